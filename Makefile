@@ -1,0 +1,50 @@
+# Every target sets up .venv by itself; `make help` lists them.
+
+SHELL := bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+ARGS ?=
+
+.PHONY: help run test test-long lint format bench update-goldens clean
+
+help: ## list the targets
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
+
+run: $(STAMP) ## train and evaluate the TalkItOut agent; more options in ARGS="--frames 50000"
+	$(BIN)/socialai-run scenarios/talkitout.yaml $(ARGS)
+
+test: $(STAMP) ## run the tests
+	$(BIN)/python -m pytest $(ARGS)
+
+test-long: $(STAMP) ## run the tests that take minutes
+	$(BIN)/python -m pytest -m slow $(ARGS)
+
+lint: $(STAMP) ## check formatting, style and types
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+format: $(STAMP) ## rewrite the code in the house style
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: $(STAMP) ## measure the engine's speed on this machine
+	$(BIN)/socialai bench $(ARGS)
+
+update-goldens: $(STAMP) ## rewrite the golden files; review the diff before committing it
+	$(BIN)/python -m pytest --update-goldens $(ARGS)
+
+clean: ## remove caches and builds; .venv and runs/ stay
+	rm -rf .pytest_cache .mypy_cache .ruff_cache .hypothesis build dist
+	find socialai_dsl trainer tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# Locked versions bind the installation and, through the variable, the build tool as well.
+$(STAMP): requirements.lock pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[train,dev]'
+	touch $@
