@@ -1,0 +1,198 @@
+"""Syntax trees of the strings inside a scenario file: frozen nodes, each with its offset in the string.
+
+`at` is the 0-based offset of the node's first character (of its operator's first character for none of them:
+always the leftmost character of the node), so a loader can turn it into file:line:column.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from typing import Literal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Node:
+    """A piece of an expression."""
+
+    at: int = 0
+
+    def children(self) -> Iterator[Expr]:
+        """The sub-expressions in source order."""
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, Node):
+                yield value  # type: ignore[misc]
+            elif isinstance(value, tuple):
+                yield from (item for item in value if isinstance(item, Node))  # type: ignore[misc]
+
+    def walk(self) -> Iterator[Expr]:
+        """This node and everything below it, depth first, in source order."""
+        yield self  # type: ignore[misc]
+        for child in self.children():
+            yield from child.walk()
+
+
+@dataclass(frozen=True, slots=True)
+class Number(Node):
+    """A whole number: `4`."""
+
+    value: int
+
+
+@dataclass(frozen=True, slots=True)
+class Truth(Node):
+    """`true` or `false`."""
+
+    value: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Text(Node):
+    """A quoted text, with `<...>` parts: `"Here is <wanted>"`; also a whole YAML text such as a `say:`."""
+
+    parts: tuple[str | Expr, ...]
+
+    @property
+    def plain(self) -> str | None:
+        """The text if it has no `<...>` part, else None."""
+        if any(not isinstance(part, str) for part in self.parts):
+            return None
+        return "".join(part for part in self.parts if isinstance(part, str))
+
+
+@dataclass(frozen=True, slots=True)
+class Name(Node):
+    """A bare word: something declared in the scenario, or a word of the language (`left`, `colors`, `t`)."""
+
+    id: str
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter(Node):
+    """`$name`: the value of a parameter of the file."""
+
+    id: str
+
+
+@dataclass(frozen=True, slots=True)
+class Attribute(Node):
+    """`subject.name`: `exit.color`."""
+
+    subject: Expr
+    name: str
+    name_at: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Call(Node):
+    """`name(args)`, or `subject.name(args)`: `next_to(exit)`, `agent.next_to(exit)`; subject None means one's own."""
+
+    name: str
+    args: tuple[Expr, ...]
+    subject: Expr | None = None
+    name_at: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Quantifier(Node):
+    """`name(var in group where condition to target)`: any, all, count, first, pick, nearest."""
+
+    name: str
+    var: str
+    group: Expr
+    where: Expr | None = None
+    to: Expr | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Not(Node):
+    """`not operand`."""
+
+    operand: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Logic(Node):
+    """`a and b and c`, or the same with `or`, flattened."""
+
+    op: Literal["and", "or"]
+    operands: tuple[Expr, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Compare(Node):
+    """`left op right` with one of == != <= >= < >."""
+
+    op: str
+    left: Expr
+    right: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Member(Node):
+    """`left in right`, or `left not in right`."""
+
+    left: Expr
+    right: Expr
+    negated: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Alternatives(Node):
+    """`a | b | 2 * c`."""
+
+    options: tuple[Expr, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Interval(Node):
+    """`low .. high`, both included."""
+
+    low: Expr
+    high: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Arithmetic(Node):
+    """`left op right` with one of + - * // %."""
+
+    op: str
+    left: Expr
+    right: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Negative(Node):
+    """`-operand`."""
+
+    operand: Expr
+
+
+@dataclass(frozen=True, slots=True)
+class Placed(Node):
+    """`region where condition`, in a `place:`."""
+
+    region: Expr
+    where: Expr
+
+
+Expr = (
+    Number
+    | Truth
+    | Text
+    | Name
+    | Parameter
+    | Attribute
+    | Call
+    | Quantifier
+    | Not
+    | Logic
+    | Compare
+    | Member
+    | Alternatives
+    | Interval
+    | Arithmetic
+    | Negative
+    | Placed
+)

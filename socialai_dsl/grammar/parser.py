@@ -1,0 +1,265 @@
+"""Text to syntax tree: one lark LALR grammar, and lark's exceptions turned into one message with an offset."""
+
+from __future__ import annotations
+
+import re
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import Any
+
+from lark import Lark, Token, v_args
+from lark.exceptions import UnexpectedCharacters, UnexpectedEOF, UnexpectedInput, UnexpectedToken, VisitError
+from lark.visitors import Transformer_NonRecursive
+
+from socialai_dsl.grammar import ast
+
+MAX_LENGTH = 500
+MAX_DEPTH = 24
+
+
+class ParseProblem(Exception):
+    """What is wrong with a string of the language: a code of the catalogue, a message and where.
+
+    Attributes: code, message, offset (0-based, into the parsed string), hint (or None).
+    """
+
+    def __init__(self, code: str, message: str, offset: int, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.code, self.message, self.offset, self.hint = code, message, offset, hint
+
+
+@lru_cache(maxsize=4096)
+def parse_expression(text: str) -> ast.Expr:
+    """The tree of an expression, place, activity or effect.
+
+    Raises ParseProblem: S202 for brackets, S203 for a wrong symbol, S207 for chained comparisons,
+    S210 for anything else, S004 when the text is too long or too deeply nested.
+    """
+    if len(text) > MAX_LENGTH:
+        raise ParseProblem(
+            "S004", f"an expression may have {MAX_LENGTH} characters, this one has {len(text)}", 0
+        )
+    _check_brackets(text)
+    try:
+        tree = _ToAst().transform(_parser().parse(text))
+    except VisitError as error:
+        if isinstance(error.orig_exc, ParseProblem):
+            raise error.orig_exc from None
+        raise
+    except UnexpectedInput as error:
+        raise _explain(text, error) from None
+    return tree  # type: ignore[return-value]
+
+
+@lru_cache(maxsize=4096)
+def parse_text(text: str) -> ast.Text:
+    """A text with `<...>` parts, each an expression; offsets inside count from the start of `text`."""
+    parts: list[str | ast.Expr] = []
+    rest = 0
+    for match in re.finditer(r"<([^<>]*)>", text):
+        if match.start() > rest:
+            parts.append(text[rest : match.start()])
+        parts.append(_parse_slot(match.group(1), match.start() + 1))
+        rest = match.end()
+    if rest < len(text):
+        parts.append(text[rest:])
+    for part in _plain_pieces(text):
+        if "<" in part.group() or ">" in part.group():
+            offset = part.start() + re.search("[<>]", part.group()).start()  # type: ignore[union-attr]
+            raise ParseProblem("S202", "a `<` or `>` without its partner: a slot is written <name>", offset)
+    return ast.Text(tuple(parts), at=0)
+
+
+def _plain_pieces(text: str) -> list[re.Match[str]]:
+    return list(re.finditer(r"[^<>]+|[<>]", re.sub(r"<[^<>]*>", lambda m: " " * len(m.group()), text)))
+
+
+def _parse_slot(inner: str, offset: int) -> ast.Expr:
+    if not inner.strip():
+        raise ParseProblem("S202", "an empty slot `<>`", offset - 1)
+    try:
+        return shift(parse_expression(inner), offset)
+    except ParseProblem as problem:
+        raise ParseProblem(problem.code, problem.message, problem.offset + offset, problem.hint) from None
+
+
+def shift(node: ast.Expr, by: int) -> ast.Expr:
+    """The same tree with every offset moved by `by`."""
+    changes: dict[str, Any] = {}
+    for name in node.__dataclass_fields__:
+        value = getattr(node, name)
+        if name in ("at", "name_at"):
+            changes[name] = value + by
+        elif isinstance(value, ast.Node):
+            changes[name] = shift(value, by)  # type: ignore[arg-type]
+        elif isinstance(value, tuple):
+            changes[name] = tuple(shift(v, by) if isinstance(v, ast.Node) else v for v in value)  # type: ignore[arg-type]
+        else:
+            changes[name] = value
+    return type(node)(**changes)
+
+
+@cache
+def _parser() -> Lark:
+    grammar = Path(__file__).with_name("expression.lark").read_text(encoding="utf-8")
+    return Lark(grammar, parser="lalr", lexer="contextual", propagate_positions=True)
+
+
+@v_args(meta=True)
+class _ToAst(Transformer_NonRecursive):  # type: ignore[type-arg]
+    """Builds our nodes from lark's tree, bottom-up, so no recursion depends on the input."""
+
+    def _made(self, node: Any) -> Any:
+        depth = 1 + max((_depth_of(child) for child in node.children()), default=0)
+        if depth > MAX_DEPTH:
+            raise ParseProblem("S004", f"an expression may be nested {MAX_DEPTH} deep", node.at)
+        return node
+
+    def number(self, meta: Any, items: list[Any]) -> Any:
+        if len(items[0]) > 9:
+            raise ParseProblem("S004", f"the number {items[0][:12]}... is too large", meta.start_pos)
+        return self._made(ast.Number(int(items[0]), at=meta.start_pos))
+
+    def text(self, meta: Any, items: list[Any]) -> Any:
+        inner = parse_text(str(items[0])[1:-1])
+        return self._made(shift(inner, meta.start_pos + 1))
+
+    def yes(self, meta: Any, items: list[Any]) -> Any:
+        return self._made(ast.Truth(True, at=meta.start_pos))
+
+    def no(self, meta: Any, items: list[Any]) -> Any:
+        return self._made(ast.Truth(False, at=meta.start_pos))
+
+    def parameter(self, meta: Any, items: list[Any]) -> Any:
+        return self._made(ast.Parameter(str(items[0]), at=meta.start_pos))
+
+    def name(self, meta: Any, items: list[Any]) -> Any:
+        return self._made(ast.Name(str(items[0]), at=meta.start_pos))
+
+    def binder(self, meta: Any, items: list[Any]) -> Any:
+        return tuple(items)
+
+    def args(self, meta: Any, items: list[Any]) -> Any:
+        return tuple(items)
+
+    def quantifier(self, meta: Any, items: list[Any]) -> Any:
+        name, (var, group, where, to) = items
+        return self._made(ast.Quantifier(str(name), str(var), group, where, to, at=meta.start_pos))
+
+    def call(self, meta: Any, items: list[Any]) -> Any:
+        name, args = items
+        return self._made(ast.Call(str(name), args or (), None, name.start_pos, at=meta.start_pos))
+
+    def verb(self, meta: Any, items: list[Any]) -> Any:
+        subject, name, args = items
+        return self._made(ast.Call(str(name), args or (), subject, name.start_pos, at=meta.start_pos))
+
+    def attribute(self, meta: Any, items: list[Any]) -> Any:
+        subject, name = items
+        return self._made(ast.Attribute(subject, str(name), name.start_pos, at=meta.start_pos))
+
+    def negative(self, meta: Any, items: list[Any]) -> Any:
+        if items[0] != "-":
+            raise ParseProblem("S203", "a leading `+` is not needed", meta.start_pos)
+        return self._made(ast.Negative(items[1], at=meta.start_pos))
+
+    def arithmetic(self, meta: Any, items: list[Any]) -> Any:
+        return self._made(ast.Arithmetic(str(items[1]), items[0], items[2], at=meta.start_pos))
+
+    def interval(self, meta: Any, items: list[Any]) -> Any:
+        return self._made(ast.Interval(*items, at=meta.start_pos))
+
+    def alternatives(self, meta: Any, items: list[Any]) -> Any:
+        return self._made(ast.Alternatives(tuple(items), at=meta.start_pos))
+
+    def comparison(self, meta: Any, items: list[Any]) -> Any:
+        return self._made(ast.Compare(str(items[1]), items[0], items[2], at=meta.start_pos))
+
+    def membership(self, meta: Any, items: list[Any]) -> Any:
+        return self._made(ast.Member(items[0], items[1], at=meta.start_pos))
+
+    def exclusion(self, meta: Any, items: list[Any]) -> Any:
+        return self._made(ast.Member(items[0], items[1], True, at=meta.start_pos))
+
+    def negation(self, meta: Any, items: list[Any]) -> Any:
+        return self._made(ast.Not(items[0], at=meta.start_pos))
+
+    def all_of(self, meta: Any, items: list[Any]) -> Any:
+        return self._made(ast.Logic("and", tuple(items), at=meta.start_pos))
+
+    def any_of(self, meta: Any, items: list[Any]) -> Any:
+        return self._made(ast.Logic("or", tuple(items), at=meta.start_pos))
+
+    def placed(self, meta: Any, items: list[Any]) -> Any:
+        return self._made(ast.Placed(*items, at=meta.start_pos))
+
+
+def _depth_of(node: ast.Expr) -> int:
+    # Children were checked when they were made, so this recursion is bounded by MAX_DEPTH.
+    return 1 + max((_depth_of(child) for child in node.children()), default=0)
+
+
+_SYMBOLS = {
+    "&&": "write `and`",
+    "&": "write `and`",
+    "||": "write `or`",
+    "!": "write `not`",
+    "=": "to compare write `==`",
+    "/": "division is written `//`",
+    "'": 'a text is quoted with "',
+    "{": "a slot is written <name>",
+    "[": "alternatives are written a | b",
+    ";": "one expression at a time",
+}
+
+
+def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
+    """lark's exception as one sentence of ours."""
+    if isinstance(error, UnexpectedCharacters):
+        offset = error.pos_in_stream
+        return _wrong_symbol(text, offset)
+    if isinstance(error, UnexpectedEOF) or (
+        isinstance(error, UnexpectedToken) and error.token.type == "$END"
+    ):
+        return ParseProblem(
+            "S210", "the expression ends too early: something is missing at its end", len(text)
+        )
+    assert isinstance(error, UnexpectedToken), "internal: an unknown kind of lark error"
+    token, offset = error.token, error.token.start_pos or 0
+    if token.type == "CMP" and "CMP" not in error.expected:
+        return ParseProblem("S207", "comparisons do not chain: write `a < b and b < c`", offset)
+    if token.type == "WHERE":
+        return ParseProblem("S210", "`where` belongs in a place or inside pick(x in group where ...)", offset)
+    if token.type == "RPAR":
+        return ParseProblem("S202", "something is missing before this bracket", offset)
+    return ParseProblem("S210", f"did not expect `{token}` here", offset)
+
+
+def _wrong_symbol(text: str, offset: int) -> ParseProblem:
+    for symbol, cure in _SYMBOLS.items():
+        if text.startswith(symbol, offset):
+            return ParseProblem("S203", f"`{symbol}` is not used here: {cure}", offset, cure)
+    if text[offset] == '"':
+        return ParseProblem("S202", 'a text is not closed: its second `"` is missing', offset)
+    return ParseProblem("S203", f"`{text[offset]}` means nothing here", offset)
+
+
+def _check_brackets(text: str) -> None:
+    """Unbalanced brackets are the commonest slip and lark reports them far from the cause."""
+    opened: list[int] = []
+    quoted = False
+    for offset, char in enumerate(text):
+        if char == '"':
+            quoted = not quoted
+        elif quoted:
+            continue
+        elif char == "(":
+            opened.append(offset)
+            if len(opened) > MAX_DEPTH:
+                raise ParseProblem("S004", f"an expression may be nested {MAX_DEPTH} deep", offset)
+        elif char == ")":
+            if not opened:
+                raise ParseProblem("S202", "a bracket is closed that was not opened", offset)
+            opened.pop()
+    if opened:
+        raise ParseProblem("S202", "a bracket is not closed", opened[-1])

@@ -1,0 +1,99 @@
+"""Who acts and how: frames with their states, steps and rules, and the members of the cast."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from socialai_dsl.schema.base import Expression, Expressions, Model, Texts, TextLine, Word, _as_tuple
+
+SlotType = Literal["text", "utterance", "object", "npc", "cell", "direction", "color", "int", "bool", "noun"]
+
+
+class Effects(Model):
+    """What a rule or a step does, in this order whatever the order in the file: do, set, cause, say, goto."""
+
+    set: dict[Word, Expression] = Field(default_factory=dict, description="registers of the frame's `let`")
+    cause: Expressions = Field((), description="effects on objects and on oneself, in order")
+    say: TextLine | None = None
+
+
+class Rule(Effects):
+    """Conditions, all of which must hold, and effects."""
+
+    id: Word | None = Field(None, description="names the rule in coverage, traces and patches")
+    hears: Texts = Field((), description="an utterance, or a list of alternatives")
+    when: Expression | None = None
+    after: int | None = Field(None, ge=0, description="holds from this turn in the state on")
+    chance: Annotated[float, BeforeValidator(lambda v: float(v) if type(v) is int else v)] | None = Field(
+        None, ge=0, le=1, description="drawn anew each turn if everything else holds"
+    )
+    once: bool = Field(False, description="once per episode and NPC")
+
+
+class ThenRule(Rule):
+    """A rule read after the body action."""
+
+    goto: Word | None = None
+    goto_now: Word | None = None
+
+
+class FirstRule(ThenRule):
+    """A rule read before the body action, which it may choose itself."""
+
+    do: str | None = None
+
+
+class State(Model):
+    """One state of a frame: what is noticed before moving, one body action, what is noticed after it."""
+
+    first: Annotated[tuple[FirstRule, ...], BeforeValidator(_as_tuple)] = ()
+    do: str | None = Field(None, description="an activity; default stay")
+    then: Annotated[tuple[ThenRule, ...], BeforeValidator(_as_tuple)] = ()
+
+
+class Step(Effects):
+    """One entry of `steps`: an activity until it is finished, then its effects."""
+
+    state: Word | None = Field(None, description="a name for npc.is(name)")
+    do: str | None = None
+    until: Expression | None = None
+    for_: Expression | None = Field(None, alias="for", description="number of steps, or `ever`")
+
+
+class Frame(Model):
+    """A pragmatic frame: a protocol of interaction with slots for what varies."""
+
+    slots: dict[Word, SlotType] = Field(default_factory=dict)
+    let: dict[Word, Expression] = Field(default_factory=dict, description="registers, one copy per NPC")
+    define: dict[str, Expression] = Field(default_factory=dict, description="recomputed at every use")
+    start: Word | None = Field(None, description="the first state; default the first written")
+    states: dict[Word, State] | None = None
+    steps: Annotated[tuple[Step, ...], BeforeValidator(_as_tuple)] | None = None
+
+
+class CastMember(Model):
+    """The agent or an NPC. Keys left out come from `npc_defaults`, then from the defaults of the language."""
+
+    kind: Word | None = Field(None, description="what it looks like; default peer")
+    name: Expression | None = Field(None, description="what precedes its lines; default its key, capitalised")
+    color: Expression | None = Field(None, description="default random")
+    place: str | None = Field(None, description="default anywhere")
+    at: Annotated[tuple[Expression, ...], BeforeValidator(_as_tuple)] | None = None
+    facing: Expression | None = Field(None, description="a direction, random, or toward(x); default random")
+    view: int | None = Field(None, ge=1, le=15)
+    earshot: Expression | None = Field(None, description="how far its voice carries")
+    frame: Word | None = Field(None, description="the frame it follows; default none: it stays")
+    with_: dict[Word, Expression] = Field(default_factory=dict, alias="with", description="fills the slots")
+    audible: Literal["always"] | None = Field(None, description="heard even while NPCs are hidden")
+    kind_code: int | None = Field(None, ge=0, le=255, description="status code in the image")
+
+    def over(self, defaults: CastMember) -> CastMember:
+        """This member with what it leaves out taken from `defaults`; `with` is merged key by key."""
+        given: dict[str, Any] = {name: getattr(self, name) for name in self.model_fields_set}
+        base: dict[str, Any] = {name: getattr(defaults, name) for name in defaults.model_fields_set}
+        if "place" in given or "at" in given:
+            base.pop("place", None), base.pop("at", None)
+        given["with_"] = {**defaults.with_, **self.with_}
+        return CastMember.model_construct(**{**base, **given})

@@ -1,0 +1,68 @@
+"""The world of a scenario: room, objects, and what the agent perceives of it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field
+
+from socialai_dsl.schema.base import Expression, Expressions, Model, TextLine, Word, _as_tuple
+
+
+class Room(Model):
+    """A walled rectangle; sizes count the walls. Width and height are drawn independently from `size`."""
+
+    size: Expression | None = Field(
+        None, description="n, or a..b: both width and height", examples=["5..8", 8]
+    )
+    width: Expression | None = Field(None, description="width in cells, walls included")
+    height: Expression | None = Field(None, description="height in cells, walls included")
+    build: Annotated[tuple[dict[Word, str], ...], BeforeValidator(_as_tuple)] = Field(
+        (),
+        description="fixed things in place of floor, as {type: place}",
+        examples=[[{"lava": "column(W // 2)"}]],
+    )
+    canvas: Annotated[tuple[int, int], BeforeValidator(_as_tuple)] | None = Field(
+        None, description="[width, height] of the grid the room lies on; default the largest room"
+    )
+
+
+class ObjectGroup(Model):
+    """An object, or with `count` (or a list in `at`) a group of them."""
+
+    type: Word = Field(description="an object type of the prelude", examples=["door"])
+    count: int | None = Field(None, ge=1, le=16)
+    place: Expressions | None = Field(None, description="where it is drawn; a list gives one each")
+    at: (
+        Annotated[
+            tuple[Expression, ...] | tuple[tuple[Expression, ...], ...],
+            BeforeValidator(lambda v: tuple(_as_tuple(item) for item in v) if isinstance(v, list) else v),
+        ]
+        | None
+    ) = Field(None, description="[x, y], or a list of them: a group")
+    color: Expressions | None = Field(None, description="a colour, `random`, `distinct`, or one each")
+    state: Word | None = Field(None, description="initial status; default the type's")
+
+
+class Observe(Model):
+    """What the agent perceives; it never changes what happens."""
+
+    npcs: Literal["shown", "hidden"] = "shown"
+    image: Literal["end", "before_npcs"] = Field("end", description="when in the step the picture is taken")
+    names: Literal["shown", "hidden"] = Field("shown", description="speaker names in what is heard")
+    own_voice: bool = Field(False, description="whether the agent hears itself")
+
+
+class UtteranceGrammar(Model):
+    """What the agent can say: every template with every noun."""
+
+    templates: Annotated[tuple[TextLine, ...], BeforeValidator(_as_tuple)] = Field(
+        min_length=1, max_length=64
+    )
+    nouns: Annotated[tuple[TextLine | int, ...], BeforeValidator(_as_tuple)] = Field(
+        min_length=1, max_length=256
+    )
+
+    def utterance(self, template: int, noun: int) -> str:
+        """The text of a pair: the template with its <noun> filled."""
+        return self.templates[template].replace("<noun>", str(self.nouns[noun]))
