@@ -1,0 +1,117 @@
+"""This module turns what a room looks like now into pictures and text, without a display."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.envs import tiles
+from socialai_dsl.envs.tiles import draw_tile
+
+_ARROWS: Final = ">v<^"
+_ANSI_COLOURS: Final = (31, 32, 34, 35, 33, 37)
+_RESET: Final = "\x1b[0m"
+
+# Letters of the text picture; where a status matters it picks from the letters, the last one serves the rest.
+_LETTERS: Final[dict[int, str]] = {
+    tiles.UNSEEN: " ",
+    tiles.EMPTY: ".",
+    tiles.WALL: "#",
+    tiles.FLOOR: ",",
+    tiles.DOOR: "/DL",
+    tiles.BALL: "o*",
+    tiles.BOX: "Bb",
+    tiles.LAVA: "~",
+    tiles.SWITCH: "sS",
+    tiles.APPLE: "a:",
+    tiles.LEVER: "lJ",
+    tiles.GENERATOR: "gG",
+    tiles.MARBLE: "m",
+    tiles.PLATFORM: "pP",
+    tiles.FENCE: "+",
+    tiles.REMOTE_DOOR: "_RK",
+}
+
+
+def draw_grid(
+    codes: NDArray[np.uint8],
+    agent: tuple[int, int, int],
+    seen: NDArray[np.bool_] | None = None,
+    tile: int = 32,
+) -> NDArray[np.uint8]:
+    """Draw the room from above.
+
+    Args:
+        codes: uint8 (H, W, 4), each cell's (type, colour, status, orientation) as in the observation.
+        agent: (x, y, direction); x to the right, y down, direction 0 right, 1 down, 2 left, 3 up.
+        seen: bool (H, W), the cells in the agent's field of view, lightly tinted; None tints nothing.
+        tile: side of a cell in pixels.
+
+    Returns:
+        uint8 (H * tile, W * tile, 3).
+
+    Raises:
+        ValueError: a shape does not fit.
+    """
+    _check(codes, seen)
+    height, width = codes.shape[:2]
+    x, y, direction = agent
+    rows = []
+    for row in range(height):
+        cells = []
+        for column in range(width):
+            code = _code(codes, row, column)
+            here = direction % 4 if (column, row) == (x, y) else None
+            lit = bool(seen[row, column]) if seen is not None else False
+            cells.append(draw_tile(code, here, lit, tile))
+        rows.append(np.concatenate(cells, axis=1))
+    return np.concatenate(rows, axis=0)
+
+
+def draw_ansi(codes: NDArray[np.uint8], agent: tuple[int, int, int], colour: bool = False) -> str:
+    """The room as text, two characters a cell.
+
+    The agent and the NPCs show an arrow in their direction of gaze: the agent's stands alone, an NPC's
+    follows the letter of its kind (`A` for kind 0). Capital letters of objects mean closed, lit or full;
+    with `colour`, escape codes give the objects' colours.
+    """
+    _check(codes, None)
+    x, y, direction = agent
+    lines = []
+    for row in range(codes.shape[0]):
+        cells = []
+        for column in range(codes.shape[1]):
+            code = _code(codes, row, column)
+            if (column, row) == (x, y):
+                cells.append(_paint(f" {_ARROWS[direction % 4]}", "1;31", colour))
+            elif code[0] == tiles.EMPTY:
+                cells.append(" .")
+            else:
+                cells.append(_paint(_letters(code), str(_ANSI_COLOURS[code[1] % 6]), colour))
+        lines.append("".join(cells))
+    return "\n".join(lines)
+
+
+def _letters(code: tuple[int, int, int, int]) -> str:
+    kind, _, status, orientation = code
+    if kind == tiles.NPC:
+        return chr(ord("A") + status % 26) + _ARROWS[orientation % 4]
+    choices = _LETTERS.get(kind, "?")
+    letter = choices[min(status, len(choices) - 1)]
+    return "##" if kind == tiles.WALL else " " + letter
+
+
+def _paint(text: str, style: str, colour: bool) -> str:
+    return f"\x1b[{style}m{text}{_RESET}" if colour else text
+
+
+def _code(codes: NDArray[np.uint8], row: int, column: int) -> tuple[int, int, int, int]:
+    kind, colour, status, orientation = (int(value) for value in codes[row, column])
+    return kind, colour, status, orientation
+
+
+def _check(codes: NDArray[np.uint8], seen: NDArray[np.bool_] | None) -> None:
+    if codes.ndim != 3 or codes.shape[2] != 4:
+        raise ValueError(f"codes: expected an array of shape (H, W, 4), got {codes.shape}")
+    if seen is not None and seen.shape != codes.shape[:2]:
+        raise ValueError(f"seen: expected an array of shape {codes.shape[:2]}, got {seen.shape}")
