@@ -1,0 +1,412 @@
+"""The narrow waist: what the compiler hands to the engine, and nothing else.
+
+A `Program` is one int32 vector (`words`) that the engine reads, plus names and texts for people. `words` starts with a
+header (`Header`), which holds sizes, flags and the offsets of the tables below. All offsets count from the first word of
+the program, so programs can be laid one behind the other in a batch.
+
+**State.** An environment is a row of int16 registers, a row of uint32 boards, and a row of uint64 keys (engine/state.py
+gives shapes). Registers 0 to 31 are the same in every program (`Register`). From `FIRST_ENTITY` on follow the entities,
+`ENTITY_FIELDS` registers each (`Field`): the agent is entity 0, NPCs follow in cast order, then objects in file order,
+members of a group next to each other. Then come the program's own registers (drawn names, `let`, frame states, clocks,
+...), the lines heard this step, the inboxes of the NPCs, and the log of lines heard since the last reset.
+
+**Code.** An instruction is four words: op, a, b, c. Tests go on with the next instruction if they hold and skip `c`
+instructions forward if not; nothing ever jumps backward. `EACH_CELL` is the one loop: it runs the instructions up to
+its `END_EACH` once for each cell of a board, so it is bounded by the room. Code starts at a `pc`, counted in
+instructions from the code table's start, and ends at `HALT`; pc 0 is a `HALT`, so a table entry of 0 means "nothing to do".
+
+**Operands.** `value(x)` of an operand word x: a constant x - CONSTANT if x >= CONSTANT // 2; a temporary if
+x >= TEMPORARY; else the register x. Temporaries are int64 scratch of one run and carry nothing from run to run, except
+that the three phases `first`, activity and `then` never share any. Where an op writes, `dst` is a register or temporary.
+An "entity" operand is a value that is an entity's number.
+
+**Utterance classes.** The compiler groups all pairs (template, noun) that no rule of the program tells apart into one
+class; class 0 is silence, 1 is "said, but nothing any rule waits for". Tables are indexed by class, so a step visits only
+rules that what was heard can fire.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from functools import cached_property
+from hashlib import sha256
+
+import numpy as np
+import numpy.typing as npt
+
+from socialai_dsl.source import Span
+
+VERSION = 1
+TEMPORARY = 8192
+TEMPORARIES = 64
+CONSTANT = 1 << 20
+BOARDS = 8
+"""Scratch boards (sets of cells) that reset code may use."""
+
+ENTITY_FIELDS = 8
+FIRST_ENTITY = 32
+NO_ACTION = 7
+VIEW = 7
+MAX_SIDE = 30
+"""Widest and highest canvas: a row of a board is one 32-bit word."""
+
+
+class Header(IntEnum):
+    """Words of the header. Offsets (`*_AT`) count words from the program's start; `*_PC` are code addresses."""
+
+    SIZE = 0  # words in the whole program
+    REGISTERS = 1  # int16 registers of a row
+    CANVAS_WIDTH = 2
+    CANVAS_HEIGHT = 3
+    ENTITIES = 4  # agent + NPCs + objects
+    NPCS = 5
+    PRIMITIVES = 6  # the agent's body actions, without "no movement"
+    TEMPLATES = 7
+    NOUNS = 8
+    CLASSES = 9  # utterance classes C, silence and "other" included
+    HORIZON = 10
+    FLAGS = 11  # see Flag
+    TOKENS = 12  # L, length of the history buffer
+    LOG = 13  # first register of the log; entries are line numbers, oldest first
+    LOG_SIZE = 14  # how many lines it holds: never more than fit into L tokens
+    HEARD = 15  # first register of the lines the agent heard this step, in the order spoken
+    HEARD_SIZE = 16
+    INBOX = 17  # first register of the inboxes: INBOX_SIZE + 1 registers for each NPC (count, then classes)
+    INBOX_SIZE = 18
+    FRAMES = 19  # frame instances; the agent's, if it has one, is the first
+    DEADLY = 20  # bit k: type code k is deadly
+    MIN_WIDTH = 21
+    MIN_HEIGHT = 22
+    HEIGHTS = 23  # number of heights: room template = (width - MIN_WIDTH) * HEIGHTS + height - MIN_HEIGHT
+    OUTSIDE = 24  # packed code of a cell off the canvas
+    CODE_AT = 25  # (I, 4)
+    INSTRUCTIONS = 26
+    ACTION_AT = 27  # (PRIMITIVES + 1,) index of the agent's primitive -> Body
+    CLASS_AT = 28  # (TEMPLATES, NOUNS) -> utterance class, never 0
+    ENTITY_AT = 29  # (ENTITIES, ENTITY_COLUMNS), see EntityColumn
+    TYPE_AT = 30  # (rows, TYPE_COLUMNS): one row for each (type, status), see TypeColumn
+    ROOM_AT = 31  # (templates, W*H + 1 + 2*H): packed cells (the last is OUTSIDE), solid rows, floor rows
+    FRAME_AT = 32  # (FRAMES, FRAME_COLUMNS), see FrameColumn
+    STATE_AT = 33  # (states, 1 + 2 * (C + 1)): activity pc, `first` pc by class, `then` pc by class
+    OUTCOME_AT = 34  # (C, 8) pc by utterance class and Body
+    LINE_AT = 35  # (lines, LINE_COLUMNS), see LineColumn
+    TOKEN_AT = 36  # (sum of line lengths,) token ids
+    SITE_AT = 37  # (sites, 2): site, number (draws.py)
+    RESET_PC = 38
+    SETTLE_PC = 39
+    RULES_PC = 40
+    LINES = 41
+    STATES = 42
+    SITES = 43
+    TYPE_ROWS = 44
+    COUNTERS = 45  # rules, then outcomes, then deadly, time-out, episodes
+    AGENT_SAYS = 46  # 1 + line spoken by the agent for pair (0, 0), if it hears itself; pairs follow row by row; else 0
+    END = 47
+
+
+class Flag(IntEnum):
+    """Bits of Header.FLAGS."""
+
+    NPCS_HIDDEN = 1
+    PICTURE_BEFORE_NPCS = 2
+    AGENT_FRAME = 4
+    OWN_VOICE = 8
+
+
+class Register(IntEnum):
+    """Registers that every program has."""
+
+    T = 0  # steps since reset
+    WIDTH = 1
+    HEIGHT = 2
+    ROOM = 3  # room template
+    ACTION = 4  # Body of the agent this step
+    CLASS = 5  # utterance class of the agent this step, 0 silent
+    TEMPLATE = 6  # of the agent's utterance this step, -1 silent
+    NOUN = 7
+    OUTCOME = 8  # index into Program.outcomes once the episode has ended, else -1
+    PERCENT = 9  # of the reward, for that outcome
+    HEARD = 10  # number of lines heard this step
+    LOGGED = 11  # number of lines in the log
+    TOKENS = 12  # number of tokens in the history
+    ENDED = 13  # 1 terminated, 2 truncated, else 0; in NextStep mode the next step resets
+    POKED = 14  # entity toggled at by the agent this step, -1 none (an NPC: it was poked)
+    SAID_LINE = 15  # 1 + line that the entity on turn says this step, 0 none
+    LAST_TURN = 16  # Body of the entity on turn
+
+
+class Field(IntEnum):
+    """Registers of an entity."""
+
+    X = 0
+    Y = 1
+    DIR = 2  # 0 right (east), 1 down (south), 2 left (west), 3 up (north)
+    COLOR = 3  # 0 red, 1 green, 2 blue, 3 purple, 4 yellow, 5 grey
+    STATUS = 4  # of an object: index into its type's states; 0 for others
+    GONE = 5  # 1: not in the room
+    POKED = 6  # NPC: 1 once it was poked in this episode
+    LAST = 7  # Body of its last turn
+
+
+class Body(IntEnum):
+    """Body actions, in the order of the paper."""
+
+    LEFT = 0
+    RIGHT = 1
+    FORWARD = 2
+    PICKUP = 3
+    DROP = 4
+    TOGGLE = 5
+    DONE = 6
+    NONE = 7
+
+
+class EntityColumn(IntEnum):
+    """Columns of the entity table."""
+
+    TYPE = 0  # first row in the type table; the status is added
+    KIND = 1  # NPC: status code in the picture; object: 0
+    NEAR = 2  # least and greatest Manhattan distance at which its voice is heard
+    FAR = 3
+    AUDIBLE = 4  # 1: heard even while NPCs are hidden
+    IN_WALL = 5  # object: 1 if it lies in a wall (then "in front" is the cell one step into the room)
+    COLUMNS = 6
+
+
+class TypeColumn(IntEnum):
+    """Columns of the type table; one row for each status of each object type, one for NPCs, one for the agent."""
+
+    CODE = 0  # type code in the picture
+    STATUS = 1  # status code in the picture
+    ORIENTATION = 2
+    WALKABLE = 3
+    TRANSPARENT = 4
+    TOGGLED = 5  # status after a toggle (its own index if a toggle does nothing)
+    COLUMNS = 6
+
+
+class FrameColumn(IntEnum):
+    """Columns of the frame table: one row for each (cast member, frame), in the order of their turns."""
+
+    ENTITY = 0
+    STATE = 1  # register of the state (counted from 0 within this frame)
+    CLOCK = 2  # register: activities of this state that have been run
+    ROWS = 3  # first row in the state table
+    STATES = 4  # number of states
+    INBOX = 5  # first register of its inbox
+    COLUMNS = 6
+
+
+class LineColumn(IntEnum):
+    """Columns of the line table: one row for each thing that may be heard."""
+
+    FIRST_TOKEN = 0
+    TOKENS = 1
+    CLASS = 2  # utterance class to NPCs that hear it, 1 if no rule waits for it
+    COLUMNS = 3
+
+
+class Op(IntEnum):
+    """The instruction set. `v(x)` is the value of operand x, `e(x)` the entity v(x), n the words to skip when false."""
+
+    HALT = 0  # end of this code
+    SKIP = 1  # c: skip c instructions
+    # Tests: go on if true, else skip c instructions.
+    IF_EQ = 2  # v(a) == v(b)
+    IF_NE = 3  # v(a) != v(b)
+    IF_LT = 4  # v(a) < v(b)
+    IF_LE = 5  # v(a) <= v(b)
+    IF_BIT = 6  # bit v(b) of v(a) is set
+    IF_UNPINNED = 7  # no layout gives register a (the register number itself, not its value)
+    IF_CHANCE = (
+        8  # an event of probability a / 65536 (a literal word) happens, drawn at site b (a literal word)
+    )
+    IF_HEARD = 9  # class b (literal) is in the inbox that starts at register a (literal)
+    IF_SAME_CELL = 10  # e(a) and e(b) are in one cell, both present
+    IF_NEXT_TO = 11  # Manhattan distance 1, both present
+    IF_FACES = 12  # e(b) is in the cell ahead of e(a)
+    IF_IN_FRONT_OF = (
+        13  # e(a) stands in the cell in front of e(b): one step into the room from a wall, else ahead of it
+    )
+    IF_EYE_CONTACT = (
+        14  # same row or column, different cells, each facing the other; nothing is tested between
+    )
+    IF_FACES_TOWARD = 15  # direction of e(a) is the quadrant of the way to e(b)
+    IF_IN_LINE = 16  # same row or column, both present
+    IF_REACHES = 17  # e(a) has a path to the cell of e(b), or next to it
+    # Values.
+    LOAD = 20  # dst a = v(b)
+    ADD = 21  # dst a = v(b) + v(c)
+    SUB = 22
+    MUL = 23
+    DIV = 24  # floored; 0 if v(c) == 0
+    MOD = 25  # floored, sign of the divisor; 0 if v(c) == 0
+    MIN = 26
+    MAX = 27
+    ABS = 28  # dst a = |v(b)|
+    FIELD = 29  # dst a = field c (literal Field) of e(b)
+    DISTANCE = 30  # dst a = Manhattan distance of e(b) and e(c)
+    QUADRANT = 31  # dst a = direction in which e(c) lies from e(b): |dx| == |dy|: SE -> right, NE -> up, NW -> left, SW -> down
+    DRAW = 32  # dst a = uniform number below v(b), drawn at site c (literal)
+    SET_BIT = 33  # dst a |= 1 << v(b)
+    COUNT_BITS = 34  # dst a = number of set bits of v(b)
+    LOWEST_BIT = 35  # dst a = position of the lowest set bit of v(b); 0 if none
+    PICK_BIT = 36  # dst a = position of a uniformly drawn set bit of v(b), site c (literal); 0 if none
+    # Effects.
+    SET_FIELD = 40  # field b (literal) of e(a) = v(c); X, Y, STATUS, GONE have ops of their own
+    BECOME = 41  # status of e(a) = v(b); the cell is drawn anew
+    VANISH = 42  # e(a) leaves the room
+    SAY = 43  # e(a) says line v(b) at the end of its turn, unless it says something already
+    GOTO = 44  # frame a (literal) enters state b (literal), clock 0
+    COUNT = 45  # counter a (literal) += 1
+    END = 46  # the episode ends: outcome a (literal), b (literal) per cent of the reward
+    # Activities: choose the body action of the entity on turn.
+    BODY = 50  # action v(a)
+    TURN_TO = (
+        51  # e(a) makes one quarter turn towards direction v(b), none if it faces it; behind: site c decides
+    )
+    GO_TO = 52  # e(a) takes one step of a shortest path to the cell of e(b); site c for turning round
+    GO_NEXT_TO = 53  # e(a) takes one step of a shortest path to a free cell next to e(b); site c
+    # Boards: sets of cells, numbered 0 to BOARDS - 1 (literals). Only in reset code.
+    B_FLOOR = 60  # board a = cells of plain floor
+    B_WALL = 61  # board a = cells of wall side b (literal Side), at least c (literal) cells from its corners
+    B_RECT = (
+        62  # board a = floor cells with v(b) <= x <= v(b + 1) and v(b + 2) <= y <= v(b + 3); b is a temporary
+    )
+    B_NEXT_TO = 63  # board a = cells with Manhattan distance 1 to e(b)
+    B_IN_FRONT_OF = 64  # board a = the cell in front of e(b)
+    B_AND = 65  # board a = a and b
+    B_OR = 66  # board a = a or b
+    B_WITHOUT = 67  # board a = a without b
+    B_FREE = 68  # board a = a without cells that hold an entity
+    EACH_CELL = 69  # run up to END_EACH for each cell of board a, row by row, v(b), v(b + 1) = x, y; c instructions inside
+    DROP_CELL = 70  # take the current cell out of the board of the loop
+    END_EACH = 71
+    PICK_CELL = (
+        72  # dst a, a + 1 (temporaries) = x, y of a uniformly drawn cell of board b, site c; -1, -1 if none
+    )
+    PUT = 73  # e(a) is placed at x = v(b), y = v(b + 1) (b is a temporary); not in the room if x is -1
+    MAKE_ROOM = 74  # the room has width v(a), height v(b)
+
+
+class Side(IntEnum):
+    """Sides of a room."""
+
+    TOP = 0
+    BOTTOM = 1
+    LEFT = 2
+    RIGHT = 3
+
+
+TESTS = range(Op.IF_EQ, Op.IF_REACHES + 1)
+CODES_OF_TYPES: Mapping[str, int] = {"empty": 1, "wall": 2, "npc": 11}
+COLORS = ("red", "green", "blue", "purple", "yellow", "grey")
+DIRECTIONS = ("right", "down", "left", "up")
+BODY_WORDS = ("left", "right", "forward", "pickup", "drop", "toggle", "done", "none")
+
+
+def pack_cell(code: int, color: int = 0, status: int = 0, orientation: int = 0) -> int:
+    """The four channels of a cell in one 32-bit word; its bytes in memory order are the channels."""
+    return code | color << 8 | status << 16 | orientation << 24
+
+
+@dataclass(frozen=True, slots=True)
+class EntityName:
+    """How the scenario calls an entity. `key` is the cast member's or object's name, `index` its place in a group."""
+
+    key: str
+    index: int | None
+    role: str  # agent, npc or object
+    type: str  # object type, or the NPC's kind
+    states: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return self.key if self.index is None else f"{self.key}[{self.index}]"
+
+
+@dataclass(frozen=True, slots=True)
+class RegisterName:
+    """How the scenario calls a register of its own, and what its numbers mean.
+
+    Attributes:
+        path: address in a layout: `let.exit`, `wizard.frame`, `wizard.clock`, `wizard.name`, `jill.goal`.
+        register: its number.
+        values: word of each value from `low` on; empty for plain numbers.
+        low, high: range of its values.
+    """
+
+    path: str
+    register: int
+    values: tuple[str, ...] = ()
+    low: int = 0
+    high: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """One way an episode ends: `name` is the outcome's id, else `success@46` (line of the file)."""
+
+    name: str
+    success: bool
+    span: Span | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A compiled scenario: integers for the engine, names for people.
+
+    Attributes:
+        words: int32 (Header.SIZE,), see the module's docstring. Never changed.
+        name: canonical name of the scenario with its variants.
+        actions, templates, nouns: words of the agent's action, in order of index.
+        entities: by number. registers: the program's own. lines: text of each line, as heard.
+        outcomes: by index; the last two are `deadly` and `timeout`. rules: name of each counted rule.
+        vocabulary: token id -> word; 0 pads, 1 is unknown.
+        source_map: one span (or None) for each instruction. labels: pc -> what starts there.
+    """
+
+    words: npt.NDArray[np.int32]
+    name: str
+    actions: tuple[str, ...]
+    templates: tuple[str, ...]
+    nouns: tuple[str, ...]
+    entities: tuple[EntityName, ...]
+    registers: tuple[RegisterName, ...]
+    lines: tuple[str, ...]
+    outcome_table: tuple[Outcome, ...]
+    rules: tuple[str, ...]
+    vocabulary: tuple[str, ...]
+    source_map: Sequence[Span | None] = field(repr=False)
+    labels: Mapping[int, str] = field(repr=False)
+
+    def header(self, word: Header) -> int:
+        """One word of the header."""
+        return int(self.words[word])
+
+    @cached_property
+    def outcomes(self) -> list[str]:
+        """Names of the ways an episode can end, by index."""
+        return [outcome.name for outcome in self.outcome_table]
+
+    @cached_property
+    def sha256(self) -> str:
+        """Digest of everything that decides what an environment does and shows."""
+        digest = sha256(self.words.tobytes())
+        for texts in (self.actions, self.templates, self.nouns, self.lines, self.outcomes, self.vocabulary):
+            digest.update("\x1f".join(texts).encode())
+            digest.update(b"\x1e")
+        return digest.hexdigest()
+
+    @property
+    def code(self) -> npt.NDArray[np.int32]:
+        """The instructions, int32 (I, 4)."""
+        start = self.header(Header.CODE_AT)
+        return self.words[start : start + 4 * self.header(Header.INSTRUCTIONS)].reshape(-1, 4)
+
+    def listing(self) -> str:
+        """The program as text, one instruction a line with file:line."""
+        from socialai_dsl.listing import listing  # a view of this contract; kept apart because it only prints
+
+        return listing(self)
