@@ -1,0 +1,149 @@
+"""This module prints the findings of a check for people, for tools and for code hosts."""
+
+import json
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+from xml.etree import ElementTree
+
+from socialai_dsl.diagnostics import CODES, Diagnostic, Severity, render_text, to_json
+from socialai_dsl.source import Source
+
+
+@dataclass(frozen=True)
+class Checked:
+    """One checked input and what was found in it, or in files it uses.
+
+    Attributes:
+        name: as given on the command line.
+        diagnostics: sorted by place.
+        sources: name -> source of the files they point into.
+    """
+
+    name: str
+    diagnostics: tuple[Diagnostic, ...]
+    sources: dict[str, Source]
+
+    @property
+    def errors(self) -> int:
+        """Number of errors."""
+        return sum(d.severity is Severity.ERROR for d in self.diagnostics)
+
+    @property
+    def warnings(self) -> int:
+        """Number of warnings."""
+        return len(self.diagnostics) - self.errors
+
+
+def report_text(checked: Sequence[Checked], color: bool) -> str:
+    """One block per finding with the line it points at, then a summary."""
+    diagnostics = _all(checked)
+    sources = {name: source for c in checked for name, source in c.sources.items()}
+    errors = sum(d.severity is Severity.ERROR for d in diagnostics)
+    counts = [_count(errors, "error"), _count(len(diagnostics) - errors, "warning")]
+    summary = f"{_count(len(checked), 'file')} checked: {', '.join(counts)}"
+    return "\n".join([render_text([d], sources, color) for d in diagnostics] + [summary])
+
+
+def report_json(checked: Sequence[Checked], color: bool) -> str:
+    """An array of findings."""
+    del color
+    return json.dumps(to_json(_all(checked)), indent=2, ensure_ascii=False)
+
+
+def report_github(checked: Sequence[Checked], color: bool) -> str:
+    """GitHub workflow commands, shown as annotations of the changed lines."""
+    del color
+    lines = []
+    for d in _all(checked):
+        place = {
+            "file": d.span.file,
+            "line": d.span.line,
+            "col": d.span.column,
+            "endColumn": d.span.column + d.span.width,
+            "title": d.code,
+        }
+        properties = ",".join(f"{key}={_escape(str(value), ':,')}" for key, value in place.items())
+        message = d.text if d.hint is None else f"{d.text}\n{d.hint}"
+        lines.append(f"::{d.severity.value} {properties}::{_escape(message)}")
+    return "\n".join(lines)
+
+
+def report_sarif(checked: Sequence[Checked], color: bool) -> str:
+    """A SARIF 2.1.0 log."""
+    del color
+    diagnostics = _all(checked)
+    rules = [
+        {"id": code, "shortDescription": {"text": CODES[code]}} for code in sorted({d.code for d in diagnostics})
+    ]
+    run = {
+        "tool": {"driver": {"name": "socialai", "rules": rules}},
+        "columnKind": "unicodeCodePoints",
+        "results": [_sarif_result(d) for d in diagnostics],
+    }
+    log = {
+        "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
+        "version": "2.1.0",
+        "runs": [run],
+    }
+    return json.dumps(log, indent=2, ensure_ascii=False)
+
+
+def report_junit(checked: Sequence[Checked], color: bool) -> str:
+    """A JUnit XML file: one test case per checked file; warnings are its output, errors its failures."""
+    del color
+    failed = sum(c.errors > 0 for c in checked)
+    suite = ElementTree.Element(
+        "testsuite", name="socialai validate", tests=str(len(checked)), failures=str(failed)
+    )
+    for c in checked:
+        case = ElementTree.SubElement(suite, "testcase", classname="socialai.validate", name=c.name)
+        if c.errors:
+            failure = ElementTree.SubElement(case, "failure", message=_count(c.errors, "error"))
+            failure.text = render_text(c.diagnostics, c.sources)
+        elif c.diagnostics:
+            ElementTree.SubElement(case, "system-out").text = render_text(c.diagnostics, c.sources)
+    return ElementTree.tostring(suite, encoding="unicode", xml_declaration=True)
+
+
+REPORTERS: Final[dict[str, Callable[[Sequence[Checked], bool], str]]] = {
+    "text": report_text,
+    "json": report_json,
+    "github": report_github,
+    "sarif": report_sarif,
+    "junit": report_junit,
+}
+"""Format -> function from what was checked, and whether to colour, to the report."""
+
+
+def _all(checked: Iterable[Checked]) -> list[Diagnostic]:
+    """Every finding once, even where several inputs share the file it lies in."""
+    return list(dict.fromkeys(d for c in checked for d in c.diagnostics))
+
+
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
+def _escape(text: str, also: str = "") -> str:
+    for character in "%\r\n" + also:
+        text = text.replace(character, f"%{ord(character):02X}")
+    return text
+
+
+def _sarif_result(diagnostic: Diagnostic) -> dict[str, Any]:
+    span = diagnostic.span
+    region = {"startLine": span.line, "startColumn": span.column, "endColumn": span.column + span.width}
+    location = {"physicalLocation": {"artifactLocation": {"uri": _uri(span.file)}, "region": region}}
+    return {
+        "ruleId": diagnostic.code,
+        "level": diagnostic.severity.value,
+        "message": {"text": diagnostic.text if diagnostic.hint is None else f"{diagnostic.text}\n{diagnostic.hint}"},
+        "locations": [location],
+    }
+
+
+def _uri(file: str) -> str:
+    from urllib.parse import quote
+
+    return quote(file.replace("\\", "/"))

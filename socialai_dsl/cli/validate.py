@@ -1,0 +1,68 @@
+"""This module is `socialai validate`: it checks scenario files and reports what is wrong with them."""
+
+import argparse
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.reporters import REPORTERS, Checked
+
+SUMMARY: Final = "check scenario files and folders of them"
+
+_SUFFIXES: Final = frozenset({".yaml", ".yml"})
+# What a name on the command line may be found to be when it is no scenario at all.
+_NOT_A_SCENARIO: Final = frozenset({"S007", "S504", "S508"})
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this command."""
+    parser.add_argument(
+        "paths", nargs="+", metavar="PATH", help="a file, a folder, or a scenario's name such as dance+unsocial"
+    )
+    parser.add_argument(
+        "--format",
+        choices=sorted(REPORTERS),
+        default="text",
+        help="how to print the findings (default: text); json prints an array",
+    )
+    parser.add_argument("--strict", action="store_true", help="warnings count as failures too")
+
+
+def execute(arguments: argparse.Namespace) -> Exit:
+    """Check everything that was named, then print one report."""
+    checked = [_check(name) for name in _expand(arguments.paths)]
+    report = REPORTERS[arguments.format](checked, sys.stdout.isatty())
+    if report:
+        print(report)
+    failed = any(c.errors or (arguments.strict and c.warnings) for c in checked)
+    return Exit.FINDINGS if failed else Exit.GOOD
+
+
+def _expand(paths: list[str]) -> Iterator[str]:
+    """Yield each file once: a folder gives the YAML files under it, sorted; anything else stays as it is."""
+    yielded = set()
+    for path in paths:
+        names = [path]
+        if Path(path).is_dir():
+            names = sorted(str(p) for p in Path(path).rglob("*") if p.suffix in _SUFFIXES and p.is_file())
+            if not names:
+                raise UsageError(f"{path}: expected scenario files (*.yaml) in this folder, found none")
+        for name in names:
+            if name not in yielded:
+                yielded.add(name)
+                yield name
+
+
+def _check(name: str) -> Checked:
+    from socialai_dsl import frontend
+
+    if Path(name).suffix in _SUFFIXES:
+        with open(name, "rb") as file:  # raises OSError where the file cannot be read: usage, not a finding
+            file.read(1)
+    result = frontend.check(name)
+    codes = {diagnostic.code for diagnostic in result.diagnostics}
+    if result.scenario is None and codes and codes <= _NOT_A_SCENARIO and not Path(name).exists():
+        raise UsageError("; ".join(diagnostic.text for diagnostic in result.diagnostics))
+    return Checked(name, tuple(result.diagnostics), dict(result.sources))
