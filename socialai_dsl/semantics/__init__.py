@@ -1,0 +1,1 @@
+"""Meaning across models: names, types and flow, each mistake with its place."""

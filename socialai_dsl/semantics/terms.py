@@ -1,0 +1,527 @@
+"""Typed trees: what an expression means once every name is resolved; the compiler reads nothing else.
+
+Every value is a whole number at run time. A `Type` says which numbers, and which word each stands for:
+
+=========  =====================================================================================
+bool       0, 1
+int        low..high
+direction  0 right, 1 down, 2 left, 3 up (a turn added to a direction is taken modulo 4)
+color      0 red, 1 green, 2 blue, 3 purple, 4 yellow, 5 grey
+action     0 left, 1 right, 2 forward, 3 pickup, 4 drop, 5 toggle, 6 done, 7 none
+entity     number of the entity: 0 the agent, NPCs in cast order, then objects in file order
+text       index into `words`: the finite set of texts that the expression can be (names, kinds)
+noun       index into `words`, the nouns of the scenario's grammar
+status     index into `words`, the states of an object type
+=========  =====================================================================================
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from socialai_dsl.source import Span
+
+Kind = Literal["bool", "int", "direction", "color", "action", "entity", "text", "noun", "status"]
+
+
+@dataclass(frozen=True, slots=True)
+class Type:
+    """A kind of value and its range; `words[v - low]` is the word for v where values have words."""
+
+    kind: Kind
+    low: int
+    high: int
+    words: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """How many values there are."""
+        return self.high - self.low + 1
+
+
+BOOL = Type("bool", 0, 1, ("false", "true"))
+DIRECTION = Type("direction", 0, 3, ("right", "down", "left", "up"))
+COLOR = Type("color", 0, 5, ("red", "green", "blue", "purple", "yellow", "grey"))
+ACTION = Type("action", 0, 7, ("left", "right", "forward", "pickup", "drop", "toggle", "done", "none"))
+
+
+@dataclass(frozen=True, slots=True)
+class Const:
+    """A known value."""
+
+    type: Type
+    value: int
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """A register of the scenario, by its path: `let.exit`, `wizard.name`, `jill.goal` (a frame's `let` or slot)."""
+
+    type: Type
+    path: str
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """A fact of the world: t, width, height, action (the agent's this step), noun (of its last utterance, this step)."""
+
+    type: Type
+    name: Literal["t", "width", "height", "action", "noun"]
+
+
+@dataclass(frozen=True, slots=True)
+class FieldOf:
+    """An attribute of an entity: x, y, dir, color, status, gone, poked."""
+
+    type: Type
+    entity: Term
+    name: Literal["x", "y", "dir", "color", "status", "gone", "poked"]
+
+
+@dataclass(frozen=True, slots=True)
+class Here:
+    """A coordinate of the candidate cell, in the `where` of a place."""
+
+    type: Type
+    name: Literal["x", "y"]
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """The variable of an enclosing quantifier."""
+
+    type: Type
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """Arithmetic on integers: + - * // % min max abs neg; `turn` is + modulo 4 on directions."""
+
+    type: Type
+    op: Literal["+", "-", "*", "//", "%", "min", "max", "abs", "neg", "turn"]
+    args: tuple[Term, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """A number between two entities: distance (Manhattan), dir_to (quadrant direction from the first to the second)."""
+
+    type: Type
+    name: Literal["distance", "dir_to"]
+    args: tuple[Term, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Compare:
+    """== != < <= (others are turned round by the resolver)."""
+
+    op: Literal["==", "!=", "<", "<="]
+    left: Term
+    right: Term
+    type: Type = BOOL
+
+
+@dataclass(frozen=True, slots=True)
+class Logic:
+    """and / or of conditions, read left to right."""
+
+    op: Literal["and", "or"]
+    args: tuple[Term, ...]
+    type: Type = BOOL
+
+
+@dataclass(frozen=True, slots=True)
+class Not:
+    """Negation."""
+
+    arg: Term
+    type: Type = BOOL
+
+
+@dataclass(frozen=True, slots=True)
+class Test:
+    """A relation of two entities: at (same cell), next_to, faces, faces_toward, in_front_of, eye_contact, in_line,
+    can_reach; or of the candidate cell (`subject` is None: here.next_to(x), here.at(x), here.in_front_of(x))."""
+
+    name: Literal[
+        "at", "next_to", "faces", "faces_toward", "in_front_of", "eye_contact", "in_line", "can_reach"
+    ]
+    subject: Term | None
+    object: Term
+    type: Type = BOOL
+
+
+@dataclass(frozen=True, slots=True)
+class PokedNow:
+    """Whether the agent toggled at this entity in this step."""
+
+    entity: Term
+    type: Type = BOOL
+
+
+@dataclass(frozen=True, slots=True)
+class Pattern:
+    """A set of the agent's utterances: pairs (template, noun); `text` is how it was written."""
+
+    pairs: frozenset[tuple[int, int]]
+    text: str
+    said_by_npcs: frozenset[str] = frozenset()
+    """Plain texts of NPCs (without speaker) that match as well."""
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """The agent said one of these in this step, at whatever distance."""
+
+    pattern: Pattern
+    type: Type = BOOL
+
+
+@dataclass(frozen=True, slots=True)
+class Spoke:
+    """The agent said anything in this step."""
+
+    type: Type = BOOL
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """The member whose frame this is heard one of these since its last turn."""
+
+    patterns: tuple[Pattern, ...]
+    type: Type = BOOL
+
+
+@dataclass(frozen=True, slots=True)
+class InState:
+    """The frame of a cast member is in the state of this name."""
+
+    member: str
+    frame: str
+    state: str
+    type: Type = BOOL
+
+
+@dataclass(frozen=True, slots=True)
+class Quantified:
+    """any, all, count, first, nearest, pick over the constants `items`; `condition` may hold Variable(name).
+
+    pick and first give an item (`type` is the items'); count an int; any and all a bool; nearest the item with the least
+    distance to `to`. `ordinal` numbers the picks of one value in source order (draws.py).
+    """
+
+    type: Type
+    op: Literal["any", "all", "count", "first", "pick", "nearest"]
+    variable: str
+    items: tuple[Const, ...]
+    condition: Term | None
+    to: Term | None = None
+    ordinal: int = 0
+
+
+Term = (
+    Const
+    | Read
+    | World
+    | FieldOf
+    | Here
+    | Variable
+    | Operation
+    | Measure
+    | Compare
+    | Logic
+    | Not
+    | Test
+    | PokedNow
+    | Said
+    | Spoke
+    | Heard
+    | InState
+    | Quantified
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Sited:
+    """A term together with the site of its picks (a path, see draws.py) and where it was written."""
+
+    term: Term
+    site: str
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """What can be said: fixed pieces and values with words, joined; `site` for picks inside."""
+
+    parts: tuple[str | Term, ...]
+    site: str
+    span: Span
+
+
+# --- places -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """A set of cells.
+
+    `name` and `args`: anywhere; left_half, right_half, top_half, bottom_half; column(x); row(y); rect(x0, y0, x1, y1);
+    next_to(entity), in_front_of(entity); wall (side in `side`, cells at least `margin` from its corners).
+    """
+
+    name: Literal[
+        "anywhere",
+        "left_half",
+        "right_half",
+        "top_half",
+        "bottom_half",
+        "column",
+        "row",
+        "rect",
+        "next_to",
+        "in_front_of",
+        "wall",
+    ]
+    args: tuple[Term, ...] = ()
+    side: Literal["top", "bottom", "left", "right"] | None = None
+    margin: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Placing:
+    """Where an entity is put: exactly one of `at` (x, y), `regions` (their union, filtered by `where`), or nowhere."""
+
+    entity: int
+    site: str
+    number: int
+    span: Span
+    at: tuple[Term, Term] | None = None
+    regions: tuple[Region, ...] = ()
+    where: Term | None = None
+    where_site: str = ""
+    nowhere: bool = False
+
+
+# --- what happens -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Activity:
+    """One body action a turn: stay, left, right, forward, toggle, face(x), turn_to(dir), turn(left|right), go_to(x),
+    go_next_to(x), use(x), enter(x), choose(...); `weights` go with the args of choose."""
+
+    name: Literal[
+        "stay",
+        "left",
+        "right",
+        "forward",
+        "toggle",
+        "face",
+        "turn_to",
+        "turn",
+        "go_to",
+        "go_next_to",
+        "use",
+        "enter",
+        "choose",
+    ]
+    args: tuple[Term, ...]
+    site: str
+    span: Span
+    weights: tuple[int, ...] = ()
+    ordinal: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """An effect on an object or NPC: open, close, lock, unlock, reset, vanish, become (status in `value`)."""
+
+    name: Literal["open", "close", "lock", "unlock", "reset", "vanish", "become"]
+    entities: tuple[Term, ...]
+    span: Span
+    value: Term | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RulePlan:
+    """A rule with everything resolved. `name` is its address: `wizard.courtesy.acquainted.then[0]` or its id."""
+
+    name: str
+    site: str
+    span: Span
+    hears: tuple[Pattern, ...] = ()
+    when: Sited | None = None
+    after: int = 0
+    chance: float | None = None
+    once: bool = False
+    do: Activity | None = None
+    sets: tuple[tuple[str, Sited], ...] = ()
+    causes: tuple[Effect, ...] = ()
+    say: Line | None = None
+    goto: str | None = None
+    goto_now: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StatePlan:
+    """A state: rules before the activity, the activity, rules after it."""
+
+    name: str
+    first: tuple[RulePlan, ...]
+    activity: Activity
+    then: tuple[RulePlan, ...]
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class StepPlan:
+    """An entry of `steps`. `steps` None: until finished (or one step); -1: for ever. `state` is its name, if any."""
+
+    name: str
+    state: str | None
+    activity: Activity
+    span: Span
+    until: Sited | None = None
+    duration: int | None = None
+    sets: tuple[tuple[str, Sited], ...] = ()
+    causes: tuple[Effect, ...] = ()
+    say: Line | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FramePlan:
+    """A frame as one member plays it; exactly one of `states` and `steps` is not empty."""
+
+    member: str
+    frame: str
+    entity: int
+    span: Span
+    start: str = ""
+    states: tuple[StatePlan, ...] = ()
+    steps: tuple[StepPlan, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A register given its value at reset: names, `let`s, start values and slots of frames."""
+
+    path: str
+    type: Type
+    value: Sited
+
+
+@dataclass(frozen=True, slots=True)
+class Coloring:
+    """Colour of an entity at reset: random (value None), or a value; `distinct_from` are the members of the group drawn
+    before it, whose colours it must not have."""
+
+    entity: int
+    site: str
+    number: int
+    span: Span
+    value: Sited | None = None
+    distinct_from: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Facing:
+    """Direction of a cast member at reset: random (value None), a direction, or towards an entity."""
+
+    entity: int
+    site: str
+    span: Span
+    value: Sited | None = None
+    toward: Term | None = None
+
+
+Setup = Drawn | Coloring | Placing | Facing
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectType:
+    """A type of the prelude: what its statuses mean. All mappings are by index of status."""
+
+    name: str
+    code: int
+    states: tuple[str, ...]
+    initial: int
+    walkable: frozenset[int]
+    transparent: frozenset[int]
+    toggled: dict[int, int]
+    deadly: bool = False
+    shown: dict[int, tuple[int, int]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Entity:
+    """The agent, an NPC or an object.
+
+    Attributes:
+        number: its place in the order agent, NPCs, objects. key, index: `doors`, 2 for doors[2]; index None if single.
+        type: of an object. status: initial. kind, kind_code: of an NPC. name: type and term of its name (cast members).
+        near, far: Manhattan distances at which its voice is heard. in_wall: it lies in a wall.
+    """
+
+    number: int
+    key: str
+    index: int | None
+    role: Literal["agent", "npc", "object"]
+    span: Span
+    type: ObjectType | None = None
+    status: int = 0
+    kind: str = ""
+    kind_code: int = 0
+    name: Term | None = None
+    near: int = 1
+    far: int = 1
+    audible: bool = False
+    in_wall: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class OutcomePlan:
+    """One entry of `outcome`. `name` is its id, or success@LINE."""
+
+    name: str
+    success: bool
+    percent: int
+    condition: Sited
+
+
+@dataclass(frozen=True, slots=True)
+class RoomPlan:
+    """Sizes (walls included) and what is built: (object type, region, span); regions read only width and height."""
+
+    width: tuple[int, int]
+    height: tuple[int, int]
+    canvas: tuple[int, int]
+    build: tuple[tuple[ObjectType, Region, Span], ...] = ()
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A scenario in which everything is resolved and nothing is wrong: the compiler's input.
+
+    Attributes:
+        setup: what is drawn at reset after the room, in the order it is done (needs first).
+        words_in_order: every word that may be heard, in order of first appearance, lower case.
+    """
+
+    name: str
+    horizon: int
+    actions: tuple[str, ...]
+    templates: tuple[str, ...]
+    nouns: tuple[str, ...]
+    room: RoomPlan
+    entities: tuple[Entity, ...]
+    setup: tuple[Setup, ...]
+    frames: tuple[FramePlan, ...]
+    outcomes: tuple[OutcomePlan, ...]
+    words_in_order: tuple[str, ...]
+    npcs_hidden: bool
+    picture_before_npcs: bool
+    names_shown: bool
+    own_voice: bool
