@@ -16,7 +16,7 @@ CODES: Final[dict[str, str]] = {
     "S002": "a key given twice",
     "S003": "a plain word that YAML tools read differently",
     "S004": "larger or deeper than the language allows",
-    "S005": "anchors, aliases, merge keys and tags are not part of the language",
+    "S005": "anchors, aliases, merge keys, tags and directives are not part of the language",
     "S006": "encoding or control character",
     "S007": "a file that cannot be read",
     # S1xx: the shape of the document
@@ -125,7 +125,9 @@ class ScenarioError(Exception):
         sources: name -> source, for all files the findings point into that could be read.
     """
 
-    def __init__(self, diagnostics: Iterable[Diagnostic], sources: Mapping[str, Source] | None = None) -> None:
+    def __init__(
+        self, diagnostics: Iterable[Diagnostic], sources: Mapping[str, Source] | None = None
+    ) -> None:
         self.diagnostics: tuple[Diagnostic, ...] = tuple(diagnostics)
         self.sources: dict[str, Source] = dict(sources or {})
         super().__init__(self.diagnostics, self.sources)
@@ -235,7 +237,7 @@ def _nearness(word: str, candidate: str) -> int | None:
 
 
 def _edit_distance(a: str, b: str, cut_off: int) -> int:
-    """Insertions, deletions, replacements and exchanges of neighbours; `cut_off + 1` for anything above it."""
+    """Insertions, deletions, replacements and exchanges of neighbours; at most `cut_off + 1`."""
     before_last: list[int] = []
     last = list(range(len(b) + 1))
     for i, x in enumerate(a, 1):
@@ -254,8 +256,9 @@ def _edit_distance(a: str, b: str, cut_off: int) -> int:
 def printable(text: str) -> str:
     r"""`text` on one line with everything a terminal could act on escaped.
 
-    Control characters (C0, C1, line breaks, tabs), bidirectional and invisible formatting characters, surrogates and
-    unusual spaces become `\n`, `\x1b`, `\u202e` and so on. All text that reaches a terminal passes here.
+    Control characters (C0, C1, line breaks, tabs), bidirectional and invisible formatting characters,
+    surrogates and unusual spaces become `\n`, `\x1b`, `\u202e` and so on. All text that reaches a terminal
+    passes here.
     """
     if text.isprintable():
         return text

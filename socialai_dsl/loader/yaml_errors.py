@@ -1,0 +1,150 @@
+"""What the YAML parser's errors mean to an author."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, Final
+
+from socialai_dsl.diagnostics import Diagnostic
+from socialai_dsl.source import Source, Span
+
+_TEXT_QUOTES: Final = {"'": "'", '"': '"'}
+_COLON_IN_TEXT: Final = "not YAML: a colon followed by a space starts a new key; quote the text"
+
+
+def explain(error: Exception, source: Source) -> Diagnostic:
+    """The finding for whatever libyaml or PyYAML raised over this source."""
+    problem = str(getattr(error, "problem", None) or "the text cannot be read")
+    mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
+    place = _Place(source, mark)
+    context = _Place(source, getattr(error, "context_mark", None) or mark)
+    for explanation in (_unclosed, _colon, _first_character, _after_quote, _layout):
+        found = explanation(problem, place, context)
+        if found:
+            return found
+    return place.finding(f"not YAML: {problem}")
+
+
+class _Place:
+    """A mark of the parser, looked at in the text."""
+
+    def __init__(self, source: Source, mark: Any) -> None:
+        self.line_number = int(mark.line) + 1 if mark else 1
+        self.column = int(mark.column) + 1 if mark else 1
+        self._source = source
+        self.line = source.line(self.line_number)
+        self.before = self.line[: self.column - 1]
+        self.character = self.line[self.column - 1 : self.column]
+
+    @property
+    def at_end(self) -> bool:
+        return not self.character and not self._source.line(self.line_number + 1)
+
+    @property
+    def span(self) -> Span:
+        return self._source.span(self.line_number, self.column)
+
+    def line_above(self) -> _Place:
+        """The first character of the line above."""
+        above = _Place(self._source, None)
+        above.line_number = max(1, self.line_number - 1)
+        above.line = self._source.line(above.line_number)
+        above.column = len(above.line) - len(above.line.lstrip()) + 1
+        return above
+
+    def run_together(self) -> Diagnostic | None:
+        """The finding for a `key:value` that starts here, without a space."""
+        match = re.match(r"(?:- )?([\w.]+):([^\s:].*)", self.line[self.column - 1 :])
+        if not match:
+            return None
+        hint = f"write `{match[1]}: {match[2]}`"
+        return self.finding("not YAML: a space is missing after the colon", hint)
+
+    def finding(self, message: str, hint: str | None = None) -> Diagnostic:
+        return Diagnostic("S001", message, self.span, hint=hint)
+
+
+def _unclosed(problem: str, place: _Place, context: _Place) -> Diagnostic | None:
+    if "end of stream" in problem and context.character in _TEXT_QUOTES:
+        return context.finding(f"not YAML: the quote {context.character} is not closed")
+    if not re.search(r"',' or '[}\]]'", problem):
+        return None
+    closing = {"{": "}", "[": "]"}.get(context.character)
+    if closing and (place.at_end or (place.character == ":" and not _has_key(place.before))):
+        return context.finding(f"not YAML: the `{context.character}` is not closed with `{closing}`")
+    if place.character and place.character in "[]{}":
+        message = f"not YAML: `{place.character}` in a text inside {{ }} or [ ]; quote the text"
+        return place.finding(message)
+    return None
+
+
+def _has_key(text: str) -> bool:
+    return re.search(r":(\s|$)", text) is not None
+
+
+def _colon(problem: str, place: _Place, context: _Place) -> Diagnostic | None:
+    if "could not find expected ':'" in problem:
+        return context.run_together() or context.finding(
+            "not YAML: a key without its colon", "write `key: value`"
+        )
+    if place.character != ":":
+        return None
+    if "not allowed" in problem and not _has_key(place.before):
+        missing_space = place.line_above().run_together()
+        if missing_space:
+            return missing_space
+        return place.finding(
+            "not YAML: this line is indented further than the key above, which has its value already",
+            "give keys of one mapping the same indentation",
+        )
+    if not place.before.strip(" -{,"):
+        return place.finding("not YAML: there is no key before this colon")
+    return place.finding(_COLON_IN_TEXT)
+
+
+def _first_character(problem: str, place: _Place, context: _Place) -> Diagnostic | None:
+    if place.character == "\t" and not place.before.strip():
+        return place.finding("not YAML: a tab cannot indent; use spaces")
+    if "start any token" in problem:
+        character = "a backquote" if place.character == "`" else f"`{place.character}`"
+        return place.finding(f"not YAML: a text cannot begin with {character}; quote the text")
+    if context.character and context.character in "&*" and "alphabetic" in problem:
+        hint = "write `and` for `&&`" if context.line[context.column - 1 :].startswith("&&") else None
+        message = f"not YAML: a text cannot begin with `{context.character}`; quote the text"
+        return context.finding(message, hint)
+    if context.character and context.character in "|>" and "comment" in problem:
+        return context.finding(
+            f"not YAML: a leading `{context.character}` starts a text on the lines below; quote the text"
+        )
+    if "escape" in problem:
+        hint = "in double quotes a backslash starts an escape; use single quotes"
+        return place.finding("not YAML: an unknown escape sequence", hint)
+    return None
+
+
+def _after_quote(problem: str, place: _Place, context: _Place) -> Diagnostic | None:
+    if not place.character:
+        return None
+    if place.before.rstrip()[-1:] in _TEXT_QUOTES:
+        message = "not YAML: there is something behind the closing quote"
+        return place.finding(message, "quote the whole value, or nothing of it")
+    if place.character in "}]":
+        return place.finding(f"not YAML: there is nothing for this `{place.character}` to close")
+    if place.character == ",":
+        return place.finding("not YAML: a text cannot begin with `,`; quote the text")
+    return None
+
+
+def _layout(problem: str, place: _Place, context: _Place) -> Diagnostic | None:
+    if place.character == "-" and "not allowed" in problem:
+        return place.finding("not YAML: a list starts on a line of its own", "or write it as [a, b]")
+    if place.character == "?" and "not allowed" in problem:
+        return place.finding("not YAML: a text cannot begin with `? `; quote the text")
+    if context.line.startswith("%"):
+        return context.finding("not YAML: a text cannot begin with `%`; quote the text")
+    if re.search(r"expected key|block end|'-' indicator", problem):
+        return place.finding(
+            "not YAML: this line fits neither the list or mapping above nor one around it",
+            "give keys of one mapping, and the dashes of one list, the same indentation",
+        )
+    return None
