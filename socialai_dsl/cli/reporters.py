@@ -74,7 +74,8 @@ def report_sarif(checked: Sequence[Checked], color: bool) -> str:
     del color
     diagnostics = _all(checked)
     rules = [
-        {"id": code, "shortDescription": {"text": CODES[code]}} for code in sorted({d.code for d in diagnostics})
+        {"id": code, "shortDescription": {"text": CODES[code]}}
+        for code in sorted({d.code for d in diagnostics})
     ]
     run = {
         "tool": {"driver": {"name": "socialai", "rules": rules}},
@@ -138,7 +139,9 @@ def _sarif_result(diagnostic: Diagnostic) -> dict[str, Any]:
     return {
         "ruleId": diagnostic.code,
         "level": diagnostic.severity.value,
-        "message": {"text": diagnostic.text if diagnostic.hint is None else f"{diagnostic.text}\n{diagnostic.hint}"},
+        "message": {
+            "text": diagnostic.text if diagnostic.hint is None else f"{diagnostic.text}\n{diagnostic.hint}"
+        },
         "locations": [location],
     }
 

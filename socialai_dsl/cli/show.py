@@ -10,7 +10,9 @@ SUMMARY: Final = "print a scenario after extends and variants, or the program it
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
-    parser.add_argument("scenario", metavar="SCENARIO", help="a path or a name, with +variants and ?parameters")
+    parser.add_argument(
+        "scenario", metavar="SCENARIO", help="a path or a name, with +variants and ?parameters"
+    )
     parser.add_argument("--program", action="store_true", help="print the compiled program's listing instead")
 
 

@@ -19,7 +19,10 @@ _NOT_A_SCENARIO: Final = frozenset({"S007", "S504", "S508"})
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
     parser.add_argument(
-        "paths", nargs="+", metavar="PATH", help="a file, a folder, or a scenario's name such as dance+unsocial"
+        "paths",
+        nargs="+",
+        metavar="PATH",
+        help="a file, a folder, or a scenario's name such as dance+unsocial",
     )
     parser.add_argument(
         "--format",

@@ -1,0 +1,80 @@
+"""What each format of `socialai validate` prints."""
+
+import json
+from xml.etree import ElementTree
+
+import pytest
+
+from socialai_dsl.cli.reporters import REPORTERS, Checked
+from socialai_dsl.diagnostics import Diagnostic, Severity
+from socialai_dsl.source import Source, Span
+
+SOURCE = Source("a.yaml", "scenario: a\nhorizn: 3\n")
+ERROR = Diagnostic("S101", "unknown key `horizn`", Span("a.yaml", 2, 1, 6), suggestion="horizon")
+WARNING = Diagnostic("W306", "50% <odd> & more", Span("b,c:d.yaml", 4, 7), Severity.WARNING, hint="remove it")
+CHECKED = [
+    Checked("a.yaml", (ERROR,), {"a.yaml": SOURCE}),
+    Checked("b.yaml", (ERROR, WARNING), {"a.yaml": SOURCE}),
+    Checked("c.yaml", (), {}),
+]
+
+
+def report(name: str) -> str:
+    return REPORTERS[name](CHECKED, False)
+
+
+def test_text_points_at_the_line_and_counts_shared_findings_once() -> None:
+    assert report("text").splitlines() == [
+        "a.yaml:2:1: S101 unknown key `horizn`; did you mean `horizon`?",
+        "   2 | horizn: 3",
+        "       ^~~~~~",
+        "b,c:d.yaml:4:7: W306 50% <odd> & more",
+        "  help: remove it",
+        "3 files checked: 1 error, 1 warning",
+    ]
+
+
+def test_json_is_an_array_of_findings() -> None:
+    first, second = json.loads(report("json"))
+    assert first == {
+        "file": "a.yaml",
+        "line": 2,
+        "column": 1,
+        "severity": "error",
+        "code": "S101",
+        "message": "unknown key `horizn`; did you mean `horizon`?",
+        "hint": None,
+    }
+    assert (second["severity"], second["hint"]) == ("warning", "remove it")
+
+
+def test_github_annotations_are_escaped() -> None:
+    assert report("github").splitlines() == [
+        "::error file=a.yaml,line=2,col=1,endColumn=7,title=S101::unknown key `horizn`; did you mean `horizon`?",
+        "::warning file=b%2Cc%3Ad.yaml,line=4,col=7,endColumn=8,title=W306::50%25 <odd> & more%0Aremove it",
+    ]
+
+
+def test_sarif_has_rules_and_regions() -> None:
+    (run,) = json.loads(report("sarif"))["runs"]
+    assert [rule["id"] for rule in run["tool"]["driver"]["rules"]] == ["S101", "W306"]
+    first, second = run["results"]
+    region = first["locations"][0]["physicalLocation"]["region"]
+    assert region == {"startLine": 2, "startColumn": 1, "endColumn": 7}
+    assert second["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] == "b%2Cc%3Ad.yaml"
+
+
+def test_junit_has_a_case_for_each_file() -> None:
+    suite = ElementTree.fromstring(report("junit"))
+    assert (suite.get("tests"), suite.get("failures")) == ("3", "2")
+    assert [case.find("failure") is not None for case in suite] == [True, True, False]
+
+
+@pytest.mark.parametrize("name", sorted(REPORTERS))
+def test_nothing_found(name: str) -> None:
+    text = REPORTERS[name]([Checked("c.yaml", (), {})], False)
+    expected = {"text": "1 file checked: 0 errors, 0 warnings", "json": "[]", "github": ""}
+    if name in expected:
+        assert text == expected[name]
+    else:
+        assert "S101" not in text

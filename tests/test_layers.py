@@ -1,0 +1,104 @@
+"""Imports point one way, and checking a file stays light: the layer table of ARCHITECTURE.md, executed."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+TEXT_SIDE = {"source", "diagnostics", "draws", "grammar", "schema", "semantics", "loader", "frontend"}
+
+# layer -> (layers of socialai_dsl it may import, third-party packages it may import)
+MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
+    "source": (set(), set()),
+    "diagnostics": ({"source"}, set()),
+    "draws": (set(), {"numpy", "numba"}),
+    "grammar": ({"source", "diagnostics"}, {"lark"}),
+    "schema": ({"source", "diagnostics", "grammar"}, {"pydantic", "pydantic_core"}),
+    "semantics": ({"source", "diagnostics", "draws", "grammar", "schema"}, set()),
+    "loader": (TEXT_SIDE - {"frontend"}, {"yaml", "pydantic", "pydantic_core"}),
+    "frontend": (TEXT_SIDE, set()),
+    "program": ({"source", "listing"}, {"numpy"}),
+    "listing": ({"source", "program"}, {"numpy"}),
+    "compiler": (TEXT_SIDE - {"loader", "frontend"} | {"program"}, {"numpy"}),
+    "engine": ({"program", "draws"}, {"numpy", "numba"}),
+    "envs": (TEXT_SIDE | {"program", "compiler", "engine"}, {"numpy", "gymnasium", "PIL"}),
+    "": (TEXT_SIDE | {"program", "compiler", "engine", "envs"}, set()),
+}
+
+# What the trainer may use: the facade's names, nothing below it.
+FACADE = {"socialai_dsl"} | {f"socialai_dsl.{name}" for name in ("load", "compile", "make", "make_vec")}
+
+
+def modules(package: str) -> list[Path]:
+    return sorted((ROOT / package).rglob("*.py"))
+
+
+def layer(path: Path) -> str:
+    """`socialai_dsl/compiler/lower.py` -> `compiler`; the facade is ''."""
+    parts = path.relative_to(ROOT / "socialai_dsl").with_suffix("").parts
+    return "" if parts == ("__init__",) else parts[0]
+
+
+def imported(tree: ast.AST) -> Iterator[tuple[str, int]]:
+    """Dotted names of what is imported anywhere in it, `from package import name` as both, with the line."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, node.lineno) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"line {node.lineno}: imports are absolute in this project"
+            assert node.module is not None
+            if node.module == "socialai_dsl":
+                yield from ((f"socialai_dsl.{alias.name}", node.lineno) for alias in node.names)
+            else:
+                yield node.module, node.lineno
+
+
+def violations(path: Path, own: str) -> Iterator[str]:
+    internal, third_party = MAY_IMPORT[own]
+    for name, line in imported(ast.parse(path.read_text(encoding="utf-8"))):
+        root, _, rest = name.partition(".")
+        place = f"{path.relative_to(ROOT)}:{line}"
+        if root == "socialai_dsl":
+            target = rest.split(".")[0]
+            if target not in internal | {own}:
+                yield f"{place}: layer {own!r} must not import {name}"
+        elif root not in sys.stdlib_module_names and root not in third_party:
+            yield f"{place}: layer {own!r} must not import {name}"
+
+
+@pytest.mark.parametrize("path", modules("socialai_dsl"), ids=lambda p: str(p.relative_to(ROOT)))
+def test_imports_point_one_way(path: Path) -> None:
+    own = layer(path)
+    if own == "cli":
+        return  # it lies above everything; that it starts light is proved below
+    assert own in MAY_IMPORT, f"{path.relative_to(ROOT)} belongs to no layer of the table"
+    assert list(violations(path, own)) == []
+
+
+@pytest.mark.parametrize("path", modules("trainer"), ids=lambda p: str(p.relative_to(ROOT)))
+def test_the_trainer_sees_only_the_facade(path: Path) -> None:
+    for name, line in imported(ast.parse(path.read_text(encoding="utf-8"))):
+        if name.split(".")[0] == "socialai_dsl":
+            assert name in FACADE, f"{path.relative_to(ROOT)}:{line}: the trainer must not import {name}"
+
+
+def test_engine_and_compiler_do_not_know_each_other() -> None:
+    """The point of the table, said on its own so that nobody relaxes it by editing a set."""
+    for own, other in (("engine", "compiler"), ("compiler", "engine")):
+        assert other not in MAY_IMPORT[own][0]
+        assert not MAY_IMPORT["engine"][0] & (TEXT_SIDE - {"draws"})
+
+
+@pytest.mark.parametrize("statement", ["import socialai_dsl.frontend", "import socialai_dsl.cli.main"])
+def test_checking_a_file_loads_nothing_heavy(statement: str) -> None:
+    heavy = ("numba", "torch", "gymnasium", "matplotlib", "PIL")
+    script = f"{statement}\nimport sys\nprint([name for name in {heavy!r} if name in sys.modules])"
+    result = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT, timeout=60
+    )
+    assert result.stdout.strip() == "[]"
