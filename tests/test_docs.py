@@ -82,7 +82,11 @@ def test_architecture_names_files_that_exist() -> None:
     text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
     names = set(re.findall(r"`([\w./-]+(?:\.py|\.yaml|\.lark|/))`", text))
     assert len(names) > 10
-    missing = [name for name in sorted(names) if not any((ROOT / root / name).exists() for root in ("", "socialai_dsl"))]
+    missing = [
+        name
+        for name in sorted(names)
+        if not any((ROOT / root / name).exists() for root in ("", "socialai_dsl"))
+    ]
     assert missing == []
 
 

@@ -1,0 +1,135 @@
+"""This module draws a run's learning curve."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter, PercentFormatter
+from numpy.typing import NDArray
+
+_BLUE: Final = "#2f62b8"
+_RED: Final = "#c23b33"
+_GREYS: Final = ("#8d939d", "#b3b7be", "#d3d6da", "#e6e7ea")
+_SUCCESSES: Final = ("#3a8f56", "#6bb583", "#a0d2b0")
+_FAILURES: Final = ("#c8543f", "#dd8a62", "#ebb48f", "#f4d3b8")
+
+
+@dataclass(frozen=True)
+class Curve:
+    """What was measured while a run learned, one entry per update.
+
+    Attributes:
+        frames: frames seen so far.
+        success: share of the training episodes that ended in this update and succeeded; nan where none ended.
+        outcomes: outcome -> its share of those episodes.
+        test: frames, success rate and standard error of the evaluation, None if there was none.
+    """
+
+    frames: Sequence[float]
+    success: Sequence[float]
+    outcomes: Mapping[str, Sequence[float]]
+    test: tuple[float, float, float] | None = None
+
+
+def draw_learning_curve(curve: Curve, title: str, path: Path) -> None:
+    """Write the picture: success over frames above, how episodes ended below."""
+    figure = Figure(figsize=(7.2, 5.4), dpi=130, layout="constrained")
+    FigureCanvasAgg(figure)
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    figure.suptitle(title, fontsize=11, x=0.01, ha="left", weight="bold")
+    _draw_success(above, curve)
+    _draw_outcomes(below, curve)
+    for axes in (above, below):
+        axes.set_ylim(0, 1)
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.tick_params(labelsize=8)
+    below.set_xlim(0, max(curve.frames, default=1) * 1.02)
+    below.xaxis.set_major_formatter(EngFormatter(sep=""))
+    below.set_xlabel("frames", fontsize=9)
+    figure.savefig(path)
+
+
+def smooth(values: Sequence[float], width: int) -> NDArray[np.float64]:
+    """Mean over the last `width` values that are not nan; nan where there are none."""
+    array = np.asarray(values, np.float64)
+    known = ~np.isnan(array)
+    sums = np.concatenate([[0.0], np.cumsum(np.where(known, array, 0.0))])
+    counts = np.concatenate([[0], np.cumsum(known)])
+    end = np.arange(1, len(array) + 1)
+    start = np.maximum(end - width, 0)
+    number = counts[end] - counts[start]
+    return np.where(number > 0, (sums[end] - sums[start]) / np.maximum(number, 1), np.nan)
+
+
+def _window(curve: Curve) -> int:
+    return max(1, len(curve.frames) // 25)
+
+
+def _draw_success(axes: Axes, curve: Curve) -> None:
+    axes.plot(curve.frames, curve.success, color=_BLUE, alpha=0.25, linewidth=0.8)
+    axes.plot(
+        curve.frames,
+        smooth(curve.success, _window(curve)),
+        color=_BLUE,
+        linewidth=1.8,
+        label="training episodes",
+    )
+    if curve.test is not None:
+        frames, rate, error = curve.test
+        axes.errorbar(
+            [frames],
+            [rate],
+            [2 * error],
+            fmt="o",
+            color=_RED,
+            markersize=6,
+            capsize=4,
+            clip_on=False,
+            label=f"test set: {rate:.1%} ± {2 * error:.1%}",
+            zorder=3,
+        )
+    axes.set_ylabel("success", fontsize=9)
+    axes.grid(axis="y", color="#e6e6e6", linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.legend(loc="upper left", fontsize=8, frameon=False)
+
+
+def _draw_outcomes(axes: Axes, curve: Curve) -> None:
+    """Stack the ways episodes ended, successes at the bottom, the rarest of the others together."""
+    shares = {name: smooth(values, _window(curve)) for name, values in curve.outcomes.items()}
+    shares = {name: values for name, values in shares.items() if np.nanmax(values, initial=0.0) > 0}
+    if not shares:
+        return
+    names = sorted(shares, key=lambda name: (_rank(name), -float(np.nanmean(shares[name]))))
+    colours = _colours(names)
+    axes.stackplot(
+        curve.frames,
+        [np.nan_to_num(shares[name]) for name in names],
+        colors=colours,
+        labels=names,
+        linewidth=0,
+    )
+    axes.set_ylabel("episodes ended by", fontsize=9)
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, frameon=False, reverse=True)
+
+
+def _rank(name: str) -> int:
+    """Successes first, time-outs last."""
+    return 0 if name.startswith("success") else 2 if name == "timeout" else 1
+
+
+def _colours(names: Sequence[str]) -> list[str]:
+    palettes = (_SUCCESSES, _FAILURES, _GREYS)
+    used = [0, 0, 0]
+    colours = []
+    for name in names:
+        rank = _rank(name)
+        colours.append(palettes[rank][used[rank] % len(palettes[rank])])
+        used[rank] += 1
+    return colours

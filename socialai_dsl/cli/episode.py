@@ -1,0 +1,146 @@
+"""This module records one episode for people: a film with its dialogue, and a transcript."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from socialai_dsl.diagnostics import printable
+from socialai_dsl.envs.panel import DialogueLine, compose_frame
+from socialai_dsl.program import Program
+
+_STEP_MILLISECONDS: Final = 450
+_END_MILLISECONDS: Final = 2500
+_PALETTE_COLOURS: Final = 160
+
+Act = Callable[[dict[str, NDArray[Any]], bool], NDArray[np.int64]]
+"""Chooses the action, int64 (4,), for an observation; the flag says whether it is the episode's first."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of an episode, in words.
+
+    Attributes:
+        t: counted from 1.
+        action: the primitive's name, "none" where the agent did not move.
+        said: the agent's utterance, None if it was silent.
+        heard: lines `Name: text`, in the order spoken.
+    """
+
+    t: int
+    action: str
+    said: str | None
+    heard: tuple[str, ...]
+
+    @property
+    def dialogue(self) -> list[DialogueLine]:
+        """What was said in this step, the agent first."""
+        own = [DialogueLine(self.t, "You", self.said)] if self.said is not None else []
+        return own + [_heard_line(self.t, line) for line in self.heard]
+
+
+@dataclass
+class Episode:
+    """A recorded episode.
+
+    Attributes:
+        title: what was recorded.
+        steps: in order.
+        frames: a picture after the reset and one after each step, uint8 (H, W, 3).
+        outcome: how it ended, in the scenario's words.
+        success: whether that counts as success.
+        reward: sum of the rewards.
+    """
+
+    title: str
+    steps: list[Step] = field(default_factory=list)
+    frames: list[NDArray[np.uint8]] = field(default_factory=list)
+    outcome: str = ""
+    success: bool = False
+    reward: float = 0.0
+
+    def transcript(self) -> str:
+        """The episode as text: one line for each step, what was heard under it."""
+        lines = [self.title, ""]
+        for step in self.steps:
+            said = f'   You: "{step.said}"' if step.said is not None else ""
+            lines.append(f"{step.t:>4}  {step.action:<8}{said}".rstrip())
+            lines += [f"{'':17}{printable(line)}" for line in step.heard]
+        verdict = "success" if self.success else "no success"
+        lines += ["", f"{verdict} ({self.outcome}) after {len(self.steps)} steps, reward {self.reward:.3f}"]
+        return "\n".join(lines) + "\n"
+
+    def save_film(self, path: Path) -> None:
+        """Write the frames as a GIF that loops; the last one stays longer."""
+        sample = np.concatenate([self.frames[0], self.frames[len(self.frames) // 2], self.frames[-1]])
+        palette = Image.fromarray(sample).quantize(_PALETTE_COLOURS)
+        images = [
+            Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+            for frame in self.frames
+        ]
+        durations = [_STEP_MILLISECONDS] * (len(images) - 1) + [_END_MILLISECONDS]
+        images[0].save(
+            path, save_all=True, append_images=images[1:], duration=durations, loop=0, optimize=True
+        )
+
+
+def record(env: Any, program: Program, act: Act, title: str, reset: dict[str, Any]) -> Episode:
+    """Play one episode and record it.
+
+    Args:
+        env: a single environment with render mode `rgb_array`.
+        program: the scenario's, for the words of actions and outcomes.
+        act: chooses the actions.
+        title: first line of the transcript.
+        reset: arguments of `env.reset`.
+    """
+    episode = Episode(title)
+    observation, info = env.reset(**reset)
+    dialogue: list[DialogueLine] = []
+    episode.frames.append(compose_frame(env.render(), dialogue, ["before the first step"]))
+    ended, first = False, True
+    while not ended:
+        action = act(observation, first)
+        first = False
+        observation, reward, terminated, truncated, info = env.step(action)
+        ended = bool(terminated or truncated)
+        step = describe_step(program, action, len(episode.steps) + 1, info["utterance"])
+        episode.steps.append(step)
+        episode.reward += float(reward)
+        dialogue += step.dialogue
+        if ended:
+            episode.outcome, episode.success = str(info["outcome"]), bool(info["success"])
+        caption = _caption(episode, step, ended)
+        episode.frames.append(compose_frame(env.render(), dialogue, caption, now=step.t))
+    return episode
+
+
+def describe_step(
+    program: Program, action: Sequence[int] | NDArray[np.int64], t: int, utterance: str
+) -> Step:
+    """Put an action and what was heard into words."""
+    primitive, speaks, template, noun = (int(part) for part in action)
+    words = [*program.actions, "none"]
+    said = program.templates[template].replace("<noun>", program.nouns[noun]) if speaks else None
+    heard = () if utterance == "NA" else tuple(utterance.splitlines())
+    return Step(t, words[primitive], said, heard)
+
+
+def _heard_line(t: int, line: str) -> DialogueLine:
+    name, separator, text = line.partition(": ")
+    return DialogueLine(t, name, text) if separator else DialogueLine(t, "", line)
+
+
+def _caption(episode: Episode, step: Step, ended: bool) -> list[str]:
+    lines = [f"step {step.t}   {step.action}"]
+    if ended:
+        verdict = "success" if episode.success else "no success"
+        lines.append(f"{verdict} ({episode.outcome}), reward {episode.reward:.3f}")
+    else:
+        lines.append("")
+    return lines

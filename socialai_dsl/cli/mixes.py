@@ -1,0 +1,90 @@
+"""This module generates the agent's actions of `socialai bench` beforehand.
+
+`random` is uniform over the action space. `walk` turns and walks and speaks half of the time, without what ends the
+scenario, so that episodes last; which actions those are is found by trying, because it holds for any scenario.
+"""
+
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import socialai_dsl
+
+BATCHES: Final = 64
+_WALKING: Final = ("left", "right", "forward", "none")
+_PROBE_ENVS: Final = 1024
+_PROBE_STEPS: Final = 96
+
+Actions = NDArray[np.int64]
+
+
+def random_actions(envs: Any, seed: int) -> Actions:
+    """Uniform actions, int64 (BATCHES, E, 4)."""
+    sizes = envs.single_action_space.nvec
+    generator = np.random.default_rng(seed)
+    return generator.integers(0, sizes, (BATCHES, envs.num_envs, 4))
+
+
+def walk_actions(envs: Any, allowed: "Allowed", seed: int) -> Actions:
+    """Walking and harmless talk, int64 (BATCHES, E, 4)."""
+    shape = (BATCHES, envs.num_envs)
+    generator = np.random.default_rng(seed)
+    actions = np.zeros((*shape, 4), np.int64)
+    actions[..., 0] = generator.choice(allowed.primitives, shape)
+    if len(allowed.utterances):
+        actions[..., 1] = generator.integers(0, 2, shape)
+        actions[..., 2:] = generator.choice(allowed.utterances, shape)
+    return actions
+
+
+class Allowed:
+    """What `walk` may do in a scenario.
+
+    Attributes:
+        primitives: int64 (P',), indices of left, right, forward and none, without those that end most episodes
+            in the step in which they are done.
+        utterances: int64 (U, 2), pairs (template, noun) that never ended an episode when said standing still.
+    """
+
+    def __init__(self, name: str, seed: int = 0) -> None:
+        envs = socialai_dsl.make_vec(name, num_envs=_PROBE_ENVS)
+        sizes = [int(n) for n in envs.single_action_space.nvec]
+        words = [*socialai_dsl.compile(socialai_dsl.load(name)).actions, "none"]
+        walking = np.array([i for i, word in enumerate(words[: sizes[0]]) if word in _WALKING], np.int64)
+        generator = np.random.default_rng(seed)
+        envs.reset(seed=seed)
+        self.primitives = self._probe_primitives(envs, walking, sizes[0], generator)
+        self.utterances = self._probe_utterances(envs, sizes, generator)
+        envs.close()
+
+    def _probe_primitives(
+        self, envs: Any, walking: Actions, count: int, generator: np.random.Generator
+    ) -> Actions:
+        used, ended = np.zeros(count), np.zeros(count)
+        for _ in range(_PROBE_STEPS):
+            actions = np.zeros((_PROBE_ENVS, 4), np.int64)
+            actions[:, 0] = generator.choice(walking, _PROBE_ENVS)
+            *_, terminations, _, _ = envs.step(actions)
+            used += np.bincount(actions[:, 0], minlength=count)
+            ended += np.bincount(actions[:, 0], terminations, minlength=count)
+        # Below one half, because an action given in the step that starts the next episode is not carried out.
+        return walking[ended[walking] < 0.3 * used[walking]]
+
+    def _probe_utterances(self, envs: Any, sizes: list[int], generator: np.random.Generator) -> Actions:
+        templates, nouns = sizes[2], sizes[3]
+        ended = np.zeros(templates * nouns, bool)
+        still = sizes[0] - 1
+        for step in range(2 * _PROBE_STEPS):
+            actions = np.zeros((_PROBE_ENVS, 4), np.int64)
+            pairs = generator.integers(0, templates * nouns, _PROBE_ENVS)
+            if step % 2:
+                actions[:, 0], actions[:, 1] = still, 1
+                actions[:, 2], actions[:, 3] = pairs // nouns, pairs % nouns
+            else:
+                actions[:, 0] = generator.choice(self.primitives, _PROBE_ENVS)
+            *_, terminations, _, _ = envs.step(actions)
+            if step % 2:
+                ended[pairs[terminations]] = True
+        harmless = np.flatnonzero(~ended)
+        return np.stack([harmless // nouns, harmless % nouns], axis=1).astype(np.int64)

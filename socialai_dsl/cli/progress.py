@@ -1,0 +1,81 @@
+"""This module shows how far a training run has come: a live bar on a terminal, plain lines elsewhere."""
+
+import math
+import time
+from collections import deque
+from types import TracebackType
+from typing import IO, Self
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+
+_SECONDS_BETWEEN_LINES = 5.0
+_REMEMBERED_UPDATES = 20
+
+
+class TrainingProgress:
+    """Reports frames, frames per second, success and the time left; use it in a `with` statement.
+
+    On a terminal one line is redrawn; otherwise a line is written every few seconds, so that logs stay short.
+    """
+
+    def __init__(self, total: int, done: int, stream: IO[str]) -> None:
+        """Report on `total` frames, of which `done` were trained before, writing to `stream`."""
+        self._total, self._first = total, done
+        self._stream = stream
+        self._started = time.monotonic()
+        self._last_line = self._started
+        self._success: deque[float] = deque(maxlen=_REMEMBERED_UPDATES)
+        self._bar: Progress | None = None
+        if stream.isatty():
+            self._bar = Progress(
+                TextColumn("training"),
+                BarColumn(bar_width=28),
+                TaskProgressColumn(),
+                TextColumn("{task.fields[text]}"),
+                console=Console(file=stream),
+            )
+            self._task = self._bar.add_task("training", total=total, completed=done, text="")
+
+    def __enter__(self) -> Self:
+        if self._bar is not None:
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def update(self, frames: int, success: float | None) -> None:
+        """Report one update.
+
+        Args:
+            frames: frames trained so far, earlier parts of a resumed run included.
+            success: share of the episodes ended in this update that succeeded; None or nan if none ended.
+        """
+        if success is not None and not math.isnan(success):
+            self._success.append(success)
+        text = self._text(frames)
+        if self._bar is not None:
+            self._bar.update(self._task, completed=min(frames, self._total), text=text)
+        elif time.monotonic() - self._last_line > _SECONDS_BETWEEN_LINES or frames >= self._total:
+            self._last_line = time.monotonic()
+            print(f"{frames:>12,} of {self._total:,} frames  {text}", file=self._stream, flush=True)
+
+    def _text(self, frames: int) -> str:
+        elapsed = max(time.monotonic() - self._started, 1e-9)
+        speed = (frames - self._first) / elapsed
+        left = max(self._total - frames, 0) / speed if speed > 0 else math.inf
+        known = f"{sum(self._success) / len(self._success):.3f}" if self._success else "-"
+        return f"{speed:>9,.0f} frames/s  success {known}  {_clock(left)} left"
+
+
+def _clock(seconds: float) -> str:
+    """Seconds as h:mm:ss or m:ss."""
+    if math.isinf(seconds):
+        return "-:--"
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"

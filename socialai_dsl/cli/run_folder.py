@@ -1,0 +1,94 @@
+"""This module names a run's folder and writes its small files so that a reader never sees half of one."""
+
+import json
+import os
+import platform
+import time
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, Final
+
+from socialai_dsl.cli.errors import UsageError
+
+RESULT: Final = "result.json"
+SETTINGS: Final = "run.json"
+_REPORTED_PACKAGES: Final = ("socialai-dsl", "numpy", "numba", "gymnasium", "torch")
+
+
+def scenario_folder_name(spec: str) -> str:
+    """`scenarios/talkitout.yaml+unsocial?a=1&b=2` -> `talkitout+unsocial,a=1,b=2`."""
+    path, mark, parameters = spec.partition("?")
+    name, plus, variants = Path(path).name.partition("+")
+    name = name.removesuffix(".yaml").removesuffix(".yml")
+    return name + plus + variants + ("," if mark else "") + parameters.replace("&", ",").replace("/", "_")
+
+
+def create_run_folder(out: Path | None, spec: str, seed: int) -> Path:
+    """Make the folder of a new run: `out`, or `runs/<scenario>/<time>-s<seed>`.
+
+    Raises:
+        UsageError: `out` holds a run already.
+        OSError: it cannot be made.
+    """
+    if out is not None:
+        if (out / SETTINGS).exists():
+            raise UsageError(
+                f"--out: {out} holds a run already; go on with --resume, or choose another folder"
+            )
+        out.mkdir(parents=True, exist_ok=True)
+        return out
+    parent = Path("runs") / scenario_folder_name(spec)
+    stamp = f"{time.strftime('%Y%m%d-%H%M%S')}-s{seed}"
+    for attempt in range(100):
+        folder = parent / (stamp if attempt == 0 else f"{stamp}-{attempt + 1}")
+        try:
+            folder.mkdir(parents=True)
+        except FileExistsError:
+            continue
+        return folder
+    raise UsageError(f"{parent}: a hundred runs were started in this second")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file by replacing it in one go."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        with open(temporary, "w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    """Write a JSON object by replacing the file in one go."""
+    write_text(path, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Read a JSON object.
+
+    Raises:
+        OSError: the file cannot be read.
+        UsageError: it holds something else.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise UsageError(f"{path}: expected JSON, {error}") from None
+    if not isinstance(content, dict):
+        raise UsageError(f"{path}: expected a JSON object, got {type(content).__name__}")
+    return content
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages that decide a run's results; those not installed are left out."""
+    found = {"python": platform.python_version()}
+    for package in _REPORTED_PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found

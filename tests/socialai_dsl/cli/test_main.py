@@ -1,0 +1,108 @@
+"""Exit codes and messages: every way a command can end."""
+
+import argparse
+import errno
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from socialai_dsl.cli import main as cli
+from socialai_dsl.cli import validate
+from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.main import main, run_main
+from socialai_dsl.diagnostics import Diagnostic, ScenarioError
+from socialai_dsl.source import Span
+
+Capture = pytest.CaptureFixture[str]
+
+
+def ending_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> Callable[..., int]:
+    """`socialai validate` whose work ends with this error."""
+
+    def execute(arguments: argparse.Namespace) -> Exit:
+        raise error
+
+    monkeypatch.setattr(validate, "execute", execute)
+    return lambda *options: main(["validate", "x.yaml", *options])
+
+
+def test_findings(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    finding = Diagnostic("S101", "unknown key `horizn`", Span("a.yaml", 2, 1, 6))
+    assert ending_with(monkeypatch, ScenarioError([finding]))() == 1
+    assert capsys.readouterr().err == "a.yaml:2:1: S101 unknown key `horizn`\n"
+
+
+def test_usage(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    assert ending_with(monkeypatch, UsageError("frames: got -1, expected at least 1"))() == 2
+    assert capsys.readouterr().err == "socialai: frames: got -1, expected at least 1\n"
+
+
+def test_unwritable_output_names_the_file(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    error = PermissionError(errno.EACCES, os.strerror(errno.EACCES), "/runs/result.json")
+    assert ending_with(monkeypatch, error)() == 2
+    assert capsys.readouterr().err == "socialai: Permission denied: /runs/result.json\n"
+
+
+def test_our_own_bug_asks_for_a_report(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    assert ending_with(monkeypatch, AssertionError("internal: no such register"))() == 3
+    shown = capsys.readouterr().err
+    assert "internal: no such register" in shown
+    assert "report it" in shown
+    assert "Traceback" not in shown
+
+
+def test_debug_shows_the_traceback(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    assert ending_with(monkeypatch, AssertionError("internal: x"))("--debug") == 3
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_ctrl_c(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    assert ending_with(monkeypatch, KeyboardInterrupt())() == 130
+    assert capsys.readouterr().err == "socialai: interrupted\n"
+
+
+def test_a_reader_that_went_away_is_no_error() -> None:
+    script = "import sys; from socialai_dsl.cli.main import main; sys.exit(main(['schema']))"
+    process = subprocess.Popen(
+        [sys.executable, "-c", script],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        cwd=Path(cli.__file__).parents[2],
+    )
+    assert process.stdout is not None
+    assert process.stderr is not None
+    process.stdout.close()
+    errors = process.stderr.read()
+    process.stderr.close()
+    assert (process.wait(60), errors) == (141, b"")
+
+
+@pytest.mark.parametrize(
+    "arguments", [[], ["dance"], ["validate"], ["validate", "--format", "xml", "a.yaml"]]
+)
+def test_wrong_usage(arguments: list[str], capsys: Capture) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == 2
+    assert "usage: socialai" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("entry", [main, run_main])
+def test_help_and_version(entry: Callable[[list[str]], int], capsys: Capture) -> None:
+    for option, expected in (("--help", "usage: "), ("--version", "socialai")):
+        with pytest.raises(SystemExit) as ended:
+            entry([option])
+        assert ended.value.code == 0
+        assert expected in capsys.readouterr().out
+
+
+def test_every_command_explains_itself(capsys: Capture) -> None:
+    for command in cli._COMMANDS:
+        with pytest.raises(SystemExit) as ended:
+            main([command, "--help"])
+        assert ended.value.code == 0
+        assert "--debug" in capsys.readouterr().out
