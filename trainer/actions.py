@@ -1,0 +1,45 @@
+"""This module turns the four heads' logits into actions, log-probabilities and entropies."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+SPEAK, TEMPLATE = 1, 2  # positions of these heads; the noun follows the template
+
+
+def gumbel_noise(shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
+    """Noise, float32, whose addition to logits makes the argmax a sample; drawn on the CPU whatever the device."""
+    uniform = torch.rand(shape, generator=generator).clamp_(min=torch.finfo(torch.float32).tiny)
+    return uniform.log_().neg_().log_().neg_()
+
+
+def choose(logits: Tensor, sizes: tuple[int, ...]) -> Tensor:
+    """The best choice of each head, int64 (..., 4); a sample if noise was added to the logits (..., sum of sizes)."""
+    return torch.stack([part.argmax(-1) for part in logits.split(sizes, -1)], -1)
+
+
+def spoken_mask(actions: Tensor) -> Tensor:
+    """Which heads took part in each action, float (..., 4): template and noun only when something was said."""
+    mask = torch.ones(actions.shape, device=actions.device)
+    mask[..., TEMPLATE:] = actions[..., SPEAK : SPEAK + 1].to(mask.dtype)
+    return mask
+
+
+def log_probs(logits: Tensor, actions: Tensor, sizes: tuple[int, ...]) -> Tensor:
+    """Log-probability of each head's choice, (..., 4), before masking."""
+    parts = [
+        torch.log_softmax(part, -1).gather(-1, actions[..., head : head + 1])
+        for head, part in enumerate(logits.split(sizes, -1))
+    ]
+    return torch.cat(parts, -1)
+
+
+def log_probs_and_entropies(logits: Tensor, actions: Tensor, sizes: tuple[int, ...]) -> tuple[Tensor, Tensor]:
+    """Log-probability of each head's choice and each head's entropy in nats, both (..., 4), before masking."""
+    chosen, entropies = [], []
+    for head, part in enumerate(logits.split(sizes, -1)):
+        logs = torch.log_softmax(part, -1)
+        chosen.append(logs.gather(-1, actions[..., head : head + 1]))
+        entropies.append(-(logs.exp() * logs).sum(-1))
+    return torch.cat(chosen, -1), torch.stack(entropies, -1)

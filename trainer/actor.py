@@ -1,0 +1,122 @@
+"""This module runs a network forward one step at a time, processing each distinct frame of a rollout once."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from trainer.distinct import DistinctRows, Int64, content_ids, history_lengths, prefix_tree
+from trainer.nets import ActorCritic
+
+
+class Actor:
+    """A network together with what it has already computed under its present weights.
+
+    `begin` forgets all of that and must be called whenever the weights changed. Between two calls of `begin` the
+    tables below only grow, and rows in them are never changed.
+
+    Attributes:
+        images: distinct images, uint8 (I, H, W, C).
+        histories: distinct 0-padded histories, int16 (D, L); row 0 is an empty one, where encoding begins.
+        pairs: distinct (image row, history row), int64 (P, 2).
+    """
+
+    def __init__(self, net: ActorCritic, tokens_length: int) -> None:
+        self.net = net
+        self.device = next(net.parameters()).device
+        self._length = tokens_length
+        self._frames = 0
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget every encoding, because the weights changed."""
+        self.images = DistinctRows(self.net.spec.image_shape, np.uint8)
+        self.histories = DistinctRows((self._length,), np.int16, unnamed=1)
+        self.pairs = DistinctRows((2,), np.int64)
+        self._lengths = np.zeros(1, np.int64)
+        self._last_history: Int64 | None = None
+        with torch.no_grad():
+            self._words = self.net.dialogue.word_inputs()
+        self._texts = torch.zeros(1024, self.net.dialogue.size, device=self.device)
+        self._features = torch.zeros(4096, self.net.features, device=self.device)
+
+    @torch.no_grad()
+    def see(
+        self, images: NDArray[np.uint8], tokens: NDArray[np.int16], ids: tuple[Int64, Int64] | None = None
+    ) -> tuple[Int64, Tensor]:
+        """Take in one observation of every environment.
+
+        Args:
+            images: uint8 (E, H, W, C).
+            tokens: int16 (E, L), 0-padded.
+            ids: 64-bit ids of the images and of the histories, int64 (E,) each; made from the content if absent.
+
+        Returns:
+            int64 (E,) row of `pairs` of every environment, and their features (E, F).
+        """
+        image_ids, history_ids = ids or (content_ids(images), content_ids(tokens))
+        if not self.net.distinct:
+            image_ids = np.arange(self._frames, self._frames + len(images))
+            self._frames += len(images)
+        image_rows, _ = self.images.add(image_ids, images)
+        history_rows = self._hear(history_ids, tokens)
+        pairs = np.stack((image_rows, history_rows), 1)
+        rows, fresh = self.pairs.add(image_rows << 32 | history_rows, pairs)
+        if len(fresh):
+            self._perceive(pairs[fresh])
+        return rows, self._features[torch.from_numpy(rows).to(self.device)]
+
+    def _perceive(self, pairs: Int64) -> None:
+        """Compute the features of the pairs last added."""
+        image_rows, image_index = np.unique(pairs[:, 0], return_inverse=True)
+        prepared = self.net.prepare(self._move(self.images.data[image_rows]))
+        features = self.net.perceive(prepared, self._texts, self._move(image_index), self._move(pairs[:, 1]))
+        self._features = _with_room(self._features, self.pairs.size)
+        self._features[self.pairs.size - len(pairs) : self.pairs.size] = features
+
+    def _hear(self, ids: Int64, tokens: NDArray[np.int16]) -> Int64:
+        """Row of every history, int64 (E,); new ones are encoded, from where the same environment was if possible."""
+        before = self.histories.size
+        rows, fresh = self.histories.add(ids, tokens)
+        if len(fresh):
+            words = tokens[fresh]
+            lengths = history_lengths(words)
+            parents = (
+                np.zeros(len(fresh), np.int64) if self._last_history is None else self._last_history[fresh]
+            )
+            known = self._lengths[parents]
+            same = self.histories.data[parents] == words
+            prefix = (same | (np.arange(self._length) >= known[:, None])).all(axis=1)
+            parents, known = np.where(prefix, parents, 0), np.where(prefix, known, 0)
+            self._lengths = np.concatenate((self._lengths, lengths))
+            self._texts = _with_room(self._texts, self.histories.size)
+            self._texts[before : self.histories.size] = self._encode(words, parents, known, lengths - known)
+        self._last_history = rows
+        return rows
+
+    def _encode(self, words: NDArray[np.int16], parents: Int64, known: Int64, new: Int64) -> Tensor:
+        """Encode histories given the row and length of the known beginning and the number of new words of each."""
+        if not known.any():
+            tree = prefix_tree(words)
+            states = self.net.dialogue(self._move(tree.tokens), self._move(tree.parents), tree.offsets)
+            return states[self._move(tree.leaves)]
+        order = np.argsort(-new, kind="stable")
+        columns = known[order, None] + np.arange(new.max())
+        suffix = np.take_along_axis(words[order].astype(np.int64), np.minimum(columns, self._length - 1), 1)
+        texts = self._texts[self._move(parents[order])]
+        encoded = self.net.dialogue.extend(texts, self._move(suffix), new[order].tolist(), self._words)
+        return torch.empty_like(encoded).index_copy_(0, self._move(order), encoded)
+
+    def _move(self, array: NDArray[np.generic]) -> Tensor:
+        return torch.from_numpy(np.ascontiguousarray(array)).to(self.device)
+
+
+def _with_room(table: Tensor, rows: int) -> Tensor:
+    """The table itself, or a copy with at least twice its rows, so that `rows` fit."""
+    if rows <= len(table):
+        return table
+    grown = table.new_zeros(max(rows, 2 * len(table)), table.shape[1])
+    grown[: len(table)] = table
+    return grown

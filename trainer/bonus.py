@@ -1,0 +1,94 @@
+"""This module pays episodic count-based exploration bonuses for what is heard or seen for the first time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trainer.config import TrainConfig
+from trainer.distinct import Int64
+
+
+class Bonus:
+    """`T * tanh(sum over keys k of (C / 40) / (N_k + 1) ** M)`, N_k = earlier visits of k in this episode.
+
+    `lang`: the one key of a step is the utterance heard, silence included. `cell`: the keys are the distinct kinds
+    of cells in the image. The observation a step returns counts, the first one after a reset does not; a step that
+    ends the episode pays nothing and clears the counts.
+    Source: SocialAI 1.0, exploration bonus (text and released code agree).
+
+    Attributes:
+        counts: int32 (E, K), visits in the running episodes, by environment and key.
+        keys: the key of each column: an utterance's id, or a kind of cell's code.
+    """
+
+    def __init__(self, config: TrainConfig, num_envs: int) -> None:
+        if config.explo == "none":
+            raise ValueError("explo: got 'none', expected 'lang' or 'cell'")
+        self._kind = config.explo
+        self._unit, self._power, self._scale = config.explo_c / 40, config.explo_m, config.explo_t
+        self.counts = np.zeros((num_envs, 0), np.int32)
+        self.keys: dict[int, int] = {}
+
+    def step(self, envs: Any, image: NDArray[np.uint8], ended: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """Bonus of the step just made, float64 (E,).
+
+        Args:
+            envs: the vector environment, asked for the ids of what was heard.
+            image: uint8 (E, H, W, C) observed after the step.
+            ended: bool (E,), where the step ended the episode (so that the observation is already the next one's).
+        """
+        if self._kind == "lang":
+            keys = np.asarray(envs.utterance_ids())[:, None]
+            new = np.ones(keys.shape, np.bool_)
+        else:
+            keys = np.sort(cell_codes(image), axis=1)
+            new = np.ones(keys.shape, np.bool_)
+            new[:, 1:] = keys[:, 1:] != keys[:, :-1]
+        columns = self._columns(keys)
+        rows = np.arange(len(keys))[:, None]
+        visits = self.counts[rows, columns]
+        terms = np.where(new, self._unit / (visits + 1.0) ** self._power, 0.0)
+        bonus: NDArray[np.float64] = np.where(ended, 0.0, self._scale * np.tanh(terms.sum(axis=1)))
+        self.counts[np.broadcast_to(rows, keys.shape)[new], columns[new]] += 1
+        self.counts[ended] = 0
+        return bonus
+
+    def _columns(self, keys: Int64) -> Int64:
+        """Column of each key, adding columns for keys not met before."""
+        unique, inverse = np.unique(keys, return_inverse=True)
+        columns = np.array([self.keys.setdefault(key, len(self.keys)) for key in unique.tolist()], np.int64)
+        missing = len(self.keys) - self.counts.shape[1]
+        if missing > 0:
+            spare = np.zeros((len(self.counts), max(missing, self.counts.shape[1])), np.int32)
+            self.counts = np.concatenate((self.counts, spare), axis=1)
+        return columns[inverse].reshape(keys.shape)
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        """Counts and keys, to be saved with a run."""
+        return {"counts": self.counts.copy(), "keys": np.array(list(self.keys), np.int64)}
+
+    def load_state(self, state: dict[str, NDArray[Any]]) -> None:
+        """Continue from `state()` of an equal bonus.
+
+        Raises:
+            ValueError: the counts are of another number of environments.
+        """
+        counts, keys = state["counts"], state["keys"]
+        if counts.ndim != 2 or len(counts) != len(self.counts) or len(keys) > counts.shape[1]:
+            raise ValueError(
+                f"bonus: got counts {counts.shape}, expected ({len(self.counts)}, {len(keys)} or more)"
+            )
+        self.counts = counts.astype(np.int32)
+        self.keys = {key: column for column, key in enumerate(keys.tolist())}
+
+
+def cell_codes(image: NDArray[np.uint8]) -> Int64:
+    """One integer per cell, int64 (E, H * W), equal where all channels are."""
+    cells = image.reshape(len(image), -1, image.shape[-1]).astype(np.int64)
+    codes = cells[..., 0]
+    for channel in range(1, image.shape[-1]):
+        codes = codes << 8 | cells[..., channel]
+    return codes

@@ -1,0 +1,248 @@
+"""This module writes and reads checkpoints: one safetensors file with JSON metadata and a digest, replaced atomically."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import safetensors.torch
+import torch
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from safetensors import SafetensorError
+from torch import Tensor
+
+from trainer.config import TrainConfig
+from trainer.errors import CheckpointError
+from trainer.nets import ActorCritic, NetSpec, build_net
+
+KEPT = 2
+_HEADER_LIMIT = 1_000_000
+_FILE_LIMIT = 8_000_000_000
+_NO_DIGEST = "0" * 64
+_EMBEDDING = "dialogue.embedding.weight"
+
+
+class CheckpointMeta(BaseModel):
+    """What a checkpoint says about itself.
+
+    Attributes:
+        format: version of this layout.
+        config: hyper-parameters of the run, its network's name among them.
+        action_sizes, image_shape: what the weights were made for.
+        vocabulary: words by token id.
+        program_sha256: digest of the compiled scenario.
+        frames, update: how far the run had come.
+        torch_version: version that wrote it.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    format: Literal[1] = 1
+    config: TrainConfig
+    action_sizes: tuple[int, int, int, int]
+    image_shape: tuple[int, int, int]
+    vocabulary: list[str] = Field(max_length=100_000)
+    program_sha256: str = Field(max_length=64)
+    frames: int = Field(ge=0)
+    update: int = Field(ge=0)
+    torch_version: str = Field(max_length=100)
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A checkpoint in memory: metadata and tensors by dotted name (`net.*`, `adam.*`, `state.*`, `rng`, `envs`)."""
+
+    meta: CheckpointMeta
+    tensors: dict[str, Tensor]
+
+    def part(self, prefix: str) -> dict[str, Tensor]:
+        """The tensors under `prefix.`, without it."""
+        start = prefix + "."
+        return {
+            name.removeprefix(start): value for name, value in self.tensors.items() if name.startswith(start)
+        }
+
+
+def write(directory: Path, checkpoint: Checkpoint) -> Path:
+    """Write `directory/<frames>.safetensors`, keep the `KEPT` newest, and sweep leftovers of writes that were killed.
+
+    The file appears under its name only when all of it is on the disk.
+
+    Raises:
+        OSError: it cannot be written, for example because the disk is full; earlier checkpoints are untouched.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    path = directory / f"{checkpoint.meta.frames:015d}.safetensors"
+    temporary = path.with_suffix(".tmp")
+    try:
+        with temporary.open("wb") as file:
+            file.write(_encode(checkpoint))
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except OSError:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        raise
+    _sync_directory(directory)
+    for old in [*sorted(directory.glob("*.safetensors"))[:-KEPT], *directory.glob("*.tmp")]:
+        old.unlink(missing_ok=True)
+    return path
+
+
+def _sync_directory(directory: Path) -> None:
+    descriptor = os.open(directory, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _encode(checkpoint: Checkpoint) -> bytes:
+    """The file's bytes; the digest is that of the same bytes with zeros in its place."""
+    tensors = {name: value.detach().cpu().contiguous() for name, value in checkpoint.tensors.items()}
+    metadata = {"meta": checkpoint.meta.model_dump_json(), "sha256": _NO_DIGEST}
+    blank = safetensors.torch.save(tensors, metadata)
+    return _with_digest(blank, hashlib.sha256(blank).hexdigest())
+
+
+def _with_digest(data: bytes, digest: str) -> bytes:
+    """Replace the digest in the header."""
+    start = data.index(b'"sha256":"') + len(b'"sha256":"')
+    return data[:start] + digest.encode() + data[start + len(digest) :]
+
+
+def read(path: Path) -> Checkpoint:
+    """Read a checkpoint file, or the newest intact one of a directory.
+
+    Raises:
+        CheckpointError: there is none, it is damaged, or it is not one of ours.
+    """
+    if not path.is_dir():
+        return _read_file(path)
+    failures = []
+    for candidate in sorted(path.glob("*.safetensors"), reverse=True):
+        try:
+            checkpoint = _read_file(candidate)
+        except CheckpointError as error:
+            failures.append(str(error))
+            continue
+        for failure in failures:
+            warnings.warn(f"{failure}; using {candidate.name} instead", stacklevel=2)
+        return checkpoint
+    raise CheckpointError("; ".join(failures) or f"{path}: there is no checkpoint in this directory")
+
+
+def _read_file(path: Path) -> Checkpoint:
+    try:
+        if path.stat().st_size > _FILE_LIMIT:
+            raise CheckpointError(f"{path}: larger than a checkpoint can be")
+        data = path.read_bytes()
+    except OSError as error:
+        raise CheckpointError(f"{path}: cannot be read: {error.strerror}") from error
+    try:
+        size = int.from_bytes(data[:8], "little")
+        if not 2 <= size <= min(_HEADER_LIMIT, len(data) - 8):
+            raise CheckpointError(f"{path}: not a checkpoint (no safetensors header)")
+        metadata = json.loads(data[8 : 8 + size])["__metadata__"]
+        digest, described = metadata["sha256"], metadata["meta"]
+        # The digest must be where the writer puts it: the first match in the bytes, inside the header.
+        blank = _with_digest(data, _NO_DIGEST)
+        if hashlib.sha256(blank).hexdigest() != digest or _with_digest(blank, digest) != data:
+            raise CheckpointError(f"{path}: damaged (its SHA-256 digest does not match)")
+        meta = CheckpointMeta.model_validate_json(described)
+        return Checkpoint(meta, safetensors.torch.load(data))
+    except CheckpointError:
+        raise
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise CheckpointError(f"{path}: made by another version ({where}: {first['msg']})") from error
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, SafetensorError) as error:
+        raise CheckpointError(f"{path}: not a checkpoint of this trainer, or damaged") from error
+
+
+def restore_net(
+    checkpoint: Checkpoint, spec: NetSpec, vocabulary: list[str], net: str | None = None
+) -> ActorCritic:
+    """Build the checkpoint's network for environments described by `spec` and `vocabulary`.
+
+    Word embeddings follow the spelling; words the checkpoint never met keep fresh ones, and a warning lists the
+    differences.
+
+    Args:
+        checkpoint: result of `read`.
+        spec: spaces of the environments it is to play.
+        vocabulary: their words by token id.
+        net: name of the network, needed if it is not a shipped one, because a file must not choose what is imported.
+
+    Raises:
+        CheckpointError: actions or images have another shape, or the weights are not those of the network.
+    """
+    meta = checkpoint.meta
+    if meta.action_sizes != spec.action_sizes:
+        raise CheckpointError(
+            f"checkpoint is for actions {meta.action_sizes}, but the scenario has {spec.action_sizes}"
+        )
+    if meta.image_shape != spec.image_shape:
+        raise CheckpointError(
+            f"checkpoint is for images {meta.image_shape}, but the scenario has {spec.image_shape}"
+        )
+    name = meta.config.net
+    if ":" in name and net != name:
+        raise CheckpointError(
+            f"checkpoint was made with the network {name}; name it (--net {name}) to load that code"
+        )
+    model = build_net(name, spec, meta.config.seed)
+    weights = checkpoint.part("net")
+    if vocabulary != meta.vocabulary:
+        _warn_of_words(meta.vocabulary, vocabulary)
+        _move_words(weights, model, meta.vocabulary, vocabulary)
+    _check_weights(weights, model.state_dict())
+    model.load_state_dict(weights)
+    return model
+
+
+def _warn_of_words(old: list[str], new: list[str]) -> None:
+    missing, unused = sorted(set(new) - set(old)), sorted(set(old) - set(new))
+    parts = [f"new words it never met: {', '.join(missing)}"] if missing else []
+    parts += [f"words not used here: {', '.join(unused)}"] if unused else []
+    detail = "; ".join(parts) or "the same words in another order"
+    warnings.warn(f"the checkpoint's vocabulary differs ({detail})", stacklevel=4)
+
+
+def _move_words(weights: dict[str, Tensor], model: ActorCritic, old: list[str], new: list[str]) -> None:
+    """Rearrange the rows of the word embedding from the order of `old` to that of `new`."""
+    source = weights.get(_EMBEDDING)
+    fresh = model.state_dict()[_EMBEDDING].clone()
+    if source is None or source.ndim != 2 or len(source) < len(old) or source.shape[1:] != fresh.shape[1:]:
+        raise CheckpointError(f"checkpoint's {_EMBEDDING} does not fit its vocabulary")
+    position = {word: index for index, word in enumerate(old)}
+    for index, word in enumerate(new):
+        if word in position:
+            fresh[index] = source[position[word]]
+    weights[_EMBEDDING] = fresh
+
+
+def _check_weights(weights: dict[str, Tensor], expected: dict[str, Tensor]) -> None:
+    """Refuse tensors that are missing, unknown, of another shape or type, or not finite."""
+    unlike = sorted(weights.keys() ^ expected.keys())
+    if unlike:
+        raise CheckpointError(
+            f"checkpoint's weights are not those of its network (first difference: {unlike[0]})"
+        )
+    for name, value in weights.items():
+        if value.shape != expected[name].shape or value.dtype != expected[name].dtype:
+            got, wanted = (
+                (tuple(value.shape), value.dtype),
+                (tuple(expected[name].shape), expected[name].dtype),
+            )
+            raise CheckpointError(f"checkpoint's {name}: got {got}, expected {wanted}")
+        if not bool(torch.isfinite(value).all()):
+            raise CheckpointError(f"checkpoint's {name} holds numbers that are not finite")

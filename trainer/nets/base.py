@@ -1,0 +1,134 @@
+"""This module states what the trainer asks of a network and provides the parts all of them share."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from torch import Tensor, nn
+
+from trainer.nets.dialogue import DialogueEncoder
+from trainer.nets.memory import Memory
+
+HEADS = ("primitive", "speak", "template", "noun")
+
+
+@dataclass(frozen=True)
+class NetSpec:
+    """What a network is built for.
+
+    Attributes:
+        action_sizes: choices of the four heads: primitive (last = no movement), speak (0 = silent), template, noun.
+        image_shape: cells along, cells ahead, channels.
+        image_high: highest value of each channel.
+        vocabulary_size: words, the padding and the unknown word included.
+    """
+
+    action_sizes: tuple[int, int, int, int]
+    image_shape: tuple[int, int, int]
+    image_high: tuple[int, ...]
+    vocabulary_size: int
+
+    @classmethod
+    def of(cls, action_space: Any, observation_space: Any, vocabulary_size: int) -> NetSpec:
+        """Read the spaces of one environment.
+
+        Raises:
+            ValueError: the spaces are not a `MultiDiscrete` of four and a `Dict` of `image` and `tokens`.
+        """
+        if not isinstance(action_space, spaces.MultiDiscrete) or len(action_space.nvec) != len(HEADS):
+            raise ValueError(
+                f"action space: got {action_space}, expected MultiDiscrete([primitives, 2, templates, nouns])"
+            )
+        image = observation_space["image"] if isinstance(observation_space, spaces.Dict) else None
+        if (
+            not isinstance(image, spaces.Box)
+            or len(image.shape) != 3
+            or "tokens" not in observation_space.keys()
+        ):
+            raise ValueError(
+                f"observation space: got {observation_space}, expected Dict(image=Box(H, W, C), tokens=Box(L))"
+            )
+        sizes = tuple(int(n) for n in action_space.nvec)
+        high = np.asarray(image.high).reshape(-1, image.shape[-1]).max(axis=0)
+        return cls(
+            (sizes[0], sizes[1], sizes[2], sizes[3]),
+            (image.shape[0], image.shape[1], image.shape[2]),
+            tuple(int(value) for value in high),
+            vocabulary_size,
+        )
+
+
+class Heads(nn.Module):
+    """Five two-layer heads: the four parts of the action and the value.
+
+    Each is Linear to 64, tanh, Linear (SocialAI 1.0's heads); their first layers are kept as one matrix, because one
+    product is faster than five.
+    """
+
+    def __init__(self, input_size: int, action_sizes: tuple[int, ...], hidden: int = 64) -> None:
+        super().__init__()
+        self.hidden_size = hidden
+        self.hidden = nn.Linear(input_size, hidden * (len(action_sizes) + 1))
+        self.out = nn.ModuleList(nn.Linear(hidden, n) for n in (*action_sizes, 1))
+
+    def forward(self, memory: Tensor) -> tuple[Tensor, Tensor]:
+        """Memory (..., M) to logits of all heads side by side (..., sum of sizes) and value (...)."""
+        parts = torch.tanh(self.hidden(memory)).split(self.hidden_size, dim=-1)
+        outputs = [layer(part) for layer, part in zip(self.out, parts, strict=True)]
+        return torch.cat(outputs[:-1], -1), outputs[-1].squeeze(-1)
+
+
+def unit_row_linear(module: nn.Module) -> None:
+    """Draw a `Linear` as the paper's code does: normal weights, each row scaled to length 1; bias 0."""
+    if isinstance(module, nn.Linear):
+        nn.init.normal_(module.weight)
+        with torch.no_grad():
+            module.weight /= module.weight.norm(dim=1, keepdim=True)
+        nn.init.zeros_(module.bias)
+
+
+class ActorCritic(nn.Module, ABC):
+    """A recurrent policy and value: images and dialogue to features, LSTM, four heads and a critic.
+
+    A subclass implements `prepare` and `perceive`; `--net my.module:MyNet` builds `MyNet(spec)`. The trainer calls
+    the parts one by one, so that each distinct image, history and pair of the two is processed once.
+
+    Attributes:
+        distinct: whether equal frames may share their features; False for networks whose features depend on the
+            rest of the batch.
+    """
+
+    distinct = True
+
+    def __init__(
+        self, spec: NetSpec, features: int, dialogue: DialogueEncoder, memory_size: int = 128
+    ) -> None:
+        super().__init__()
+        self.spec = spec
+        self.features = features
+        self.dialogue = dialogue
+        self.memory = Memory(features, memory_size)
+        self.heads = Heads(memory_size, spec.action_sizes)
+
+    @abstractmethod
+    def prepare(self, images: Tensor) -> Any:
+        """Whatever `perceive` wants to know about images, uint8 (I, H, W, C), that no weight influences."""
+
+    @abstractmethod
+    def perceive(self, prepared: Any, text: Tensor, image_index: Tensor, text_index: Tensor) -> Tensor:
+        """Features of pairs of an image and a history.
+
+        Args:
+            prepared: result of `prepare` for I images.
+            text: (D, dialogue.size) encoded histories.
+            image_index: int64 (P,) image of each pair.
+            text_index: int64 (P,) history of each pair.
+
+        Returns:
+            (P, features).
+        """

@@ -1,0 +1,87 @@
+"""This module is the network of the SocialAI 1.0 baselines: convolutions modulated by the dialogue."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from trainer.nets.base import ActorCritic, NetSpec, unit_row_linear
+from trainer.nets.dialogue import DialogueEncoder
+
+_VOCABULARY_CAPACITY = 100
+
+
+def _conv(inputs: int, outputs: int) -> nn.Conv2d:
+    return nn.Conv2d(inputs, outputs, kernel_size=3, padding=1)
+
+
+def _norm(width: int, batch_norm: bool) -> nn.Module:
+    return nn.BatchNorm2d(width) if batch_norm else nn.Identity()
+
+
+class _FilmBlock(nn.Module):
+    """Two convolutions, modulation per channel by the dialogue, and a residual connection."""
+
+    def __init__(self, width: int, text_size: int, batch_norm: bool) -> None:
+        super().__init__()
+        self.conv1, self.norm1 = _conv(width, width), _norm(width, batch_norm)
+        self.conv2, self.norm2 = _conv(width, width), _norm(width, batch_norm)
+        self.scale = nn.Linear(text_size, width)
+        self.shift = nn.Linear(text_size, width)
+
+    def forward(self, images: Tensor, text: Tensor, text_index: Tensor) -> Tensor:
+        hidden = self.conv2(torch.relu(self.norm1(self.conv1(images))))
+        scale = self.scale(text).index_select(0, text_index)[:, :, None, None]
+        shift = self.shift(text).index_select(0, text_index)[:, :, None, None]
+        return torch.relu(self.norm2(hidden * scale + shift)) + images
+
+
+class PaperNet(ActorCritic):
+    """Two convolutions, two FiLM blocks, max pooling, LSTM 128 and heads; no BatchNorm.
+
+    Source: SocialAI 1.0, appendix on the baselines, with details of the released code: raw integers as input,
+    gamma without "1 +", normalisation after the modulation, heads and FiLM layers with rows of length 1.
+
+    Attributes:
+        batch_norm: whether to normalise over the batch as the released code does.
+    """
+
+    batch_norm = False
+
+    def __init__(self, spec: NetSpec, width: int = 128) -> None:
+        vocabulary = max(spec.vocabulary_size, _VOCABULARY_CAPACITY)
+        super().__init__(spec, width, DialogueEncoder(vocabulary))
+        self.image_conv = nn.Sequential(
+            _conv(spec.image_shape[2], width),
+            _norm(width, self.batch_norm),
+            nn.ReLU(),
+            _conv(width, width),
+            _norm(width, self.batch_norm),
+            nn.ReLU(),
+        )
+        self.blocks = nn.ModuleList(_FilmBlock(width, self.dialogue.size, self.batch_norm) for _ in range(2))
+        self.apply(unit_row_linear)
+        self.to(memory_format=torch.channels_last)
+
+    def prepare(self, images: Tensor) -> Tensor:
+        """Images as floats, channels first; the bytes are channels-last in memory as convolutions like them."""
+        return images.permute(0, 3, 1, 2).float()
+
+    def perceive(self, prepared: Tensor, text: Tensor, image_index: Tensor, text_index: Tensor) -> Tensor:
+        """Features (P, width) of the pairs; see `ActorCritic.perceive`."""
+        hidden = self.image_conv(prepared.to(self.image_conv[0].weight.dtype)).index_select(0, image_index)
+        for block in self.blocks:
+            hidden = block(hidden, text, text_index)
+        pooled = functional.max_pool2d(hidden, tuple(hidden.shape[2:]))
+        return torch.relu(pooled.flatten(1))
+
+
+class PaperReferenceNet(PaperNet):
+    """The paper's network with BatchNorm, whose statistics are those of the batch while acting and while learning.
+
+    Frames are never shared, because each one's features depend on the others in its batch.
+    """
+
+    batch_norm = True
+    distinct = False

@@ -1,0 +1,166 @@
+"""This module is everything a training run has to remember, and how that goes into a checkpoint and comes back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from trainer import checkpoint as checkpoints
+from trainer.actor import Actor
+from trainer.bonus import Bonus
+from trainer.checkpoint import Checkpoint, CheckpointMeta
+from trainer.config import RESUMABLE_FIELDS, TrainConfig
+from trainer.errors import CheckpointError
+from trainer.nets import NetSpec, build_net
+from trainer.rollout import RolloutState
+
+_ADAM = ("step", "exp_avg", "exp_avg_sq")
+
+
+@dataclass
+class Session:
+    """A run between two updates; equal sessions have equal futures on the same CPU with the same number of threads.
+
+    Attributes:
+        update: updates made. frames: environment steps made.
+        generator: the one source of the trainer's randomness.
+    """
+
+    config: TrainConfig
+    envs: Any
+    actor: Actor
+    optimizer: torch.optim.Adam
+    state: RolloutState
+    generator: torch.Generator
+    bonus: Bonus | None
+    update: int = 0
+
+    @property
+    def frames(self) -> int:
+        """Environment steps made, all environments together."""
+        return self.update * self.config.frames_per_update
+
+    @classmethod
+    def start(cls, config: TrainConfig, envs: Any) -> Session:
+        """Begin a run: fresh weights, environments reset with the run's seed.
+
+        Raises:
+            ValueError: the environments do not fit the configuration, or are not of the form the trainer learns.
+        """
+        if envs.num_envs != config.num_envs:
+            raise ValueError(f"envs: got {envs.num_envs} environments, expected num_envs = {config.num_envs}")
+        spec = net_spec(envs)
+        net = build_net(config.net, spec, config.seed).to(config.device)
+        observation, _ = envs.reset(seed=config.seed)
+        return cls(
+            config,
+            envs,
+            Actor(net, observation["tokens"].shape[1]),
+            torch.optim.Adam(net.parameters(), lr=config.lr, eps=config.adam_eps, fused=True),
+            RolloutState.initial(observation, net.memory.initial(config.num_envs)),
+            torch.Generator().manual_seed(config.seed),
+            Bonus(config, config.num_envs) if config.explo != "none" else None,
+        )
+
+    def checkpoint(self) -> Checkpoint:
+        """Everything needed to continue exactly."""
+        net, state = self.actor.net, self.state
+        tensors: dict[str, Tensor] = {f"net.{name}": value for name, value in net.state_dict().items()}
+        for name, parameter in net.named_parameters():
+            for key, value in self.optimizer.state.get(parameter, {}).items():
+                tensors[f"adam.{key}.{name}"] = value
+        tensors["state.memory"] = state.memory
+        for name in ("image", "tokens", "starts", "returns", "lengths"):
+            tensors[f"state.{name}"] = torch.from_numpy(getattr(state, name))
+        if self.bonus is not None:
+            for name, array in self.bonus.state().items():
+                tensors[f"bonus.{name}"] = torch.from_numpy(array)
+        tensors["rng"] = self.generator.get_state()
+        tensors["envs"] = torch.frombuffer(bytearray(self.envs.snapshot()), dtype=torch.uint8)
+        return Checkpoint(self._meta(), tensors)
+
+    def _meta(self) -> CheckpointMeta:
+        spec, program = self.actor.net.spec, self.envs.program
+        return CheckpointMeta(
+            config=self.config,
+            action_sizes=spec.action_sizes,
+            image_shape=spec.image_shape,
+            vocabulary=list(program.vocabulary),
+            program_sha256=program.sha256,
+            frames=self.frames,
+            update=self.update,
+            torch_version=str(torch.__version__),
+        )
+
+    def load(self, checkpoint: Checkpoint) -> None:
+        """Continue from a checkpoint of this very run, in a session begun with the same configuration.
+
+        Raises:
+            CheckpointError: it is of another scenario, of other hyper-parameters, or incomplete.
+        """
+        self._check_same_run(checkpoint.meta)
+        net = checkpoints.restore_net(
+            checkpoint, self.actor.net.spec, list(self.envs.program.vocabulary), self.config.net
+        )
+        try:
+            self.actor.net.load_state_dict(net.state_dict())
+            self._load_adam(checkpoint)
+            self._load_state(checkpoint.part("state"))
+            if self.bonus is not None:
+                self.bonus.load_state(
+                    {name: value.numpy() for name, value in checkpoint.part("bonus").items()}
+                )
+            self.generator.set_state(checkpoint.tensors["rng"])
+            self.envs.restore(checkpoint.tensors["envs"].numpy().tobytes())
+        except (KeyError, ValueError, TypeError, RuntimeError) as error:
+            raise CheckpointError(f"checkpoint cannot continue this run: {error}") from error
+        self.update = checkpoint.meta.update
+
+    def _check_same_run(self, meta: CheckpointMeta) -> None:
+        if meta.program_sha256 != self.envs.program.sha256:
+            raise CheckpointError(
+                "the scenario has changed since this checkpoint; a run resumes only on the same one"
+            )
+        old, new = meta.config.model_dump(), self.config.model_dump()
+        changed = [name for name in new if name not in RESUMABLE_FIELDS and old[name] != new[name]]
+        if changed:
+            detail = ", ".join(f"{name}: {old[name]} -> {new[name]}" for name in changed)
+            raise CheckpointError(f"a run resumes only with the same settings; changed: {detail}")
+
+    def _load_adam(self, checkpoint: Checkpoint) -> None:
+        stored = checkpoint.part("adam")
+        state: dict[int, dict[str, Tensor]] = {}
+        for index, (name, parameter) in enumerate(self.actor.net.named_parameters()):
+            if not stored:
+                break
+            values = {key: stored[f"{key}.{name}"] for key in _ADAM}
+            if any(values[key].shape != parameter.shape for key in _ADAM[1:]):
+                raise ValueError(f"optimiser state of {name} has another shape")
+            state[index] = values
+        self.optimizer.load_state_dict(
+            {"state": state, "param_groups": self.optimizer.state_dict()["param_groups"]}
+        )
+
+    def _load_state(self, stored: dict[str, Tensor]) -> None:
+        state = self.state
+        for name in ("image", "tokens", "starts", "returns", "lengths"):
+            present, value = getattr(state, name), stored[name].numpy()
+            if value.shape != present.shape or value.dtype != present.dtype:
+                raise ValueError(
+                    f"state.{name}: got {value.shape} {value.dtype}, expected {present.shape} {present.dtype}"
+                )
+            setattr(state, name, np.array(value))
+        if stored["memory"].shape != state.memory.shape:
+            raise ValueError(
+                f"state.memory: got {tuple(stored['memory'].shape)}, expected {tuple(state.memory.shape)}"
+            )
+        state.memory = stored["memory"].to(state.memory)
+
+
+def net_spec(envs: Any) -> NetSpec:
+    """Shapes a network for these environments must have."""
+    return NetSpec.of(envs.single_action_space, envs.single_observation_space, len(envs.program.vocabulary))
