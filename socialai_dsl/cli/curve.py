@@ -1,5 +1,7 @@
 """This module draws a run's learning curve."""
 
+import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,6 +36,22 @@ class Curve:
     success: Sequence[float]
     outcomes: Mapping[str, Sequence[float]]
     test: tuple[float, float, float] | None = None
+
+
+def read_curve(metrics: Path, test: tuple[float, float, float] | None) -> Curve:
+    """The curve that a run's `metrics.jsonl` describes."""
+    rows = [json.loads(line) for line in metrics.read_text(encoding="utf-8").splitlines()]
+    names = list(dict.fromkeys(name for row in rows for name in row["outcomes"]))
+    return Curve(
+        [float(row["frames"]) for row in rows],
+        [_number(row["success"]) for row in rows],
+        {name: [_number(row["outcomes"].get(name)) for row in rows] for name in names},
+        test,
+    )
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value
 
 
 def draw_learning_curve(curve: Curve, title: str, path: Path) -> None:

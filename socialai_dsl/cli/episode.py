@@ -1,6 +1,6 @@
 """This module records one episode for people: a film with its dialogue, and a transcript."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -16,9 +16,6 @@ from socialai_dsl.program import Program
 _STEP_MILLISECONDS: Final = 450
 _END_MILLISECONDS: Final = 2500
 _PALETTE_COLOURS: Final = 160
-
-Act = Callable[[dict[str, NDArray[Any]], bool], NDArray[np.int64]]
-"""Chooses the action, int64 (4,), for an observation; the flag says whether it is the episode's first."""
 
 
 @dataclass(frozen=True)
@@ -89,34 +86,35 @@ class Episode:
         )
 
 
-def record(env: Any, program: Program, act: Act, title: str, reset: dict[str, Any]) -> Episode:
-    """Play one episode and record it.
+def record(
+    env: Any, program: Program, actions: Sequence[NDArray[np.int64]], title: str, reset: dict[str, Any]
+) -> Episode:
+    """Play one episode with given actions and record it.
 
     Args:
         env: a single environment with render mode `rgb_array`.
-        program: the scenario's, for the words of actions and outcomes.
-        act: chooses the actions.
+        program: the scenario's, for the words of actions.
+        actions: int64 (4,) each; the last one ends the episode.
         title: first line of the transcript.
         reset: arguments of `env.reset`.
     """
     episode = Episode(title)
-    observation, info = env.reset(**reset)
+    env.reset(**reset)
     dialogue: list[DialogueLine] = []
-    episode.frames.append(compose_frame(env.render(), dialogue, ["before the first step"]))
-    ended, first = False, True
-    while not ended:
-        action = act(observation, first)
-        first = False
-        observation, reward, terminated, truncated, info = env.step(action)
+    episode.frames.append(compose_frame(env.render(), dialogue, ["before the first step", ""]))
+    for t, action in enumerate(actions, start=1):
+        _, reward, terminated, truncated, info = env.step(action)
         ended = bool(terminated or truncated)
-        step = describe_step(program, action, len(episode.steps) + 1, info["utterance"])
+        assert ended == (t == len(actions)), f"internal: played again, the episode ended={ended} at step {t}"
+        step = describe_step(program, action, t, info["utterance"])
         episode.steps.append(step)
         episode.reward += float(reward)
         dialogue += step.dialogue
         if ended:
             episode.outcome, episode.success = str(info["outcome"]), bool(info["success"])
-        caption = _caption(episode, step, ended)
-        episode.frames.append(compose_frame(env.render(), dialogue, caption, now=step.t))
+        episode.frames.append(
+            compose_frame(env.render(), dialogue, _caption(episode, step, ended), now=step.t)
+        )
     return episode
 
 

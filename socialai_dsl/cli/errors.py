@@ -16,3 +16,7 @@ class Exit(IntEnum):
 
 class UsageError(Exception):
     """The caller asked for something that cannot be done; the message says what was got and expected."""
+
+
+class RunFailed(Exception):  # noqa: N818 - it says what happened
+    """Training broke down although everything was asked for rightly."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from socialai_dsl.cli import bench, evaluate, run, schema, show, validate
-from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.errors import Exit, RunFailed, UsageError
 from socialai_dsl.diagnostics import ScenarioError, render_text
 
 _COMMANDS: Final = {
@@ -53,20 +53,23 @@ def _add_debug(parser: argparse.ArgumentParser) -> None:
 
 def _guarded(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
     """Parse and execute; every error is answered with one message and its exit code."""
-    arguments = parser.parse_args(argv)
+    debug = False
     try:
-        code = int(arguments.execute(arguments))
-        sys.stdout.flush()
-        return code
+        try:
+            arguments = parser.parse_args(argv)
+            debug = arguments.debug
+            return int(arguments.execute(arguments))
+        finally:
+            sys.stdout.flush()
     except BrokenPipeError:
         # Python flushes stdout once more when it exits and would complain there.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return Exit.BROKEN_PIPE
-    except KeyboardInterrupt:
-        print(f"{parser.prog}: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as interruption:
+        print(f"{parser.prog}: {str(interruption) or 'interrupted'}", file=sys.stderr)
         return Exit.INTERRUPTED
     except Exception as error:
-        if arguments.debug:
+        if debug:
             traceback.print_exc()
         return _explain(parser.prog, error)
 
@@ -78,9 +81,9 @@ def _explain(program: str, error: Exception) -> Exit:
             file=sys.stderr,
         )
         return Exit.FINDINGS
-    if isinstance(error, UsageError):
+    if isinstance(error, UsageError | RunFailed):
         print(f"{program}: {error}", file=sys.stderr)
-        return Exit.USAGE
+        return Exit.USAGE if isinstance(error, UsageError) else Exit.FINDINGS
     if isinstance(error, OSError):
         place = f": {error.filename}" if error.filename is not None else ""
         print(f"{program}: {error.strerror or error}{place}", file=sys.stderr)

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -171,6 +172,27 @@ def _measure_peer(repetitions: int, seconds: float) -> Iterator[Row]:
     cpu, wall = _time(run, 1, repetitions, seconds)
     env.close()
     yield Row(f"MiniGrid {minigrid.__version__} Empty-8x8", "random", 0, cpu, wall, 0.0)
+
+
+def _measure_training(scenario: str, frames: int) -> float:
+    """Frames per second of training with the trainer's defaults, the first tenth left out."""
+    from tempfile import TemporaryDirectory
+
+    from trainer.config import TrainConfig
+    from trainer.train import Progress, train
+
+    config = TrainConfig(frames=frames, tensorboard=False)
+    envs = socialai_dsl.make_vec(scenario, num_envs=config.num_envs, copy=False, autoreset_mode="SameStep")
+    speeds: list[float] = []
+
+    def note(progress: Progress) -> None:
+        speeds.append(progress.frames_per_second)
+
+    with TemporaryDirectory() as folder:
+        train(config, envs, Path(folder), progress=note)
+    envs.close()
+    kept = speeds[len(speeds) // 10 :]
+    return len(kept) / sum(1 / speed for speed in kept)
 
 
 def _time(run: Callable[[int], None], per_step: int, repetitions: int, seconds: float) -> tuple[float, float]:

@@ -1,6 +1,5 @@
 """This module shows how far a training run has come: a live bar on a terminal, plain lines elsewhere."""
 
-import math
 import time
 from collections import deque
 from types import TracebackType
@@ -19,13 +18,13 @@ class TrainingProgress:
     On a terminal one line is redrawn; otherwise a line is written every few seconds, so that logs stay short.
     """
 
-    def __init__(self, total: int, done: int, stream: IO[str]) -> None:
-        """Report on `total` frames, of which `done` were trained before, writing to `stream`."""
-        self._total, self._first = total, done
+    def __init__(self, total: int, stream: IO[str]) -> None:
+        """Report on a run of `total` frames, writing to `stream`."""
+        self._total = total
         self._stream = stream
-        self._started = time.monotonic()
-        self._last_line = self._started
+        self._last_line = time.monotonic()
         self._success: deque[float] = deque(maxlen=_REMEMBERED_UPDATES)
+        self._speed: deque[float] = deque(maxlen=_REMEMBERED_UPDATES)
         self._bar: Progress | None = None
         if stream.isatty():
             self._bar = Progress(
@@ -35,7 +34,7 @@ class TrainingProgress:
                 TextColumn("{task.fields[text]}"),
                 console=Console(file=stream),
             )
-            self._task = self._bar.add_task("training", total=total, completed=done, text="")
+            self._task = self._bar.add_task("training", total=total, text="")
 
     def __enter__(self) -> Self:
         if self._bar is not None:
@@ -48,15 +47,17 @@ class TrainingProgress:
         if self._bar is not None:
             self._bar.stop()
 
-    def update(self, frames: int, success: float | None) -> None:
+    def update(self, frames: int, success: float | None, speed: float) -> None:
         """Report one update.
 
         Args:
             frames: frames trained so far, earlier parts of a resumed run included.
-            success: share of the episodes ended in this update that succeeded; None or nan if none ended.
+            success: share of the episodes ended in this update that succeeded; None if none ended.
+            speed: frames per second of this update.
         """
-        if success is not None and not math.isnan(success):
+        if success is not None:
             self._success.append(success)
+        self._speed.append(speed)
         text = self._text(frames)
         if self._bar is not None:
             self._bar.update(self._task, completed=min(frames, self._total), text=text)
@@ -65,17 +66,15 @@ class TrainingProgress:
             print(f"{frames:>12,} of {self._total:,} frames  {text}", file=self._stream, flush=True)
 
     def _text(self, frames: int) -> str:
-        elapsed = max(time.monotonic() - self._started, 1e-9)
-        speed = (frames - self._first) / elapsed
-        left = max(self._total - frames, 0) / speed if speed > 0 else math.inf
+        # The mean time of a frame, not the mean speed: a slow update counts for as long as it took.
+        speed = len(self._speed) / sum(1 / max(s, 1e-9) for s in self._speed)
+        left = max(self._total - frames, 0) / speed
         known = f"{sum(self._success) / len(self._success):.3f}" if self._success else "-"
         return f"{speed:>9,.0f} frames/s  success {known}  {_clock(left)} left"
 
 
 def _clock(seconds: float) -> str:
     """Seconds as h:mm:ss or m:ss."""
-    if math.isinf(seconds):
-        return "-:--"
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"

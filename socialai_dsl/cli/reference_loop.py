@@ -3,17 +3,18 @@
 import time
 
 import numpy as np
-from numba import njit
+
+from socialai_dsl.engine.jit import outline
 
 ITERATIONS = 20_000_000
 
 
-@njit
-def reference_loop(iterations: int) -> int:
+@outline
+def reference_loop(iterations: int) -> np.int64:
     """Mix a 64-bit number, look up and change a table of 64 KiB, branch: what an interpreter's step is made of."""
     table = np.zeros(16384, np.uint32)
     number = np.uint64(0x9E3779B97F4A7C15)
-    total = 0
+    total = np.int64(0)
     for i in range(iterations):
         number ^= number << np.uint64(13)
         number ^= number >> np.uint64(7)

@@ -11,7 +11,7 @@ from typing import Any, Final
 from socialai_dsl.cli.errors import UsageError
 
 RESULT: Final = "result.json"
-SETTINGS: Final = "run.json"
+SETTINGS: Final = "config.json"
 _REPORTED_PACKAGES: Final = ("socialai-dsl", "numpy", "numba", "gymnasium", "torch")
 
 
@@ -21,6 +21,11 @@ def scenario_folder_name(spec: str) -> str:
     name, plus, variants = Path(path).name.partition("+")
     name = name.removesuffix(".yaml").removesuffix(".yml")
     return name + plus + variants + ("," if mark else "") + parameters.replace("&", ",").replace("/", "_")
+
+
+def base_name(spec: str) -> str:
+    """`scenarios/talkitout.yaml+unsocial?a=1` -> `talkitout`."""
+    return scenario_folder_name(spec.partition("?")[0]).partition("+")[0]
 
 
 def create_run_folder(out: Path | None, spec: str, seed: int) -> Path:

@@ -66,12 +66,15 @@ def test_ctrl_c(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
 
 
 def test_a_reader_that_went_away_is_no_error() -> None:
-    script = "import sys; from socialai_dsl.cli.main import main; sys.exit(main(['schema']))"
+    script = "import sys; from socialai_dsl.cli.main import main; sys.exit(main(['--help']))"
+    # Unbuffered, argparse would meet the broken pipe and keep quiet about it.
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     process = subprocess.Popen(
         [sys.executable, "-c", script],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         cwd=Path(cli.__file__).parents[2],
+        env=environment,
     )
     assert process.stdout is not None
     assert process.stderr is not None

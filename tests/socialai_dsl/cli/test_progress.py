@@ -24,27 +24,42 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 def test_lines_are_rare_and_the_last_update_is_always_shown(clock: Clock) -> None:
     stream = io.StringIO()
-    with TrainingProgress(10_000, 0, stream) as shown:
+    with TrainingProgress(10_000, stream) as shown:
         for update in range(1, 101):
             clock.now = update * 0.1
-            shown.update(update * 100, 0.5)
+            shown.update(update * 100, 0.5, 1000)
     lines = stream.getvalue().splitlines()
     assert len(lines) == 2
     assert lines[-1].split() == "10,000 of 10,000 frames 1,000 frames/s success 0.500 0:00 left".split()
 
 
-def test_time_left_and_speed_count_only_this_part_of_a_resumed_run(clock: Clock) -> None:
+def test_a_slow_update_counts_for_the_time_it_took(clock: Clock) -> None:
+    """100 frames at 100/s and 100 at 300/s are 200 frames in 4/3 s."""
     stream = io.StringIO()
-    with TrainingProgress(1_000_000, 900_000, stream) as shown:
+    with TrainingProgress(9_200, stream) as shown:
+        shown.update(100, None, 100)
         clock.now = 10.0
-        shown.update(910_000, None)
-    assert stream.getvalue().split()[4:] == "1,000 frames/s success - 1:30 left".split()
+        shown.update(200, None, 300)
+    assert stream.getvalue().split() == "200 of 9,200 frames 150 frames/s success - 1:00 left".split()
 
 
 def test_updates_in_which_no_episode_ended_do_not_spoil_the_success(clock: Clock) -> None:
     stream = io.StringIO()
-    with TrainingProgress(100, 0, stream) as shown:
-        shown.update(50, 0.25)
-        clock.now = 1.0
-        shown.update(100, float("nan"))
+    with TrainingProgress(100, stream) as shown:
+        shown.update(50, 0.25, 10)
+        shown.update(100, None, 10)
     assert "success 0.250" in stream.getvalue()
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_terminal_gets_one_line_that_is_redrawn() -> None:
+    stream = Terminal()
+    with TrainingProgress(1000, stream) as shown:
+        for frames in range(100, 1100, 100):
+            shown.update(frames, 0.5, 100)
+    assert "100%" in stream.getvalue()
+    assert "1,000 of" not in stream.getvalue()

@@ -1,0 +1,229 @@
+"""This module is `socialai-run`: check a scenario, train an agent on it, evaluate it, leave a folder of results."""
+
+import argparse
+import json
+import sys
+import time
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.run_folder import (
+    RESULT,
+    SETTINGS,
+    create_run_folder,
+    read_json,
+    versions,
+    write_json,
+    write_text,
+)
+from socialai_dsl.cli.settings import Settings
+
+if TYPE_CHECKING:
+    from socialai_dsl.program import Program
+
+SUMMARY: Final = "train an agent on a scenario, evaluate it and write pictures and figures"
+
+# About two minutes of training with the fast network on two cores of a server.
+DEFAULT_FRAMES: Final = 1_000_000
+BUILT_IN_AGENTS: Final = ("ppo", "random", "oracle")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this command."""
+    parser.add_argument(
+        "scenario", nargs="?", metavar="SCENARIO", help="a path or a name, with +variants and ?parameters"
+    )
+    parser.add_argument(
+        "--agent",
+        default="ppo",
+        help="ppo (default), random, oracle, or a checkpoint or run folder; all but ppo skip training",
+    )
+    parser.add_argument(
+        "--frames", type=_positive, metavar="N", help=f"frames to train for (default: {DEFAULT_FRAMES:,})"
+    )
+    parser.add_argument("--seed", type=_natural, default=0, metavar="N", help="default: 0")
+    parser.add_argument(
+        "--envs", type=_positive, default=256, metavar="N", help="environments at once (default: 256)"
+    )
+    parser.add_argument(
+        "--net", default="fast", help="fast (default), paper, paper-reference, or my.module:MyNet"
+    )
+    parser.add_argument(
+        "--explo",
+        choices=("none", "auto", "lang", "cell"),
+        default="auto",
+        help="exploration bonus; auto (default): the paper's choice for this scenario",
+    )
+    parser.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help="default: auto")
+    parser.add_argument(
+        "--eval-episodes", type=_positive, default=500, metavar="N", help="of the test set (default: 500)"
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="folder of this run (default: runs/<scenario>/<time>-s<seed>)"
+    )
+    parser.add_argument("--resume", type=Path, metavar="RUN_DIR", help="go on with a run that was stopped")
+    parser.add_argument("--json", action="store_true", help="print only the result, as one JSON object")
+
+
+def execute(arguments: argparse.Namespace) -> Exit:
+    """Do the whole run."""
+    import socialai_dsl
+    from socialai_dsl.cli.agents import evaluate_agent, require_trainer, train_agent
+
+    require_trainer()
+    settings = _resumed(arguments) if arguments.resume else _started(arguments)
+    program = socialai_dsl.compile(socialai_dsl.load(settings.scenario))
+    folder = arguments.resume or create_run_folder(arguments.out, settings.scenario, settings.seed)
+    write_json(folder / SETTINGS, asdict(settings))
+    # With --json, standard output belongs to the result alone.
+    stream = sys.stderr if arguments.json else sys.stdout
+    print(f"{settings.scenario}: {_size(program)}; writing to {folder}", file=stream, flush=True)
+
+    agent, training = settings.agent, _NOT_TRAINED
+    if settings.agent == "ppo":
+        start = time.perf_counter()
+        agent = str(train_agent(settings, folder, bool(arguments.resume), stream))
+        training = _training_figures(folder, time.perf_counter() - start)
+    label = f"agent {settings.agent}, seed {settings.seed}"
+    evaluation, episode = evaluate_agent(
+        agent, settings.scenario, program, settings.eval_episodes, settings.device, label
+    )
+    result = {
+        "scenario": settings.scenario,
+        "agent": settings.agent,
+        "seed": settings.seed,
+        **training,
+        "eval": evaluation,
+        "program_sha256": program.sha256,
+        "versions": versions(),
+    }
+    write_text(folder / "transcript.txt", episode.transcript())
+    episode.save_film(folder / "episode.gif")
+    if settings.agent == "ppo":
+        _draw_curve(settings, folder, result)
+    write_json(folder / RESULT, result)  # last, so that its presence means a complete run
+    print(json.dumps(result, indent=2, ensure_ascii=False) if arguments.json else _table(result, folder))
+    return Exit.GOOD
+
+
+_NOT_TRAINED: Final = {"frames": 0, "train_seconds": 0.0, "frames_per_second": None}
+
+
+def _training_figures(folder: Path, seconds: float) -> dict[str, Any]:
+    """Frames of the whole run, and seconds and speed of this part of it."""
+    lines = (folder / "metrics.jsonl").read_text(encoding="utf-8").splitlines()
+    rows = [json.loads(line) for line in lines]
+    per_frame = sum(1 / row["frames_per_second"] for row in rows) / len(rows)
+    return {
+        "frames": rows[-1]["frames"],
+        "train_seconds": round(seconds, 3),
+        "frames_per_second": round(1 / per_frame, 1),
+    }
+
+
+def _started(arguments: argparse.Namespace) -> Settings:
+    """The settings of a new run."""
+    from socialai_dsl.cli.agents import resolve_device, resolve_exploration
+
+    if arguments.scenario is None:
+        raise UsageError("expected a scenario (a path or a name), or --resume RUN_DIR")
+    trains = arguments.agent == "ppo"
+    if arguments.agent not in BUILT_IN_AGENTS and not Path(arguments.agent).exists():
+        known = ", ".join(BUILT_IN_AGENTS)
+        raise UsageError(f"--agent: expected {known} or the path of a checkpoint, got {arguments.agent!r}")
+    if not trains and arguments.frames is not None:
+        raise UsageError(f"--frames: the agent {arguments.agent!r} is not trained")
+    explo, explo_c = resolve_exploration(arguments.explo, arguments.scenario)
+    return Settings(
+        scenario=arguments.scenario,
+        agent=arguments.agent,
+        seed=arguments.seed,
+        frames=(arguments.frames or DEFAULT_FRAMES) if trains else 0,
+        envs=arguments.envs,
+        net=arguments.net,
+        explo=explo,
+        explo_c=explo_c,
+        device=resolve_device(arguments.device),
+        eval_episodes=arguments.eval_episodes,
+    )
+
+
+def _resumed(arguments: argparse.Namespace) -> Settings:
+    """The settings of a run that was stopped; `--frames` may be raised."""
+    from pydantic import TypeAdapter, ValidationError
+
+    folder: Path = arguments.resume
+    if arguments.scenario is not None or arguments.out is not None:
+        raise UsageError(
+            "--resume: the run's folder says which scenario it is; give neither SCENARIO nor --out"
+        )
+    if not (folder / SETTINGS).is_file():
+        raise UsageError(f"--resume: {folder} is not a run's folder, it has no {SETTINGS}")
+    content = read_json(folder / SETTINGS)
+    try:
+        settings = TypeAdapter(Settings).validate_python(content, strict=True)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise UsageError(f"{folder / SETTINGS}: {first['loc'][0]}: {first['msg']}") from None
+    if settings.agent != "ppo":
+        raise UsageError(f"--resume: the agent {settings.agent!r} of {folder} is not trained")
+    return replace(settings, frames=arguments.frames or settings.frames)
+
+
+def _draw_curve(settings: Settings, folder: Path, result: dict[str, Any]) -> None:
+    from socialai_dsl.cli.curve import draw_learning_curve, read_curve
+
+    test = (result["frames"], result["eval"]["success_rate"], result["eval"]["success_rate_se"])
+    curve = read_curve(folder / "metrics.jsonl", test)
+    title = f"{settings.scenario}, {settings.agent}, seed {settings.seed}"
+    draw_learning_curve(curve, title, folder / "learning_curve.png")
+
+
+def _size(program: "Program") -> str:
+    """The size of the agent's choices, in one phrase."""
+    said = len(program.templates) * len(program.nouns)
+    return f"{len(program.actions)} actions, {said} utterances, {len(program.vocabulary)} words"
+
+
+def _table(result: dict[str, Any], folder: Path) -> str:
+    evaluation = result["eval"]
+    rate, error = evaluation["success_rate"], evaluation["success_rate_se"]
+    rows = [
+        ("success", f"{rate:.1%} ± {error:.1%} (standard error) of {evaluation['episodes']} test episodes")
+    ]
+    rows += [(f"  {name}", f"{share:.1%}") for name, share in evaluation["outcomes"].items() if share > 0]
+    rows += [
+        ("mean length", f"{evaluation['mean_length']:.1f} steps"),
+        ("mean return", f"{evaluation['mean_return']:.3f}"),
+    ]
+    if result["frames"]:
+        speed = result["frames_per_second"]
+        rows.append(
+            (
+                "training",
+                f"{result['frames']:,} frames in {result['train_seconds']:.0f} s, {speed:,.0f} frames/s",
+            )
+        )
+    rows.append(("written to", str(folder)))
+    width = max(len(name) for name, _ in rows)
+    return "\n" + "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
+
+
+def _positive(text: str) -> int:
+    return _number(text, 1)
+
+
+def _natural(text: str) -> int:
+    return _number(text, 0)
+
+
+def _number(text: str, least: int) -> int:
+    try:
+        number = int(text.replace("_", "").replace(",", ""))
+    except ValueError:
+        number = least - 1
+    if number < least:
+        raise argparse.ArgumentTypeError(f"expected a whole number of at least {least}, got {text!r}")
+    return number

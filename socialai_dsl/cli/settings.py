@@ -1,0 +1,33 @@
+"""This module is what a run was asked for, as its folder remembers it."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a run was asked for, kept in its folder so that it can be resumed.
+
+    Attributes:
+        scenario: path or name, with variants and parameters.
+        agent: `ppo`, `random`, `oracle`, or the path of a checkpoint or run folder.
+        seed: of training; the test set is always the same.
+        frames: to train for, 0 for agents that are not trained here.
+        envs: environments stepped together while training.
+        net: the network, as the trainer names it.
+        explo: exploration bonus, `none`, `lang` or `cell`, with `auto` resolved.
+        explo_c: scale of the bonus.
+        device: where the network runs.
+        eval_episodes: how many episodes of the test set are played, from the first on.
+    """
+
+    scenario: str
+    agent: str
+    seed: int
+    frames: int
+    envs: int
+    net: str
+    explo: Literal["none", "lang", "cell"]
+    explo_c: float
+    device: str
+    eval_episodes: int
