@@ -1,0 +1,105 @@
+"""Recording an episode: words for actions, the transcript, the film."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from socialai_dsl.cli.episode import Episode, Step, describe_step, record
+from socialai_dsl.envs.panel import DialogueLine
+from socialai_dsl.program import Program
+
+
+@dataclass
+class Words:
+    """The part of a program that the recording reads."""
+
+    actions: tuple[str, ...] = ("left", "right", "forward")
+    templates: tuple[str, ...] = ("Where is <noun>", "Hello")
+    nouns: tuple[str, ...] = ("the exit", "Ann")
+
+
+PROGRAM = cast(Program, Words())
+
+
+class Stand:
+    """An environment of three steps that says what it was told to."""
+
+    def __init__(self, heard: list[str]) -> None:
+        self._heard = heard
+
+    def reset(self, **options: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+        self.t, self.options = 0, options
+        return {}, {}
+
+    def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        self.t += 1
+        info: dict[str, Any] = {"utterance": self._heard[self.t - 1]}
+        ended = self.t == len(self._heard)
+        if ended:
+            info |= {"outcome": "success@7", "success": True}
+        return {}, 0.75 if ended else 0.0, ended, False, info
+
+    def render(self) -> np.ndarray:
+        return np.full((64, 64, 3), 40 * self.t, np.uint8)
+
+
+ACTIONS = [np.array(action) for action in ([0, 1, 0, 0], [3, 0, 1, 1], [2, 1, 1, 1])]
+HEARD = ["Ann: I am fine.\nBob: Me \x1b[31mtoo", "NA", "nobody"]
+
+
+def recorded() -> Episode:
+    return record(Stand(HEARD), PROGRAM, ACTIONS, "an episode", {"options": {"test_episode": 4}})
+
+
+@pytest.mark.parametrize(
+    ("action", "primitive", "said"),
+    [
+        ([0, 1, 0, 1], "left", "Where is Ann"),
+        ([3, 0, 0, 1], "none", None),
+        ([2, 1, 1, 0], "forward", "Hello"),
+    ],
+)
+def test_actions_in_words(action: list[int], primitive: str, said: str | None) -> None:
+    step = describe_step(PROGRAM, action, 5, "NA")
+    assert step == Step(5, primitive, said, ())
+
+
+def test_a_dialogue_has_the_agent_first() -> None:
+    step = describe_step(PROGRAM, [0, 1, 0, 0], 2, "Ann: Go: left.\nnobody")
+    assert step.dialogue == [
+        DialogueLine(2, "You", "Where is the exit"),
+        DialogueLine(2, "Ann", "Go: left."),
+        DialogueLine(2, "", "nobody"),
+    ]
+
+
+def test_transcript() -> None:
+    assert recorded().transcript().splitlines() == [
+        "an episode",
+        "",
+        '   1  left       You: "Where is the exit"',
+        "                 Ann: I am fine.",
+        r"                 Bob: Me \x1b[31mtoo",
+        "   2  none",
+        '   3  forward    You: "Hello"',
+        "                 nobody",
+        "",
+        "success (success@7) after 3 steps, reward 0.750",
+    ]
+
+
+def test_the_film_has_a_picture_for_each_step_and_one_before(tmp_path: Path) -> None:
+    recorded().save_film(tmp_path / "episode.gif")
+    with Image.open(tmp_path / "episode.gif") as film:
+        assert (film.n_frames, film.size) == (4, (640, 360))  # type: ignore[attr-defined]
+        film.seek(3)
+        assert film.info["duration"] > 1000
+
+
+def test_an_episode_that_goes_otherwise_is_a_bug_of_ours() -> None:
+    with pytest.raises(AssertionError, match="internal: played again, the episode ended=False at step 2"):
+        record(Stand(HEARD), PROGRAM, ACTIONS[:2], "an episode", {})
