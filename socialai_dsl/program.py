@@ -281,7 +281,9 @@ class Op(IntEnum):
     B_OR = 66  # board a = a or b
     B_WITHOUT = 67  # board a = a without b
     B_FREE = 68  # board a = a without cells that hold an entity
-    EACH_CELL = 69  # run up to END_EACH for each cell of board a, row by row, v(b), v(b + 1) = x, y; c instructions inside
+    EACH_CELL = (
+        69  # run the c instructions up to END_EACH for each cell of board a, row by row; v(b), v(b+1) = x, y
+    )
     DROP_CELL = 70  # take the current cell out of the board of the loop
     END_EACH = 71
     PICK_CELL = (
@@ -289,6 +291,7 @@ class Op(IntEnum):
     )
     PUT = 73  # e(a) is placed at x = v(b), y = v(b + 1) (b is a temporary); not in the room if x is -1
     MAKE_ROOM = 74  # the room has width v(a), height v(b)
+    B_COPY = 75  # board a = board b
 
 
 class Side(IntEnum):

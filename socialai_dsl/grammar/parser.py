@@ -7,7 +7,7 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
-from lark import Lark, Token, v_args
+from lark import Lark, v_args
 from lark.exceptions import UnexpectedCharacters, UnexpectedEOF, UnexpectedInput, UnexpectedToken, VisitError
 from lark.visitors import Transformer_NonRecursive
 
@@ -48,6 +48,7 @@ def parse_expression(text: str) -> ast.Expr:
         raise
     except UnexpectedInput as error:
         raise _explain(text, error) from None
+    assert isinstance(tree, ast.Node), "internal: lark gave no tree"
     return tree  # type: ignore[return-value]
 
 
@@ -214,7 +215,7 @@ _SYMBOLS = {
 
 
 def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
-    """lark's exception as one sentence of ours."""
+    """Lark's exception as one sentence of ours."""
     if isinstance(error, UnexpectedCharacters):
         offset = error.pos_in_stream
         return _wrong_symbol(text, offset)

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from socialai_dsl.schema.base import Expression, Expressions, Model, Texts, TextLine, Word, _as_tuple
+from socialai_dsl.schema.base import Expression, Expressions, Model, TextLine, Texts, Word, _as_tuple
 
 SlotType = Literal["text", "utterance", "object", "npc", "cell", "direction", "color", "int", "bool", "noun"]
 

@@ -209,7 +209,8 @@ class Quantified:
     """any, all, count, first, nearest, pick over the constants `items`; `condition` may hold Variable(name).
 
     pick and first give an item (`type` is the items'); count an int; any and all a bool; nearest the item with the least
-    distance to `to`. `ordinal` numbers the picks of one value in source order (draws.py).
+    distance to `to`. `ordinal` numbers the picks of one value in source order (draws.py); `site` is empty unless the pick
+    comes from a slot that is substituted into a larger value: then it is the site of the slot's value.
     """
 
     type: Type
@@ -219,6 +220,7 @@ class Quantified:
     condition: Term | None
     to: Term | None = None
     ordinal: int = 0
+    site: str = ""
 
 
 Term = (
@@ -343,6 +345,7 @@ class Effect:
     entities: tuple[Term, ...]
     span: Span
     value: Term | None = None
+    site: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -525,3 +528,10 @@ class Checked:
     picture_before_npcs: bool
     names_shown: bool
     own_voice: bool
+
+
+TURN = Type("int", -1, 1, ("left", "none", "right"))
+"""A quarter turn: -1 left, 1 right; the argument of the activity `turn` and of the operation `turn`."""
+
+SIDE = Type("int", 0, 3, ("top", "bottom", "left", "right"))
+"""A wall. A region `wall` whose side is drawn has `side` None and the side as its only argument."""

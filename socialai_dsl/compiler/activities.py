@@ -1,0 +1,146 @@
+"""Activities to code: one body action of the entity on turn, and when an activity is finished."""
+
+from __future__ import annotations
+
+from socialai_dsl.compiler.assembler import Label, constant
+from socialai_dsl.compiler.expressions import Expressions
+from socialai_dsl.compiler.registers import entity_register
+from socialai_dsl.program import Body, Field, Op
+from socialai_dsl.semantics.terms import Activity, Checked, Const, ObjectType, Term
+
+_BODIES = {"left": Body.LEFT, "right": Body.RIGHT, "forward": Body.FORWARD, "toggle": Body.TOGGLE}
+GOING = ("go_to", "go_next_to", "enter")
+"""Activities that take no step when they are fulfilled before they begin."""
+
+
+class Activities:
+    """Emits the activities of one cast member through `to`."""
+
+    def __init__(self, to: Expressions, checked: Checked, entity: int) -> None:
+        self.to, self.checked, self.entity = to, checked, entity
+        self.turn = to.sites.row(f"cast.{checked.entities[entity].key}.turn")
+
+    def emit(self, activity: Activity) -> None:
+        """Choose the body action; `stay` chooses none."""
+        to, block = self.to, self.to.block
+        to.site, block.span = activity.site, activity.span
+        own = constant(self.entity)
+        match activity.name:
+            case "stay":
+                block.emit(Op.BODY, constant(Body.NONE))
+            case "left" | "right" | "forward" | "toggle":
+                block.emit(Op.BODY, constant(_BODIES[activity.name]))
+            case "face":
+                self._turn_towards(to.value(activity.args[0]))
+            case "turn_to":
+                block.emit(Op.TURN_TO, own, to.value(activity.args[0]), self.turn)
+            case "turn":
+                self._turn(activity.args[0])
+            case "go_to":
+                block.emit(Op.GO_TO, own, to.value(activity.args[0]), self.turn)
+            case "go_next_to":
+                block.emit(Op.GO_NEXT_TO, own, to.value(activity.args[0]), self.turn)
+            case "use":
+                self._use(to.value(activity.args[0]))
+            case "enter":
+                self._enter(activity.args[0])
+            case "choose":
+                self._choose(activity)
+
+    def _turn_towards(self, goal: int) -> None:
+        block = self.to.block
+        direction = block.temporary()
+        block.emit(Op.QUADRANT, direction, constant(self.entity), goal)
+        block.emit(Op.TURN_TO, constant(self.entity), direction, self.turn)
+
+    def _turn(self, direction: Term) -> None:
+        """`turn(left)` and `turn(right)`: a direction that is not known yet counts as left unless it is right."""
+        block = self.to.block
+        other, done = Label(), Label()
+        block.test(Op.IF_EQ, self.to.value(direction), constant(0), other)
+        block.emit(Op.BODY, constant(Body.RIGHT))
+        block.skip(done)
+        block.bind(other)
+        block.emit(Op.BODY, constant(Body.LEFT))
+        block.bind(done)
+
+    def _use(self, goal: int) -> None:
+        """Go next to the goal, face it, toggle."""
+        block = self.to.block
+        own = constant(self.entity)
+        away, aside, done = Label(), Label(), Label()
+        block.test(Op.IF_NEXT_TO, own, goal, away)
+        block.test(Op.IF_FACES, own, goal, aside)
+        block.emit(Op.BODY, constant(Body.TOGGLE))
+        block.skip(done)
+        block.bind(aside)
+        self._turn_towards(goal)
+        block.skip(done)
+        block.bind(away)
+        block.emit(Op.GO_NEXT_TO, own, goal, self.turn)
+        block.bind(done)
+
+    def _enter(self, goal: Term) -> None:
+        """Use it while it cannot be walked on, then go there."""
+        block = self.to.block
+        entity = self.to.value(goal)
+        shut, done = Label(), Label()
+        walkable = sorted(_kind_of(self.checked, goal).walkable)
+        status = block.temporary()
+        block.emit(Op.FIELD, status, entity, Field.STATUS)
+        found = Label()
+        for number in walkable:
+            following = Label()
+            block.test(Op.IF_EQ, status, constant(number), following)
+            block.skip(found)
+            block.bind(following)
+        block.skip(shut)
+        block.bind(found)
+        block.emit(Op.GO_TO, constant(self.entity), entity, self.turn)
+        block.skip(done)
+        block.bind(shut)
+        self._use(entity)
+        block.bind(done)
+
+    def _choose(self, activity: Activity) -> None:
+        block = self.to.block
+        weights = activity.weights or (1,) * len(activity.args)
+        drawn = block.temporary()
+        site = self.to.sites.row(activity.site, activity.ordinal)
+        block.emit(Op.DRAW, drawn, constant(sum(weights)), site)
+        done = Label()
+        below = 0
+        for option, weight in zip(activity.args, weights, strict=True):
+            below += weight
+            following = Label()
+            block.test(Op.IF_LT, drawn, constant(below), following)
+            block.emit(Op.BODY, self.to.value(option))
+            block.skip(done)
+            block.bind(following)
+        block.bind(done)
+
+    def unless_finished(self, activity: Activity, otherwise: Label) -> None:
+        """Fall through if the activity is finished, else skip; what has no end of its own lasts one step."""
+        to, block = self.to, self.to.block
+        if activity.name not in (*GOING, "use"):
+            return
+        to.site, block.span = activity.site, activity.span
+        own = constant(self.entity)
+        mark = block.taken
+        if activity.name == "use":
+            last = entity_register(self.entity, Field.LAST)
+            goal = to.value(activity.args[0])
+            block.test(Op.IF_EQ, last, constant(Body.TOGGLE), otherwise)
+            block.test(Op.IF_FACES, own, goal, otherwise)
+        else:
+            op = Op.IF_NEXT_TO if activity.name == "go_next_to" else Op.IF_SAME_CELL
+            block.test(op, own, to.value(activity.args[0]), otherwise)
+        block.release(mark)
+
+
+def _kind_of(checked: Checked, goal: Term) -> ObjectType:
+    """The object type of what a term can be; the resolver lets only objects of one type be entered."""
+    number = goal.value if isinstance(goal, Const) else goal.type.low
+    kind = checked.entities[number].type
+    assert kind is not None, "internal: only objects can be entered"
+    return kind

@@ -1,0 +1,121 @@
+"""Instructions and labels: blocks of position-independent code, and the code table they are put into."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from socialai_dsl.draws import site as site_number
+from socialai_dsl.program import CONSTANT, TEMPORARIES, TEMPORARY, Op
+from socialai_dsl.source import Span
+
+LARGEST = CONSTANT // 2 - 1
+
+
+def constant(value: int) -> int:
+    """The operand word of a known value."""
+    assert -LARGEST <= value <= LARGEST, f"internal: the constant {value} does not fit into an operand"
+    return CONSTANT + value
+
+
+@dataclass(eq=False)
+class Label:
+    """A place further down in a block; `uses` are the instructions that skip to it."""
+
+    uses: list[int] = field(default_factory=list)
+    position: int | None = None
+
+
+@dataclass
+class Sites:
+    """The table of draw sites: (path, number) -> row."""
+
+    rows: dict[tuple[str, int], int] = field(default_factory=dict)
+
+    def row(self, path: str, number: int = 0) -> int:
+        """The row of this site, made on first use."""
+        return self.rows.setdefault((path, number), len(self.rows))
+
+    def words(self) -> list[int]:
+        """The table as int32 words."""
+        paths = {path for path, _ in self.rows}
+        numbers = {site_number(path) for path in paths}
+        assert len(paths) == len(numbers), "internal: two draw sites share a hash; rename one of their owners"
+        return [word for path, number in self.rows for word in (site_number(path), number)]
+
+
+class Block:
+    """A piece of code under construction; falls through top-down and ends with HALT."""
+
+    def __init__(self) -> None:
+        self.instructions: list[list[int]] = []
+        self.spans: list[Span | None] = []
+        self.span: Span | None = None
+        self._temporaries = 0
+
+    def emit(self, op: Op, a: int = 0, b: int = 0, c: int = 0) -> None:
+        """Append an instruction, attributed to `self.span`."""
+        self.instructions.append([int(op), a, b, c])
+        self.spans.append(self.span)
+
+    def test(self, op: Op, a: int, b: int, otherwise: Label) -> None:
+        """Append a test that skips to `otherwise` if false."""
+        otherwise.uses.append(len(self.instructions))
+        self.emit(op, a, b)
+
+    def skip(self, to: Label) -> None:
+        """Append an unconditional skip."""
+        to.uses.append(len(self.instructions))
+        self.emit(Op.SKIP)
+
+    def bind(self, label: Label) -> None:
+        """Say that `label` is here, and fill in the skips to it."""
+        assert label.position is None, "internal: a label is bound twice"
+        label.position = len(self.instructions)
+        for use in label.uses:
+            self.instructions[use][3] = label.position - use - 1
+
+    def halt(self) -> None:
+        """End of this path."""
+        self.emit(Op.HALT)
+
+    def temporary(self, count: int = 1) -> int:
+        """The first of `count` fresh temporaries, as an operand."""
+        first = self._temporaries
+        self._temporaries += count
+        assert self._temporaries <= TEMPORARIES, (
+            "internal: an expression needs more temporaries than the engine has"
+        )
+        return TEMPORARY + first
+
+    def release(self, mark: int) -> None:
+        """Give back the temporaries taken since `mark = block.taken`."""
+        self._temporaries = mark
+
+    @property
+    def taken(self) -> int:
+        """How many temporaries are in use."""
+        return self._temporaries
+
+
+class CodeTable:
+    """All blocks of a program, equal ones stored once. Address 0 is a HALT."""
+
+    def __init__(self) -> None:
+        self.instructions: list[list[int]] = [[int(Op.HALT), 0, 0, 0]]
+        self.spans: list[Span | None] = [None]
+        self.labels: dict[int, str] = {}
+        self._known: dict[tuple[tuple[int, ...], ...], int] = {}
+
+    def add(self, block: Block, label: str) -> int:
+        """Store a block, return its address; 0 if it does nothing."""
+        if not block.instructions or block.instructions[0][0] == Op.HALT:
+            return 0
+        if block.instructions[-1][0] != Op.HALT:
+            block.halt()
+        key = tuple(tuple(row) for row in block.instructions)
+        if key not in self._known:
+            self._known[key] = len(self.instructions)
+            self.labels[len(self.instructions)] = label
+            self.instructions.extend(block.instructions)
+            self.spans.extend(block.spans)
+        return self._known[key]

@@ -1,0 +1,319 @@
+"""Frames to code: for each state and each class of utterance heard, only the rules that can then fire."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from socialai_dsl.compiler.activities import GOING, Activities
+from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Sites, constant
+from socialai_dsl.compiler.classes import Classes
+from socialai_dsl.compiler.expressions import Expressions
+from socialai_dsl.compiler.folding import FALSE, SEVERAL, Facts, fold
+from socialai_dsl.compiler.lines import Lines
+from socialai_dsl.compiler.registers import Registers, state_names
+from socialai_dsl.program import Field, Op
+from socialai_dsl.semantics import terms
+from socialai_dsl.semantics.terms import Checked, Effect, FramePlan, RulePlan, Sited, StepPlan
+
+FOR_EVER = -1
+
+
+@dataclass
+class Behaviour:
+    """Compiles the frames of a scenario into rows of the state table.
+
+    Attributes:
+        rules: name of each counted rule, in the order of their counters.
+    """
+
+    checked: Checked
+    registers: Registers
+    classes: Classes
+    sites: Sites
+    lines: Lines
+    code: CodeTable
+    rules: list[str]
+    inbox_of: dict[str, int]
+
+    def rows(self, number: int, frame: FramePlan) -> list[list[int]]:
+        """The state table of frame instance `number`: activity, `first` by class, `then` by class."""
+        return _FrameCompiler(self, number, frame).rows()
+
+
+class _FrameCompiler:
+    """One frame as one member plays it."""
+
+    def __init__(self, shared: Behaviour, number: int, frame: FramePlan) -> None:
+        self.shared, self.number, self.frame = shared, number, frame
+        self.states = state_names(frame)
+        self.clock = shared.registers.by_path[f"{frame.member}.clock"]
+        self.counters = {name: self._counter(name) for name in self._names()}
+        self.once = {
+            rule.name: shared.registers.reserve(1)
+            for state in frame.states
+            for rule in (*state.first, *state.then)
+            if rule.once
+        }
+
+    def _names(self) -> list[str]:
+        if self.frame.steps:
+            return [step.name for step in self.frame.steps]
+        return [rule.name for state in self.frame.states for rule in (*state.first, *state.then)]
+
+    def _counter(self, name: str) -> int:
+        self.shared.rules.append(name)
+        return len(self.shared.rules) - 1
+
+    def rows(self) -> list[list[int]]:
+        if self.frame.steps:
+            return [self._step_row(k) for k in range(len(self.frame.steps))] + [self._idle_row()]
+        return [self._state_row(k) for k in range(len(self.frame.states))]
+
+    # --- shared by both forms ---
+
+    def _row(
+        self,
+        k: int,
+        activity: terms.Activity | None,
+        first: Callable[[Expressions], None],
+        then: Callable[[Expressions], None],
+    ) -> list[int]:
+        where = f"{self.frame.member}.{self.frame.frame}.{self.states[k]}"
+        return [
+            self._activity(activity, where),
+            *self._by_class(first, f"{where}.first"),
+            *self._by_class(then, f"{where}.then"),
+        ]
+
+    def _by_class(self, emit: Callable[[Expressions], None], label: str) -> list[int]:
+        addresses = []
+        for heard in (*range(self.shared.classes.count), SEVERAL):
+            to = self._expressions(Facts(heard=heard))
+            emit(to)
+            addresses.append(self.shared.code.add(to.block, label))
+        return addresses
+
+    def _expressions(self, facts: Facts) -> Expressions:
+        shared = self.shared
+        inbox = shared.inbox_of[self.frame.member]
+        to = Expressions(Block(), shared.checked, shared.registers, shared.classes, shared.sites, inbox)
+        to.facts = facts
+        return to
+
+    def _activity(self, activity: terms.Activity | None, label: str) -> int:
+        if activity is None or activity.name == "stay":
+            return 0
+        to = self._expressions(Facts())
+        self._activities(to).emit(activity)
+        return self.shared.code.add(to.block, f"{label}.do")
+
+    def _activities(self, to: Expressions) -> Activities:
+        return Activities(to, self.shared.checked, self.frame.entity)
+
+    def _idle_row(self) -> list[int]:
+        return [0] * (1 + 2 * (self.shared.classes.count + 1))
+
+    def _effects(self, to: Expressions, what: RulePlan | StepPlan, failed: Label) -> None:
+        """Compute all values first, then act: set, cause, say (the body action comes before, `goto` after)."""
+        block = to.block
+        to.failed = failed
+        values = [(path, sited, self._kept(to, sited)) for path, sited in what.sets]
+        entities = [self._targets(to, effect) for effect in what.causes]
+        line = None
+        if what.say is not None:
+            line = self.shared.lines.say(to, self.shared.checked.entities[self.frame.entity], what.say)
+        to.failed = None
+        block.span = what.span
+        block.emit(Op.COUNT, self.counters[what.name])
+        if isinstance(what, RulePlan) and what.do is not None:
+            self._activities(to).emit(what.do)
+            block.span = what.span
+        for path, sited, value in values:
+            self._store(to, path, sited, value)
+        for effect, targets in zip(what.causes, entities, strict=True):
+            for term, entity in zip(effect.entities, targets, strict=True):
+                self._cause(to, effect, term, entity)
+        if line is not None:
+            block.emit(Op.SAY, constant(self.frame.entity), line)
+
+    @staticmethod
+    def _targets(to: Expressions, effect: Effect) -> list[int]:
+        to.site = effect.site
+        return [to.value(entity) for entity in effect.entities]
+
+    @staticmethod
+    def _kept(to: Expressions, sited: Sited) -> int:
+        """A value in a temporary, so that no later effect of the same rule can change it."""
+        value = to.sited_value(sited)
+        kept = to.block.temporary()
+        to.block.emit(Op.LOAD, kept, value)
+        return kept
+
+    def _store(self, to: Expressions, path: str, sited: Sited, value: int) -> None:
+        """Registers with a range of integers saturate."""
+        name = next(name for name in self.shared.registers.names if name.path == path)
+        if not name.values:
+            to.block.emit(Op.MAX, value, value, constant(name.low))
+            to.block.emit(Op.MIN, value, value, constant(name.high))
+        to.block.emit(Op.LOAD, name.register, value)
+
+    def _cause(self, to: Expressions, effect: Effect, term: terms.Term, entity: int) -> None:
+        block = to.block
+        block.span = effect.span
+        if effect.name == "vanish":
+            block.emit(Op.VANISH, entity)
+            return
+        if effect.name == "become":
+            assert effect.value is not None
+            block.emit(Op.BECOME, entity, to.value(effect.value))
+            return
+        number = term.value if isinstance(term, terms.Const) else term.type.low
+        thing = self.shared.checked.entities[number]
+        assert thing.type is not None, "internal: only objects have a status"
+        if effect.name == "reset":
+            block.emit(Op.BECOME, entity, constant(thing.status))
+            return
+        states = thing.type.states
+        target = {"open": "open", "close": "closed", "lock": "locked", "unlock": "closed"}[effect.name]
+        done = Label()
+        if effect.name == "unlock":
+            status = block.temporary()
+            block.emit(Op.FIELD, status, entity, Field.STATUS)
+            block.test(Op.IF_EQ, status, constant(states.index("locked")), done)
+        block.emit(Op.BECOME, entity, constant(states.index(target)))
+        block.bind(done)
+
+    # --- frames by states ---
+
+    def _state_row(self, k: int) -> list[int]:
+        state = self.frame.states[k]
+        return self._row(
+            k,
+            state.activity,
+            lambda to: self._rules(to, state.first, follow=False),
+            lambda to: self._rules(to, state.then, follow=True),
+        )
+
+    def _rules(
+        self, to: Expressions, rules: tuple[RulePlan, ...], follow: bool, clock: int | None = None
+    ) -> None:
+        """Rules top to bottom; the first that holds fires. `clock` is known right after a goto_now."""
+        for rule in rules:
+            if clock is not None and rule.after > clock:
+                continue
+            heard = fold(terms.Heard(rule.hears), to.facts, self.shared.classes) if rule.hears else None
+            when = fold(rule.when.term, to.facts, self.shared.classes) if rule.when else None
+            if FALSE in (heard, when):
+                continue
+            self._rule(to, rule, follow)
+        to.block.halt()
+
+    def _rule(self, to: Expressions, rule: RulePlan, follow: bool) -> None:
+        block = to.block
+        following = Label()
+        mark = block.taken
+        block.span = rule.span
+        if rule.hears:
+            to.condition(fold(terms.Heard(rule.hears), to.facts, self.shared.classes), following)
+        if rule.once:
+            block.test(Op.IF_EQ, self.once[rule.name], constant(0), following)
+        if rule.after:
+            block.test(Op.IF_LE, constant(rule.after), self.clock, following)
+        if rule.when is not None:
+            to.sited_condition(rule.when, following)
+        block.span = rule.span
+        if rule.chance is not None:
+            site = self.shared.sites.row(f"{rule.site}.chance")
+            following.uses.append(len(block.instructions))
+            block.emit(Op.IF_CHANCE, round(rule.chance * 65536), site)
+        self._effects(to, rule, following)
+        if rule.once:
+            block.emit(Op.LOAD, self.once[rule.name], constant(1))
+        block.span = rule.span
+        self._go(to, rule, follow)
+        block.bind(following)
+        block.release(mark)
+
+    def _go(self, to: Expressions, rule: RulePlan, follow: bool) -> None:
+        """Enter the next state; after goto_now in `then`, look at the new state's `then` at once."""
+        target = rule.goto or rule.goto_now
+        if target is None:
+            to.block.halt()
+            return
+        number = self.states.index(target)
+        to.block.emit(Op.GOTO, self.number, number)
+        if rule.goto_now is not None and follow:
+            self._rules(to, self.frame.states[number].then, follow=True, clock=0)
+        else:
+            to.block.halt()
+
+    # --- frames by steps ---
+
+    def _step_row(self, k: int) -> list[int]:
+        step = self.frame.steps[k]
+        return self._row(
+            k, step.activity, lambda to: self._skip_fulfilled(to, k), lambda to: self._end_step(to, k)
+        )
+
+    def _next(self, k: int) -> int:
+        """The state after entry k: entries with `for: 0` are left out."""
+        k += 1
+        while k < len(self.frame.steps) and self.frame.steps[k].duration == 0:
+            k += 1
+        return k
+
+    def _skip_fulfilled(self, to: Expressions, k: int) -> None:
+        """Entries that are fulfilled before they begin are skipped without taking the step."""
+        block = to.block
+        entry = k
+        while entry < len(self.frame.steps) and self._skippable(self.frame.steps[entry]):
+            stop = Label()
+            self._activities(to).unless_finished(self.frame.steps[entry].activity, stop)
+            leave = Label()
+            block.skip(leave)
+            block.bind(stop)
+            if entry != k:
+                block.emit(Op.GOTO, self.number, entry)
+            block.halt()
+            block.bind(leave)
+            entry = self._next(entry)
+        if entry != k:
+            block.emit(Op.GOTO, self.number, entry)
+        block.halt()
+
+    @staticmethod
+    def _skippable(step: StepPlan) -> bool:
+        has_effects = step.sets or step.causes or step.say is not None
+        return (
+            step.activity.name in GOING and not has_effects and step.until is None and step.duration is None
+        )
+
+    def _end_step(self, to: Expressions, k: int) -> None:
+        """The entry's effects and the next entry, once it has ended."""
+        step = self.frame.steps[k]
+        block = to.block
+        running, ended = Label(), Label()
+        block.span = step.span
+        if step.duration is not None and step.duration > 0:
+            self._after(step.duration, to, ended, running if step.until is None else None)
+        if step.until is not None:
+            to.sited_condition(step.until, running)
+        elif step.duration == FOR_EVER:
+            block.halt()
+            return
+        elif step.duration is None:
+            self._activities(to).unless_finished(step.activity, running)
+        block.bind(ended)
+        self._effects(to, step, running)
+        block.emit(Op.GOTO, self.number, self._next(k))
+        block.halt()
+        block.bind(running)
+        block.halt()
+
+    def _after(self, duration: int, to: Expressions, ended: Label, running: Label | None) -> None:
+        """Skip to `ended` once the entry has lasted long enough, else to `running` (None: fall through)."""
+        not_yet = Label()
+        to.block.test(Op.IF_LE, constant(duration), self.clock, running or not_yet)
+        to.block.skip(ended)
+        to.block.bind(not_yet)

@@ -1,0 +1,314 @@
+"""Terms to code: conditions fall through when true and skip when false; values end in an operand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from socialai_dsl.compiler.assembler import Block, Label, Sites, constant
+from socialai_dsl.compiler.classes import SILENCE, Classes
+from socialai_dsl.compiler.folding import TRUE, Facts, fold, substitute
+from socialai_dsl.compiler.registers import Registers, entity_register, state_names
+from socialai_dsl.program import Field, Op, Register
+from socialai_dsl.semantics import terms
+from socialai_dsl.semantics.terms import Checked, Const, Term
+
+_FIELDS = {
+    "x": Field.X,
+    "y": Field.Y,
+    "dir": Field.DIR,
+    "color": Field.COLOR,
+    "status": Field.STATUS,
+    "gone": Field.GONE,
+    "poked": Field.POKED,
+}
+_WORLD = {
+    "t": Register.T,
+    "width": Register.WIDTH,
+    "height": Register.HEIGHT,
+    "action": Register.ACTION,
+    "noun": Register.NOUN,
+}
+_TESTS = {
+    "at": Op.IF_SAME_CELL,
+    "next_to": Op.IF_NEXT_TO,
+    "faces": Op.IF_FACES,
+    "faces_toward": Op.IF_FACES_TOWARD,
+    "in_front_of": Op.IF_IN_FRONT_OF,
+    "eye_contact": Op.IF_EYE_CONTACT,
+    "in_line": Op.IF_IN_LINE,
+    "can_reach": Op.IF_REACHES,
+}
+_ARITHMETIC = {
+    "+": Op.ADD,
+    "-": Op.SUB,
+    "*": Op.MUL,
+    "//": Op.DIV,
+    "%": Op.MOD,
+    "min": Op.MIN,
+    "max": Op.MAX,
+}
+_COMPARE = {"==": Op.IF_EQ, "!=": Op.IF_NE, "<": Op.IF_LT, "<=": Op.IF_LE}
+_OPPOSITE = {"==": "!=", "!=": "=="}
+
+
+class Expressions:
+    """Emits conditions and values into one block.
+
+    Attributes:
+        block: where to. site: path of the picks of the value being emitted. facts: what is known. inbox: first register
+        of the inbox of the member whose frame this is, or -1.
+        here: operands of x and y of the candidate cell inside the loop of a place, or None.
+        failed: label to skip to when a pick finds nothing; None: it takes the first item.
+    """
+
+    def __init__(
+        self,
+        block: Block,
+        checked: Checked,
+        registers: Registers,
+        classes: Classes,
+        sites: Sites,
+        inbox: int = -1,
+    ) -> None:
+        self.block, self.checked, self.registers = block, checked, registers
+        self.classes, self.sites, self.inbox = classes, sites, inbox
+        self.site = ""
+        self.facts = Facts()
+        self.here: tuple[int, int] | None = None
+        self.failed: Label | None = None
+
+    # --- conditions ---
+
+    def sited_condition(self, sited: terms.Sited, otherwise: Label) -> None:
+        """A condition with its own site and place in the source."""
+        self.site, self.block.span = sited.site, sited.span
+        self.condition(fold(sited.term, self.facts, self.classes), otherwise)
+
+    def condition(self, term: Term, otherwise: Label) -> None:
+        """Fall through if `term` holds, else skip to `otherwise`."""
+        mark = self.block.taken
+        self._condition(term, otherwise)
+        self.block.release(mark)
+
+    def _condition(self, term: Term, otherwise: Label) -> None:
+        block = self.block
+        match term:
+            case Const():
+                if not term.value:
+                    block.skip(otherwise)
+            case terms.Logic(op="and"):
+                for arg in term.args:
+                    self.condition(arg, otherwise)
+            case terms.Logic():
+                self._either(term.args, otherwise)
+            case terms.Not():
+                self._negated(term.arg, otherwise)
+            case terms.Compare():
+                block.test(_COMPARE[term.op], self.value(term.left), self.value(term.right), otherwise)
+            case terms.Test(subject=None):
+                self._about_here(term, otherwise)
+            case terms.Test():
+                assert term.subject is not None
+                block.test(_TESTS[term.name], self.value(term.subject), self.value(term.object), otherwise)
+            case terms.Quantified(op="any" | "all"):
+                self.condition(fold(term, self.facts, self.classes), otherwise)
+            case terms.PokedNow():
+                block.test(Op.IF_EQ, Register.POKED, self.value(term.entity), otherwise)
+            case terms.Spoke():
+                block.test(Op.IF_NE, Register.CLASS, constant(SILENCE), otherwise)
+            case terms.Said():
+                self._one_of(Op.IF_EQ, Register.CLASS, self.classes.matching(term.pattern), otherwise)
+            case terms.Heard():
+                heard = frozenset[int]().union(*(self.classes.matching(pattern) for pattern in term.patterns))
+                self._one_of(Op.IF_HEARD, self.inbox, heard, otherwise)
+            case terms.InState():
+                self._in_state(term, otherwise)
+            case _:  # a value of type bool
+                block.test(Op.IF_NE, self.value(term), constant(0), otherwise)
+
+    def _either(self, args: Iterable[Term], otherwise: Label) -> None:
+        *rest, last = args
+        done = Label()
+        for arg in rest:
+            following = Label()
+            self.condition(arg, following)
+            self.block.skip(done)
+            self.block.bind(following)
+        self.condition(last, otherwise)
+        self.block.bind(done)
+
+    def _negated(self, arg: Term, otherwise: Label) -> None:
+        if isinstance(arg, terms.Compare) and arg.op in _OPPOSITE:
+            return self.condition(replace(arg, op=_OPPOSITE[arg.op]), otherwise)  # type: ignore[arg-type]
+        false = Label()
+        self.condition(arg, false)
+        self.block.skip(otherwise)
+        self.block.bind(false)
+        return None
+
+    def _one_of(self, op: Op, left: int, numbers: frozenset[int], otherwise: Label) -> None:
+        """Whether a class (or state) is among these numbers."""
+        found = Label()
+        for number in sorted(numbers):
+            following = Label()
+            # IF_HEARD takes the class itself, not an operand.
+            self.block.test(op, left, number if op == Op.IF_HEARD else constant(number), following)
+            self.block.skip(found)
+            self.block.bind(following)
+        self.block.skip(otherwise)
+        self.block.bind(found)
+
+    def _in_state(self, term: terms.InState, otherwise: Label) -> None:
+        frame = next(f for f in self.checked.frames if f.member == term.member and f.frame == term.frame)
+        register = self.registers.by_path[f"{term.member}.frame"]
+        numbers = frozenset(i for i, name in enumerate(state_names(frame)) if name == term.state)
+        self._one_of(Op.IF_EQ, register, numbers, otherwise)
+
+    def _about_here(self, term: terms.Test, otherwise: Label) -> None:
+        assert self.here is not None, "internal: `here` outside of a place"
+        assert term.name in ("next_to", "at"), f"internal: here.{term.name} is a board of its own"
+        block = self.block
+        total = block.temporary()
+        difference = block.temporary()
+        entity = self.value(term.object)
+        block.emit(Op.LOAD, total, constant(0))
+        for here, which in zip(self.here, (Field.X, Field.Y), strict=True):
+            block.emit(Op.FIELD, difference, entity, which)
+            block.emit(Op.SUB, difference, difference, here)
+            block.emit(Op.ABS, difference, difference)
+            block.emit(Op.ADD, total, total, difference)
+        block.test(Op.IF_EQ, total, constant(1 if term.name == "next_to" else 0), otherwise)
+
+    # --- values ---
+
+    def sited_value(self, sited: terms.Sited) -> int:
+        """A value with its own site and place in the source."""
+        self.site, self.block.span = sited.site, sited.span
+        return self.value(fold(sited.term, self.facts, self.classes))
+
+    def value(self, term: Term) -> int:
+        """Emit what computes the term; the operand it is in afterwards."""
+        match term:
+            case Const():
+                return constant(term.value)
+            case terms.Read():
+                return self.registers.by_path[term.path]
+            case terms.World():
+                return int(_WORLD[term.name])
+            case terms.Here():
+                assert self.here is not None, "internal: `here` outside of a place"
+                return self.here[0] if term.name == "x" else self.here[1]
+            case terms.FieldOf(entity=Const(value=entity)):
+                return entity_register(entity, _FIELDS[term.name])
+            case terms.FieldOf():
+                entity = self.value(term.entity)
+                return self._into_temporary(Op.FIELD, entity, _FIELDS[term.name])
+            case terms.Operation():
+                return self._operation(term)
+            case terms.Measure():
+                op = Op.DISTANCE if term.name == "distance" else Op.QUADRANT
+                return self._into_temporary(op, self.value(term.args[0]), self.value(term.args[1]))
+            case terms.Quantified(op="pick"):
+                return self._pick(term)
+            case terms.Quantified(op="first"):
+                return self._chosen(term, Op.LOWEST_BIT)
+            case terms.Quantified(op="count"):
+                return self._into_temporary(Op.COUNT_BITS, self._mask(term))
+            case terms.Quantified(op="nearest"):
+                return self._nearest(term)
+            case terms.Variable():
+                raise AssertionError(f"internal: the variable {term.name} is free")
+            case _:
+                return self._truth_value(term)
+
+    def _into_temporary(self, op: Op, b: int, c: int = 0) -> int:
+        result = self.block.temporary()
+        self.block.emit(op, result, b, c)
+        return result
+
+    def _operation(self, term: terms.Operation) -> int:
+        if term.op in ("abs", "neg"):
+            value = self.value(term.args[0])
+            return self._into_temporary(
+                *((Op.ABS, value) if term.op == "abs" else (Op.SUB, constant(0), value))
+            )
+        if term.op == "turn":
+            total = self._into_temporary(Op.ADD, self.value(term.args[0]), self.value(term.args[1]))
+            return self._into_temporary(Op.MOD, total, constant(4))
+        result = self.value(term.args[0])
+        for arg in term.args[1:]:
+            result = self._into_temporary(_ARITHMETIC[term.op], result, self.value(arg))
+        return result
+
+    def _truth_value(self, term: Term) -> int:
+        result = self.block.temporary()
+        false = Label()
+        self.block.emit(Op.LOAD, result, constant(0))
+        self.condition(term, false)
+        self.block.emit(Op.LOAD, result, constant(1))
+        self.block.bind(false)
+        return result
+
+    # --- quantifiers ---
+
+    def _mask(self, term: terms.Quantified) -> int:
+        """A temporary whose bit i says whether item i holds."""
+        assert len(term.items) <= 62, "internal: a quantifier over more than 62 things"
+        mask = self.block.temporary()
+        self.block.emit(Op.LOAD, mask, constant(0))
+        for i, item in enumerate(term.items):
+            following = Label()
+            self.condition(self.instance(term, item), following)
+            self.block.emit(Op.SET_BIT, mask, constant(i))
+            self.block.bind(following)
+        return mask
+
+    def instance(self, term: terms.Quantified, item: Const) -> Term:
+        """The condition of a quantifier for one of its items."""
+        return fold(substitute(term.condition or TRUE, term.variable, item), self.facts, self.classes)
+
+    def _pick(self, term: terms.Quantified) -> int:
+        site = self.sites.row(self.site, term.ordinal)
+        if term.condition is not None:
+            return self._chosen(term, Op.PICK_BIT, site)
+        return self._item(term.items, self._into_temporary(Op.DRAW, constant(len(term.items)), site))
+
+    def _chosen(self, term: terms.Quantified, op: Op, site: int = 0) -> int:
+        mask = self._mask(term)
+        if self.failed is not None:
+            self.block.test(Op.IF_NE, mask, constant(0), self.failed)
+        return self._item(term.items, self._into_temporary(op, mask, site))
+
+    def _item(self, items: tuple[Const, ...], position: int) -> int:
+        """The item at a position that is in a temporary."""
+        values = [item.value for item in items]
+        if values == list(range(values[0], values[0] + len(values))):
+            return self._into_temporary(Op.ADD, position, constant(values[0])) if values[0] else position
+        result = self._into_temporary(Op.LOAD, constant(values[0]))
+        for i, value in enumerate(values[1:], 1):
+            following = Label()
+            self.block.test(Op.IF_EQ, position, constant(i), following)
+            self.block.emit(Op.LOAD, result, constant(value))
+            self.block.bind(following)
+        return result
+
+    def _nearest(self, term: terms.Quantified) -> int:
+        assert term.to is not None
+        block = self.block
+        result = self._into_temporary(Op.LOAD, constant(term.items[0].value))
+        least = self._into_temporary(Op.LOAD, constant(4096))
+        to = self.value(term.to)
+        for item in term.items:
+            following = Label()
+            mark = block.taken
+            self.condition(self.instance(term, item), following)
+            distance = self._into_temporary(Op.DISTANCE, constant(item.value), to)
+            block.test(Op.IF_LT, distance, least, following)
+            block.emit(Op.LOAD, least, distance)
+            block.emit(Op.LOAD, result, constant(item.value))
+            block.bind(following)
+            block.release(mark)
+        if self.failed is not None:
+            block.test(Op.IF_LT, least, constant(4096), self.failed)
+        return result

@@ -1,0 +1,113 @@
+"""What is known when a rule is looked at, and terms simplified by it: the heart of bucketing rules by trigger."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any
+
+from socialai_dsl.compiler.classes import SILENCE, Classes
+from socialai_dsl.semantics import terms
+from socialai_dsl.semantics.terms import BOOL, Const, Term
+
+TRUE = Const(BOOL, 1)
+FALSE = Const(BOOL, 0)
+SEVERAL = -1
+"""Stands for "several classes were heard at once", where each rule has to look for itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What is known at compile time; None means unknown.
+
+    Attributes:
+        said: utterance class of the agent this step. action: its body action. heard: the class in the inbox, or SEVERAL.
+    """
+
+    said: int | None = None
+    action: int | None = None
+    heard: int | None = None
+
+
+def fold(term: Term, facts: Facts, classes: Classes) -> Term:
+    """An equal term with everything decided that the facts decide."""
+    if isinstance(term, terms.Said) and facts.said is not None:
+        return _truth(facts.said in classes.matching(term.pattern))
+    if isinstance(term, terms.Spoke) and facts.said is not None:
+        return _truth(facts.said != SILENCE)
+    if isinstance(term, terms.Heard) and facts.heard not in (None, SEVERAL):
+        return _truth(any(facts.heard in classes.matching(pattern) for pattern in term.patterns))
+    if isinstance(term, terms.World) and term.name == "action" and facts.action is not None:
+        return Const(term.type, facts.action)
+    return _decide(rebuild(term, lambda part: fold(part, facts, classes)))
+
+
+def rebuild(term: Term, change: Callable[[Term], Term]) -> Term:
+    """The same kind of node with `change` applied to the terms right below it."""
+    changes: dict[str, Any] = {}
+    for item in fields(term):
+        value = getattr(term, item.name)
+        if isinstance(value, Term):
+            changes[item.name] = change(value)
+        elif isinstance(value, tuple) and any(isinstance(part, Term) for part in value):
+            changes[item.name] = tuple(change(part) if isinstance(part, Term) else part for part in value)
+    return replace(term, **changes) if changes else term
+
+
+def substitute(term: Term, name: str, value: Const) -> Term:
+    """The term with the quantifier's variable replaced by one of its items."""
+    if isinstance(term, terms.Variable):
+        return value if term.name == name else term
+    if isinstance(term, terms.Quantified) and term.variable == name:
+        return term
+    return rebuild(term, lambda part: substitute(part, name, value))
+
+
+def mentions(term: Any, kind: type) -> bool:
+    """Whether a term of this kind stands anywhere in the tree."""
+    if isinstance(term, kind):
+        return True
+    if isinstance(term, tuple):
+        return any(mentions(part, kind) for part in term)
+    return is_dataclass(term) and any(mentions(getattr(term, item.name), kind) for item in fields(term))
+
+
+def _truth(value: bool) -> Const:
+    return TRUE if value else FALSE
+
+
+def _decide(term: Term) -> Term:
+    if isinstance(term, terms.Not) and isinstance(term.arg, Const):
+        return _truth(not term.arg.value)
+    if isinstance(term, terms.Compare) and isinstance(term.left, Const) and isinstance(term.right, Const):
+        left, right = term.left.value, term.right.value
+        return _truth(
+            {"==": left == right, "!=": left != right, "<": left < right, "<=": left <= right}[term.op]
+        )
+    if isinstance(term, terms.Logic):
+        return _decide_logic(term)
+    if isinstance(term, terms.Quantified) and term.op in ("any", "all"):
+        return _decide_quantified(term)
+    return term
+
+
+def _decide_logic(term: terms.Logic) -> Term:
+    decisive = 0 if term.op == "and" else 1
+    rest: list[Term] = []
+    for arg in term.args:
+        if not isinstance(arg, Const):
+            rest.append(arg)
+        elif bool(arg.value) == bool(decisive):
+            return _truth(bool(decisive))
+    if not rest:
+        return _truth(not decisive)
+    return rest[0] if len(rest) == 1 else replace(term, args=tuple(rest))
+
+
+def _decide_quantified(term: terms.Quantified) -> Term:
+    """Any and all are an `or` and an `and` over the items."""
+    parts = tuple(substitute(term.condition or TRUE, term.variable, item) for item in term.items)
+    if not parts:
+        return _truth(term.op == "all")
+    op: Any = "or" if term.op == "any" else "and"
+    return _decide(terms.Logic(op, tuple(_decide(part) for part in parts)))

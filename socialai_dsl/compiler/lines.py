@@ -1,0 +1,148 @@
+"""Everything that may be heard, numbered: fixed texts, texts with values inside, and the agent's own utterances."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import product
+
+from socialai_dsl.compiler.assembler import Label, constant
+from socialai_dsl.compiler.classes import OTHER, Classes, normal
+from socialai_dsl.compiler.expressions import Expressions
+from socialai_dsl.program import Op
+from socialai_dsl.semantics.terms import Checked, Const, Entity, Line, Term
+
+UNKNOWN = 1
+MAX_TOKENS = 256
+
+
+def words_of(text: str) -> list[str]:
+    """The words of a line: lower-cased maximal runs of letters, digits and apostrophes."""
+    return re.findall(r"(?:[^\W_]|')+", text.lower())
+
+
+@dataclass
+class Lines:
+    """The line table.
+
+    Attributes:
+        texts: text of each line as the agent hears it. classes: utterance class to NPCs. tokens: ids of its words.
+        agent_says: 1 + number of the agent's utterance (0, 0) where the agent's utterances are lines; else 0.
+        speakers: for each entity that says something, the numbers of its lines.
+    """
+
+    checked: Checked
+    classes_of: Classes
+    texts: list[str] = field(default_factory=list)
+    classes: list[int] = field(default_factory=list)
+    tokens: list[list[int]] = field(default_factory=list)
+    agent_says: int = 0
+    speakers: dict[int, set[int]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._known: dict[tuple[int, tuple[str | Term, ...]], int] = {}
+        self.vocabulary = ("<pad>", "<unk>", *self.checked.words_in_order)
+        self._ids = {word: number for number, word in enumerate(self.vocabulary)}
+        if self.checked.own_voice or any(frame.entity == 0 for frame in self.checked.frames):
+            self._add_agent()
+
+    def _add_agent(self) -> None:
+        self.agent_says = 1 + len(self.texts)
+        agent = self.checked.entities[0]
+        for k, (template, noun) in enumerate(product(self.checked.templates, self.checked.nouns)):
+            line = self._append(agent, self._word(agent.name), template.replace("<noun>", noun))
+            self.classes[line] = self.classes_of.of_pair[k]
+
+    def _append(self, speaker: Entity, name: str, text: str) -> int:
+        heard = f"{name}: {text}" if self.checked.names_shown else text
+        line = len(self.texts)
+        self.texts.append(heard)
+        self.classes.append(self.classes_of.of_text(text))
+        # A text without a single word still has to be heard as something.
+        self.tokens.append([self._ids.get(word, UNKNOWN) for word in words_of(heard)] or [UNKNOWN])
+        self.speakers.setdefault(speaker.number, set()).add(line)
+        return line
+
+    @staticmethod
+    def _word(term: Term | None) -> str:
+        assert isinstance(term, Const), "internal: the agent's name is drawn"
+        return term.type.words[term.value - term.type.low]
+
+    def say(self, to: Expressions, speaker: Entity, line: Line) -> int:
+        """Emit the number of the line that `speaker` says; the operand it is in."""
+        to.site, to.block.span = line.site, line.span
+        if speaker.number == 0:
+            return self._utterance(to, line)
+        parts = (speaker.name or "", *line.parts)
+        varying = [part for part in parts if not isinstance(part, str | Const)]
+        first = self._family(speaker, parts)
+        return self._index(to, varying, first)
+
+    @staticmethod
+    def _index(to: Expressions, varying: Sequence[Term], first: int) -> int:
+        """First + the values of the varying parts as one mixed-radix number."""
+        block = to.block
+        result = constant(first)
+        stride = 1
+        for part in reversed(varying):
+            value = to.value(part)
+            scaled = block.temporary()
+            block.emit(Op.SUB, scaled, value, constant(part.type.low))
+            if stride != 1:
+                block.emit(Op.MUL, scaled, scaled, constant(stride))
+            block.emit(Op.ADD, scaled, scaled, result)
+            result, stride = scaled, stride * part.type.size
+        return result
+
+    def _family(self, speaker: Entity, parts: tuple[str | Term, ...]) -> int:
+        """Number of the first of all lines that these parts can make; the last varying part changes fastest."""
+        key = (speaker.number, parts)
+        if key not in self._known:
+            self._known[key] = len(self.texts)
+            for name, *pieces in product(*(_choices(part) for part in parts)):
+                self._append(speaker, name, "".join(pieces))
+        return self._known[key]
+
+    def _utterance(self, to: Expressions, line: Line) -> int:
+        """The agent's line among the utterances of the grammar: its parts are a fixed text, or enumerated."""
+        pairs = {
+            normal(template.replace("<noun>", noun)): self.agent_says - 1 + k
+            for k, (template, noun) in enumerate(product(self.checked.templates, self.checked.nouns))
+        }
+        numbers = [
+            pairs[normal("".join(pieces))] for pieces in product(*(_choices(part) for part in line.parts))
+        ]
+        varying = [part for part in line.parts if not isinstance(part, str | Const)]
+        position = self._index(to, varying, 0)
+        result = to.block.temporary()
+        to.block.emit(Op.LOAD, result, constant(numbers[0]))
+        for i, number in enumerate(numbers[1:], 1):
+            following = Label()
+            to.block.test(Op.IF_EQ, position, constant(i), following)
+            to.block.emit(Op.LOAD, result, constant(number))
+            to.block.bind(following)
+        return result
+
+    @property
+    def history_length(self) -> int:
+        """L: room for the longest history an episode can make, a multiple of 8 from 8 to 256."""
+        heard = [s for s in self.speakers if s != 0 or self.checked.own_voice]
+        longest = sum(max(len(self.tokens[line]) for line in self.speakers[s]) for s in heard)
+        bound = max(self.checked.horizon * longest, max((len(t) for t in self.tokens), default=1))
+        return max(8, min(MAX_TOKENS, -(-bound // 8) * 8))
+
+    @property
+    def hearable_by_npcs(self) -> int:
+        """How many cast members other than the agent say something that a rule waits for."""
+        return sum(
+            any(self.classes[line] > OTHER for line in lines) for s, lines in self.speakers.items() if s != 0
+        )
+
+
+def _choices(part: str | Term) -> tuple[str, ...]:
+    """The words a part of a line can be."""
+    if isinstance(part, str):
+        return (part,)
+    words = part.type.words or tuple(str(value) for value in range(part.type.low, part.type.high + 1))
+    return (words[part.value - part.type.low],) if isinstance(part, Const) else words

@@ -1,0 +1,39 @@
+"""The outcome list to code: one block for each pair of utterance class and body action, most of them empty."""
+
+from __future__ import annotations
+
+from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Sites
+from socialai_dsl.compiler.classes import Classes
+from socialai_dsl.compiler.expressions import Expressions
+from socialai_dsl.compiler.folding import FALSE, Facts, fold
+from socialai_dsl.compiler.registers import Registers
+from socialai_dsl.program import Body, Op
+from socialai_dsl.semantics.terms import Checked
+
+
+def outcome_table(
+    checked: Checked, registers: Registers, classes: Classes, sites: Sites, code: CodeTable
+) -> list[int]:
+    """Addresses by (class, action), row by row."""
+    table = []
+    for said in range(classes.count):
+        for action in Body:
+            facts = Facts(said=said, action=action)
+            to = Expressions(Block(), checked, registers, classes, sites)
+            to.facts = facts
+            _first_that_holds(to, checked)
+            table.append(code.add(to.block, f"outcome after class {said}, {action.name.lower()}"))
+    return table
+
+
+def _first_that_holds(to: Expressions, checked: Checked) -> None:
+    block = to.block
+    for number, outcome in enumerate(checked.outcomes):
+        if fold(outcome.condition.term, to.facts, to.classes) == FALSE:
+            continue
+        following = Label()
+        to.sited_condition(outcome.condition, following)
+        block.emit(Op.END, number, outcome.percent if outcome.success else 0)
+        block.halt()
+        block.bind(following)
+    block.halt()

@@ -1,0 +1,176 @@
+"""Placements to code: sets of cells as boards, one uniform draw among the cells that are left."""
+
+from __future__ import annotations
+
+from socialai_dsl.compiler.assembler import Label, constant
+from socialai_dsl.compiler.expressions import Expressions
+from socialai_dsl.program import BOARDS, Op, Register, Side
+from socialai_dsl.semantics import terms
+from socialai_dsl.semantics.terms import Placing, Region, Term
+
+_SIDES = {"top": Side.TOP, "bottom": Side.BOTTOM, "left": Side.LEFT, "right": Side.RIGHT}
+_EVERYWHERE = 31
+
+
+class Places:
+    """Emits placements through `to`; boards are taken and given back like a stack."""
+
+    def __init__(self, to: Expressions) -> None:
+        self.to = to
+        self._boards = 0
+
+    def put(self, placing: Placing) -> None:
+        """Emit the draw of a cell and the putting of the entity there."""
+        to, block = self.to, self.to.block
+        block.span = placing.span
+        mark = block.taken
+        cell = block.temporary(2)
+        if placing.at is not None:
+            to.site = placing.where_site
+            for target, coordinate in zip((cell, cell + 1), placing.at, strict=True):
+                block.emit(Op.LOAD, target, to.value(coordinate))
+        elif placing.nowhere:
+            for target in (cell, cell + 1):
+                block.emit(Op.LOAD, target, constant(-1))
+        else:
+            to.site = placing.where_site
+            board = self._union(placing.regions)
+            block.emit(Op.B_FREE, board)
+            if placing.where is not None:
+                self._keep(board, placing.where)
+            block.emit(Op.PICK_CELL, cell, board, to.sites.row(placing.site, placing.number))
+            self._boards = 0
+        block.emit(Op.PUT, constant(placing.entity), cell)
+        block.release(mark)
+
+    def _board(self) -> int:
+        self._boards += 1
+        assert self._boards <= BOARDS, "internal: a place needs more boards than the engine has"
+        return self._boards - 1
+
+    def _union(self, regions: tuple[Region, ...]) -> int:
+        first, *rest = [self._region(region) for region in regions]
+        for board in rest:
+            self.to.block.emit(Op.B_OR, first, board)
+        self._boards = first + 1
+        return first
+
+    def _region(self, region: Region) -> int:
+        board = self._board()
+        block = self.to.block
+        match region.name:
+            case "anywhere":
+                block.emit(Op.B_FLOOR, board)
+            case "wall":
+                assert region.side is not None
+                block.emit(Op.B_WALL, board, _SIDES[region.side], region.margin)
+            case "next_to":
+                block.emit(Op.B_NEXT_TO, board, self.to.value(region.args[0]))
+                self._only_floor(board)
+            case "in_front_of":
+                block.emit(Op.B_IN_FRONT_OF, board, self.to.value(region.args[0]))
+                self._only_floor(board)
+            case _:
+                self._rectangle(board, region)
+        return board
+
+    def _only_floor(self, board: int) -> None:
+        floor = self._board()
+        self.to.block.emit(Op.B_FLOOR, floor)
+        self.to.block.emit(Op.B_AND, board, floor)
+        self._boards = floor
+
+    def _rectangle(self, board: int, region: Region) -> None:
+        """Halves, rows, columns and rectangles: x from corner to corner + 1, y from corner + 2 to corner + 3."""
+        block = self.to.block
+        mark = block.taken
+        corner = block.temporary(4)
+        bounds: list[int] = [constant(0), constant(_EVERYWHERE), constant(0), constant(_EVERYWHERE)]
+        if region.name in ("column", "row"):
+            at = 0 if region.name == "column" else 2
+            bounds[at] = bounds[at + 1] = self.to.value(region.args[0])
+        elif region.name == "rect":
+            x0, y0, x1, y1 = (self.to.value(arg) for arg in region.args)
+            bounds = [x0, x1, y0, y1]
+        else:
+            self._half(region.name, bounds)
+        for i, bound in enumerate(bounds):
+            block.emit(Op.LOAD, corner + i, bound)
+        block.emit(Op.B_RECT, board, corner)
+        block.release(mark)
+
+    def _half(self, name: str, bounds: list[int]) -> None:
+        """left_half is x < W // 2, right_half x > W // 2; top and bottom likewise: the middle line is in neither."""
+        block = self.to.block
+        middle, beyond = block.temporary(), block.temporary()
+        size = Register.WIDTH if name in ("left_half", "right_half") else Register.HEIGHT
+        block.emit(Op.DIV, middle, size, constant(2))
+        lower = name in ("left_half", "top_half")
+        block.emit(Op.SUB if lower else Op.ADD, beyond, middle, constant(1))
+        bounds[(0 if size == Register.WIDTH else 2) + (1 if lower else 0)] = beyond
+
+    # --- where ---
+
+    def _keep(self, board: int, where: Term) -> None:
+        """Take out of `board` the cells for which `where` is false."""
+        block = self.to.block
+        match where:
+            case terms.Logic(op="and"):
+                for arg in where.args:
+                    self._keep(board, arg)
+            case terms.Not():
+                held = self._copy(board)
+                self._keep(held, where.arg)
+                block.emit(Op.B_WITHOUT, board, held)
+                self._boards = held
+            case terms.Logic():
+                self._keep_either(board, where.args)
+            case terms.Quantified(op="any"):
+                self._keep_either(board, tuple(self.to.instance(where, item) for item in where.items))
+            case terms.Quantified(op="all"):
+                for item in where.items:
+                    self._keep(board, self.to.instance(where, item))
+            case terms.Test(subject=None, name="in_front_of" | "next_to"):
+                self._keep_near(board, where)
+            case _:
+                self._keep_each(board, where)
+
+    def _copy(self, board: int) -> int:
+        copy = self._board()
+        self.to.block.emit(Op.B_COPY, copy, board)
+        return copy
+
+    def _keep_either(self, board: int, args: tuple[Term, ...]) -> None:
+        rest = self._copy(board)
+        for arg in args:
+            held = self._copy(rest)
+            self._keep(held, arg)
+            self.to.block.emit(Op.B_WITHOUT, rest, held)
+            self._boards = held
+        self.to.block.emit(Op.B_WITHOUT, board, rest)
+        self._boards = rest
+
+    def _keep_near(self, board: int, where: terms.Test) -> None:
+        near = self._board()
+        op = Op.B_IN_FRONT_OF if where.name == "in_front_of" else Op.B_NEXT_TO
+        self.to.block.emit(op, near, self.to.value(where.object))
+        self.to.block.emit(Op.B_AND, board, near)
+        self._boards = near
+
+    def _keep_each(self, board: int, where: Term) -> None:
+        block = self.to.block
+        mark = block.taken
+        here = block.temporary(2)
+        keep, drop = Label(), Label()
+        self.to.here = (here, here + 1)
+        start = len(block.instructions)
+        block.emit(Op.EACH_CELL, board, here)
+        self.to.condition(where, drop)
+        block.skip(keep)
+        block.bind(drop)
+        block.emit(Op.DROP_CELL)
+        block.bind(keep)
+        block.instructions[start][3] = len(block.instructions) - start - 1
+        block.emit(Op.END_EACH)
+        self.to.here = None
+        block.release(mark)

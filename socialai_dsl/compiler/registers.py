@@ -1,0 +1,56 @@
+"""Which register holds what: one row of int16 per environment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Field, RegisterName
+from socialai_dsl.semantics.terms import Checked, Drawn, FramePlan, Type
+
+
+def entity_register(entity: int, which: Field) -> int:
+    """The register of a field of an entity."""
+    return FIRST_ENTITY + ENTITY_FIELDS * entity + which
+
+
+@dataclass
+class Registers:
+    """Allocates registers in order of need and remembers their names and ranges."""
+
+    next_free: int
+    by_path: dict[str, int] = field(default_factory=dict)
+    names: list[RegisterName] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, checked: Checked) -> Registers:
+        """Entities, then draws in the order of the setup, then states and clocks of the frames."""
+        registers = cls(FIRST_ENTITY + ENTITY_FIELDS * len(checked.entities))
+        for item in checked.setup:
+            if isinstance(item, Drawn):
+                registers.add(item.path, item.type)
+        for frame in checked.frames:
+            registers.add(
+                f"{frame.member}.frame", Type("status", 0, len(state_names(frame)) - 1, state_names(frame))
+            )
+            registers.add(f"{frame.member}.clock", Type("int", 0, checked.horizon))
+        return registers
+
+    def add(self, path: str, type_: Type) -> int:
+        """A named register."""
+        register = self.reserve(1)
+        self.by_path[path] = register
+        self.names.append(RegisterName(path, register, type_.words, type_.low, type_.high))
+        return register
+
+    def reserve(self, count: int) -> int:
+        """The first of `count` registers without a name."""
+        first = self.next_free
+        self.next_free += count
+        return first
+
+
+def state_names(frame: FramePlan) -> tuple[str, ...]:
+    """Names of a frame's states in the order of their numbers; entries of `steps` without a name are step0, step1, ..."""
+    if frame.states:
+        return tuple(state.name for state in frame.states)
+    return (*(step.state or f"step{i}" for i, step in enumerate(frame.steps)), "finished")

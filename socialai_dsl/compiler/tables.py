@@ -1,0 +1,262 @@
+"""All tables of a program put one behind the other, with the header in front."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from socialai_dsl.compiler.assembler import CodeTable, Sites
+from socialai_dsl.compiler.classes import Classes
+from socialai_dsl.compiler.lines import Lines
+from socialai_dsl.compiler.registers import Registers, state_names
+from socialai_dsl.compiler.rooms import WALL, room_templates
+from socialai_dsl.program import (
+    BODY_WORDS,
+    CODES_OF_TYPES,
+    EntityColumn,
+    EntityName,
+    Flag,
+    FrameColumn,
+    Header,
+    LineColumn,
+    Outcome,
+    Program,
+    TypeColumn,
+)
+from socialai_dsl.semantics.terms import Checked, Entity, FramePlan, ObjectType
+
+
+class Tables:
+    """Collects the tables of one scenario; `program` lays them out.
+
+    Registers of inboxes, of what is heard and of the log are reserved here, since only now their sizes are known.
+    """
+
+    def __init__(
+        self,
+        checked: Checked,
+        registers: Registers,
+        classes: Classes,
+        sites: Sites,
+        lines: Lines,
+        code: CodeTable,
+    ) -> None:
+        self.checked, self.registers, self.classes = checked, registers, classes
+        self.sites, self.lines, self.code = sites, lines, code
+        # A member hears each of the others at most once between two of its turns.
+        self.inbox_size = 1 + len(checked.frames)
+        self.inbox = 0
+
+    def reserve_inboxes(self) -> dict[str, int]:
+        """First register of the inbox of each member with a frame: a count, then classes."""
+        self.inbox = self.registers.reserve(0)
+        return {frame.member: self.registers.reserve(1 + self.inbox_size) for frame in self.checked.frames}
+
+    def program(
+        self,
+        reset_pc: int,
+        frames: list[tuple[FramePlan, list[list[int]]]],
+        outcomes: list[int],
+        rules: tuple[str, ...],
+    ) -> Program:
+        """Lay out everything; see program.Header for the order."""
+        checked, lines = self.checked, self.lines
+        length = lines.history_length
+        heard_size = max(1, len(lines.speakers))
+        heard = self.registers.reserve(heard_size)
+        log_size = length // min((len(tokens) for tokens in lines.tokens), default=length)
+        log = self.registers.reserve(log_size)
+
+        header = dict.fromkeys(Header, 0)
+        body: list[int] = []
+
+        def table(offset: Header, words: list[int]) -> None:
+            header[offset] = Header.END + len(body)
+            body.extend(words)
+
+        types = _TypeTable(checked)
+        table(Header.CODE_AT, [word for row in self.code.instructions for word in row])
+        table(
+            Header.ACTION_AT, [*(BODY_WORDS.index(action) for action in checked.actions), len(BODY_WORDS) - 1]
+        )
+        table(Header.CLASS_AT, self.classes.of_pair)
+        table(Header.ENTITY_AT, [word for entity in checked.entities for word in _entity_row(entity, types)])
+        table(Header.TYPE_AT, [word for row in types.rows for word in row])
+        table(Header.ROOM_AT, room_templates(checked.room))
+        table(Header.FRAME_AT, self._frame_rows(frames))
+        table(Header.STATE_AT, [word for _, rows in frames for row in rows for word in row])
+        table(Header.OUTCOME_AT, outcomes)
+        table(Header.LINE_AT, self._line_rows())
+        table(Header.TOKEN_AT, [token for tokens in lines.tokens for token in tokens])
+        table(Header.SITE_AT, self.sites.words())
+
+        header |= {
+            Header.SIZE: Header.END + len(body),
+            Header.REGISTERS: self.registers.next_free,
+            Header.CANVAS_WIDTH: checked.room.canvas[0],
+            Header.CANVAS_HEIGHT: checked.room.canvas[1],
+            Header.ENTITIES: len(checked.entities),
+            Header.NPCS: sum(entity.role == "npc" for entity in checked.entities),
+            Header.PRIMITIVES: len(checked.actions),
+            Header.TEMPLATES: len(checked.templates),
+            Header.NOUNS: len(checked.nouns),
+            Header.CLASSES: self.classes.count,
+            Header.HORIZON: checked.horizon,
+            Header.FLAGS: self._flags(),
+            Header.TOKENS: length,
+            Header.LOG: log,
+            Header.LOG_SIZE: log_size,
+            Header.HEARD: heard,
+            Header.HEARD_SIZE: heard_size,
+            Header.INBOX: self.inbox,
+            Header.INBOX_SIZE: self.inbox_size,
+            Header.FRAMES: len(frames),
+            Header.DEADLY: types.deadly,
+            Header.MIN_WIDTH: checked.room.width[0],
+            Header.MIN_HEIGHT: checked.room.height[0],
+            Header.HEIGHTS: checked.room.height[1] - checked.room.height[0] + 1,
+            Header.OUTSIDE: WALL,
+            Header.INSTRUCTIONS: len(self.code.instructions),
+            Header.RESET_PC: reset_pc,
+            Header.LINES: len(lines.texts),
+            Header.STATES: sum(len(rows) for _, rows in frames),
+            Header.SITES: len(self.sites.rows),
+            Header.TYPE_ROWS: len(types.rows),
+            Header.COUNTERS: len(rules) + len(checked.outcomes) + 3,
+            Header.AGENT_SAYS: lines.agent_says,
+        }
+        words = np.array([*(header[word] for word in Header if word != Header.END), *body], dtype=np.int64)
+        # Boards are sets of bits, so a word may use the sign bit.
+        return Program(
+            words=words.astype(np.uint64).astype(np.uint32).view(np.int32),
+            name=checked.name,
+            actions=checked.actions,
+            templates=checked.templates,
+            nouns=checked.nouns,
+            entities=tuple(_entity_name(entity) for entity in checked.entities),
+            registers=tuple(self.registers.names),
+            lines=tuple(lines.texts),
+            outcome_table=(
+                *(Outcome(o.name, o.success, o.condition.span) for o in checked.outcomes),
+                Outcome("deadly", False),
+                Outcome("timeout", False),
+            ),
+            rules=rules,
+            vocabulary=lines.vocabulary,
+            source_map=tuple(self.code.spans),
+            labels=dict(self.code.labels),
+        )
+
+    def _flags(self) -> int:
+        checked = self.checked
+        flags = {
+            Flag.NPCS_HIDDEN: checked.npcs_hidden,
+            Flag.PICTURE_BEFORE_NPCS: checked.picture_before_npcs,
+            Flag.AGENT_FRAME: any(frame.entity == 0 for frame in checked.frames),
+            Flag.OWN_VOICE: checked.own_voice,
+        }
+        return sum(flag for flag, on in flags.items() if on)
+
+    def _frame_rows(self, frames: list[tuple[FramePlan, list[list[int]]]]) -> list[int]:
+        words = []
+        first_row = 0
+        for number, (frame, rows) in enumerate(frames):
+            row = dict.fromkeys(FrameColumn, 0) | {
+                FrameColumn.ENTITY: frame.entity,
+                FrameColumn.STATE: self.registers.by_path[f"{frame.member}.frame"],
+                FrameColumn.CLOCK: self.registers.by_path[f"{frame.member}.clock"],
+                FrameColumn.ROWS: first_row,
+                FrameColumn.STATES: len(state_names(frame)),
+                FrameColumn.INBOX: self.inbox + number * (1 + self.inbox_size),
+            }
+            first_row += len(rows)
+            words += [row[column] for column in FrameColumn if column != FrameColumn.COLUMNS]
+        return words
+
+    def _line_rows(self) -> list[int]:
+        words = []
+        first_token = 0
+        for tokens, number in zip(self.lines.tokens, self.lines.classes, strict=True):
+            row = {
+                LineColumn.FIRST_TOKEN: first_token,
+                LineColumn.TOKENS: len(tokens),
+                LineColumn.CLASS: number,
+            }
+            words += [row[column] for column in LineColumn if column != LineColumn.COLUMNS]
+            first_token += len(tokens)
+        return words
+
+
+class _TypeTable:
+    """One row for each status of each object type in the scenario, one for NPCs, one for the agent."""
+
+    def __init__(self, checked: Checked) -> None:
+        self.rows: list[list[int]] = []
+        self.deadly = 0
+        self.agent = self._add(code=CODES_OF_TYPES["empty"], status=0, toggled=0)
+        self.npc = self._add(code=CODES_OF_TYPES["npc"], status=0, toggled=0, transparent=1)
+        self._first: dict[str, int] = {}
+        for kind in [
+            *(e.type for e in checked.entities if e.type),
+            *(kind for kind, _, _ in checked.room.build),
+        ]:
+            if kind.name not in self._first:
+                self._first[kind.name] = self._object(kind)
+
+    def _add(
+        self,
+        code: int,
+        status: int,
+        toggled: int,
+        orientation: int = 0,
+        walkable: int = 0,
+        transparent: int = 0,
+    ) -> int:
+        row = {
+            TypeColumn.CODE: code,
+            TypeColumn.STATUS: status,
+            TypeColumn.ORIENTATION: orientation,
+            TypeColumn.WALKABLE: walkable,
+            TypeColumn.TRANSPARENT: transparent,
+            TypeColumn.TOGGLED: toggled,
+        }
+        self.rows.append([row[column] for column in TypeColumn if column != TypeColumn.COLUMNS])
+        return len(self.rows) - 1
+
+    def _object(self, kind: ObjectType) -> int:
+        self.deadly |= int(kind.deadly) << kind.code
+        rows = [
+            self._add(
+                code=kind.code,
+                status=kind.shown.get(status, (status, 0))[0],
+                orientation=kind.shown.get(status, (status, 0))[1],
+                toggled=kind.toggled.get(status, status),
+                walkable=int(status in kind.walkable),
+                transparent=int(status in kind.transparent),
+            )
+            for status in range(len(kind.states))
+        ]
+        return rows[0]
+
+    def of(self, entity: Entity) -> int:
+        """First row of an entity's type."""
+        if entity.type is not None:
+            return self._first[entity.type.name]
+        return self.npc if entity.role == "npc" else self.agent
+
+
+def _entity_row(entity: Entity, types: _TypeTable) -> list[int]:
+    row = {
+        EntityColumn.TYPE: types.of(entity),
+        EntityColumn.KIND: entity.kind_code,
+        EntityColumn.NEAR: entity.near,
+        EntityColumn.FAR: entity.far,
+        EntityColumn.AUDIBLE: int(entity.audible),
+        EntityColumn.IN_WALL: int(entity.in_wall),
+    }
+    return [row[column] for column in EntityColumn if column != EntityColumn.COLUMNS]
+
+
+def _entity_name(entity: Entity) -> EntityName:
+    kind = entity.type.name if entity.type else entity.kind
+    states = entity.type.states if entity.type else ()
+    return EntityName(entity.key, entity.index, entity.role, kind, states)

@@ -1,0 +1,193 @@
+"""Proves that a program cannot make the engine leave its arrays or run for ever; nothing runs that is not proven.
+
+Every address is in range, every skip goes forward, every path ends; each operand is followed as an interval of values,
+so an entity, a line, a status or a coordinate that could be out of range is found before the program runs.
+"""
+
+from __future__ import annotations
+
+from socialai_dsl.compiler.code_verifier import verify_code
+from socialai_dsl.compiler.invalid import InvalidProgram
+from socialai_dsl.program import (
+    ENTITY_FIELDS,
+    FIRST_ENTITY,
+    MAX_SIDE,
+    EntityColumn,
+    FrameColumn,
+    Header,
+    LineColumn,
+    Program,
+    TypeColumn,
+)
+
+__all__ = ["InvalidProgram", "verify"]
+
+
+def verify(program: Program) -> None:
+    """Raise InvalidProgram unless the program is proven safe."""
+    _header(program)
+    _entities(program)
+    _frames(program)
+    _lines(program)
+    _inside(program, Header.ACTION_AT, program.header(Header.PRIMITIVES) + 1, 0, 7)
+    pairs = program.header(Header.TEMPLATES) * program.header(Header.NOUNS)
+    _inside(program, Header.CLASS_AT, pairs, 1, program.header(Header.CLASSES) - 1)
+    verify_code(program)
+
+
+def _require(condition: bool, message: str) -> None:
+    if not condition:
+        raise InvalidProgram(message)
+
+
+def _sizes(program: Program) -> dict[Header, int]:
+    h = program.header
+    width, height = h(Header.CANVAS_WIDTH), h(Header.CANVAS_HEIGHT)
+    lines = h(Header.LINE_AT)
+    tokens = h(Header.LINES) and max(
+        int(program.words[lines + LineColumn.COLUMNS * k + LineColumn.FIRST_TOKEN])
+        + int(program.words[lines + LineColumn.COLUMNS * k + LineColumn.TOKENS])
+        for k in range(h(Header.LINES))
+    )
+    return {
+        Header.CODE_AT: 4 * h(Header.INSTRUCTIONS),
+        Header.ACTION_AT: h(Header.PRIMITIVES) + 1,
+        Header.CLASS_AT: h(Header.TEMPLATES) * h(Header.NOUNS),
+        Header.ENTITY_AT: h(Header.ENTITIES) * EntityColumn.COLUMNS,
+        Header.TYPE_AT: h(Header.TYPE_ROWS) * TypeColumn.COLUMNS,
+        Header.ROOM_AT: h(Header.HEIGHTS) * (width * height + 1 + 2 * height),
+        Header.FRAME_AT: h(Header.FRAMES) * FrameColumn.COLUMNS,
+        Header.STATE_AT: h(Header.STATES) * (1 + 2 * (h(Header.CLASSES) + 1)),
+        Header.OUTCOME_AT: h(Header.CLASSES) * 8,
+        Header.LINE_AT: h(Header.LINES) * LineColumn.COLUMNS,
+        Header.TOKEN_AT: tokens,
+        Header.SITE_AT: 2 * h(Header.SITES),
+    }
+
+
+def _header(program: Program) -> None:
+    h = program.header
+    _require(len(program.words) >= Header.END, "the header is cut off")
+    _require(
+        h(Header.SIZE) == len(program.words), f"{len(program.words)} words, the header says {h(Header.SIZE)}"
+    )
+    for word in (Header.CANVAS_WIDTH, Header.CANVAS_HEIGHT):
+        _require(3 <= h(word) <= MAX_SIDE, f"{word.name} is {h(word)}")
+    for word in (
+        Header.ENTITIES,
+        Header.PRIMITIVES,
+        Header.TEMPLATES,
+        Header.NOUNS,
+        Header.HORIZON,
+        Header.HEIGHTS,
+    ):
+        _require(0 < h(word) < 32768, f"{word.name} is {h(word)}")
+    _require(h(Header.CLASSES) >= 2 and h(Header.NPCS) < h(Header.ENTITIES), "too few classes or entities")
+    _require(
+        h(Header.MIN_HEIGHT) + h(Header.HEIGHTS) - 1 <= h(Header.CANVAS_HEIGHT),
+        "a room is higher than the canvas",
+    )
+    for offset in _OFFSETS:
+        _require(Header.END <= h(offset) <= len(program.words), f"{offset.name} is {h(offset)}")
+    for offset, size in _sizes(program).items():
+        _require(h(offset) + size <= len(program.words), f"the table at {offset.name} is cut off")
+    _registers(program)
+
+
+_OFFSETS = [word for word in Header if word.name.endswith("_AT")]
+
+
+def _registers(program: Program) -> None:
+    """Entities, inboxes, lines heard and the log lie inside the row and do not overlap."""
+    h = program.header
+    areas = sorted(
+        [
+            (0, FIRST_ENTITY + ENTITY_FIELDS * h(Header.ENTITIES), "entities"),
+            (h(Header.INBOX), h(Header.INBOX) + h(Header.FRAMES) * (1 + h(Header.INBOX_SIZE)), "inboxes"),
+            (h(Header.HEARD), h(Header.HEARD) + h(Header.HEARD_SIZE), "lines heard"),
+            (h(Header.LOG), h(Header.LOG) + h(Header.LOG_SIZE), "log"),
+        ]
+    )
+    for (_, end, name), (start, _, following) in zip(areas, areas[1:], strict=False):
+        _require(end <= start, f"registers of {name} reach into {following}")
+    _require(areas[-1][1] <= h(Header.REGISTERS) < 8192, "registers beyond the end of the row")
+    _require(h(Header.INBOX_SIZE) >= 1 + h(Header.FRAMES), "an inbox could overflow")
+    named = [name.register for name in program.registers]
+    for start, end, name in areas:
+        _require(not any(start <= register < end for register in named), f"a named register lies in {name}")
+
+
+def _inside(program: Program, table: Header, count: int, low: int, high: int) -> None:
+    words = program.words[program.header(table) : program.header(table) + count]
+    _require(
+        bool(((words >= low) & (words <= high)).all()), f"{table.name} holds a number outside {low}..{high}"
+    )
+
+
+def _entities(program: Program) -> None:
+    h = program.header
+    rows = h(Header.TYPE_ROWS)
+    _require(len(program.entities) == h(Header.ENTITIES), "entities without names")
+    for number, entity in enumerate(program.entities):
+        at = h(Header.ENTITY_AT) + EntityColumn.COLUMNS * number
+        first = int(program.words[at + EntityColumn.TYPE])
+        statuses = max(1, len(entity.states))
+        _require(first >= 0 and first + statuses <= rows, f"the type of {entity} is out of range")
+        for status in range(statuses):
+            toggled = int(
+                program.words[h(Header.TYPE_AT) + TypeColumn.COLUMNS * (first + status) + TypeColumn.TOGGLED]
+            )
+            _require(0 <= toggled < statuses, f"a toggle gives {entity} a status it does not have")
+    for row in range(rows):
+        at = h(Header.TYPE_AT) + TypeColumn.COLUMNS * row
+        _require(0 < int(program.words[at + TypeColumn.CODE]) < 32, f"type row {row} has no type code")
+        for column in (TypeColumn.STATUS, TypeColumn.ORIENTATION):
+            _require(
+                0 <= int(program.words[at + column]) < 256, f"type row {row} does not fit into the picture"
+            )
+
+
+def _frames(program: Program) -> None:
+    h = program.header
+    named = {name.register: name for name in program.registers}
+    for number in range(h(Header.FRAMES)):
+        at = h(Header.FRAME_AT) + FrameColumn.COLUMNS * number
+        row = {
+            column: int(program.words[at + column]) for column in FrameColumn if column != FrameColumn.COLUMNS
+        }
+        _require(
+            0 <= row[FrameColumn.ENTITY] <= h(Header.NPCS), f"frame {number} moves what is no cast member"
+        )
+        _require(row[FrameColumn.STATES] > 0, f"frame {number} has no state")
+        last = row[FrameColumn.ROWS] + row[FrameColumn.STATES]
+        _require(
+            row[FrameColumn.ROWS] >= 0 and last <= h(Header.STATES),
+            f"states of frame {number} are out of range",
+        )
+        state, clock = named.get(row[FrameColumn.STATE]), named.get(row[FrameColumn.CLOCK])
+        _require(state is not None and state.low == 0, f"frame {number} has no register for its state")
+        assert state is not None
+        _require(state.high < row[FrameColumn.STATES], f"frame {number} may be in a state it does not have")
+        _require(clock is not None, f"frame {number} has no clock")
+        inbox = h(Header.INBOX) + number * (1 + h(Header.INBOX_SIZE))
+        _require(row[FrameColumn.INBOX] == inbox, f"frame {number} has no inbox of its own")
+
+
+def _lines(program: Program) -> None:
+    h = program.header
+    _require(len(program.lines) == h(Header.LINES) < 32767, "lines without texts")
+    _require(h(Header.TOKENS) >= 8, "no room for a history")
+    for number in range(h(Header.LINES)):
+        at = h(Header.LINE_AT) + LineColumn.COLUMNS * number
+        first, count, heard_as = (int(word) for word in program.words[at : at + LineColumn.COLUMNS])
+        _require(
+            first >= 0 and 1 <= count <= h(Header.TOKENS), f"line {number} does not fit into the history"
+        )
+        _require(
+            count * (h(Header.LOG_SIZE) + 1) > h(Header.TOKENS),
+            f"the log cannot hold line {number} often enough",
+        )
+        _require(1 <= heard_as < h(Header.CLASSES), f"line {number} has no utterance class")
+        tokens = program.words[h(Header.TOKEN_AT) + first : h(Header.TOKEN_AT) + first + count]
+        known = bool(((tokens >= 1) & (tokens < len(program.vocabulary))).all())
+        _require(known, f"line {number} has a word outside the vocabulary")

@@ -1,0 +1,160 @@
+"""A program as text: one instruction a line, with the place in the scenario file it comes from."""
+
+from __future__ import annotations
+
+from socialai_dsl.program import (
+    CONSTANT,
+    ENTITY_FIELDS,
+    FIRST_ENTITY,
+    TEMPORARY,
+    TESTS,
+    Field,
+    FrameColumn,
+    Header,
+    Op,
+    Program,
+    Register,
+)
+
+_ENTITIES = frozenset({*range(Op.IF_SAME_CELL, Op.IF_REACHES + 1), Op.GO_TO, Op.GO_NEXT_TO})
+_FIRST_IS_ENTITY = _ENTITIES | {Op.PUT, Op.SAY, Op.TURN_TO, Op.BECOME, Op.VANISH, Op.SET_FIELD}
+_SECOND_IS_ENTITY = _ENTITIES | {Op.FIELD, Op.DISTANCE, Op.QUADRANT, Op.B_NEXT_TO, Op.B_IN_FRONT_OF}
+_THIRD_IS_ENTITY = frozenset({Op.DISTANCE, Op.QUADRANT})
+_LITERALS: dict[Op, tuple[int, ...]] = {
+    Op.IF_UNPINNED: (),
+    Op.IF_CHANCE: (0, 1),
+    Op.IF_HEARD: (1,),
+    Op.FIELD: (2,),
+    Op.DRAW: (2,),
+    Op.PICK_BIT: (2,),
+    Op.SET_FIELD: (1,),
+    Op.GOTO: (0, 1),
+    Op.COUNT: (0,),
+    Op.END: (0, 1),
+    Op.TURN_TO: (2,),
+    Op.GO_TO: (2,),
+    Op.GO_NEXT_TO: (2,),
+    Op.PICK_CELL: (1, 2),
+    **dict.fromkeys(map(Op, range(Op.B_FLOOR, Op.B_FREE + 1)), (0,)),
+    Op.B_WALL: (0, 1, 2),
+    **dict.fromkeys((Op.B_AND, Op.B_OR, Op.B_WITHOUT, Op.B_COPY), (0, 1)),
+    Op.EACH_CELL: (0,),
+}
+
+
+def listing(program: Program) -> str:
+    """The sizes, then the code with a heading for each block, then lines, outcomes and vocabulary."""
+    return "\n".join([*_head(program), "", *_code(program), "", *_tables(program)]) + "\n"
+
+
+def _head(program: Program) -> list[str]:
+    h = program.header
+    return [
+        f"program {program.name}",
+        f"  {h(Header.SIZE)} words, {h(Header.REGISTERS)} registers, {h(Header.INSTRUCTIONS)} instructions, "
+        f"{h(Header.CLASSES)} utterance classes, {h(Header.LINES)} lines, history of {h(Header.TOKENS)} tokens",
+        f"  canvas {h(Header.CANVAS_WIDTH)}x{h(Header.CANVAS_HEIGHT)}, horizon {h(Header.HORIZON)}",
+    ]
+
+
+def _code(program: Program) -> list[str]:
+    names = _Names(program)
+    rows = []
+    for pc, ((op, *operands), span) in enumerate(zip(program.code.tolist(), program.source_map, strict=True)):
+        if pc in program.labels:
+            rows += ["", f"{program.labels[pc]}:"]
+        text = f"{pc:5d}  {Op(op).name:<16}{names.operands(Op(op), pc, operands)}"
+        place = f"{_short(span.file)}:{span.line}" if span else ""
+        rows.append(f"{text:<68}{place}".rstrip())
+    return rows
+
+
+def _short(file: str) -> str:
+    return file.rsplit("/", 1)[-1]
+
+
+def _tables(program: Program) -> list[str]:
+    return [
+        "frames:",
+        *_frames(program),
+        "lines:",
+        *(f"{number:5d}  {text}" for number, text in enumerate(program.lines)),
+        "outcomes:",
+        *(f"{number:5d}  {name}" for number, name in enumerate(program.outcomes)),
+        "vocabulary:",
+        "       " + " ".join(program.vocabulary),
+    ]
+
+
+def _frames(program: Program) -> list[str]:
+    """Each state with the addresses of its activity, its `first` and its `then`, by class of utterance heard."""
+    h, words = program.header, program.words
+    classes = h(Header.CLASSES) + 1
+    rows = []
+    for number in range(h(Header.FRAMES)):
+        at = h(Header.FRAME_AT) + FrameColumn.COLUMNS * number
+        entity, first, count = (
+            int(words[at + column]) for column in (FrameColumn.ENTITY, FrameColumn.ROWS, FrameColumn.STATES)
+        )
+        register = next(n for n in program.registers if n.register == int(words[at + FrameColumn.STATE]))
+        for k in range(count):
+            row = h(Header.STATE_AT) + (first + k) * (1 + 2 * classes)
+            activity, *rest = (int(word) for word in words[row : row + 1 + 2 * classes])
+            rows.append(
+                f"       {program.entities[entity]}.{register.values[k]}: do {activity}, "
+                f"first {rest[:classes]}, then {rest[classes:]}"
+            )
+    return rows
+
+
+class _Names:
+    """Operands in the scenario's own words."""
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self.registers = {int(register): register.name.lower() for register in Register}
+        for number, entity in enumerate(program.entities):
+            for field in Field:
+                self.registers[FIRST_ENTITY + ENTITY_FIELDS * number + field] = (
+                    f"{entity}.{field.name.lower()}"
+                )
+        self.registers |= {name.register: name.path for name in program.registers}
+
+    def operands(self, op: Op, pc: int, words: list[int]) -> str:
+        """The operands of one instruction; skips as the address they lead to."""
+        if op in (Op.HALT, Op.DROP_CELL, Op.END_EACH):
+            return ""
+        skip = op in TESTS or op in (Op.SKIP, Op.EACH_CELL)
+        shown = (
+            []
+            if op == Op.SKIP
+            else [self._operand(op, i, word) for i, word in enumerate(words[: 2 if skip else 3])]
+        )
+        while shown and shown[-1] == "0" and len(shown) > _least_operands(op):
+            shown.pop()
+        if skip:
+            shown.append(f"-> {pc + 1 + words[2]}")
+        return ", ".join(shown)
+
+    def _operand(self, op: Op, position: int, word: int) -> str:
+        if op == Op.COUNT:
+            return self.program.rules[word] if position == 0 else "0"
+        if op == Op.END and position == 0:
+            return self.program.outcomes[word]
+        if position in _LITERALS.get(op, ()):
+            return Field(word).name.lower() if op in (Op.FIELD, Op.SET_FIELD) else str(word)
+        if word >= CONSTANT // 2:
+            value = word - CONSTANT
+            entity = (op in _FIRST_IS_ENTITY, op in _SECOND_IS_ENTITY, op in _THIRD_IS_ENTITY)[position]
+            return str(self.program.entities[value]) if entity else f"#{value}"
+        if word >= TEMPORARY:
+            return f"%{word - TEMPORARY}"
+        if word == 0 and position >= _least_operands(op):
+            return "0"
+        return self.registers.get(word, f"r{word}")
+
+
+def _least_operands(op: Op) -> int:
+    one = (Op.COUNT, Op.BODY, Op.VANISH, Op.IF_UNPINNED, Op.B_FLOOR, Op.B_FREE)
+    three = (*range(Op.ADD, Op.ABS), Op.FIELD, Op.DISTANCE, Op.QUADRANT, Op.DRAW, Op.PICK_BIT, Op.SET_FIELD)
+    return 1 if op in one else 3 if op in three else 2
