@@ -1,5 +1,6 @@
 """This module trains, loads and evaluates agents for the commands, by way of the trainer."""
 
+import math
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Final, Literal
 
@@ -137,7 +138,7 @@ def evaluate_agent(
     """Play test episodes and record one of them: the first success, or the first if there is none.
 
     Args:
-        agent: `random`, `oracle`, or the path of a checkpoint, of a folder of them or of a run.
+        agent: `random`, `oracle`, `human`, or the path of a checkpoint, of a folder of them or of a run.
         scenario: what to play.
         program: the scenario's.
         episodes: how many test episodes, from the first on.
@@ -150,6 +151,9 @@ def evaluate_agent(
     Raises:
         UsageError: the checkpoint or the script does not fit the scenario.
     """
+    if agent == "human":
+        return _evaluate_human(scenario, program, episodes)
+
     import socialai_dsl
     from trainer.evaluate import evaluate
 
@@ -178,6 +182,35 @@ def _make_policy(agent: str, envs: Any, device: str) -> "Policy":
     path = Path(agent)
     checkpoints = path / "checkpoints"
     return CheckpointPolicy.load(checkpoints if checkpoints.is_dir() else path, envs, device=device)
+
+
+def _evaluate_human(scenario: str, program: "Program", episodes: int) -> tuple[dict[str, Any], "Episode"]:
+    """Let a person play test episodes until they quit."""
+    import socialai_dsl
+    from socialai_dsl.cli.play import HELP, Played, Quit, play_episode
+
+    env = socialai_dsl.make(scenario, render_mode="ansi")
+    played: list[Played] = []
+    print(HELP)
+    try:
+        for number in range(episodes):
+            played.append(play_episode(env, program, {"options": {"test_episode": number}}))
+    except Quit:
+        if not played:
+            raise UsageError("no episode was played to its end") from None
+    finally:
+        env.close()
+    count, rate = len(played), sum(p.success for p in played) / len(played)
+    figures = {
+        "episodes": count,
+        "success_rate": rate,
+        "success_rate_se": math.sqrt(rate * (1 - rate) / count),
+        "mean_length": sum(len(p.actions) for p in played) / count,
+        "mean_return": sum(p.reward for p in played) / count,
+        "outcomes": {name: sum(p.outcome == name for p in played) / count for name in program.outcomes},
+    }
+    number = next((i for i, p in enumerate(played) if p.success), 0)
+    return figures, _record(scenario, program, number, played[number].actions, "agent human")
 
 
 class _Remembering:

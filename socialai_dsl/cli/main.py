@@ -7,7 +7,7 @@ import traceback
 from collections.abc import Sequence
 from typing import Final
 
-from socialai_dsl.cli import bench, evaluate, run, schema, show, validate
+from socialai_dsl.cli import bench, evaluate, play, run, schema, show, validate
 from socialai_dsl.cli.errors import Exit, RunFailed, UsageError
 from socialai_dsl.diagnostics import ScenarioError, render_text
 
@@ -17,6 +17,7 @@ _COMMANDS: Final = {
     "schema": schema,
     "show": show,
     "evaluate": evaluate,
+    "play": play,
     "bench": bench,
 }
 

@@ -27,7 +27,7 @@ SUMMARY: Final = "train an agent on a scenario, evaluate it and write pictures a
 
 # About two minutes of training with the fast network on two cores of a server.
 DEFAULT_FRAMES: Final = 1_000_000
-BUILT_IN_AGENTS: Final = ("ppo", "random", "oracle")
+BUILT_IN_AGENTS: Final = ("ppo", "random", "oracle", "human")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--agent",
         default="ppo",
-        help="ppo (default), random, oracle, or a checkpoint or run folder; all but ppo skip training",
+        help="ppo (default), random, oracle, human, or a checkpoint or run folder; all but ppo skip training",
     )
     parser.add_argument(
         "--frames", type=_positive, metavar="N", help=f"frames to train for (default: {DEFAULT_FRAMES:,})"
@@ -135,6 +135,8 @@ def _started(arguments: argparse.Namespace) -> Settings:
         raise UsageError(f"--agent: expected {known} or the path of a checkpoint, got {arguments.agent!r}")
     if not trains and arguments.frames is not None:
         raise UsageError(f"--frames: the agent {arguments.agent!r} is not trained")
+    if arguments.agent == "human" and arguments.json:
+        raise UsageError("--json: the agent 'human' plays on standard output")
     explo, explo_c = resolve_exploration(arguments.explo, arguments.scenario)
     return Settings(
         scenario=arguments.scenario,
