@@ -1,0 +1,62 @@
+"""The project's own files: what is locked, what a wheel carries, what the readme promises."""
+
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+def normalised(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def locked() -> dict[str, str]:
+    lines = (ROOT / "requirements.lock").read_text(encoding="utf-8").splitlines()
+    pins = dict(line.split("==") for line in lines if line and not line.startswith("#"))
+    return {normalised(name): version for name, version in pins.items()}
+
+
+def test_every_dependency_is_locked() -> None:
+    wanted = list(PROJECT["project"]["dependencies"]) + list(PROJECT["build-system"]["requires"])
+    for extra in PROJECT["project"]["optional-dependencies"].values():
+        wanted += extra
+    names = [normalised(re.split(r"[<>=!~\[; ]", requirement)[0]) for requirement in wanted]
+    assert [name for name in names if name not in locked()] == []
+
+
+def test_locked_dependencies_are_plain_pins() -> None:
+    """No host, no address, no build of one machine: any index the user has configured will do."""
+    for name, version in locked().items():
+        assert re.fullmatch(r"[0-9][0-9a-z.]*", version), f"{name}=={version}"
+
+
+def test_make_lists_its_targets() -> None:
+    result = subprocess.run(
+        ["make", "help"], cwd=ROOT, capture_output=True, text=True, check=True, timeout=60
+    )
+    listed = {line.split()[0] for line in result.stdout.splitlines() if line}
+    assert {"run", "test", "test-long", "lint", "bench", "update-goldens"} <= listed
+
+
+@pytest.mark.slow
+def test_a_wheel_carries_the_scenarios_and_the_data_files(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "pip", "wheel", "-qq", "--no-deps", "-w", str(tmp_path), str(ROOT)]
+    subprocess.run(command, check=True, timeout=280)
+    (wheel,) = tmp_path.glob("*.whl")
+    names = set(zipfile.ZipFile(wheel).namelist())
+    sources = [path for path in (ROOT / "scenarios").rglob("*.yaml")]
+    assert sources
+    for path in sources:
+        assert f"socialai_dsl/scenarios/{path.relative_to(ROOT / 'scenarios')}" in names
+    for package in ("socialai_dsl", "trainer"):
+        for path in (ROOT / package).rglob("*"):
+            if path.is_file() and path.suffix != ".pyc":
+                assert str(path.relative_to(ROOT)) in names
+    assert not [name for name in names if name.startswith(("tests/", "runs/"))]
