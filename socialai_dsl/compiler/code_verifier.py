@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from socialai_dsl.compiler.intervals import ANYTHING, Interval, Known, Ranges, clamp
-from socialai_dsl.compiler.invalid import InvalidProgram
+from socialai_dsl.compiler.invalid import InvalidProgramError
 from socialai_dsl.program import (
     BOARDS,
     ENTITY_FIELDS,
@@ -27,7 +27,7 @@ _BOUNDS = 64
 
 
 def verify_code(program: Program) -> None:
-    """Raise InvalidProgram unless every block that a table names is safe from its first instruction to its HALTs."""
+    """Raise InvalidProgramError unless every block that a table names is safe from its start to its HALTs."""
     _Code(program).check()
 
 
@@ -48,11 +48,11 @@ class _Code:
 
     def check(self) -> None:
         if not self.code or self.code[0][0] != Op.HALT:
-            raise InvalidProgram("address 0 is not a HALT")
+            raise InvalidProgramError("address 0 is not a HALT")
         reset = self.program.header(Header.RESET_PC)
         for pc in sorted(set(self._entries())):
             if not 0 <= pc < len(self.code):
-                raise InvalidProgram(f"an entry at {pc}, outside of the code")
+                raise InvalidProgramError(f"an entry at {pc}, outside of the code")
             self._block(pc, boards=pc == reset)
 
     def _entries(self) -> Iterator[int]:
@@ -68,34 +68,34 @@ class _Code:
             pc = min(pending)
             path = pending.pop(pc)
             if pc >= len(self.code):
-                raise InvalidProgram(f"the code that starts at {start} runs over the end of the table")
+                raise InvalidProgramError(f"the code that starts at {start} runs over the end of the table")
             for target, known, loop in self._next(pc, path, boards):
                 if target <= pc:
-                    raise InvalidProgram(f"at {pc}: a jump backward to {target}")
+                    raise InvalidProgramError(f"at {pc}: a jump backward to {target}")
                 known_there = pending.get(target)
                 if known_there is not None and known_there.loop != loop:
-                    raise InvalidProgram(f"at {pc}: a jump into or out of a loop")
+                    raise InvalidProgramError(f"at {pc}: a jump into or out of a loop")
                 pending[target] = _Path(known.joined(known_there.known if known_there else None), loop)
 
     def _next(self, pc: int, path: _Path, boards: bool) -> Iterator[tuple[int, Known, int | None]]:
         op, a, b, c = self.code[pc]
         known, loop = path.known, path.loop
         if op not in Op._value2member_map_:
-            raise InvalidProgram(f"at {pc}: unknown op {op}")
+            raise InvalidProgramError(f"at {pc}: unknown op {op}")
         if op in _BOARD_OPS and not boards:
-            raise InvalidProgram(f"at {pc}: {Op(op).name} outside of reset code")
+            raise InvalidProgramError(f"at {pc}: {Op(op).name} outside of reset code")
         if loop is not None and pc > loop:
-            raise InvalidProgram(f"at {pc}: a loop is left past its end")
+            raise InvalidProgramError(f"at {pc}: a loop is left past its end")
         if op == Op.HALT:
             if loop is not None:
-                raise InvalidProgram(f"at {pc}: HALT inside a loop")
+                raise InvalidProgramError(f"at {pc}: HALT inside a loop")
             return
         problem = _Instruction(self, known).problem(Op(op), a, b, c)
         if problem:
-            raise InvalidProgram(f"at {pc}, {Op(op).name} {a} {b} {c}: {problem}")
+            raise InvalidProgramError(f"at {pc}, {Op(op).name} {a} {b} {c}: {problem}")
         if op == Op.SKIP or op in TESTS:
             if c < 0:
-                raise InvalidProgram(f"at {pc}: a skip of {c} goes backward")
+                raise InvalidProgramError(f"at {pc}: a skip of {c} goes backward")
             yield pc + 1 + c, known, loop
             if op == Op.SKIP:
                 return
@@ -103,7 +103,7 @@ class _Code:
             loop = self._enter_loop(pc, c, loop, known)
         elif op == Op.END_EACH:
             if loop != pc:
-                raise InvalidProgram(f"at {pc}: the end of no loop")
+                raise InvalidProgramError(f"at {pc}: the end of no loop")
             loop = None
         yield pc + 1, known, loop
 
@@ -111,7 +111,7 @@ class _Code:
         """Temporaries written inside may hold anything at the start of the next round."""
         end = pc + 1 + length
         if loop is not None or length < 1 or end >= len(self.code) or self.code[end][0] != Op.END_EACH:
-            raise InvalidProgram(f"at {pc}: a loop without its own end, or inside another")
+            raise InvalidProgramError(f"at {pc}: a loop without its own end, or inside another")
         for op, a, _, _ in self.code[pc + 1 : end]:
             if op in _WRITERS and TEMPORARY <= a < TEMPORARY + TEMPORARIES:
                 known.temporaries[a - TEMPORARY] = ANYTHING

@@ -149,14 +149,19 @@ class Expressions:
 
     def _one_of(self, op: Op, left: int, numbers: frozenset[int], otherwise: Label) -> None:
         """Whether a class (or state) is among these numbers."""
+        if not numbers:
+            self.block.skip(otherwise)
+            return
         found = Label()
-        for number in sorted(numbers):
+        *rest, last = (
+            n if op == Op.IF_HEARD else constant(n) for n in sorted(numbers)
+        )  # IF_HEARD takes the class itself
+        for number in rest:
             following = Label()
-            # IF_HEARD takes the class itself, not an operand.
-            self.block.test(op, left, number if op == Op.IF_HEARD else constant(number), following)
+            self.block.test(op, left, number, following)
             self.block.skip(found)
             self.block.bind(following)
-        self.block.skip(otherwise)
+        self.block.test(op, left, last, otherwise)
         self.block.bind(found)
 
     def _in_state(self, term: terms.InState, otherwise: Label) -> None:

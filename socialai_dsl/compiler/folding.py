@@ -21,7 +21,8 @@ class Facts:
     """What is known at compile time; None means unknown.
 
     Attributes:
-        said: utterance class of the agent this step. action: its body action. heard: the class in the inbox, or SEVERAL.
+        said: utterance class of the agent this step. action: its body action.
+        heard: the class in the inbox, or SEVERAL.
     """
 
     said: int | None = None

@@ -119,10 +119,7 @@ class Places:
                 for arg in where.args:
                     self._keep(board, arg)
             case terms.Not():
-                held = self._copy(board)
-                self._keep(held, where.arg)
-                block.emit(Op.B_WITHOUT, board, held)
-                self._boards = held
+                self._keep_not(board, where.arg)
             case terms.Logic():
                 self._keep_either(board, where.args)
             case terms.Quantified(op="any"):
@@ -131,9 +128,31 @@ class Places:
                 for item in where.items:
                     self._keep(board, self.to.instance(where, item))
             case terms.Test(subject=None, name="in_front_of" | "next_to"):
-                self._keep_near(board, where)
+                near = self._near(where)
+                block.emit(Op.B_AND, board, near)
+                self._boards = near
             case _:
                 self._keep_each(board, where)
+
+    def _keep_not(self, board: int, arg: Term) -> None:
+        """Take out the cells for which `arg` is true."""
+        block = self.to.block
+        match arg:
+            case terms.Logic(op="or"):
+                for part in arg.args:
+                    self._keep_not(board, part)
+            case terms.Quantified(op="any"):
+                for item in arg.items:
+                    self._keep_not(board, self.to.instance(arg, item))
+            case terms.Test(subject=None, name="in_front_of" | "next_to"):
+                near = self._near(arg)
+                block.emit(Op.B_WITHOUT, board, near)
+                self._boards = near
+            case _:
+                held = self._copy(board)
+                self._keep(held, arg)
+                block.emit(Op.B_WITHOUT, board, held)
+                self._boards = held
 
     def _copy(self, board: int) -> int:
         copy = self._board()
@@ -150,12 +169,11 @@ class Places:
         self.to.block.emit(Op.B_WITHOUT, board, rest)
         self._boards = rest
 
-    def _keep_near(self, board: int, where: terms.Test) -> None:
+    def _near(self, where: terms.Test) -> int:
         near = self._board()
         op = Op.B_IN_FRONT_OF if where.name == "in_front_of" else Op.B_NEXT_TO
         self.to.block.emit(op, near, self.to.value(where.object))
-        self.to.block.emit(Op.B_AND, board, near)
-        self._boards = near
+        return near
 
     def _keep_each(self, board: int, where: Term) -> None:
         block = self.to.block

@@ -50,7 +50,7 @@ class Registers:
 
 
 def state_names(frame: FramePlan) -> tuple[str, ...]:
-    """Names of a frame's states in the order of their numbers; entries of `steps` without a name are step0, step1, ..."""
+    """Names of a frame's states in the order of their numbers; nameless entries of `steps` are step0, step1, ..."""
     if frame.states:
         return tuple(state.name for state in frame.states)
     return (*(step.state or f"step{i}" for i, step in enumerate(frame.steps)), "finished")

@@ -6,8 +6,10 @@ so an entity, a line, a status or a coordinate that could be out of range is fou
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from socialai_dsl.compiler.code_verifier import verify_code
-from socialai_dsl.compiler.invalid import InvalidProgram
+from socialai_dsl.compiler.invalid import InvalidProgramError
 from socialai_dsl.program import (
     ENTITY_FIELDS,
     FIRST_ENTITY,
@@ -20,11 +22,11 @@ from socialai_dsl.program import (
     TypeColumn,
 )
 
-__all__ = ["InvalidProgram", "verify"]
+__all__ = ["InvalidProgramError", "verify"]
 
 
 def verify(program: Program) -> None:
-    """Raise InvalidProgram unless the program is proven safe."""
+    """Raise InvalidProgramError unless the program is proven safe."""
     _header(program)
     _entities(program)
     _frames(program)
@@ -37,7 +39,7 @@ def verify(program: Program) -> None:
 
 def _require(condition: bool, message: str) -> None:
     if not condition:
-        raise InvalidProgram(message)
+        raise InvalidProgramError(message)
 
 
 def _sizes(program: Program) -> dict[Header, int]:
@@ -108,7 +110,7 @@ def _registers(program: Program) -> None:
             (h(Header.LOG), h(Header.LOG) + h(Header.LOG_SIZE), "log"),
         ]
     )
-    for (_, end, name), (start, _, following) in zip(areas, areas[1:], strict=False):
+    for (_, end, name), (start, _, following) in pairwise(areas):
         _require(end <= start, f"registers of {name} reach into {following}")
     _require(areas[-1][1] <= h(Header.REGISTERS) < 8192, "registers beyond the end of the row")
     _require(h(Header.INBOX_SIZE) >= 1 + h(Header.FRAMES), "an inbox could overflow")
