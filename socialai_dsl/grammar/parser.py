@@ -17,7 +17,7 @@ MAX_LENGTH = 500
 MAX_DEPTH = 24
 
 
-class ParseProblem(Exception):
+class ParseProblem(Exception):  # noqa: N818 - a finding on its way to a diagnostic, not a failure
     """What is wrong with a string of the language: a code of the catalogue, a message and where.
 
     Attributes: code, message, offset (0-based, into the parsed string), hint (or None).
@@ -218,7 +218,7 @@ def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
     """Lark's exception as one sentence of ours."""
     if isinstance(error, UnexpectedCharacters):
         offset = error.pos_in_stream
-        return _wrong_symbol(text, offset)
+        return _wrong_symbol(text, offset or 0)
     if isinstance(error, UnexpectedEOF) or (
         isinstance(error, UnexpectedToken) and error.token.type == "$END"
     ):
@@ -229,6 +229,8 @@ def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
     token, offset = error.token, error.token.start_pos or 0
     if token.type == "CMP" and "CMP" not in error.expected:
         return ParseProblem("S207", "comparisons do not chain: write `a < b and b < c`", offset)
+    if text.startswith("||", offset - 1):
+        return _wrong_symbol(text, offset - 1)
     if token.type == "WHERE":
         return ParseProblem("S210", "`where` belongs in a place or inside pick(x in group where ...)", offset)
     if token.type == "RPAR":
@@ -240,19 +242,17 @@ def _wrong_symbol(text: str, offset: int) -> ParseProblem:
     for symbol, cure in _SYMBOLS.items():
         if text.startswith(symbol, offset):
             return ParseProblem("S203", f"`{symbol}` is not used here: {cure}", offset, cure)
-    if text[offset] == '"':
-        return ParseProblem("S202", 'a text is not closed: its second `"` is missing', offset)
     return ParseProblem("S203", f"`{text[offset]}` means nothing here", offset)
 
 
 def _check_brackets(text: str) -> None:
     """Unbalanced brackets are the commonest slip and lark reports them far from the cause."""
     opened: list[int] = []
-    quoted = False
+    quote: int | None = None
     for offset, char in enumerate(text):
         if char == '"':
-            quoted = not quoted
-        elif quoted:
+            quote = offset if quote is None else None
+        elif quote is not None:
             continue
         elif char == "(":
             opened.append(offset)
@@ -262,5 +262,7 @@ def _check_brackets(text: str) -> None:
             if not opened:
                 raise ParseProblem("S202", "a bracket is closed that was not opened", offset)
             opened.pop()
+    if quote is not None:
+        raise ParseProblem("S202", 'a text is not closed: its second `"` is missing', quote)
     if opened:
         raise ParseProblem("S202", "a bracket is not closed", opened[-1])

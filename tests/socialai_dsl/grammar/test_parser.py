@@ -1,0 +1,131 @@
+"""Expressions and texts: trees with offsets, and one message for each kind of slip."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from socialai_dsl.grammar import ParseProblem, ast, parse_expression, parse_text
+from socialai_dsl.grammar.parser import MAX_DEPTH, MAX_LENGTH
+
+
+def shape(node: ast.Expr | str) -> object:
+    """A tree without its offsets, for reading in a test."""
+    match node:
+        case str():
+            return node
+        case ast.Name() | ast.Parameter():
+            return node.id
+        case ast.Number() | ast.Truth():
+            return node.value
+        case ast.Text():
+            return [shape(part) for part in node.parts]
+    head = getattr(node, "op", None) or getattr(node, "name", None) or type(node).__name__
+    return (head, *(shape(child) for child in node.children()))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a or b and not c", ("or", "a", ("and", "b", ("Not", "c")))),
+        ("a and b and c", ("and", "a", "b", "c")),
+        ("1 + 2 * 3 - 4", ("-", ("+", 1, ("*", 2, 3)), 4)),
+        ("W // 2 - 1", ("-", ("//", "W", 2), 1)),
+        ("5..8", ("Interval", 5, 8)),
+        ("left | right | 2 * forward", ("Alternatives", "left", "right", ("*", 2, "forward"))),
+        ("a in b | c", ("Member", "a", ("Alternatives", "b", "c"))),
+        ("exit.color == red", ("==", ("color", "exit"), "red")),
+        ("next_to(exit)", ("next_to", "exit")),
+        ("agent.would_see(c, left)", ("would_see", "c", "left", "agent")),
+        (
+            "pick(n in A | B where n != x.name)",
+            ("pick", ("Alternatives", "A", "B"), ("!=", "n", ("name", "x"))),
+        ),
+        ("nearest(d in doors to me)", ("nearest", "doors", "me")),
+        (
+            "anywhere where not here.in_front_of(doors)",
+            ("Placed", "anywhere", ("Not", ("in_front_of", "doors", "here"))),
+        ),
+        ('agent.said("Here is <wanted>")', ("said", ["Here is ", "wanted"], "agent")),
+        ("pick(doors).color", ("color", ("pick", "doors"))),
+        ("-$n", ("Negative", "n")),
+        ("a\n  and b", ("and", "a", "b")),
+    ],
+)
+def test_trees(text: str, expected: object) -> None:
+    assert shape(parse_expression(text)) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "offset", "words"),
+    [
+        ("a && b", "S203", 2, "write `and`"),
+        ("a || b", "S203", 2, "write `or`"),
+        ("!a", "S203", 0, "write `not`"),
+        ("a = b", "S203", 2, "write `==`"),
+        ("1 < d <= 2", "S207", 6, "do not chain"),
+        ("push(marble, east", "S202", 4, "not closed"),
+        ("a)", "S202", 1, "not opened"),
+        ('said("Open)', "S202", 5, "not closed"),
+        ("a and", "S210", 5, "ends too early"),
+        ("", "S210", 0, "ends too early"),
+        ("a b", "S210", 2, "did not expect `b`"),
+        ("x / 2", "S203", 2, "//"),
+        ("é", "S203", 0, "means nothing here"),
+        ("a where b where c", "S210", 10, "where"),
+        ("1" * 12, "S004", 0, "too large"),
+    ],
+)
+def test_slips(text: str, code: str, offset: int, words: str) -> None:
+    with pytest.raises(ParseProblem) as caught:
+        parse_expression(text)
+    assert (caught.value.code, caught.value.offset) == (code, offset)
+    assert words in caught.value.message
+
+
+@pytest.mark.parametrize(
+    "bomb",
+    [
+        "(" * 200 + "a" + ")" * 200,
+        "not " * 100 + "a",
+        "-" * 200 + "1",
+        "1+" * 200 + "1",
+        "a" * (MAX_LENGTH + 1),
+    ],
+)
+def test_bombs_are_refused(bomb: str) -> None:
+    with pytest.raises(ParseProblem) as caught:
+        parse_expression(bomb)
+    assert caught.value.code == "S004"
+
+
+def test_the_deepest_allowed_expression_is_accepted() -> None:
+    assert parse_expression("not " * (MAX_DEPTH - 1) + "a")
+
+
+def test_texts_have_parts_with_offsets_into_the_whole() -> None:
+    text = parse_text("Go to the <exit.color> door.")
+    assert shape(text) == ["Go to the ", ("color", "exit"), " door."]
+    part = text.parts[1]
+    assert isinstance(part, ast.Attribute)
+    assert (part.at, part.name_at) == (11, 16)
+    assert parse_text("Open sesame").plain == "Open sesame"
+    assert text.plain is None
+
+
+@pytest.mark.parametrize(("text", "offset"), [("a < b", 2), ("a > b", 2), ("<>", 0), ("Is <x > 2> red", 9)])
+def test_stray_marks_in_texts(text: str, offset: int) -> None:
+    with pytest.raises(ParseProblem) as caught:
+        parse_text(text)
+    assert (caught.value.code, caught.value.offset) == ("S202", offset)
+
+
+@given(st.text(alphabet='ab1 ().,|+-*/<>=!&"$_\n\tdoornotandinwhere', max_size=60))
+def test_any_text_gives_a_tree_or_one_problem(text: str) -> None:
+    for parse in (parse_expression, parse_text):
+        try:
+            tree = parse(text)
+        except ParseProblem as problem:
+            assert 0 <= problem.offset <= len(text)
+            assert problem.message
+        else:
+            assert all(0 <= node.at <= len(text) for node in tree.walk())
