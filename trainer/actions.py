@@ -16,7 +16,7 @@ def gumbel_noise(shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
 
 def choose(logits: Tensor, sizes: tuple[int, ...]) -> Tensor:
     """The best choice of each head, int64 (..., 4); a sample if noise was added to the logits (..., sum of sizes)."""
-    return torch.stack([part.argmax(-1) for part in logits.split(sizes, -1)], -1)
+    return torch.stack([part.argmax(-1) for part in torch.split(logits, list(sizes), -1)], -1)
 
 
 def spoken_mask(actions: Tensor) -> Tensor:
@@ -30,7 +30,7 @@ def log_probs(logits: Tensor, actions: Tensor, sizes: tuple[int, ...]) -> Tensor
     """Log-probability of each head's choice, (..., 4), before masking."""
     parts = [
         torch.log_softmax(part, -1).gather(-1, actions[..., head : head + 1])
-        for head, part in enumerate(logits.split(sizes, -1))
+        for head, part in enumerate(torch.split(logits, list(sizes), -1))
     ]
     return torch.cat(parts, -1)
 
@@ -38,7 +38,7 @@ def log_probs(logits: Tensor, actions: Tensor, sizes: tuple[int, ...]) -> Tensor
 def log_probs_and_entropies(logits: Tensor, actions: Tensor, sizes: tuple[int, ...]) -> tuple[Tensor, Tensor]:
     """Log-probability of each head's choice and each head's entropy in nats, both (..., 4), before masking."""
     chosen, entropies = [], []
-    for head, part in enumerate(logits.split(sizes, -1)):
+    for head, part in enumerate(torch.split(logits, list(sizes), -1)):
         logs = torch.log_softmax(part, -1)
         chosen.append(logs.gather(-1, actions[..., head : head + 1]))
         entropies.append(-(logs.exp() * logs).sum(-1))

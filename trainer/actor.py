@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from trainer.distinct import DistinctRows, Int64, content_ids, history_lengths, prefix_tree
+from trainer.errors import ObservationError
 from trainer.nets import ActorCritic
 
 
@@ -27,6 +28,7 @@ class Actor:
         self.net = net
         self.device = next(net.parameters()).device
         self._length = tokens_length
+        self._image_high = np.array(net.spec.image_high)
         self._frames = 0
         self.begin()
 
@@ -55,12 +57,19 @@ class Actor:
 
         Returns:
             int64 (E,) row of `pairs` of every environment, and their features (E, F).
+
+        Raises:
+            ObservationError: something is outside its bounds.
         """
         image_ids, history_ids = ids or (content_ids(images), content_ids(tokens))
         if not self.net.distinct:
             image_ids = np.arange(self._frames, self._frames + len(images))
             self._frames += len(images)
-        image_rows, _ = self.images.add(image_ids, images)
+        image_rows, fresh = self.images.add(image_ids, images)
+        if (images[fresh] > self._image_high).any():
+            raise ObservationError(
+                f"image: a cell exceeds the bounds {tuple(self.net.spec.image_high)} of its channels"
+            )
         history_rows = self._hear(history_ids, tokens)
         pairs = np.stack((image_rows, history_rows), 1)
         rows, fresh = self.pairs.add(image_rows << 32 | history_rows, pairs)
@@ -82,6 +91,9 @@ class Actor:
         rows, fresh = self.histories.add(ids, tokens)
         if len(fresh):
             words = tokens[fresh]
+            if words.min() < 0 or words.max() >= self.net.spec.vocabulary_size:
+                got, last = int(words.max()), self.net.spec.vocabulary_size - 1
+                raise ObservationError(f"tokens: got {got}, expected ids from 0 to {last}")
             lengths = history_lengths(words)
             parents = (
                 np.zeros(len(fresh), np.int64) if self._last_history is None else self._last_history[fresh]
@@ -100,7 +112,9 @@ class Actor:
         """Encode histories given the row and length of the known beginning and the number of new words of each."""
         if not known.any():
             tree = prefix_tree(words)
-            states = self.net.dialogue(self._move(tree.tokens), self._move(tree.parents), tree.offsets)
+            states: Tensor = self.net.dialogue(
+                self._move(tree.tokens), self._move(tree.parents), tree.offsets
+            )
             return states[self._move(tree.leaves)]
         order = np.argsort(-new, kind="stable")
         columns = known[order, None] + np.arange(new.max())

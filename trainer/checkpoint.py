@@ -1,4 +1,4 @@
-"""This module writes and reads checkpoints: one safetensors file with JSON metadata and a digest, replaced atomically."""
+"""This module writes and reads checkpoints: safetensors with JSON metadata and a digest, replaced atomically."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""This module keeps each distinct image and dialogue history of a rollout once and arranges histories as a prefix tree."""
+"""This module keeps each distinct image and history of a rollout once, and arranges histories as a prefix tree."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ def content_ids(rows: NDArray[np.generic]) -> Int64:
     if flat.shape[1] > len(_MULTIPLIERS):
         raise ValueError(f"rows: got {flat.shape[1]} columns, expected at most {len(_MULTIPLIERS)}")
     total = flat.astype(np.uint64) @ _MULTIPLIERS[: flat.shape[1]]
-    return (total ^ (total >> np.uint64(29))).view(np.int64)
+    ids: Int64 = (total ^ (total >> np.uint64(29))).view(np.int64)
+    return ids
 
 
 class DistinctRows:
@@ -93,7 +94,8 @@ class PrefixTree:
 
 def history_lengths(tokens: NDArray[np.generic]) -> Int64:
     """Return the number of words, int64 (D,), of 0-padded histories (D, L)."""
-    return np.count_nonzero(tokens, axis=1).astype(np.int64)
+    lengths: Int64 = np.count_nonzero(tokens, axis=1).astype(np.int64)
+    return lengths
 
 
 def prefix_tree(tokens: NDArray[np.generic]) -> PrefixTree:

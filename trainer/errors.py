@@ -1,8 +1,12 @@
-"""This module names the two ways in which training can be refused or stopped."""
+"""This module names the ways in which training can be refused or stopped."""
 
 
 class CheckpointError(ValueError):
     """A checkpoint cannot be used: it is damaged, not one of ours, or made for other actions or images."""
+
+
+class ObservationError(ValueError):
+    """An environment returned an image or a token outside the bounds of its observation space."""
 
 
 class TrainingStopped(RuntimeError):  # noqa: N818 - it reports an event, as StopIteration does

@@ -20,7 +20,8 @@ def episode_metrics(
 
     Args:
         tally: the trainer's own sums.
-        before, after: the environments' `counters()` before and after the rollout.
+        before: the environments' `counters()` before the rollout.
+        after: the same after it.
 
     Returns:
         episodes, success, mean_return, mean_length, timeouts, and per episode the rate of each outcome and of each
@@ -62,7 +63,7 @@ class MetricsLog:
         if tensorboard:
             from torch.utils.tensorboard import SummaryWriter
 
-            self._events = SummaryWriter(str(run_dir), purge_step=update + 1)  # type: ignore[no-untyped-call]
+            self._events = SummaryWriter(str(run_dir), purge_step=update + 1)
 
     def write(self, update: int, row: Mapping[str, Any]) -> None:
         """Append the row of one update. TensorBoard counts in frames (`row["frames"]`)."""

@@ -31,9 +31,11 @@ def compute_gae(
     """Generalised advantage estimates, (T, E) (Schulman et al. 2016, equation 16).
 
     Args:
-        rewards, values: (T, E) reward of a step and value of the state it was made in.
+        rewards: (T, E) reward of each step.
+        values: (T, E) value of the state it was made in.
         next_value: (E,) value of the state after the last step.
-        terminated, truncated: bool (T, E), how the episode ended with this step, if it did.
+        terminated: bool (T, E), whether the step ended the episode.
+        truncated: bool (T, E), whether the episode was cut off after the step.
         bootstrap: (T, E) value of the state a truncated episode ended in; 0 makes the time-out terminal.
         gamma: discount per step.
         gae_lambda: weight of longer estimates.
@@ -91,7 +93,8 @@ def ppo_loss(
 
     Args:
         batch: the frames and what the acting policy thought of them.
-        logits: (N, sum of sizes) of the present policy. values: (N,) of the present critic.
+        logits: (N, sum of sizes) of the present policy.
+        values: (N,) of the present critic.
         sizes: choices of each head.
         config: coefficients.
     """
@@ -188,7 +191,7 @@ def make_minibatch(
             cut(advantages).flatten(),
             cut(returns).flatten(),
         ),
-        cut(rollout.starts),
+        cut(torch.from_numpy(rollout.starts)).to(device),
         rollout.memories.index_select(2, envs.to(device)).transpose(0, 1).flatten(1, 2),
         actor.net.prepare(move(actor.images.data[image_rows])),
         move(tree.tokens),
@@ -219,13 +222,14 @@ def update(
         TrainingStopped: a loss or a gradient is not finite; the weights are as the last good step left them.
     """
     net = actor.net
+    device = actor.device
     raw = compute_gae(
-        rollout.rewards,
+        torch.from_numpy(rollout.rewards).to(device, torch.float32),
         rollout.values,
         rollout.next_value,
-        rollout.terminated,
-        rollout.truncated,
-        rollout.bootstrap,
+        torch.from_numpy(rollout.terminated).to(device),
+        torch.from_numpy(rollout.truncated).to(device),
+        torch.from_numpy(rollout.bootstrap).to(device, torch.float32),
         config.gamma,
         config.gae_lambda,
     )

@@ -72,9 +72,9 @@ class Rollout:
 
     Attributes:
         actions: int64 (T, E, 4). log_probs: float32 (T, E, 4), before masking. values: float32 (T, E).
-        rewards: float32 (T, E), bonus included.
+        rewards: float64 (T, E), bonus included.
         terminated, truncated, starts: bool (T, E); starts: the episode begins with this step.
-        bootstrap: float32 (T, E), value of the state a truncated episode ended in; 0 elsewhere.
+        bootstrap: float64 (T, E), value of the state a truncated episode ended in; 0 elsewhere.
         next_value: float32 (E,), value of the state after the last step.
         pair_rows: int64 (T, E), row of the actor's `pairs`.
         memories: float32 (T / bptt, 2, E, M), memory before each stretch of back-propagation.
@@ -85,11 +85,11 @@ class Rollout:
     actions: Tensor
     log_probs: Tensor
     values: Tensor
-    rewards: Tensor
-    terminated: Tensor
-    truncated: Tensor
-    starts: Tensor
-    bootstrap: Tensor
+    rewards: NDArray[np.float64]
+    terminated: NDArray[np.bool_]
+    truncated: NDArray[np.bool_]
+    starts: NDArray[np.bool_]
+    bootstrap: NDArray[np.float64]
     next_value: Tensor
     pair_rows: Int64
     memories: Tensor
@@ -123,70 +123,89 @@ def collect(
     """Play `config.horizon` steps in every environment; `state` is advanced in place.
 
     Raises:
-        TrainingStopped: an observation is outside its bounds, or a reward or a value is not finite.
+        ObservationError: an observation is outside its bounds.
+        TrainingStopped: a reward or an output of the network is not finite.
     """
     net, sizes = actor.net, actor.net.spec.action_sizes
-    steps, count = config.horizon, len(state.starts)
-    stretch = config.bptt or steps
-    device = actor.device
-    noise = heads.gumbel_noise((steps, count, sum(sizes)), generator).to(device)
-    logits = torch.empty(steps, count, sum(sizes), device=device)
-    values = torch.empty(steps, count, device=device)
-    actions = torch.empty(steps, count, 4, dtype=torch.int64, device=device)
-    memories = torch.empty(steps // stretch, 2, count, net.memory.size, device=device)
-    rewards, bootstrap = np.zeros((steps, count)), np.zeros((steps, count), np.float32)
-    terminated, truncated, starts = (np.zeros((steps, count), np.bool_) for _ in range(3))
-    pair_rows = np.zeros((steps, count), np.int64)
-    tally, paid = EpisodeTally(), 0.0
-
+    stretch = config.bptt or config.horizon
+    rollout = _allocate(actor, config, len(state.starts))
+    noise = heads.gumbel_noise((*rollout.values.shape, sum(sizes)), generator).to(actor.device)
+    logits = torch.empty_like(noise)
     actor.begin()
     with torch.no_grad():
-        pair_rows[0], features = actor.see(state.image, state.tokens, _ids(envs))
-        for t in range(steps):
-            starts[t] = state.starts
-            if state.starts.any():
-                state.memory[:, torch.from_numpy(state.starts).to(device)] = 0
+        rows, features = actor.see(state.image, state.tokens, _ids(envs))
+        for t in range(config.horizon):
+            rollout.pair_rows[t] = rows
+            _note_starts(rollout, state, t)
             if t % stretch == 0:
-                memories[t // stretch] = state.memory
+                rollout.memories[t // stretch] = state.memory
             state.memory = net.memory.step(features, state.memory)
-            logits[t], values[t] = net.heads(state.memory[0])
-            actions[t] = heads.choose(logits[t] + noise[t], sizes)
-            observation, rewards[t], terminated[t], truncated[t], infos = envs.step(actions[t].cpu().numpy())
-            ended = terminated[t] | truncated[t]
-            state.returns += rewards[t]
-            state.lengths += 1
-            if ended.any():
-                if config.bootstrap_timeouts and (cut := np.flatnonzero(truncated[t] & ~terminated[t])).size:
-                    bootstrap[t, cut] = _value(actor, final_observation(infos, cut), state.memory[:, cut])
-                _count(tally, state, ended, truncated[t] & ~terminated[t], infos)
-            if bonus is not None:
-                extra = bonus.step(envs, observation["image"], ended)
-                rewards[t] += extra
-                paid += float(extra.sum())
-            state.starts = ended
-            following, features = actor.see(observation["image"], observation["tokens"], _ids(envs))
-            if t + 1 < steps:
-                pair_rows[t + 1] = following
+            logits[t], rollout.values[t] = net.heads(state.memory[0])
+            rollout.actions[t] = heads.choose(logits[t] + noise[t], sizes)
+            observation = _step(actor, envs, state, config, bonus, rollout, t)
+            rows, features = actor.see(observation["image"], observation["tokens"], _ids(envs))
         state.image, state.tokens = observation["image"].copy(), observation["tokens"].copy()
-        memory = state.memory * torch.from_numpy(~state.starts).to(device)[:, None]
-        next_value = net.heads(net.memory.step(features, memory)[0])[1]
-        log_probs = heads.log_probs(logits, actions, sizes)
-    _check(actor, rewards, values)
+        kept = torch.from_numpy(~state.starts).to(actor.device)[:, None]
+        rollout.next_value.copy_(net.heads(net.memory.step(features, state.memory * kept)[0])[1])
+        rollout.log_probs.copy_(heads.log_probs(logits, rollout.actions, sizes))
+    _check(rollout)
+    return rollout
+
+
+def _allocate(actor: Actor, config: TrainConfig, count: int) -> Rollout:
+    """An empty rollout; what the environments write is on the CPU, what the network writes on its device."""
+    steps, device = config.horizon, actor.device
+    memories = torch.empty(steps // (config.bptt or steps), 2, count, actor.net.memory.size, device=device)
     return Rollout(
-        actions,
-        log_probs,
-        values,
-        *(
-            torch.from_numpy(array).to(device)
-            for array in (rewards.astype(np.float32), terminated, truncated, starts)
-        ),
-        torch.from_numpy(bootstrap).to(device),
-        next_value,
-        pair_rows,
-        memories,
-        tally,
-        paid / (steps * count),
+        actions=torch.empty(steps, count, 4, dtype=torch.int64, device=device),
+        log_probs=torch.empty(steps, count, 4, device=device),
+        values=torch.empty(steps, count, device=device),
+        rewards=np.zeros((steps, count)),
+        terminated=np.zeros((steps, count), np.bool_),
+        truncated=np.zeros((steps, count), np.bool_),
+        starts=np.zeros((steps, count), np.bool_),
+        bootstrap=np.zeros((steps, count)),
+        next_value=torch.empty(count, device=device),
+        pair_rows=np.zeros((steps, count), np.int64),
+        memories=memories,
     )
+
+
+def _note_starts(rollout: Rollout, state: RolloutState, t: int) -> None:
+    """Record where episodes begin and empty the memory there."""
+    rollout.starts[t] = state.starts
+    if state.starts.any():
+        state.memory[:, torch.from_numpy(state.starts).to(state.memory.device)] = 0
+
+
+def _step(
+    actor: Actor,
+    envs: Any,
+    state: RolloutState,
+    config: TrainConfig,
+    bonus: Bonus | None,
+    rollout: Rollout,
+    t: int,
+) -> dict[str, NDArray[Any]]:
+    """Step the environments with the actions of step t, record what came of it, and return the observation."""
+    observation: dict[str, NDArray[Any]]
+    observation, reward, terminated, truncated, infos = envs.step(rollout.actions[t].cpu().numpy())
+    rollout.rewards[t], rollout.terminated[t], rollout.truncated[t] = reward, terminated, truncated
+    ended = rollout.terminated[t] | rollout.truncated[t]
+    cut = rollout.truncated[t] & ~rollout.terminated[t]
+    state.returns += reward
+    state.lengths += 1
+    if config.bootstrap_timeouts and cut.any():
+        which = np.flatnonzero(cut)
+        rollout.bootstrap[t, which] = _value(actor, final_observation(infos, which), state.memory[:, which])
+    if ended.any():
+        _count(rollout.tally, state, ended, cut, infos)
+    if bonus is not None:
+        paid = bonus.step(envs, observation["image"], ended)
+        rollout.rewards[t] += paid
+        rollout.bonus += float(paid.sum()) / rollout.rewards.size
+    state.starts = ended
+    return observation
 
 
 def _ids(envs: Any) -> tuple[Int64, Int64]:
@@ -219,15 +238,9 @@ def _count(
     state.lengths[ended] = 0
 
 
-def _check(actor: Actor, rewards: NDArray[np.float64], values: Tensor) -> None:
+def _check(rollout: Rollout) -> None:
     """Refuse a rollout that would poison the weights."""
-    spec = actor.net.spec
-    if not np.isfinite(rewards).all():
+    if not np.isfinite(rollout.rewards).all():
         raise TrainingStopped("a reward is not a finite number")
-    if not bool(torch.isfinite(values).all()):
-        raise TrainingStopped("a value estimate is not a finite number")
-    if (actor.images.data.max(axis=(0, 1, 2)) > np.array(spec.image_high)).any():
-        raise TrainingStopped("an observed image is outside the bounds of its space")
-    words = actor.histories.data
-    if words.min() < 0 or words.max() >= spec.vocabulary_size:
-        raise TrainingStopped("an observed token is not in the vocabulary")
+    if not bool(torch.isfinite(rollout.values).all() & torch.isfinite(rollout.log_probs).all()):
+        raise TrainingStopped("the network's output is not a finite number")

@@ -13,7 +13,7 @@ import torch
 
 from trainer import checkpoint as checkpoints
 from trainer.config import TrainConfig
-from trainer.errors import TrainingStopped
+from trainer.errors import ObservationError, TrainingStopped
 from trainer.metrics import MetricsLog, episode_metrics
 from trainer.ppo import update
 from trainer.rollout import collect
@@ -65,7 +65,8 @@ def train(
     Raises:
         ValueError: configuration and environments do not fit.
         CheckpointError: there is nothing to resume, or it is damaged or of another run.
-        TrainingStopped: something stopped being finite, or the disk is full; the last good checkpoint is intact.
+        TrainingStopped: something is not finite or out of bounds, or the disk is full; the last good checkpoint
+            is intact.
     """
     with _threads(config.threads):
         session = Session.start(config, envs)
@@ -117,7 +118,7 @@ def _explained(session: Session, folder: Path) -> Iterator[None]:
     """Say where a run stopped, why, and what is left of it."""
     try:
         yield
-    except (TrainingStopped, OSError) as error:
+    except (TrainingStopped, ObservationError, OSError) as error:
         saved = sorted(folder.glob("*.safetensors"))
         kept = f"the last good checkpoint is {saved[-1]}" if saved else "there is no checkpoint yet"
         reason = f"cannot write: {error}" if isinstance(error, OSError) else str(error)

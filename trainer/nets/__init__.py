@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
 
 import torch
 
@@ -12,14 +13,16 @@ from trainer.nets.paper import PaperNet, PaperReferenceNet
 
 __all__ = ["HEADS", "ActorCritic", "NetSpec", "build_net", "net_class"]
 
-_SHIPPED: dict[str, type[ActorCritic]] = {
+NetClass = Callable[[NetSpec], ActorCritic]
+
+_SHIPPED: dict[str, NetClass] = {
     "fast": FastNet,
     "paper": PaperNet,
     "paper-reference": PaperReferenceNet,
 }
 
 
-def net_class(name: str) -> type[ActorCritic]:
+def net_class(name: str) -> NetClass:
     """Find a network class: `fast`, `paper`, `paper-reference`, or `my.module:MyNet`.
 
     Raises:

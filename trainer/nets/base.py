@@ -48,7 +48,7 @@ class NetSpec:
         if (
             not isinstance(image, spaces.Box)
             or len(image.shape) != 3
-            or "tokens" not in observation_space.keys()
+            or "tokens" not in observation_space.spaces
         ):
             raise ValueError(
                 f"observation space: got {observation_space}, expected Dict(image=Box(H, W, C), tokens=Box(L))"
@@ -78,7 +78,7 @@ class Heads(nn.Module):
 
     def forward(self, memory: Tensor) -> tuple[Tensor, Tensor]:
         """Memory (..., M) to logits of all heads side by side (..., sum of sizes) and value (...)."""
-        parts = torch.tanh(self.hidden(memory)).split(self.hidden_size, dim=-1)
+        parts = torch.split(torch.tanh(self.hidden(memory)), self.hidden_size, -1)
         outputs = [layer(part) for layer, part in zip(self.out, parts, strict=True)]
         return torch.cat(outputs[:-1], -1), outputs[-1].squeeze(-1)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import torch
@@ -18,7 +19,7 @@ class _TreeGru(torch.autograd.Function):
     """
 
     @staticmethod
-    def forward(  # type: ignore[override]
+    def forward(
         ctx: Any,
         inputs: Tensor,
         w_hh: Tensor,
@@ -30,47 +31,70 @@ class _TreeGru(torch.autograd.Function):
         count, size = len(parents), w_hh.shape[1]
         states = root.new_empty(count + 1, size)
         states[0] = root
-        before = root.new_empty(count, size)
-        reset_update = root.new_empty(count, 2 * size)
-        new = root.new_empty(count, size)
-        hidden_new = root.new_empty(count, size)
+        before, new = root.new_empty(count, size), root.new_empty(count, size)
+        hidden, gates = root.new_empty(count, 3 * size), root.new_empty(count, 2 * size)
+        sizes = [b - a for a, b in pairwise(offsets)]
+        rows = zip(
+            *(torch.split(array, sizes) for array in (parents, before, hidden, hidden[:, : 2 * size])),
+            *(
+                torch.split(array, sizes)
+                for array in (inputs[:, : 2 * size], gates, gates[:, :size], gates[:, size:])
+            ),
+            *(
+                torch.split(array, sizes)
+                for array in (inputs[:, 2 * size :], hidden[:, 2 * size :], new, states[1:])
+            ),
+            strict=True,
+        )
         w_t = w_hh.t()
-        for a, b in zip(offsets[:-1], offsets[1:], strict=True):
-            previous = torch.index_select(states, 0, parents[a:b], out=before[a:b])
-            hidden = torch.addmm(b_hh, previous, w_t)
-            gates = torch.add(
-                inputs[a:b, : 2 * size], hidden[:, : 2 * size], out=reset_update[a:b]
-            ).sigmoid_()
-            hidden_new[a:b] = hidden[:, 2 * size :]
-            candidate = torch.addcmul(
-                inputs[a:b, 2 * size :], gates[:, :size], hidden[:, 2 * size :], out=new[a:b]
-            ).tanh_()
-            torch.lerp(candidate, previous, gates[:, size:], out=states[a + 1 : b + 1])
-        ctx.save_for_backward(before, reset_update, new, hidden_new, w_hh, parents)
-        ctx.offsets = offsets
+        for (
+            parent,
+            previous,
+            hid,
+            hid_gates,
+            in_gates,
+            gate,
+            reset,
+            update,
+            in_new,
+            hid_new,
+            cand,
+            state,
+        ) in rows:
+            torch.index_select(states, 0, parent, out=previous)
+            torch.addmm(b_hh, previous, w_t, out=hid)
+            torch.add(in_gates, hid_gates, out=gate).sigmoid_()
+            torch.addcmul(in_new, reset, hid_new, out=cand).tanh_()
+            torch.lerp(cand, previous, update, out=state)
+        ctx.save_for_backward(before, gates, new, hidden, w_hh, parents)
+        ctx.sizes = sizes
         return states
 
     @staticmethod
-    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor | None, ...]:  # type: ignore[override]
-        before, reset_update, new, hidden_new, w_hh, parents = ctx.saved_tensors
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor | None, ...]:
+        before, gates, new, hidden, w_hh, parents = ctx.saved_tensors
         size = w_hh.shape[1]
-        reset, update = reset_update[:, :size], reset_update[:, size:]
+        reset, update = torch.split(gates, size, 1)
+        aten = torch.ops.aten
         # Local derivatives of all states at once; only the products along the tree have to go level by level.
-        to_new = (1 - update) * (1 - new * new)
-        to_reset = to_new * hidden_new * reset * (1 - reset)
-        to_update = (before - new) * update * (1 - update)
-        factors = torch.cat((to_reset, to_update, to_new * reset), 1)
+        to_new = aten.tanh_backward(1 - update, new)
+        d_hidden = torch.cat(
+            (
+                aten.sigmoid_backward(to_new * hidden[:, 2 * size :], reset),
+                aten.sigmoid_backward(before - new, update),
+                to_new * reset,
+            ),
+            1,
+        )
         d_states = grad.clone()
-        d_hidden = torch.empty_like(factors)
-        for a, b in reversed(list(zip(ctx.offsets[:-1], ctx.offsets[1:], strict=True))):
-            d_state = d_states[a + 1 : b + 1]
-            d_gates = torch.mul(
-                factors[a:b].view(b - a, 3, size),
-                d_state.unsqueeze(1),
-                out=d_hidden[a:b].view(b - a, 3, size),
-            ).view(b - a, 3 * size)
-            d_before = torch.addcmul(d_gates @ w_hh, d_state, update[a:b])
-            d_states.index_add_(0, parents[a:b], d_before)
+        rows = zip(
+            *(torch.split(array, ctx.sizes) for array in (d_hidden, d_hidden.view(-1, 3, size), update)),
+            *(torch.split(array, ctx.sizes) for array in (parents, d_states[1:], d_states[1:].unsqueeze(1))),
+            strict=True,
+        )
+        for d_gates, factors, kept, parent, d_state, d_state_row in reversed(list(rows)):
+            factors.mul_(d_state_row)
+            d_states.index_add_(0, parent, torch.addmm(d_state * kept, d_gates, w_hh))
         d_inputs = torch.cat((d_hidden[:, : 2 * size], d_states[1:] * to_new), 1)
         return d_inputs, d_hidden.t() @ before, d_hidden.sum(0), d_states[0], None, None
 
@@ -92,7 +116,8 @@ class DialogueEncoder(nn.Module):
 
     def word_inputs(self) -> Tensor:
         """The GRU's input gates of every word of the vocabulary, (V, 3 * size), made once per batch of histories."""
-        return functional.linear(self.embedding.weight, self.gru.weight_ih_l0, self.gru.bias_ih_l0)
+        w_ih, b_ih = self.gru.get_parameter("weight_ih_l0"), self.gru.get_parameter("bias_ih_l0")
+        return functional.linear(self.embedding.weight, w_ih, b_ih)
 
     def forward(self, tokens: Tensor, parents: Tensor, offsets: Sequence[int]) -> Tensor:
         """Encode the states of a `PrefixTree` (its fields as int64 tensors).
@@ -122,7 +147,7 @@ class DialogueEncoder(nn.Module):
         """
         states = states.clone()
         size, active = self.size, len(lengths)
-        w_t, b_hh = self.gru.weight_hh_l0.t(), self.gru.bias_hh_l0
+        w_t, b_hh = self.gru.get_parameter("weight_hh_l0").t(), self.gru.get_parameter("bias_hh_l0")
         for position in range(lengths[0] if lengths else 0):
             while lengths[active - 1] <= position:
                 active -= 1

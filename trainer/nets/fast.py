@@ -64,12 +64,12 @@ class _SumRows(torch.autograd.Function):
     """Sum of an image's table rows; its gradient is the same kind of sum over the transposed selection."""
 
     @staticmethod
-    def forward(ctx: Any, table: Tensor, view: CellRows) -> Tensor:  # type: ignore[override]
+    def forward(ctx: Any, table: Tensor, view: CellRows) -> Tensor:
         ctx.view = view
         return functional.embedding_bag(view.rows, table, mode="sum")
 
     @staticmethod
-    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None]:  # type: ignore[override]
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None]:
         images, offsets = ctx.view.transposed
         return functional.embedding_bag(images, grad.contiguous(), offsets, mode="sum"), None
 

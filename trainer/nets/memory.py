@@ -12,74 +12,105 @@ from torch.nn import functional
 class _ResettableLstm(torch.autograd.Function):
     """LSTM over time with zeroed memory at episode starts, with back-propagation through time written out.
 
-    One product per step in each direction; the weights' gradient is a single product at the end. Gates are ordered
-    input, forget, output, cell, so that the three sigmoids are one call.
+    One product per step in each direction; the weights' gradients are single products at the end. Gates are ordered
+    cell, input, forget, output: the three sigmoids are neighbours, and so are the three gates the cell's gradient
+    reaches.
     """
 
     @staticmethod
-    def forward(  # type: ignore[override]
-        ctx: Any, inputs: Tensor, w_hh: Tensor, h0: Tensor, c0: Tensor, keep: Tensor, resets: list[bool]
-    ) -> tuple[Tensor, Tensor]:
+    def forward(
+        ctx: Any,
+        inputs: Tensor,
+        w_ih: Tensor,
+        w_hh: Tensor,
+        bias: Tensor,
+        memory: Tensor,
+        keep: Tensor,
+        resets: list[bool],
+    ) -> Tensor:
         steps, batch, size = inputs.shape[0], inputs.shape[1], w_hh.shape[1]
-        gates = inputs.new_empty(steps, batch, 4 * size)
-        h_in = inputs.new_empty(steps, batch, size)
-        c_in = inputs.new_empty(steps, batch, size)
-        squashed = inputs.new_empty(steps, batch, size)
-        outputs = inputs.new_empty(steps, batch, size)
-        w_t, h, c = w_hh.t(), h0, c0
-        for t in range(steps):
+        gates = functional.linear(inputs.flatten(0, 1), w_ih, bias).view(steps, batch, 4 * size)
+        cells, squashed, outputs = (inputs.new_empty(steps, batch, size) for _ in range(3))
+        rows = zip(
+            gates.unbind(),
+            gates[..., size:].unbind(),
+            *(gate.unbind() for gate in torch.split(gates, size, 2)),
+            cells.unbind(),
+            squashed.unbind(),
+            outputs.unbind(),
+            strict=True,
+        )
+        w_t = w_hh.t()
+        h, c = memory.unbind()
+        for t, (gate, sigmoids, candidate, entry, forget, exit_, cell, squash, output) in enumerate(rows):
             if resets[t]:
-                h, c = torch.mul(h, keep[t], out=h_in[t]), torch.mul(c, keep[t], out=c_in[t])
-            else:
-                h, c = h_in[t].copy_(h), c_in[t].copy_(c)
-            gate = torch.addmm(inputs[t], h, w_t, out=gates[t])
-            gate[:, : 3 * size].sigmoid_()
-            gate[:, 3 * size :].tanh_()
-            c = torch.addcmul(gate[:, :size] * gate[:, 3 * size :], gate[:, size : 2 * size], c)
-            torch.tanh(c, out=squashed[t])
-            h = torch.mul(gate[:, 2 * size : 3 * size], squashed[t], out=outputs[t])
-        ctx.save_for_backward(gates, h_in, c_in, squashed, w_hh, keep)
+                h, c = h * keep[t], c * keep[t]
+            gate.addmm_(h, w_t)
+            sigmoids.sigmoid_()
+            candidate.tanh_()
+            torch.mul(entry, candidate, out=cell).addcmul_(forget, c)
+            torch.tanh(cell, out=squash)
+            torch.mul(exit_, squash, out=output)
+            h, c = output, cell
+        ctx.save_for_backward(inputs, w_ih, w_hh, memory, keep, gates, cells, squashed, outputs)
         ctx.resets = resets
-        ctx.mark_non_differentiable(c)
-        return outputs, c
+        return outputs
 
     @staticmethod
-    def backward(ctx: Any, grad: Tensor, _: Tensor) -> tuple[Tensor | None, ...]:  # type: ignore[override]
-        gates, h_in, c_in, squashed, w_hh, keep = ctx.saved_tensors
-        steps, batch, size = h_in.shape
-        sigmoids = gates[..., : 3 * size]
-        entry, forget, exit_, cell = gates.split(size, dim=2)
-        # Local derivatives of all steps at once: from the cell (entry, forget, cell gates) and the output gate.
-        slope = torch.empty_like(gates)
-        torch.mul(sigmoids, 1 - sigmoids, out=slope[..., : 3 * size])
-        slope[..., :size] *= cell
-        slope[..., size : 2 * size] *= c_in
-        slope[..., 2 * size : 3 * size] *= squashed
-        torch.mul(entry, 1 - cell * cell, out=slope[..., 3 * size :])
-        to_cell = exit_ * (1 - squashed * squashed)
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor | None, ...]:
+        inputs, w_ih, w_hh, memory, keep, gates, cells, squashed, outputs = ctx.saved_tensors
+        steps, batch, size = outputs.shape
+        h_in = torch.cat((memory[:1], outputs[:-1])).mul_(keep)
+        c_in = torch.cat((memory[1:], cells[:-1])).mul_(keep)
+        candidate, entry, forget, exit_ = torch.split(gates, size, 2)
+        # What each gate's input does to the cell (output gate: to h), for all steps at once.
+        slopes = torch.empty_like(gates)
+        aten = torch.ops.aten
+        for part, (reach, gate) in zip(
+            torch.split(slopes, size, 2),
+            ((entry, candidate), (candidate, entry), (c_in, forget), (squashed, exit_)),
+            strict=True,
+        ):
+            rule = aten.tanh_backward if gate is candidate else aten.sigmoid_backward
+            rule.grad_input(reach, gate, grad_input=part)
+        to_cell = aten.tanh_backward(exit_, squashed)
 
-        d_gates = torch.empty_like(gates)
-        d_c = torch.zeros_like(h_in[0])
-        d_h = grad[steps - 1]
-        for t in range(steps - 1, -1, -1):
-            d_c = torch.addcmul(d_c, d_h, to_cell[t])
-            d_gate = d_gates[t]
-            torch.mul(
-                slope[t, :, : 2 * size].view(batch, 2, size),
-                d_c.unsqueeze(1),
-                out=d_gate[:, : 2 * size].view(batch, 2, size),
+        d_gates = slopes  # each step's slopes are replaced by its gradients
+        rows = list(
+            zip(
+                d_gates.unbind(),
+                d_gates.view(steps, batch, 4, size)[:, :, :3].unbind(),
+                d_gates[..., 3 * size :].unbind(),
+                forget.unbind(),
+                to_cell.unbind(),
+                grad.unbind(),
+                strict=True,
             )
-            torch.mul(slope[t, :, 2 * size : 3 * size], d_h, out=d_gate[:, 2 * size : 3 * size])
-            torch.mul(slope[t, :, 3 * size :], d_c, out=d_gate[:, 3 * size :])
-            d_c = d_c * forget[t]
-            d_h = d_gate @ w_hh
+        )
+        d_c, d_h = torch.zeros_like(cells[0]), rows[-1][-1]
+        d_c_row = d_c.unsqueeze(1)
+        for t in range(steps - 1, -1, -1):
+            d_gate, reached, last, forgotten, slope, _ = rows[t]
+            d_c.addcmul_(d_h, slope)
+            reached.mul_(d_c_row)
+            last.mul_(d_h)
+            d_c.mul_(forgotten)
+            before = rows[t - 1][-1] if t else None
+            if before is not None and not ctx.resets[t]:
+                d_h = torch.addmm(before, d_gate, w_hh)
+                continue
+            d_h = torch.mm(d_gate, w_hh)
             if ctx.resets[t]:
-                d_c *= keep[t]
-                d_h *= keep[t]
-            if t:
-                d_h += grad[t - 1]
-        d_w = d_gates.view(-1, 4 * size).t() @ h_in.view(-1, size)
-        return d_gates, d_w, d_h, d_c, None, None
+                d_c.mul_(keep[t])
+                d_h.mul_(keep[t])
+            if before is not None:
+                d_h.add_(before)
+        flat = d_gates.view(-1, 4 * size)
+        flat_t = flat.t()
+        d_inputs = (flat @ w_ih).view_as(inputs)
+        d_w_ih = flat_t @ inputs.flatten(0, 1)
+        d_w_hh = flat_t @ h_in.view(-1, size)
+        return d_inputs, d_w_ih, d_w_hh, flat.sum(0), torch.stack((d_h, d_c)), None, None
 
 
 class Memory(nn.Module):
@@ -113,17 +144,20 @@ class Memory(nn.Module):
         Returns:
             (T, B, size).
         """
-        steps, batch, _ = inputs.shape
-        w_ih, w_hh = self._reordered(self.cell.weight_ih), self._reordered(self.cell.weight_hh)
-        bias = self._reordered(self.cell.bias_ih + self.cell.bias_hh)
-        gates = functional.linear(inputs.flatten(0, 1), w_ih, bias).view(steps, batch, -1)
-        keep = (~starts).to(inputs.dtype).unsqueeze(2)
+        cell = self.cell
         outputs: Tensor = _ResettableLstm.apply(  # type: ignore[no-untyped-call]
-            gates, w_hh, memory[0], memory[1], keep, starts.any(1).tolist()
-        )[0]
+            inputs,
+            _reordered(cell.weight_ih),
+            _reordered(cell.weight_hh),
+            _reordered(cell.bias_ih + cell.bias_hh),
+            memory,
+            (~starts).to(inputs.dtype).unsqueeze(2),
+            starts.any(1).tolist(),
+        )
         return outputs
 
-    def _reordered(self, weight: Tensor) -> Tensor:
-        """PyTorch's gates (input, forget, cell, output) in the order of `_ResettableLstm`."""
-        entry, forget, cell, exit_ = weight.chunk(4)
-        return torch.cat((entry, forget, exit_, cell))
+
+def _reordered(weight: Tensor) -> Tensor:
+    """Rows in PyTorch's order of gates (input, forget, cell, output) in that of `_ResettableLstm`."""
+    entry, forget, candidate, exit_ = weight.chunk(4)
+    return torch.cat((candidate, entry, forget, exit_))

@@ -62,7 +62,9 @@ class PaperNet(ActorCritic):
         )
         self.blocks = nn.ModuleList(_FilmBlock(width, self.dialogue.size, self.batch_norm) for _ in range(2))
         self.apply(unit_row_linear)
-        self.to(memory_format=torch.channels_last)
+        for convolution in self.modules():
+            if isinstance(convolution, nn.Conv2d):
+                convolution.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def prepare(self, images: Tensor) -> Tensor:
         """Images as floats, channels first; the bytes are channels-last in memory as convolutions like them."""
@@ -70,7 +72,7 @@ class PaperNet(ActorCritic):
 
     def perceive(self, prepared: Tensor, text: Tensor, image_index: Tensor, text_index: Tensor) -> Tensor:
         """Features (P, width) of the pairs; see `ActorCritic.perceive`."""
-        hidden = self.image_conv(prepared.to(self.image_conv[0].weight.dtype)).index_select(0, image_index)
+        hidden = self.image_conv(prepared.to(text.dtype)).index_select(0, image_index)
         for block in self.blocks:
             hidden = block(hidden, text, text_index)
         pooled = functional.max_pool2d(hidden, tuple(hidden.shape[2:]))
