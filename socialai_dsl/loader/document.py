@@ -57,6 +57,13 @@ class Positions(ABC):
     def find(self, path: DataPath) -> tuple[Document, DataPath]:
         """The document in which the part at `path` was written, and its path there."""
 
+    def part(self, path: DataPath) -> Data:
+        """The part of the data at `path`, which exists."""
+        part: Data = self.data
+        for step in path:
+            part = part[step]  # type: ignore[index]
+        return part
+
     def locate(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
         """The place of the character `offset` (from 0) of the text at `path`."""
         document, there = self.find(path)
@@ -111,22 +118,18 @@ class Document(Positions):
         from socialai_dsl.loader.offsets import source_indices
 
         node = self.node(path)
-        value = node.value
+        place = node.value
         if node.style in (Style.MAPPING, Style.SEQUENCE):
-            return Span(value.file, value.line, value.column, width)
+            return place.shifted(0, width)
         text = self.source.text
         raw = text[node.start : node.end]
         if node.style is Style.PLAIN and "\n" not in raw and "\r" not in raw:
-            return value.shifted(min(max(offset, 0), len(raw)), width)
-        indices = source_indices(text, node.start, node.end, node.style, self._text_at(path))
+            return place.shifted(min(max(offset, 0), len(raw)), width)
+        value = self.part(path)
+        assert isinstance(value, str), "internal: what is written as a text is read as one"
+        indices = source_indices(text, node.start, node.end, node.style, value)
         index = indices[min(max(offset, 0), len(indices) - 1)]
         return self._span_of(node, index, width)
-
-    def _text_at(self, path: DataPath) -> str:
-        part: Data = self.data
-        for step in path:
-            part = part[step]  # type: ignore[index]
-        return part if isinstance(part, str) else ""
 
     def _span_of(self, node: NodeSpan, index: int, width: int) -> Span:
         before = Source("", self.source.text[node.start : index])

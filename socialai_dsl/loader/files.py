@@ -30,6 +30,14 @@ def display_name(path: Path) -> str:
         return str(absolute)
 
 
+def is_file(path: Path) -> bool:
+    """Whether there is a regular file that may be looked at; links are followed."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
 def read_source(path: Path, name: str | None = None) -> Source:
     """The text of a file, called `name` (by default its path) in messages.
 

@@ -22,19 +22,20 @@ _EventParser: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoad
 _STYLES = {None: Style.PLAIN, "": Style.PLAIN} | {s.value: s for s in Style if len(s.value) == 1}
 
 
-def read_document(file: Path | str | Source, name: str | None = None) -> Document:
+def read_document(file: Path | str | Source, name: str | None = None, path: Path | None = None) -> Document:
     """One YAML document as plain data with positions.
 
     Args:
         file: a path, or text that is there already.
         name: how messages call the file; by default its path relative to the working directory.
+        path: the file that text came from, if `file` is a source.
 
     Raises:
         ScenarioError: everything that is wrong with the file as YAML (S001 to S007), in one go as far as
             the text can be followed.
     """
     if isinstance(file, Source):
-        return _parse(checked(file), None)
+        return _parse(checked(file), path)
     path = Path(file)
     return _parse(read_source(path, name or display_name(path)), path.resolve())
 

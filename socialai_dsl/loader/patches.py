@@ -1,0 +1,231 @@
+"""Variants as patches: `remove`, then `set`, then `add`, each on paths of the scenario."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, did_you_mean
+from socialai_dsl.loader.limits import MAX_PATCH_PATH
+from socialai_dsl.loader.patch_paths import Miss, Place, follow, missing
+from socialai_dsl.loader.tree import Node
+from socialai_dsl.source import Span
+
+VARIANT_KEYS: Final = ("variant", "of", "about", "notes", "skills", "remove", "set", "add")
+
+_DESCRIPTION: Final = ("about", "notes", "skills")
+
+# Sections that every scenario has, if only empty: a patch may put something into them though the file has none.
+_MAPPING_SECTIONS: Final = frozenset(
+    "params grammar room objects let define state tables memory frames roles npc_defaults cast reward observe".split()
+)
+_LIST_SECTIONS: Final = frozenset("rules outcome check require".split())
+
+
+@dataclass(frozen=True)
+class Edit:
+    """One change that a patch made.
+
+    Attributes:
+        verb: what was done.
+        path: to which path of the scenario, as written.
+        span: where the patch says so.
+        removed: where what was removed or replaced had been written, if there was something.
+    """
+
+    verb: Literal["remove", "set", "add"]
+    path: str
+    span: Span
+    removed: Span | None = None
+
+
+def apply_patch(root: Node, patch: Node, found: DiagnosticBag) -> list[Edit]:
+    """Change the tree `root` as the mapping `patch` says.
+
+    Args:
+        root: a scenario or suite.
+        patch: a mapping with some of the keys `remove`, `set` and `add`; `about`, `notes` and `skills` replace those
+            of the scenario, others are left alone.
+        found: takes S501, S502 and S104; what they concern is not applied.
+    """
+    edits = _remove(root, patch, found)
+    verb: Literal["set", "add"]
+    for verb, change in (("set", _set), ("add", _add)):
+        section = patch.entry(verb)
+        if section is None:
+            continue
+        if not isinstance(section.children, dict):
+            message = f"`{verb}` is a mapping from paths to values, not {section.kind}"
+            found.add(
+                Diagnostic("S104", message, section.value_span(), hint=f"{verb}: {{cast.anna.name: Anna}}")
+            )
+            continue
+        for path, value in section.children.items():
+            edits += change(root, path, value, found)
+    for key in _DESCRIPTION:
+        entry = patch.entry(key)
+        if entry is not None and isinstance(root.children, dict):
+            root.children[key] = entry
+    return edits
+
+
+def _remove(root: Node, patch: Node, found: DiagnosticBag) -> list[Edit]:
+    section = patch.entry("remove")
+    if section is None:
+        return []
+    if not isinstance(section.children, list):
+        message = f"`remove` is a list of paths, not {section.kind}"
+        found.add(Diagnostic("S104", message, section.value_span(), hint="remove: [cast.anna]"))
+        return []
+    # All paths mean the scenario before anything is removed: indices do not shift.
+    places: list[tuple[Place, Edit]] = []
+    for item in section.children:
+        if not isinstance(item.value, str):
+            found.add(Diagnostic("S104", f"a path is a text, not {item.kind}", item.value_span()))
+            continue
+        place = _existing(root, item.value, item.value_span(), found)
+        if place is None or place.node is None:
+            continue
+        edit = Edit("remove", item.value, item.value_span(), place.node.key_span())
+        if any(place.node is earlier.node for earlier, _ in places):
+            found.add(Diagnostic("S501", f"`{item.value}` is removed twice", edit.span))
+        else:
+            places.append((place, edit))
+    for place, _ in places:
+        _take_out(place)
+    return [edit for _, edit in places]
+
+
+def _take_out(place: Place) -> None:
+    siblings = place.parent.children
+    if isinstance(siblings, dict):
+        del siblings[str(place.key)]
+    elif isinstance(siblings, list):
+        place.parent.children = [part for part in siblings if part is not place.node]
+
+
+def _set(root: Node, path: str, value: Node, found: DiagnosticBag) -> list[Edit]:
+    span = value.key_span()
+    place = _place(root, path, value, found)
+    if place is None:
+        return []
+    if isinstance(place.parent.children, dict):
+        place.parent.children[str(place.key)] = value
+    elif isinstance(place.parent.children, list):
+        place.parent.children[int(place.key)] = value
+    return [Edit("set", path, span, place.node.key_span() if place.node else None)]
+
+
+def _add(root: Node, path: str, value: Node, found: DiagnosticBag) -> list[Edit]:
+    span = value.key_span()
+    place = _place(root, path, value, found)
+    if place is None:
+        return []
+    target = place.node or _empty_section(root, path, value)
+    if target is None:
+        _report(missing(place.parent, path[: -len(str(place.key))], str(place.key)), span, found)
+        return []
+    if isinstance(target.children, list):
+        return _append(target, target.children, path, value, found)
+    if isinstance(target.children, dict):
+        return _add_keys(target.children, path, value, found)
+    message = f"nothing can be added to `{path}`: it is {target.kind}"
+    found.add(Diagnostic("S104", message, span, hint="to replace it use `set`"))
+    return []
+
+
+def _append(target: Node, items: list[Node], path: str, value: Node, found: DiagnosticBag) -> list[Edit]:
+    if not isinstance(value.children, list):
+        message = f"`{path}` in {target.file} is a list: give a list of items to add, not {value.kind}"
+        found.add(Diagnostic("S104", message, value.value_span()))
+        return []
+    items.extend(value.children)
+    return [Edit("add", path, value.key_span())]
+
+
+def _add_keys(entries: dict[str, Node], path: str, value: Node, found: DiagnosticBag) -> list[Edit]:
+    if not isinstance(value.children, dict):
+        message = f"`{path}` is a mapping: give the keys to add with their values, not {value.kind}"
+        found.add(Diagnostic("S104", message, value.value_span()))
+        return []
+    for key, part in value.children.items():
+        if key in entries:
+            there = entries[key].key_span()
+            message = f"`{path}.{key}` exists already ({there.file}:{there.line})"
+            found.add(Diagnostic("S502", message, part.key_span(), hint="to replace it use `set`"))
+        else:
+            entries[key] = part
+    return [Edit("add", path, value.key_span())]
+
+
+def _place(root: Node, path: str, value: Node, found: DiagnosticBag) -> Place | None:
+    """Where a patch puts a value: an existing part, or a new key of an existing mapping."""
+    if len(path) > MAX_PATCH_PATH:
+        found.add(Diagnostic("S004", f"a path has at most {MAX_PATCH_PATH} characters", value.key_span()))
+        return None
+    place = follow(root, path)
+    section = path.split(".", 1)[0]
+    if isinstance(place, Miss) and root.entry(section) is None and section in _MAPPING_SECTIONS:
+        _empty_section(root, section, value)
+        place = follow(root, path)
+    if isinstance(place, Miss):
+        _report(_or_section(place, root, section, path), value.key_span(), found)
+        return None
+    return place
+
+
+def _existing(root: Node, path: str, span: Span, found: DiagnosticBag) -> Place | None:
+    place = follow(root, path) if len(path) <= MAX_PATCH_PATH else Miss("this path is too long")
+    if isinstance(place, Place) and place.node is None:
+        place = missing(place.parent, path[: -len(str(place.key))], str(place.key))
+    if isinstance(place, Miss):
+        _report(place, span, found)
+        return None
+    return place
+
+
+def _or_section(miss: Miss, root: Node, section: str, path: str) -> Miss:
+    """The same miss; if it is about the first key, the sections that may be empty are suggested as well."""
+    if miss.suggestion or root.entry(section) is not None:
+        return miss
+    named = did_you_mean(section, _MAPPING_SECTIONS | _LIST_SECTIONS)
+    return Miss(miss.message, named + path[len(section) :] if named else None, None, miss.hint)
+
+
+def _empty_section(root: Node, path: str, value: Node) -> Node | None:
+    """A section that the scenario does not have, made empty; None if there is no section of this name."""
+    if not isinstance(root.children, dict) or path not in _MAPPING_SECTIONS | _LIST_SECTIONS:
+        return None
+    section = Node(value.document, value.path, {} if path in _MAPPING_SECTIONS else [])
+    root.children[path] = section
+    return section
+
+
+def _report(miss: Miss, span: Span, found: DiagnosticBag) -> None:
+    found.error(
+        "S501",
+        miss.message,
+        span,
+        hint=miss.hint,
+        suggestion=miss.suggestion,
+        suggestion_place=miss.suggestion_place,
+    )
+
+
+def check_variant(root: Node, found: DiagnosticBag) -> None:
+    """The shape of a variant's file, which no model sees: its keys, `of`, and that it is a variant at all."""
+    assert isinstance(root.children, dict), "internal: a variant is a mapping"
+    for key, part in root.children.items():
+        if key not in VARIANT_KEYS:
+            suggestion = did_you_mean(key, VARIANT_KEYS)
+            hint = None if suggestion else "a variant has `of`, `remove`, `set`, `add` and `about`"
+            message = f"unknown key `{key}` in a variant"
+            found.add(Diagnostic("S101", message, part.key_span(), hint=hint, suggestion=suggestion))
+    base = root.entry("of")
+    if base is None:
+        hint = "of: base.yaml, or `of: any` for every scenario"
+        found.add(
+            Diagnostic("S105", "a variant needs `of`: what it is a variant of", root.key_span(), hint=hint)
+        )
+    elif not isinstance(base.value, str):
+        found.add(Diagnostic("S104", f"`of` names a file, it is not {base.kind}", base.value_span()))

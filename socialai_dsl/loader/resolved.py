@@ -1,0 +1,256 @@
+"""From a scenario's name to its data, with `extends`, variants, and the files it names."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
+from socialai_dsl.loader.build import Build, Builder
+from socialai_dsl.loader.document import DataPath, Document, Positions
+from socialai_dsl.loader.files import is_file
+from socialai_dsl.loader.library import Library, yaml_files
+from socialai_dsl.loader.limits import MAX_CHAIN
+from socialai_dsl.loader.names import (
+    Part,
+    ScenarioName,
+    looks_like_path,
+    name_source,
+    parse_name,
+    shipped_folder,
+)
+from socialai_dsl.loader.tree import Node
+from socialai_dsl.loader.variants import names_in, vary
+from socialai_dsl.source import Source, Span
+
+
+class Resolved(Positions):
+    """A scenario (or suite, npc, library) with `extends` and variants applied.
+
+    Behaves like a document; its parts know in which file they were written, patches included.
+
+    Attributes:
+        name: canonical name with variants, without parameters, e.g. `talkitout+unsocial`.
+        kind: key of the file's kind; `variant` only for a variant of any scenario that was named alone.
+        data: the data; `extends` is gone, `abstract` is the file's own.
+        params: parameter -> value as written behind `?`.
+        edits: what variants changed, in order.
+    """
+
+    def __init__(self, builder: Builder, build: Build, given: Mapping[str, Part]) -> None:
+        self.name = build.name
+        self.kind = build.kind
+        self.data = build.tree.data()
+        self.params = {key: part.text for key, part in given.items()}
+        self.edits = tuple(build.edits)
+        self._builder = builder
+        self._build = build
+        self._given = given
+        self._parts = dict(build.tree.walk())
+
+    @property
+    def document(self) -> Positions:
+        """The data with its positions, which is this object itself."""
+        return self
+
+    @property
+    def files(self) -> dict[str, Source]:
+        """Name -> source, for all files read so far for the scenario that was named."""
+        return self._builder.library.sources
+
+    @property
+    def path(self) -> Path:
+        """The file that was named, resolved."""
+        return self._build.path
+
+    @property
+    def variants(self) -> tuple[str, ...]:
+        """The variants that a suite passes on to its members."""
+        return tuple(part.text for part in self._build.passed_on)
+
+    def find(self, path: DataPath) -> tuple[Document, DataPath]:
+        """The file and the path in it where the part at `path`, or its nearest ancestor, was written."""
+        path = tuple(path)
+        while path not in self._parts:
+            path = path[:-1]
+        part = self._parts[path]
+        return part.document, part.path
+
+    def origin(self, path: DataPath) -> Span:
+        """Where the value at `path` was written."""
+        return self.value_span(path)
+
+    def param_span(self, name: str) -> Span:
+        """Where the parameter was given a value, in the name of the scenario."""
+        return self._given[name].span
+
+    def include(self, path: DataPath) -> Resolved:
+        """The scenario or npc that the text at `path` names, relative to the file that text stands in.
+
+        Raises:
+            ScenarioError: whatever is wrong with the name or the file.
+        """
+        document, there = self.find(path)
+        library = self._builder.library
+        text = self.part(path)
+        if not isinstance(text, str):
+            raise library.error("S104", "the name of a file is a text", document.value_span(there))
+        found = DiagnosticBag()
+        name = parse_name(text, document.locate(there), found)
+        found.raise_errors(library.sources)
+        file = library.find(name.base.text, _folder(document), name.base.span)
+        return _resolved(self._builder, file, name, name.base.span)
+
+    def include_all(self, path: DataPath) -> tuple[Resolved, ...]:
+        """The files that the text or list of texts at `path` names.
+
+        A list keeps its order; a text with `*` in its last part stands for the matching files, sorted by name.
+
+        Raises:
+            ScenarioError: whatever is wrong with a name or a file.
+        """
+        part = self.part(path)
+        if isinstance(part, list):
+            return tuple(file for i in range(len(part)) for file in self.include_all((*path, i)))
+        if not isinstance(part, str) or "*" not in part:
+            return (self.include(path),)
+        document, there = self.find(path)
+        span = document.value_span(there)
+        files = self._builder.library.matching(part, _folder(document), span)
+        names = [ScenarioName(Part(file.name, span), (), {}) for file in files]
+        return tuple(_resolved(self._builder, f, n, span) for f, n in zip(files, names, strict=True))
+
+    def members(self) -> tuple[Resolved, ...]:
+        """The members of a suite, in order, with what `?split=` replaces and the variants it passes on.
+
+        Raises:
+            ScenarioError: whatever is wrong with a member; S503 if no member can take a variant; S206 if there is
+                no such split.
+        """
+        texts = self.part(("members",))
+        places: list[DataPath] = [("members", i) for i in range(len(texts) if isinstance(texts, list) else 0)]
+        replaced = self._replaced_by_split()
+        members = [self.include(replaced.get(str(self.part(place)), place)) for place in places]
+        for variant in self._build.passed_on:
+            changed = [member._varied(variant) for member in members]
+            if not any(changed) and variant.text not in self._build.own_variants:
+                message = f"no member of `{self.name}` has a variant `{variant.text}`"
+                raise self._builder.library.error("S503", message, variant.span)
+            members = [now or before for now, before in zip(changed, members, strict=True)]
+        return tuple(members)
+
+    def _replaced_by_split(self) -> dict[str, DataPath]:
+        """Member as written -> path of what the chosen split puts in its place."""
+        split = self._given.get("split")
+        if split is None:
+            return {}
+        known = self.data.get("splits") if isinstance(self.data, dict) else None
+        splits = known if isinstance(known, dict) else {}
+        if split.text not in splits:
+            message = f"`{self.name}` has no split `{split.text}`"
+            near = did_you_mean(split.text, splits)
+            raise self._builder.library.error("S206", message, split.span, suggestion=near)
+        chosen = splits[split.text]
+        replace = chosen.get("replace") if isinstance(chosen, dict) else None
+        members = replace if isinstance(replace, dict) else {}
+        return {member: ("splits", split.text, "replace", member) for member in members}
+
+    def _varied(self, variant: Part) -> Resolved | None:
+        """This scenario with a variant that a suite passes on; None if it has no such variant."""
+        build = self._build.copy()
+        try:
+            vary(self._builder, build, variant)
+        except ScenarioError as error:
+            if any(d.code != "S503" for d in error.diagnostics):
+                raise
+            return None
+        return Resolved(self._builder, build, self._given)
+
+    def patched(self, holder: Positions, path: DataPath) -> Resolved:
+        """This scenario changed by the mapping (`remove`, `set`, `add`) at `path` of another file.
+
+        Raises:
+            ScenarioError: S501, S502, S104.
+        """
+        build = self._build.copy()
+        document, there = holder.find(path)
+        self._builder.patch(build, Node(document, there, document.part(there)))
+        return Resolved(self._builder, build, self._given)
+
+
+def resolve(name: str, base: Path | None = None) -> Resolved:
+    """The scenario of a name: `NAME(+VARIANT)*(?parameter=value(&parameter=value)*)?`.
+
+    Args:
+        name: a path or the name of a shipped scenario, with variants and parameters.
+        base: where relative paths start, by default the working directory. If given, files of the scenario may
+            come from anywhere below it, else only from the folder of the named file; and always from the shipped
+            ones.
+
+    Raises:
+        ScenarioError: with everything found up to the first file that cannot be used.
+    """
+    source = name_source(name)
+    found = DiagnosticBag()
+    folder = base if base is not None else Path()
+    parsed = parse_name(name, source.span(1, 1), found, folder)
+    found.raise_errors({source.name: source})
+    path = _named_file(parsed.base, folder, source)
+    library = Library([path.parent] if base is None else [base, path.parent])
+    library.sources[source.name] = source
+    return _resolved(Builder(library), path, parsed)
+
+
+def shipped_names() -> list[str]:
+    """The names of the shipped scenarios, suites, and variants that stand for themselves; sorted."""
+    return names_in(shipped_folder())
+
+
+def _resolved(builder: Builder, path: Path, name: ScenarioName, asked: Span | None = None) -> Resolved:
+    build = builder.built(path, asked)
+    if len(name.variants) > MAX_CHAIN:
+        message = f"at most {MAX_CHAIN} variants can be combined"
+        raise builder.library.error("S507", message, name.variants[-1].span)
+    for variant in name.variants:
+        vary(builder, build, variant)
+    return Resolved(builder, build, name.params)
+
+
+def _folder(document: Document) -> Path:
+    assert document.path is not None, "internal: a library's documents are files"
+    return document.path.parent
+
+
+def _named_file(part: Part, folder: Path, source: Source) -> Path:
+    """The file that a name from outside means.
+
+    Raises:
+        ScenarioError: S007 for a path that leads nowhere, S504 for anything else.
+    """
+    text = part.text
+    beside, shipped = folder / text, shipped_folder() / text
+    if looks_like_path(text):
+        candidates = [beside, _with_suffix(beside), _with_suffix(shipped)]
+    else:
+        candidates = [_with_suffix(shipped), _with_suffix(beside)]
+    for candidate in candidates:
+        if is_file(candidate):
+            return candidate.resolve()
+    if os.path.lexists(beside):
+        # Reading it says what is wrong with it: a folder, a pipe, a link that leads nowhere.
+        return Path(os.path.realpath(beside))
+    found = DiagnosticBag()
+    if looks_like_path(text):
+        head = text[: text.rfind("/") + 1]
+        near = did_you_mean(text, [head + name for name in yaml_files(folder / head)])
+        found.error("S007", "there is no such file", Span(text, 1, 1), suggestion=near)
+    else:
+        near = did_you_mean(text, [*shipped_names(), *names_in(folder)])
+        hint = None if near else "a file is given by its path; shipped are " + ", ".join(shipped_names())
+        found.error("S504", f"there is no scenario `{text}`", part.span, hint=hint, suggestion=near)
+    raise ScenarioError(found, {source.name: source})
+
+
+def _with_suffix(path: Path) -> Path:
+    return path.parent / (path.name + ".yaml")
