@@ -51,7 +51,7 @@ def test_a_wheel_carries_the_scenarios_and_the_data_files(tmp_path: Path) -> Non
     subprocess.run(command, check=True, timeout=280)
     (wheel,) = tmp_path.glob("*.whl")
     names = set(zipfile.ZipFile(wheel).namelist())
-    sources = [path for path in (ROOT / "scenarios").rglob("*.yaml")]
+    sources = list((ROOT / "scenarios").rglob("*.yaml"))
     assert sources
     for path in sources:
         assert f"socialai_dsl/scenarios/{path.relative_to(ROOT / 'scenarios')}" in names

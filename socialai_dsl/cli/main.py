@@ -7,12 +7,13 @@ import traceback
 from collections.abc import Sequence
 from typing import Final
 
-from socialai_dsl.cli import bench, evaluate, play, run, schema, show, validate
+from socialai_dsl.cli import bench, evaluate, new, play, run, schema, show, validate
 from socialai_dsl.cli.errors import Exit, RunFailed, UsageError
 from socialai_dsl.diagnostics import ScenarioError, render_text
 
 _COMMANDS: Final = {
     "run": run,
+    "new": new,
     "validate": validate,
     "schema": schema,
     "show": show,

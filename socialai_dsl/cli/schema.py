@@ -17,7 +17,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(arguments: argparse.Namespace) -> Exit:
     """Print the schema."""
     del arguments
-    from socialai_dsl.schema import json_schema
+    from socialai_dsl.schema import Scenario
 
-    print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+    schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scenario.model_json_schema()}
+    print(json.dumps(schema, indent=2, ensure_ascii=False))
     return Exit.GOOD
