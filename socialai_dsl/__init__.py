@@ -1,0 +1,66 @@
+"""socialai-dsl: social grid-worlds declared in YAML, compiled to integer tables, run by the thousand.
+
+The public surface, imported on first use so that checking a file loads neither Gymnasium nor Numba:
+
+* `load(name)`: check a scenario file, or a shipped scenario by name, with variants: `talkitout+unsocial`.
+* `compile(scenario)`: its `Program`, the integer tables with vocabulary and source map.
+* `make(name)` and `make_vec(name, num_envs=...)`: Gymnasium environments, single and vectorised.
+
+Importing this package makes the ids `SocialAI/...-v1` known to Gymnasium.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from socialai_dsl import _gymnasium_hook
+
+if TYPE_CHECKING:
+    from socialai_dsl.compiler import compile_loaded as compile
+    from socialai_dsl.diagnostics import Diagnostic, ScenarioError
+    from socialai_dsl.envs import ScenarioEnv, ScenarioVectorEnv, make, make_vec
+    from socialai_dsl.frontend import LoadedScenario, load
+    from socialai_dsl.program import Program
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "load": ("socialai_dsl.frontend", "load"),
+    "LoadedScenario": ("socialai_dsl.frontend", "LoadedScenario"),
+    "compile": ("socialai_dsl.compiler", "compile_loaded"),
+    "Program": ("socialai_dsl.program", "Program"),
+    "make": ("socialai_dsl.envs", "make"),
+    "make_vec": ("socialai_dsl.envs", "make_vec"),
+    "ScenarioEnv": ("socialai_dsl.envs", "ScenarioEnv"),
+    "ScenarioVectorEnv": ("socialai_dsl.envs", "ScenarioVectorEnv"),
+    "ScenarioError": ("socialai_dsl.diagnostics", "ScenarioError"),
+    "Diagnostic": ("socialai_dsl.diagnostics", "Diagnostic"),
+}
+
+__all__ = [
+    "Diagnostic",
+    "LoadedScenario",
+    "Program",
+    "ScenarioEnv",
+    "ScenarioError",
+    "ScenarioVectorEnv",
+    "compile",
+    "load",
+    "make",
+    "make_vec",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'socialai_dsl' has no attribute {name!r}")
+    module, attribute = _HOME[name]
+    return getattr(import_module(module), attribute)
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])
+
+
+_gymnasium_hook.install()

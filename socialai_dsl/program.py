@@ -1,8 +1,8 @@
 """The narrow waist: what the compiler hands to the engine, and nothing else.
 
 A `Program` is one int32 vector (`words`) that the engine reads, plus names and texts for people. `words` starts with a
-header (`Header`), which holds sizes, flags and the offsets of the tables below. All offsets count from the first word of
-the program, so programs can be laid one behind the other in a batch.
+header (`Header`), which holds sizes, flags and the offsets of the tables below. All offsets count from the first word
+of the program, so programs can be laid one behind the other in a batch.
 
 **State.** An environment is a row of int16 registers, a row of uint32 boards, and a row of uint64 keys (engine/state.py
 gives shapes). Registers 0 to 31 are the same in every program (`Register`). From `FIRST_ENTITY` on follow the entities,
@@ -13,16 +13,15 @@ members of a group next to each other. Then come the program's own registers (dr
 **Code.** An instruction is four words: op, a, b, c. Tests go on with the next instruction if they hold and skip `c`
 instructions forward if not; nothing ever jumps backward. `EACH_CELL` is the one loop: it runs the instructions up to
 its `END_EACH` once for each cell of a board, so it is bounded by the room. Code starts at a `pc`, counted in
-instructions from the code table's start, and ends at `HALT`; pc 0 is a `HALT`, so a table entry of 0 means "nothing to do".
+instructions from the code table's start, and ends at `HALT`; pc 0 is a `HALT`, so an entry of 0 means "nothing to do".
 
 **Operands.** `value(x)` of an operand word x: a constant x - CONSTANT if x >= CONSTANT // 2; a temporary if
-x >= TEMPORARY; else the register x. Temporaries are int64 scratch of one run and carry nothing from run to run, except
-that the three phases `first`, activity and `then` never share any. Where an op writes, `dst` is a register or temporary.
-An "entity" operand is a value that is an entity's number.
+x >= TEMPORARY; else the register x. Temporaries are int64 scratch of one run and carry nothing from run to run. Where
+an op writes, `dst` is a register or temporary. An "entity" operand is a value that is an entity's number.
 
 **Utterance classes.** The compiler groups all pairs (template, noun) that no rule of the program tells apart into one
-class; class 0 is silence, 1 is "said, but nothing any rule waits for". Tables are indexed by class, so a step visits only
-rules that what was heard can fire.
+class; class 0 is silence, 1 is "said, but nothing any rule waits for". Tables are indexed by class, so a step visits
+only rules that what was heard can fire.
 """
 
 from __future__ import annotations
@@ -248,7 +247,7 @@ class Op(IntEnum):
     ABS = 28  # dst a = |v(b)|
     FIELD = 29  # dst a = field c (literal Field) of e(b)
     DISTANCE = 30  # dst a = Manhattan distance of e(b) and e(c)
-    QUADRANT = 31  # dst a = direction in which e(c) lies from e(b): |dx| == |dy|: SE -> right, NE -> up, NW -> left, SW -> down
+    QUADRANT = 31  # dst a = direction of e(c) seen from e(b); |dx| == |dy|: SE right, NE up, NW left, SW down
     DRAW = 32  # dst a = uniform number below v(b), drawn at site c (literal)
     SET_BIT = 33  # dst a |= 1 << v(b)
     COUNT_BITS = 34  # dst a = number of set bits of v(b)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from socialai_dsl.compiler.assembler import CodeTable, Sites
@@ -16,7 +18,7 @@ from socialai_dsl.compiler.verifier import verify
 from socialai_dsl.program import Program
 from socialai_dsl.semantics.terms import Checked
 
-__all__ = ["compile_scenario", "verify"]
+__all__ = ["compile_loaded", "compile_scenario", "verify"]
 
 
 def compile_scenario(checked: Checked) -> Program:
@@ -41,3 +43,17 @@ def compile_scenario(checked: Checked) -> Program:
     verify(program)
     assert program.words.dtype == np.int32, "internal: a program is a vector of int32"
     return program
+
+
+class Loaded(Protocol):
+    """What `load` returns, as far as the compiler reads it."""
+
+    @property
+    def checked(self) -> Checked:
+        """The resolved scenario."""
+        ...
+
+
+def compile_loaded(scenario: Loaded) -> Program:
+    """The program of a scenario that `load` returned."""
+    return compile_scenario(scenario.checked)
