@@ -60,14 +60,14 @@ def _key_step(node: Node, path: str, begin: int) -> tuple[str, int] | Miss:
     """The key of a mapping that the path goes on with, and where it ends in the path."""
     if not isinstance(node.children, dict):
         return Miss(f"`{_shown(path, begin)}` in {node.file} is {node.kind}, there is nothing below it")
-    if path.startswith("[", begin):
-        hint = f"write `{_shown(path, begin)}.` and the key"
-        return Miss(f"`{_shown(path, begin)}` in {node.file} is a mapping, not a list", hint=hint)
     rest = path[begin:]
     existing = [k for k in node.children if rest == k or rest.startswith((k + ".", k + "["))]
     if existing:
         key = max(existing, key=len)
         return key, begin + len(key)
+    if path.startswith("[", begin):
+        hint = f"write `{_shown(path, begin)}.` and the key"
+        return Miss(f"`{_shown(path, begin)}` in {node.file} is a mapping, not a list", hint=hint)
     match = _KEY.match(path, begin)
     if not match:
         return _no_path(path)

@@ -145,7 +145,10 @@ class _Builder:
         span = self._span(event)
         hint = "quote a text that begins with `*`; to share parts between scenarios use `extends`"
         self._error("S005", "aliases (`*name`) may not be used", span, hint)
-        self._value(None, event, Style.PLAIN)
+        if self._stack and self._stack[-1].expects_key:
+            self._stack[-1].key = ""
+        else:
+            self._value(None, event, Style.PLAIN)
 
     def _refuse_properties(self, event: Any) -> None:
         if event.anchor is not None:

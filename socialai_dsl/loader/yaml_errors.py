@@ -103,7 +103,7 @@ def _colon(problem: str, place: _Place, context: _Place) -> Diagnostic | None:
 
 
 def _first_character(problem: str, place: _Place, context: _Place) -> Diagnostic | None:
-    if place.character == "\t" and not place.before.strip():
+    if place.character == "\t":
         return place.finding("not YAML: a tab cannot indent; use spaces")
     if "start any token" in problem:
         character = "a backquote" if place.character == "`" else f"`{place.character}`"
@@ -130,6 +130,8 @@ def _after_quote(problem: str, place: _Place, context: _Place) -> Diagnostic | N
         return place.finding(message, "quote the whole value, or nothing of it")
     if place.character in "}]":
         return place.finding(f"not YAML: there is nothing for this `{place.character}` to close")
+    if place.character == "," and place.before.rstrip()[-1:] in (",", "[", "{"):
+        return place.finding("not YAML: a value is missing here")
     if place.character == ",":
         return place.finding("not YAML: a text cannot begin with `,`; quote the text")
     return None
@@ -142,6 +144,13 @@ def _layout(problem: str, place: _Place, context: _Place) -> Diagnostic | None:
         return place.finding("not YAML: a text cannot begin with `? `; quote the text")
     if context.line.startswith("%"):
         return context.finding("not YAML: a text cannot begin with `%`; quote the text")
+    if re.search(r"',' or '[}\]]'", problem):
+        message = f"not YAML: a comma is missing before this, or the `{context.character}` is not closed"
+        return place.finding(message, f"it was opened at line {context.line_number}")
+    if "node content" in problem:
+        return place.finding("not YAML: a value is missing here")
+    if "document start" in problem:
+        return place.finding("not YAML: the document has ended before this", "a file is one mapping of keys")
     if re.search(r"expected key|block end|'-' indicator", problem):
         return place.finding(
             "not YAML: this line fits neither the list or mapping above nor one around it",

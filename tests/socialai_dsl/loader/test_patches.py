@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from socialai_dsl.diagnostics import DiagnosticBag
+from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError
 from socialai_dsl.loader import Document, Edit, read_document
 from socialai_dsl.loader.patch_paths import Place, follow
 from socialai_dsl.loader.patches import apply_patch
@@ -164,6 +164,31 @@ def test_origins_follow_the_parts() -> None:
     assert places[("outcome", 2, "failure")] == "p.yaml:3:27"
     assert places[("cast", "anna", "name")] == "p.yaml:2:23"
     assert places[("cast", "bob", "name")] == "base.yaml:5:15"
+
+
+PATCH = """\
+remove: ['outcome[0]', cast.bob]
+set: {cast.anna.name: Ann, observe.npcs: hidden}
+add: {outcome: [{failure: t}]}
+"""
+PIECES = [*"{}[]:,.'\n", "add", "set: ", "remove: ", "outcome", "cast", "[late]", "~", "3", ": "]
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, len(PATCH)), st.integers(0, 9), st.sampled_from(PIECES)), max_size=5)
+)
+def test_mutated_patches_raise_nothing_but_scenario_errors(mutations: list[tuple[int, int, str]]) -> None:
+    text = PATCH
+    for place, removed, inserted in mutations:
+        text = text[:place] + inserted + text[place + removed :]
+    try:
+        data, found, edits, root = apply(text)
+    except ScenarioError:
+        return
+    assert found or edits or "set" not in text
+    assert root.data() == data
+    for _, node in root.walk():
+        assert node.value_span().file in ("base.yaml", "p.yaml")
 
 
 def document(text: str) -> Document:

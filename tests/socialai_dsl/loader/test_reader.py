@@ -151,6 +151,10 @@ NOT_YAML = {
     "a: {b: not x[1]}": "1:13: `[` in a text inside { } or [ ]; quote the text",
     ": x": "1:1: there is no key before this colon",
     "? [a]\n: b": "1:3: a key is a word, not a list or a mapping",
+    "a: [[b] c]": "1:9: a comma is missing before this, or the `[` is not closed",
+    "a: [b, , c]": "1:8: a value is missing here",
+    "'a'\n'b'": "2:1: the document has ended before this",
+    "a: b\n\t\tc: 1": "2:1: a tab cannot indent; use spaces",
     "a: ? b": "1:4: a text cannot begin with `? `; quote the text",
     "a: ,b": "1:4: a text cannot begin with `,`; quote the text",
 }
@@ -161,6 +165,14 @@ NOT_YAML = {
 def test_what_is_not_yaml_is_explained(text: str) -> None:
     place, message = NOT_YAML[text].split(": ", 1)
     assert findings(text)[0] == f"f.yaml:{place}: S001 not YAML: {message}"
+
+
+@each_parser
+@pytest.mark.parametrize(
+    "text", ["*a : 1", "? *a\n: 1", "&a b: 1", "!a b: 1", "{*a : 1}", "- *a : 1", "&a {b: 1}: c"]
+)
+def test_refused_properties_on_keys(text: str) -> None:
+    assert any("S005" in finding for finding in findings(text))
 
 
 @each_parser
