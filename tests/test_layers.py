@@ -25,9 +25,10 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "program": ({"source", "listing"}, {"numpy"}),
     "listing": ({"source", "program"}, {"numpy"}),
     "compiler": (TEXT_SIDE - {"loader", "frontend"} | {"program"}, {"numpy"}),
-    "engine": ({"program", "draws"}, {"numpy", "numba"}),
+    "engine": ({"program", "draws"}, {"numpy", "numba", "llvmlite"}),
     "envs": (TEXT_SIDE | {"program", "compiler", "engine"}, {"numpy", "gymnasium", "PIL"}),
-    "": (TEXT_SIDE | {"program", "compiler", "engine", "envs"}, set()),
+    "_gymnasium_hook": ({"envs"}, set()),
+    "": (TEXT_SIDE | {"program", "compiler", "engine", "envs", "_gymnasium_hook"}, set()),
 }
 
 # What the trainer may use: the facade's names, nothing below it.
