@@ -234,10 +234,10 @@ BOMBS = {
 
 @pytest.mark.parametrize("name", BOMBS)
 def test_bombs_are_refused_at_once(name: str) -> None:
-    start = time.perf_counter()
+    start = time.process_time()
     assert len(findings(BOMBS[name])) <= 200
-    # Half a second is generous: most take a millisecond.
-    assert time.perf_counter() - start < 1.0
+    # Most take a millisecond.
+    assert time.process_time() - start < 1.0
 
 
 def test_deep_files_do_not_need_a_deep_stack() -> None:
