@@ -1,0 +1,80 @@
+"""Streamed encoding of histories agrees with encoding each from its first word, in values and gradients."""
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from trainer.distinct import prefix_tree
+from trainer.nets.dialogue import DialogueEncoder
+
+
+@pytest.fixture
+def encoder() -> DialogueEncoder:
+    torch.manual_seed(0)
+    return DialogueEncoder(20, 16).double()
+
+
+def conversations(count: int, length: int) -> np.ndarray:
+    """Histories after each utterance of growing conversations; beyond `length` words the oldest utterances are gone."""
+    rng = np.random.default_rng(3)
+    rows = []
+    for _ in range(count):
+        utterances: list[list[int]] = []
+        for _ in range(6):
+            utterances.append(rng.integers(1, 4, rng.integers(1, 6)).tolist())
+            while sum(map(len, utterances)) > length:
+                utterances.pop(0)
+            words = [word for utterance in utterances for word in utterance]
+            rows.append(words + [0] * (length - len(words)))
+    return np.array([[0] * length, *rows], np.int16)
+
+
+def encode_one_by_one(encoder: DialogueEncoder, rows: np.ndarray) -> Tensor:
+    encodings = []
+    for row in rows:
+        words = torch.tensor(row[row > 0].astype(np.int64))
+        last = (
+            encoder.gru(encoder.embedding(words))[1][0] if len(words) else torch.zeros(encoder.size).double()
+        )
+        encodings.append(last)
+    return torch.stack(encodings)
+
+
+def encode_tree(encoder: DialogueEncoder, rows: np.ndarray) -> Tensor:
+    tree = prefix_tree(rows)
+    states = encoder(torch.from_numpy(tree.tokens), torch.from_numpy(tree.parents), tree.offsets)
+    return states[torch.from_numpy(tree.leaves)]
+
+
+def test_tree_agrees_with_reencoding_in_values_and_gradients(encoder: DialogueEncoder) -> None:
+    rows = conversations(12, 12)
+    assert (rows[:, -1] > 0).any(), "some histories must have outgrown the buffer"
+    plain, tree = encode_one_by_one(encoder, rows), encode_tree(encoder, rows)
+    assert torch.allclose(plain, tree, rtol=0, atol=1e-12)
+    weights = torch.randn(plain.shape, dtype=torch.float64)
+    parameters = list(encoder.parameters())
+    expected = torch.autograd.grad((plain * weights).sum(), parameters)
+    got = torch.autograd.grad((tree * weights).sum(), parameters)
+    for one, other in zip(expected, got, strict=True):
+        assert torch.allclose(one, other, rtol=0, atol=1e-12)
+
+
+def test_extending_agrees_with_reencoding(encoder: DialogueEncoder) -> None:
+    rows = conversations(5, 40)[1:]
+    full = encode_one_by_one(encoder, rows)
+    lengths = (rows > 0).sum(1)
+    known = np.maximum(lengths - np.array([5, 4, 3, 2, 1, 0] * 5), 0)
+    starts = np.where(np.arange(40) < known[:, None], rows, 0)
+    order = np.argsort(-(lengths - known), kind="stable")
+    new = (lengths - known)[order]
+    suffix = np.array([np.roll(rows[i], -known[i])[:6] for i in order])
+    states = encode_one_by_one(encoder, starts[order]).detach()
+    extended = encoder.extend(
+        states, torch.tensor(suffix.astype(np.int64)), new.tolist(), encoder.word_inputs()
+    )
+    assert torch.allclose(extended, full[torch.from_numpy(order)], rtol=0, atol=1e-12)
+
+
+def test_the_empty_history_is_zero(encoder: DialogueEncoder) -> None:
+    assert (encode_tree(encoder, np.zeros((3, 8), np.int16)) == 0).all()

@@ -1,0 +1,137 @@
+"""Networks have the published sizes, share frames exactly, and are found by name."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from torch.nn import functional
+
+from trainer.nets import ActorCritic, NetSpec, build_net, net_class
+from trainer.nets.fast import CellRows, FastNet
+from trainer.nets.paper import PaperNet
+
+SPEC = NetSpec((8, 2, 4, 16), (7, 7, 4), (12, 5, 3, 3), 40)
+
+
+def random_images(count: int) -> torch.Tensor:
+    high = np.array(SPEC.image_high) + 1
+    return torch.from_numpy(np.random.default_rng(0).integers(0, high, (count, 7, 7, 4)).astype(np.uint8))
+
+
+@pytest.mark.parametrize(
+    ("action_sizes", "parameters"),
+    [
+        ((8, 2, 4, 16), 1_097_503),
+        ((8, 2, 2, 2), 1_096_463),
+        ((4, 2, 2, 2), 1_096_203),
+        ((8, 2, 15, 45), 1_100_103),
+    ],
+)
+def test_the_reference_network_has_the_published_number_of_parameters(
+    action_sizes: tuple[int, int, int, int], parameters: int
+) -> None:
+    net = build_net("paper-reference", NetSpec(action_sizes, (7, 7, 4), (12, 5, 3, 3), 40), 0)
+    assert sum(p.numel() for p in net.parameters()) == parameters
+
+
+def test_the_reference_network_s_parts_have_the_published_sizes() -> None:
+    net = build_net("paper-reference", SPEC, 0)
+    assert isinstance(net, PaperNet)
+
+    def size(module: torch.nn.Module) -> int:
+        return sum(p.numel() for p in module.parameters())
+
+    assert size(net.image_conv) == 152_832
+    assert size(net.dialogue.embedding) == 12_800
+    assert size(net.dialogue.gru) == 99_072
+    assert [size(block) for block in net.blocks] == [328_704, 328_704]
+    assert size(net.memory) == 132_096
+    critic = net.heads.hidden.weight[:64].numel() + 64 + size(net.heads.out[4])
+    assert critic == 8_321
+
+
+def test_linear_layers_of_the_paper_network_start_with_unit_rows() -> None:
+    net = build_net("paper", SPEC, 0)
+    assert isinstance(net, PaperNet)
+    for layer in (net.heads.hidden, net.heads.out[0], net.blocks[0].scale):
+        assert torch.allclose(layer.weight.norm(dim=1), torch.ones(len(layer.weight)))
+        assert (layer.bias == 0).all()
+
+
+def test_the_bag_is_a_linear_layer_over_embedded_cells() -> None:
+    torch.manual_seed(0)
+    net = FastNet(SPEC).double()
+    images = random_images(5)
+    prepared, nothing = net.prepare(images), torch.zeros(5, dtype=torch.int64)
+    with torch.no_grad():
+        net.film.weight.zero_()
+        net.film.bias.zero_()
+    got = net.perceive(prepared, torch.zeros(1, 128).double(), torch.arange(5), nothing)
+    cells = images.flatten(1, 2).long()
+    channel = torch.arange(4)
+    kinds = net.kind(torch.relu(net.channels[channel, cells].sum(2)))
+    expected = torch.relu(functional.linear(kinds.flatten(1), net.places.flatten(0, 1).t(), net.bias))
+    assert torch.allclose(got, expected, rtol=0, atol=1e-12)
+    parameters = [net.places, net.channels, net.kind.weight]
+    for one, other in zip(
+        torch.autograd.grad(got.square().sum(), parameters, retain_graph=True),
+        torch.autograd.grad(expected.square().sum(), parameters),
+        strict=True,
+    ):
+        assert torch.allclose(one, other, rtol=0, atol=1e-10)
+
+
+def test_kinds_of_cells_are_told_apart_by_every_channel() -> None:
+    images = torch.zeros(5, 7, 7, 4, dtype=torch.uint8)
+    for channel, value in enumerate(SPEC.image_high):
+        images[channel + 1, 2, 3, channel] = value
+    view = CellRows(images, tuple(high + 1 for high in SPEC.image_high))
+    assert len(view.kinds) == 5
+    assert len(set(view.rows[:, 2 * 7 + 3].tolist())) == 5
+
+
+@pytest.mark.parametrize("name", ["fast", "paper"])
+def test_shared_frames_have_the_features_of_separate_ones(name: str) -> None:
+    net = build_net(name, SPEC, 0).double()
+    images, text = random_images(3), torch.randn(2, 128).double()
+    image_index, text_index = torch.tensor([0, 2, 2, 1, 0, 0]), torch.tensor([0, 1, 0, 1, 0, 1])
+    together = net.perceive(net.prepare(images), text, image_index, text_index)
+    apart = torch.cat(
+        [
+            net.perceive(
+                net.prepare(images[i : i + 1]), text[j : j + 1], torch.tensor([0]), torch.tensor([0])
+            )
+            for i, j in zip(image_index.tolist(), text_index.tolist(), strict=True)
+        ]
+    )
+    assert together.shape == (6, net.features)
+    assert torch.allclose(together, apart, rtol=0, atol=1e-10)
+
+
+def test_equal_seeds_build_equal_networks_and_leave_torch_s_generator_alone() -> None:
+    state = torch.get_rng_state()
+    one, other, third = (build_net("fast", SPEC, seed).state_dict() for seed in (3, 3, 4))
+    assert torch.equal(torch.get_rng_state(), state)
+    assert all(torch.equal(one[name], other[name]) for name in one)
+    assert not all(torch.equal(one[name], third[name]) for name in one)
+
+
+def test_a_user_s_network_is_found_in_its_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "my_nets.py").write_text(
+        "from trainer.nets.fast import FastNet\nclass Mine(FastNet):\n    kind_size = 4\nnot_a_net = 3\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    net = build_net("my_nets:Mine", SPEC, 0)
+    assert isinstance(net, ActorCritic)
+    assert type(net).__name__ == "Mine"
+    with pytest.raises(ValueError, match="subclass of"):
+        net_class("my_nets:not_a_net")
+    sys.modules.pop("my_nets")
+
+
+@pytest.mark.parametrize("name", ["slow", "no_such_module_here:Net", "trainer.nets:Nothing", ":", "a:"])
+def test_an_unknown_network_is_a_value_error(name: str) -> None:
+    with pytest.raises(ValueError, match="net: "):
+        net_class(name)

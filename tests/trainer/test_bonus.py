@@ -1,0 +1,97 @@
+"""The exploration bonus pays what the published formula says."""
+
+from math import tanh
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from trainer.bonus import Bonus, cell_codes
+from trainer.config import TrainConfig
+
+IMAGE = np.zeros((2, 7, 7, 4), np.uint8)
+
+
+def hears(*ids: int) -> SimpleNamespace:
+    return SimpleNamespace(utterance_ids=lambda: np.array(ids, np.int64))
+
+
+def ended(*marks: int) -> np.ndarray:
+    return np.array(marks, np.bool_)
+
+
+def test_first_silence_and_first_utterances_pay_and_repetitions_do_not() -> None:
+    bonus = Bonus(TrainConfig(explo="lang", explo_c=7.0), 2)
+    first = 0.6 * tanh(7 / 40)
+    assert first == pytest.approx(0.10394, abs=1e-5)
+    assert bonus.step(hears(0, 0), IMAGE, ended(0, 0)) == pytest.approx([first, first])
+    assert bonus.step(hears(0, 99), IMAGE, ended(0, 0)) == pytest.approx([0, first], abs=1e-12)
+    assert bonus.step(hears(-3, 99), IMAGE, ended(0, 0)) == pytest.approx([first, 0], abs=1e-12)
+
+
+def test_an_episode_s_end_pays_nothing_and_forgets() -> None:
+    bonus = Bonus(TrainConfig(explo="lang"), 2)
+    bonus.step(hears(5, 5), IMAGE, ended(0, 0))
+    assert bonus.step(hears(7, 7), IMAGE, ended(1, 0))[0] == 0
+    again = bonus.step(hears(5, 5), IMAGE, ended(0, 0))
+    assert again == pytest.approx([0.6 * tanh(7 / 40), 0], abs=1e-12)
+
+
+def test_small_powers_pay_repetitions_less() -> None:
+    bonus = Bonus(TrainConfig(explo="lang", explo_c=4.0, explo_m=1.0, explo_t=2.0), 1)
+    got = [bonus.step(hears(5), IMAGE[:1], ended(0))[0] for _ in range(3)]
+    assert got == pytest.approx([2 * tanh(0.1), 2 * tanh(0.05), 2 * tanh(0.1 / 3)])
+
+
+def test_cells_pay_for_each_new_kind_in_the_image() -> None:
+    bonus = Bonus(TrainConfig(explo="cell", explo_c=3.0), 2)
+    image = IMAGE.copy()
+    image[0, 0, 0] = (4, 1, 0, 0)
+    image[0, 3, 3] = (4, 1, 0, 0)
+    image[0, 5, 5] = (4, 2, 0, 0)
+    assert bonus.step(hears(0, 0), image, ended(0, 0)) == pytest.approx(
+        [0.6 * tanh(3 * 0.075), 0.6 * tanh(0.075)]
+    ), "three kinds of cells, then one"
+    image[0, 6, 6] = (4, 2, 0, 3)
+    assert bonus.step(hears(0, 0), image, ended(0, 0)) == pytest.approx([0.6 * tanh(0.075), 0], abs=1e-12)
+
+
+def test_cells_are_counted_as_a_plain_dictionary_would() -> None:
+    rng = np.random.default_rng(0)
+    bonus = Bonus(TrainConfig(explo="cell", explo_c=3.0, explo_m=2.0), 3)
+    counts: list[dict[bytes, int]] = [{} for _ in range(3)]
+    for _ in range(60):
+        image = rng.integers(0, 3, (3, 7, 7, 4)).astype(np.uint8)
+        image[:, 2:] = 0
+        ends = rng.random(3) < 0.1
+        got = bonus.step(hears(0, 0, 0), image, ends)
+        for e in range(3):
+            kinds = {cell.tobytes() for cell in image[e].reshape(-1, 4)}
+            terms = sum(3 / 40 / (counts[e].get(kind, 0) + 1) ** 2 for kind in kinds)
+            assert got[e] == pytest.approx(0 if ends[e] else 0.6 * tanh(terms), abs=1e-12)
+            counts[e] = {} if ends[e] else counts[e] | {kind: counts[e].get(kind, 0) + 1 for kind in kinds}
+
+
+def test_a_saved_bonus_continues_exactly() -> None:
+    rng = np.random.default_rng(1)
+    steps = [(rng.integers(0, 9, 2), rng.random(2) < 0.2) for _ in range(40)]
+    whole, half = (Bonus(TrainConfig(explo="lang", explo_m=1.0), 2) for _ in range(2))
+    for ids, ends in steps[:20]:
+        whole.step(hears(*ids), IMAGE, ends)
+        half.step(hears(*ids), IMAGE, ends)
+    other = Bonus(TrainConfig(explo="lang", explo_m=1.0), 2)
+    other.load_state(half.state())
+    for ids, ends in steps[20:]:
+        assert (whole.step(hears(*ids), IMAGE, ends) == other.step(hears(*ids), IMAGE, ends)).all()
+
+
+def test_a_bonus_of_another_size_is_refused() -> None:
+    bonus = Bonus(TrainConfig(explo="lang"), 2)
+    with pytest.raises(ValueError, match="bonus: got counts"):
+        bonus.load_state({"counts": np.zeros((3, 1), np.int32), "keys": np.zeros(1, np.int64)})
+
+
+def test_cell_codes_tell_channels_apart() -> None:
+    image = np.zeros((1, 1, 4, 4), np.uint8)
+    image[0, 0] = [(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)]
+    assert len(set(cell_codes(image)[0].tolist())) == 4

@@ -1,0 +1,209 @@
+"""Advantages and losses have the values worked out by hand."""
+
+from dataclasses import replace
+from math import exp, log
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from tests.trainer.fake_envs import EchoEnvs
+from trainer.config import TrainConfig
+from trainer.ppo import Batch, compute_gae, make_minibatch, ppo_loss, update
+from trainer.rollout import collect
+from trainer.session import Session
+
+SIZES = (2, 2, 2, 2)
+
+
+def column(*numbers: float) -> Tensor:
+    return torch.tensor(numbers, dtype=torch.float64)[:, None]
+
+
+def flags(*marks: int) -> Tensor:
+    return torch.tensor(marks, dtype=torch.bool)[:, None]
+
+
+def gae(
+    rewards: Tensor, values: Tensor, terminated: Tensor, truncated: Tensor, bootstrap: Tensor
+) -> list[float]:
+    next_value = torch.tensor([8.0], dtype=torch.float64)
+    return (
+        compute_gae(rewards, values, next_value, terminated, truncated, bootstrap, 0.5, 0.5)
+        .flatten()
+        .tolist()
+    )
+
+
+def test_gae_without_an_end() -> None:
+    # deltas: 1 + .5*2 - 4 = -2; 0 + .5*6 - 2 = 1; 2 + .5*8 - 6 = 0; weight of the next one .25
+    got = gae(column(1, 0, 2), column(4, 2, 6), flags(0, 0, 0), flags(0, 0, 0), column(0, 0, 0))
+    assert got == [-2 + 0.25 * 1, 1.0, 0.0]
+
+
+def test_gae_stops_at_a_termination() -> None:
+    # deltas: -2; 0 + 0 - 2 = -2 (the episode is over); 0
+    got = gae(column(1, 0, 2), column(4, 2, 6), flags(0, 1, 0), flags(0, 0, 0), column(0, 0, 0))
+    assert got == [-2 + 0.25 * -2, -2.0, 0.0]
+
+
+def test_a_time_out_without_bootstrap_is_terminal() -> None:
+    got = gae(column(1, 0, 2), column(4, 2, 6), flags(0, 0, 0), flags(0, 1, 0), column(0, 0, 0))
+    assert got == [-2.5, -2.0, 0.0]
+
+
+def test_a_bootstrapped_time_out_continues_the_value_but_not_the_sum() -> None:
+    # delta of the cut step: 0 + .5*10 - 2 = 3; nothing of the next episode flows back
+    got = gae(column(1, 0, 2), column(4, 2, 6), flags(0, 0, 0), flags(0, 1, 0), column(0, 10, 0))
+    assert got == [-2 + 0.25 * 3, 3.0, 0.0]
+
+
+def test_a_termination_in_the_last_moment_beats_the_time_out() -> None:
+    got = gae(column(1, 0, 2), column(4, 2, 6), flags(0, 1, 0), flags(0, 1, 0), column(0, 10, 0))
+    assert got == [-2.5, -2.0, 0.0]
+
+
+def one_frame(speaks: bool, advantage: float, acting: float, now: float) -> tuple[Batch, Tensor]:
+    """A frame whose every head chose option 1, then with probability `acting`, now with `now`."""
+    logits = torch.tensor([[log(1 - now), log(now)] * 4])
+    batch = Batch(
+        actions=torch.tensor([[1, int(speaks), 1, 1]]),
+        log_probs=torch.full((1, 4), log(acting)),
+        values=torch.tensor([1.0]),
+        advantages=torch.tensor([advantage]),
+        returns=torch.tensor([3.0]),
+    )
+    return batch, logits
+
+
+def entropy_of(p: float) -> float:
+    return -(p * log(p) + (1 - p) * log(1 - p))
+
+
+def config(**changes: Any) -> TrainConfig:
+    return TrainConfig(**({"value_coef": 0.5, "entropy_coef": 0.01, "clip": 0.2} | changes))
+
+
+def test_joint_loss_of_a_spoken_action() -> None:
+    batch, logits = one_frame(True, advantage=-2.0, acting=0.5, now=0.6)
+    parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config())
+    ratio = 1.2**4
+    assert parts.policy.item() == pytest.approx(2 * ratio, rel=1e-5), (
+        "a bad action's growing ratio is not clipped"
+    )
+    assert parts.value.item() == pytest.approx(1.5**2)
+    assert parts.entropy.item() == pytest.approx(4 * entropy_of(0.6), rel=1e-5)
+    assert parts.total.item() == pytest.approx(2 * ratio + 0.5 * 2.25 - 0.01 * 4 * entropy_of(0.6), rel=1e-5)
+    assert parts.clip_fraction.item() == 1
+    assert parts.approx_kl.item() == pytest.approx(ratio - 1 - log(ratio), rel=1e-4)
+
+
+def test_joint_loss_clips_a_good_action_s_ratio() -> None:
+    batch, logits = one_frame(True, advantage=2.0, acting=0.5, now=0.6)
+    assert ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config()).policy.item() == pytest.approx(
+        -2 * 1.2
+    )
+
+
+def test_silence_leaves_template_and_noun_out() -> None:
+    batch, _ = one_frame(False, advantage=-2.0, acting=0.5, now=0.6)
+    logits = torch.tensor([[log(0.4), log(0.6), log(0.6), log(0.4), log(0.2), log(0.8), log(0.9), log(0.1)]])
+    logits.requires_grad_()
+    parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config())
+    assert parts.policy.item() == pytest.approx(2 * 1.2 * 1.2, rel=1e-5)
+    assert parts.entropy.item() == pytest.approx(2 * entropy_of(0.6), rel=1e-5)
+    parts.total.backward()  # type: ignore[no-untyped-call]
+    assert logits.grad is not None
+    assert (logits.grad[0, 4:] == 0).all(), "what was not said must not be learnt from"
+    assert (logits.grad[0, :4] != 0).all()
+
+
+def test_per_head_loss_masks_and_averages_each_head() -> None:
+    batch, _ = one_frame(False, advantage=2.0, acting=0.5, now=0.6)
+    logits = torch.tensor(
+        [[log(0.4), log(0.6), log(0.45), log(0.55), log(0.2), log(0.8), log(0.9), log(0.1)]]
+    )
+    batch = replace(batch, log_probs=torch.tensor([[log(0.5), log(0.5), log(0.5), log(0.5)]]))
+    parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config(loss="per_head"))
+    primitive, speak = -2 * min(1.2, 1.2), -2 * (0.45 / 0.5)
+    entropies = entropy_of(0.6) + entropy_of(0.55)
+    expected = (primitive + speak) / 4 + 0.5 * 2.25 * 2 / 4 - 0.01 * entropies / 4
+    assert parts.total.item() == pytest.approx(expected, rel=1e-5)
+
+
+def test_clipped_value_loss_takes_the_worse_of_the_two() -> None:
+    batch, logits = one_frame(True, advantage=0.0, acting=0.5, now=0.5)
+    parts = ppo_loss(batch, logits, torch.tensor([2.5]), SIZES, config(clip_value=True))
+    assert parts.value.item() == pytest.approx((1.2 - 3) ** 2), (
+        "acting value 1, change clipped to 0.2, return 3"
+    )
+
+
+def played(config: TrainConfig) -> tuple[Session, Any]:
+    envs = EchoEnvs(config.num_envs, length=8, chatter=0.4)
+    session = Session.start(config, envs)
+    for _ in range(2):
+        rollout = collect(session.actor, envs, session.state, config, session.generator, None)
+    return session, rollout
+
+
+@pytest.mark.parametrize("bptt", [0, 4])
+@pytest.mark.parametrize("net", ["fast", "paper"])
+def test_the_update_sees_the_policy_that_acted(net: str, bptt: int, small_config: Any) -> None:
+    """Before the first step the minibatch gives the log-probabilities and values recorded while acting."""
+    config = small_config(net=net, bptt=bptt)
+    session, rollout = played(config)
+    advantages = torch.zeros_like(rollout.values)
+    for envs in (torch.tensor([0, 3, 5]), torch.tensor([1, 2, 4, 6, 7])):
+        minibatch = make_minibatch(
+            session.actor, rollout, advantages, advantages, envs, bptt or config.horizon
+        )
+        logits, values = minibatch.evaluate(session.actor.net)
+        assert torch.allclose(values, minibatch.batch.values, atol=1e-5)
+        parts = ppo_loss(minibatch.batch, logits, values, session.actor.net.spec.action_sizes, config)
+        assert parts.approx_kl.item() == pytest.approx(0, abs=1e-6)
+        assert parts.clip_fraction.item() == 0
+
+
+def test_minibatches_hold_whole_environments_in_time_order(small_config: Any) -> None:
+    config = small_config(bptt=4)
+    session, rollout = played(config)
+    marks = torch.arange(config.horizon)[:, None] * 100.0 + torch.arange(config.num_envs)
+    minibatch = make_minibatch(session.actor, rollout, marks, marks, torch.tensor([5, 2]), 4)
+    got = minibatch.batch.advantages.view(4, 4)
+    assert got.tolist() == [
+        [t * 100.0 + 5, t * 100.0 + 2, (t + 4) * 100.0 + 5, (t + 4) * 100.0 + 2] for t in range(4)
+    ]
+    assert torch.equal(minibatch.memory[:, :2], rollout.memories[0][:, [5, 2]])
+    assert torch.equal(minibatch.memory[:, 2:], rollout.memories[1][:, [5, 2]])
+
+
+def test_an_update_makes_the_better_action_likelier(small_config: Any) -> None:
+    config = small_config(normalize_advantages=False, entropy_coef=0.0, value_coef=0.0, epochs=3)
+    session, rollout = played(config)
+    favoured = rollout.actions[..., 0] == 2
+    rollout.rewards[:] = favoured.numpy()
+    rollout.values.zero_()
+    rollout.next_value.zero_()
+    rollout.terminated[:], rollout.truncated[:] = True, False
+    before = rollout.log_probs[..., 0][favoured].mean().item()
+    update(session.actor, session.optimizer, rollout, config, session.generator)
+    group = torch.arange(config.num_envs)
+    minibatch = make_minibatch(session.actor, rollout, rollout.values, rollout.values, group, config.horizon)
+    logits, _ = minibatch.evaluate(session.actor.net)
+    chosen = torch.log_softmax(logits[:, :4], 1)[:, 2].view(rollout.values.shape)[favoured]
+    assert chosen.mean().item() > before
+
+
+def test_statistics_are_finite_and_complete(small_config: Any) -> None:
+    config = small_config()
+    session, rollout = played(config)
+    statistics = update(session.actor, session.optimizer, rollout, config, session.generator)
+    assert set(statistics) == {
+        "loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "grad_norm", "explained_variance"
+    }  # fmt: skip
+    assert np.isfinite(list(statistics.values())).all()
+    assert 0 < statistics["entropy"] <= log(4) + log(2) + log(2) + log(4) + 1e-6
+    assert exp(statistics["approx_kl"]) < 2
