@@ -1,0 +1,177 @@
+"""Bodies: what a primitive action does, and which one an activity of a frame asks for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from socialai_dsl.grammar import ast
+from tests.reference import chance, geometry
+from tests.reference.evaluate import Context, drawn, of, weighed
+from tests.reference.source import Value
+from tests.reference.world import TYPES, Cell, Entity, World, as_list, quadrant, step_from, turned, where
+
+SEARCH_ORDER = ("down", "up", "right", "left")
+
+
+def act(world: World, body: Entity, primitive: str) -> None:
+    """Executes a primitive; what cannot be done is not done. pickup, drop and done change nothing in the room."""
+    body.action = primitive
+    if body.cell is None:
+        return
+    ahead = step_from(body.cell, body.facing)
+    if primitive in ("left", "right"):
+        body.facing = turned(body.facing, -1 if primitive == "left" else 1)
+    elif primitive == "forward" and can_enter(world, body, ahead):
+        body.cell = ahead
+    elif primitive == "toggle":
+        toggle(world, body, ahead)
+
+
+def can_enter(world: World, body: Entity, cell: Cell) -> bool:
+    """Bodies never share a cell, except the agent and hidden NPCs; only the agent steps on what is deadly."""
+    if body is world.agent and world.walkable(cell) and world.deadly(cell):
+        return world.npcs_hidden or all(npc.cell != cell for npc in world.npcs)
+    return geometry.free(world, cell, body)
+
+
+def toggle(world: World, user: Entity, cell: Cell) -> None:
+    """An NPC in the cell is poked; else the object there changes as its type says."""
+    body = world.body_at(cell)
+    if body is not None:
+        body.poked = body.was_poked = True
+        return
+    thing = world.object_at(cell)
+    if thing is not None:
+        thing.toggled_by.append(user)
+        thing.status = TYPES[thing.type].toggled.get(thing.status, thing.status)
+
+
+@dataclass
+class Activity:
+    """An activity with its argument computed: it lasts one turn of its member."""
+
+    verb: str
+    goal: Any = None
+
+    def primitive(self, world: World, me: Entity) -> str:
+        """The body action it asks for now."""
+        if me.cell is None:
+            return "none"
+        if self.verb in ("left", "right", "forward", "toggle"):
+            return self.verb
+        if self.verb == "turn":
+            return str(self.goal)
+        if self.verb == "turn_to":
+            return turn_towards(world, me, self.goal)
+        if self.verb == "stay":
+            return "none"
+        if all(where(goal) is None for goal in as_list(self.goal)):
+            return "none"
+        return {
+            "face": face,
+            "go_to": go_to,
+            "go_next_to": go_next_to,
+            "use": use,
+            "enter": enter,
+        }[self.verb](world, me, self.goal)
+
+    def fulfilled(self, world: World, me: Entity) -> bool:
+        """Whether what it goes for is reached already."""
+        if self.verb in ("go_to", "enter"):
+            return geometry.at(world, me, self.goal)
+        return self.verb == "go_next_to" and geometry.next_to(world, me, self.goal)
+
+    def finished(self, world: World, me: Entity) -> bool:
+        """Whether it ended with the turn that was just taken; single actions take one turn."""
+        if self.verb == "use":
+            return me.action == "toggle" and geometry.faces(world, me, self.goal)
+        if self.verb in ("go_to", "enter", "go_next_to"):
+            return self.fulfilled(world, me)
+        return me.facing == self.goal if self.verb == "turn_to" else True
+
+
+def plan(value: Value, context: Context) -> Activity:
+    """The activity that a `do:` names; `choose` and `wander` are drawn anew each turn."""
+    context = replace(context, value=value)
+    node: Any = value.tree
+    while isinstance(node, ast.Call) and node.name == "choose":
+        options = [option for arg in node.args for option, weight in weighed(arg) for _ in range(weight)]
+        node = options[drawn(context, node, len(options))]
+    if isinstance(node, ast.Name):
+        if node.id == "wander":
+            return Activity(("forward", "left", "right")[drawn(context, node, 3)])
+        return Activity(node.id)
+    assert isinstance(node, ast.Call), "internal: no activity"
+    return Activity(node.name, of(node.args[0], context))
+
+
+def turn_towards(world: World, me: Entity, wanted: str) -> str:
+    """One quarter turn; left or right at random when it is behind."""
+    if me.facing == wanted:
+        return "none"
+    for primitive, quarter in (("left", -1), ("right", 1)):
+        if turned(me.facing, quarter) == wanted:
+            return primitive
+    return ("left", "right")[chance.choose(world.key, f"cast.{me.key}.turn", world.t, 0, 2)]
+
+
+def face(world: World, me: Entity, goal: Any) -> str:
+    """Turns towards the quadrant in which x lies."""
+    return turn_towards(world, me, quadrant(where(me), where(goal)))  # type: ignore[arg-type]
+
+
+def go_to(world: World, me: Entity, goal: Any) -> str:
+    """Along a shortest path; x itself is admitted though something is in it."""
+    if geometry.at(world, me, goal):
+        return "none"
+    goals = [cell for cell in map(where, as_list(goal)) if cell is not None]
+    return along(world, me, goals)
+
+
+def go_next_to(world: World, me: Entity, goal: Any) -> str:
+    """Along a shortest path to a free cell beside x."""
+    if geometry.next_to(world, me, goal):
+        return "none"
+    beside = [
+        step_from(cell, d) for cell in map(where, as_list(goal)) if cell is not None for d in SEARCH_ORDER
+    ]
+    return along(world, me, [cell for cell in beside if geometry.free(world, cell, me)])
+
+
+def along(world: World, me: Entity, goals: list[Cell]) -> str:
+    """The next action on a shortest path to any of the goals: breadth first, ties down, up, right, left."""
+    steps = {goal: 0 for goal in goals if not (me is not world.agent and world.deadly(goal))}
+    queue = list(steps)
+    for cell in queue:
+        for direction in SEARCH_ORDER:
+            neighbour = step_from(cell, direction)
+            if neighbour not in steps and geometry.free(world, neighbour, me):
+                steps[neighbour] = steps[cell] + 1
+                queue.append(neighbour)
+    assert me.cell is not None
+    options = [d for d in SEARCH_ORDER if step_from(me.cell, d) in steps]
+    if not options:
+        return "none"
+    here = me.cell
+    best = min(options, key=lambda d: steps[step_from(here, d)])
+    return "forward" if me.facing == best else turn_towards(world, me, best)
+
+
+def use(world: World, me: Entity, goal: Any) -> str:
+    """Goes next to x, faces it, toggles it."""
+    if geometry.faces(world, me, goal):
+        return "toggle"
+    if not geometry.next_to(world, me, goal):
+        return go_next_to(world, me, goal)
+    near = next(one for one in as_list(goal) if geometry.next_to(world, me, one))
+    return face(world, me, near)
+
+
+def enter(world: World, me: Entity, goal: Any) -> str:
+    """Uses x while it is closed, goes through once it is open."""
+    cell = where(goal)
+    assert cell is not None
+    if geometry.at(world, me, goal):
+        return "none"
+    return go_to(world, me, goal) if world.walkable(cell) else use(world, me, goal)

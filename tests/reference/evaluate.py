@@ -1,0 +1,375 @@
+"""What an expression of the language means: a walk over its tree."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from socialai_dsl.grammar import ast
+from tests.reference import chance, geometry, speech
+from tests.reference.source import Value
+from tests.reference.world import COLORS, DIRECTIONS, TYPES, Entity, World, as_list, turned, where
+
+if TYPE_CHECKING:
+    from tests.reference.room import Setup
+
+
+class NothingFoundError(Exception):
+    """`pick`, `first` or `nearest` found nothing: whatever needed it does not happen."""
+
+
+@dataclass
+class Context:
+    """Who asks, where the question is written, and what its variables stand for."""
+
+    world: World
+    me: Entity | None = None
+    in_frame: bool = False  # whether slots, registers and one's own conditions can be named
+    variables: dict[str, Any] = field(default_factory=dict)
+    take_first: bool = False  # a let, a slot or a colour takes the first member where a pick finds nothing
+    setup: Setup | None = None  # while the room is being drawn
+    value: Value | None = None
+
+    def knowing(self, **variables: Any) -> Context:
+        """The same with more variables."""
+        return replace(self, variables={**self.variables, **variables})
+
+
+def evaluate(value: Value, context: Context) -> Any:
+    """The value now. Words are strings, things are entities, groups are lists, cells are pairs."""
+    return of(value.tree, replace(context, value=value))
+
+
+def holds(value: Value | None, context: Context) -> bool:
+    """Whether a condition holds; nothing written always does."""
+    return value is None or bool(evaluate(value, context))
+
+
+def of(node: Any, context: Context) -> Any:
+    """The value of a node."""
+    return HANDLERS[type(node)](node, context)
+
+
+def drawn(context: Context, node: ast.Node, size: int) -> int:
+    """A choice among `size` things by a node that draws: its site is the value's path, its number the node's."""
+    assert context.value is not None, "internal: a draw outside any value"
+    number = context.value.ordinals[id(node)]
+    return chance.choose(context.world.key, context.value.site, context.world.t, number, size)
+
+
+# -- plain nodes -------------------------------------------------------------------------------------------
+
+
+def _text(node: ast.Text, context: Context) -> str:
+    return "".join(part if isinstance(part, str) else spelled(of(part, context)) for part in node.parts)
+
+
+def spelled(value: Any) -> str:
+    """A value inside a text."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Entity):
+        return str(value.name or value.key)
+    return str(value)
+
+
+def pattern(node: Any, context: Context) -> list[str | None]:
+    """What an utterance is compared with: literal pieces, and `ANY_NOUN` for `<noun>`."""
+    if not isinstance(node, ast.Text):
+        return [spelled(of(node, context))]
+    return [
+        part
+        if isinstance(part, str)
+        else speech.ANY_NOUN
+        if isinstance(part, ast.Name) and part.id == "noun"
+        else spelled(of(part, context))
+        for part in node.parts
+    ]
+
+
+def _name(node: ast.Name, context: Context) -> Any:
+    """Names: the nearest declaration wins, then the words of the language, else the word itself."""
+    word, world, me = node.id, context.world, context.me
+    if word in context.variables:
+        return context.variables[word]
+    if context.in_frame and me is not None:
+        if word in me.registers:
+            return me.registers[word]
+        found, slot = _slot(word, context)
+        if found:
+            return slot
+    if word in context_lets(context):
+        return _let(word, context)
+    if word in world.objects:
+        return world.objects[word]
+    if word in world.cast:
+        return world.cast[word]
+    words: dict[str, Callable[[], Any]] = {
+        "t": lambda: world.t,
+        "W": lambda: world.width,
+        "H": lambda: world.height,
+        "self": lambda: me,
+        "cells": world.interior,
+        "colors": lambda: list(COLORS),
+        "directions": lambda: list(DIRECTIONS),
+        "nouns": lambda: speech.noun_values(world),
+    }
+    if word in words:
+        return words[word]()
+    if me is not None and word in ("poked", "was_poked", "gone", "spoke", "action"):
+        return attribute(me, word, context)
+    return word
+
+
+def context_lets(context: Context) -> Any:
+    """The names in `let`."""
+    return context.setup.scenario.let if context.setup else context.world.lets
+
+
+def _let(word: str, context: Context) -> Any:
+    # "Scenario `let`: once, at reset." While the room is drawn, one is computed when it is first asked for.
+    if word not in context.world.lets and context.setup:
+        context.setup.compute_let(word)
+    return context.world.lets[word]
+
+
+def _slot(word: str, context: Context) -> tuple[bool, Any]:
+    # "Slots of type text and bool: at every use; all other slots: once, at reset."
+    me = context.me
+    assert me is not None
+    if word not in me.slots and context.setup:
+        context.setup.compute_slots(me)
+    if word not in me.slots:
+        return False, None
+    slot = me.slots[word]
+    if isinstance(slot, Value):
+        return True, evaluate(slot, replace(context, in_frame=False, variables={}, take_first=True))
+    return True, slot
+
+
+def _attribute(node: ast.Attribute, context: Context) -> Any:
+    subject = of(node.subject, context)
+    if isinstance(subject, list):
+        return [attribute(item, node.name, context) for item in subject]
+    return attribute(subject, node.name, context)
+
+
+def attribute(subject: Any, name: str, context: Context) -> Any:
+    """`subject.name`: what is known about an entity or a cell."""
+    if name in ("x", "y"):
+        cell = where(subject)
+        return -1 if cell is None else cell["xy".index(name)]
+    assert isinstance(subject, Entity), f"{subject!r}.{name}"
+    if name == "color":
+        if subject.color is None and context.setup:
+            context.setup.compute_colors(subject)
+        return subject.color
+    if name == "name":
+        if subject.name is None and context.setup:
+            context.setup.compute_name(subject)
+        return subject.name
+    if name == "facing":
+        if context.setup:
+            context.setup.compute_facing(subject)
+        return subject.facing
+    if name == "spoke":
+        return subject.utterance is not None
+    if name == "toggled":
+        return bool(subject.toggled_by)
+    if name in ("kind", "cell", "index", "gone", "poked", "was_poked", "action", "noun", "type"):
+        return getattr(subject, name)
+    if subject.sort == "object":
+        assert name in TYPES[subject.type].states, f"{subject.type} has no {name}"
+        return not subject.gone and subject.status == name
+    if name in subject.registers:
+        return subject.registers[name]
+    found, slot = _slot(name, replace(context, me=subject))
+    assert found, f"{subject.key} has no {name}"
+    return slot
+
+
+def _logic(node: ast.Logic, context: Context) -> bool:
+    test = all if node.op == "and" else any
+    return test(bool(of(operand, context)) for operand in node.operands)
+
+
+def same(a: Any, b: Any) -> bool:
+    """Equality. A value fits a noun if their texts are equal, so 3 is "3"; an entity in a cell is not the cell."""
+    if isinstance(a, Entity) or isinstance(b, Entity):
+        return a is b
+    if isinstance(a, bool) or isinstance(b, bool):
+        return a is b
+    if isinstance(a, str) != isinstance(b, str):
+        return str(a) == str(b)
+    return bool(a == b)
+
+
+def _compare(node: ast.Compare, context: Context) -> bool:
+    left, right = of(node.left, context), of(node.right, context)
+    if node.op in ("==", "!="):
+        equal = any(same(a, b) for a in as_list(left) for b in as_list(right))
+        return equal == (node.op == "==")
+    if not isinstance(left, int) or not isinstance(right, int):
+        return False  # a noun that is no number is neither more nor less than anything
+    return {"<": left < right, "<=": left <= right, ">": left > right, ">=": left >= right}[node.op]
+
+
+def _member(node: ast.Member, context: Context) -> bool:
+    left, group = of(node.left, context), as_list(of(node.right, context))
+    return any(same(left, item) for item in group) != node.negated
+
+
+def _alternatives(node: ast.Alternatives, context: Context) -> list[Any]:
+    """`a | b | 2 * c`: a list; a weight multiplies; a group among the alternatives gives its members."""
+    items: list[Any] = []
+    for option, weight in weighed(node):
+        items += as_list(of(option, context)) * weight
+    return items
+
+
+def weighed(node: Any) -> list[tuple[Any, int]]:
+    """The alternatives of a node, each with its weight."""
+    options = node.options if isinstance(node, ast.Alternatives) else (node,)
+    return [
+        (option.right, option.left.value)
+        if isinstance(option, ast.Arithmetic) and option.op == "*" and isinstance(option.left, ast.Number)
+        else (option, 1)
+        for option in options
+    ]
+
+
+def _interval(node: ast.Interval, context: Context) -> list[int]:
+    return list(range(of(node.low, context), of(node.high, context) + 1))
+
+
+def _arithmetic(node: ast.Arithmetic, context: Context) -> Any:
+    left, right = of(node.left, context), of(node.right, context)
+    if isinstance(left, str):
+        # "A direction plus a turn is modulo 4 (left -1, right +1)."
+        quarter = {"left": -1, "right": 1}[right]
+        return turned(left, quarter if node.op == "+" else -quarter)
+    if node.op in ("//", "%") and right == 0:
+        return 0
+    results: dict[str, Callable[[], int]] = {
+        "+": lambda: left + right,
+        "-": lambda: left - right,
+        "*": lambda: left * right,
+        "//": lambda: left // right,
+        "%": lambda: left % right,
+    }
+    return results[node.op]()
+
+
+# -- groups ------------------------------------------------------------------------------------------------
+
+
+def _quantifier(node: ast.Quantifier, context: Context) -> Any:
+    """any, all, count, first, pick, nearest over a group; ties go to the lowest index."""
+    group = as_list(of(node.group, context))
+    condition, variable = node.where, node.var
+
+    def true_of(item: Any) -> bool:
+        return condition is None or bool(of(condition, context.knowing(**{variable: item})))
+
+    if node.name == "any":
+        return any(true_of(item) for item in group)
+    if node.name == "all":
+        return all(true_of(item) for item in group)
+    found = [item for item in group if true_of(item)]
+    if node.name == "count":
+        return len(found)
+    if node.name == "nearest":
+        goal = where(of(node.to, context))
+        found = [item for item in found if where(item) is not None and goal is not None]
+        found.sort(key=lambda item: geometry.apart(item, goal))
+    if not found and context.take_first and group:
+        return group[0]
+    if not found:
+        raise NothingFoundError
+    return found[drawn(context, node, len(found))] if node.name == "pick" else found[0]
+
+
+# -- calls -------------------------------------------------------------------------------------------------
+
+
+def _call(node: ast.Call, context: Context) -> Any:
+    if node.subject is None and node.name in FUNCTIONS:
+        return FUNCTIONS[node.name](node, context)
+    # "In a frame a verb without a subject is the NPC's own."
+    subject = context.me if node.subject is None else of(node.subject, context)
+    if isinstance(subject, list):
+        return any(_verb(one, node, context) for one in subject)
+    return _verb(subject, node, context)
+
+
+def _verb(subject: Any, node: ast.Call, context: Context) -> Any:
+    name, world = node.name, context.world
+    if name == "is":
+        return any(_in_state(subject, option, context) for option, _ in weighed(node.args[0]))
+    if name == "did":
+        return subject.action in as_list(of(node.args[0], context))
+    if name in ("said", "heard"):
+        patterns = [pattern(option, context) for option, _ in weighed(node.args[0])]
+        texts = [heard.text for heard in subject.inbox] if name == "heard" else [subject.utterance]
+        return any(
+            text is not None and speech.match(asked, text, world) is not None
+            for text in texts
+            for asked in patterns
+        )
+    arguments = [of(argument, context) for argument in node.args]
+    if name == "toggled_by":
+        return any(user in subject.toggled_by for user in as_list(arguments[0]))
+    return getattr(geometry, name)(world, subject, *arguments)
+
+
+def _in_state(member: Entity, node: Any, context: Context) -> bool:
+    """`npc.is(state)`: the name of a state, of an entry of `steps`, or `finished` after the last one."""
+    assert isinstance(node, ast.Name), "internal: a state is named by a word"
+    if isinstance(member.state, int):
+        names = context.world.step_names[str(member.frame)]
+        return (names[member.state] if member.state < len(names) else "finished") == node.id
+    return member.state == node.id
+
+
+def _pick(node: ast.Call, context: Context) -> Any:
+    group = [item for argument in node.args for item in as_list(of(argument, context))]
+    if not group:
+        raise NothingFoundError
+    return group[drawn(context, node, len(group))]
+
+
+def _first(node: ast.Call, context: Context) -> Any:
+    group = as_list(of(node.args[0], context))
+    if not group:
+        raise NothingFoundError
+    return group[0]
+
+
+FUNCTIONS: dict[str, Callable[[ast.Call, Context], Any]] = {
+    "pick": _pick,
+    "first": _first,
+    "count": lambda node, context: len(as_list(of(node.args[0], context))),
+    "min": lambda node, context: min(of(argument, context) for argument in node.args),
+    "max": lambda node, context: max(of(argument, context) for argument in node.args),
+    "abs": lambda node, context: abs(of(node.args[0], context)),
+    "opposite": lambda node, context: turned(of(node.args[0], context), 2),
+}
+
+HANDLERS: dict[type, Callable[[Any, Context], Any]] = {
+    ast.Number: lambda node, context: node.value,
+    ast.Truth: lambda node, context: node.value,
+    ast.Text: _text,
+    ast.Name: _name,
+    ast.Attribute: _attribute,
+    ast.Call: _call,
+    ast.Quantifier: _quantifier,
+    ast.Not: lambda node, context: not of(node.operand, context),
+    ast.Logic: _logic,
+    ast.Compare: _compare,
+    ast.Member: _member,
+    ast.Alternatives: _alternatives,
+    ast.Interval: _interval,
+    ast.Arithmetic: _arithmetic,
+    ast.Negative: lambda node, context: -of(node.operand, context),
+}

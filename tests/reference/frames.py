@@ -1,0 +1,308 @@
+"""Frames: which rule fires, what it does, and how states and steps follow each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from socialai_dsl.grammar import ast
+from socialai_dsl.schema import FirstRule, Frame, Rule, Step, ThenRule
+from tests.reference import bodies, chance, speech
+from tests.reference.evaluate import Context, NothingFoundError, evaluate, holds, of, pattern
+from tests.reference.source import Sources
+from tests.reference.world import TYPES, Entity, World, as_list
+
+
+@dataclass
+class Consequence:
+    """What a rule will do: all its values computed, nothing done yet."""
+
+    rule: Any
+    activity: bodies.Activity | None = None
+    registers: dict[str, Any] = field(default_factory=dict)
+    causes: list[tuple[str, list[Entity], str | None]] = field(default_factory=list)
+    say: str | None = None
+
+
+@dataclass
+class Turn:
+    """One member's turn between its activity and what follows it."""
+
+    activity: bodies.Activity
+    read_then: bool = True
+    afterwards: Consequence | None = None
+    say: str | None = None  # one utterance per turn: the first is kept
+
+
+class FrameRunner:
+    """Runs the frame of one member of the cast, a turn at a time."""
+
+    def __init__(self, sources: Sources, world: World, me: Entity) -> None:
+        self.sources, self.world, self.me = sources, world, me
+        self.path = f"{me.key}/frames.{me.frame}"
+
+    @property
+    def frame(self) -> Frame | None:
+        """The frame that is played."""
+        return self.sources.frame_of(self.me.frame)
+
+    # -- a turn --------------------------------------------------------------------------------------------
+
+    def begin(self) -> Turn:
+        """Step 4b, first part: `first`, and which activity runs."""
+        frame = self.frame
+        if frame is None:
+            return Turn(bodies.Activity("stay"))
+        return self.begin_step(frame) if frame.states is None else self.begin_state(frame)
+
+    def end(self, turn: Turn) -> str | None:
+        """Step 4b, second part, after the body action: `then`, or the end of an entry; returns what is said."""
+        frame = self.frame
+        if frame is not None:
+            self.me.clock += 1
+            if frame.states is None:
+                self.end_step(frame, turn)
+            elif turn.afterwards is not None:
+                self.perform(turn.afterwards, turn)
+            elif turn.read_then:
+                self.read_then(frame, turn)
+        # An utterance is heard until the end of its hearer's next turn.
+        self.me.inbox.clear()
+        return turn.say
+
+    # -- frames with states --------------------------------------------------------------------------------
+
+    def begin_state(self, frame: Frame) -> Turn:
+        """The first rule of `first` that holds fires; with a `do` of its own it takes the whole turn."""
+        assert frame.states is not None
+        turn = Turn(bodies.Activity("stay"))
+        path = f"{self.path}.states.{self.me.state}"
+        chosen = self.first_that_holds(frame.states[str(self.me.state)].first, f"{path}.first")
+        if chosen is not None and chosen.activity is not None:
+            turn.activity, turn.read_then, turn.afterwards = chosen.activity, False, chosen
+            return turn
+        if chosen is not None:
+            self.perform(chosen, turn)
+        state = frame.states[str(self.me.state)]
+        if state.do is not None:
+            turn.activity = self.activity(f"{self.path}.states.{self.me.state}.do", state.do)
+        return turn
+
+    def read_then(self, frame: Frame, turn: Turn) -> None:
+        """`then` of the current state; after a `goto_now` also that of the new one, and so on."""
+        assert frame.states is not None
+        for _ in range(len(frame.states) + 1):
+            path = f"{self.path}.states.{self.me.state}.then"
+            chosen = self.first_that_holds(frame.states[str(self.me.state)].then, path)
+            if chosen is None:
+                return
+            self.perform(chosen, turn)
+            if chosen.rule.goto_now is None:
+                return
+        raise AssertionError("goto_now goes round in a circle")
+
+    # -- frames with steps ---------------------------------------------------------------------------------
+
+    def begin_step(self, frame: Frame) -> Turn:
+        """The activity of the current entry; entries that are fulfilled already are skipped without a turn."""
+        assert frame.steps is not None
+        assert isinstance(self.me.state, int)
+        self.skip_empty(frame)
+        while self.me.state < len(frame.steps):
+            entry = frame.steps[self.me.state]
+            if entry.do is None:
+                return Turn(bodies.Activity("stay"))
+            activity = self.activity(f"{self.entry_path(entry)}.do", entry.do)
+            bare = entry.until is None and entry.for_ is None and not (entry.say or entry.set or entry.cause)
+            if self.me.gone or not (bare and activity.fulfilled(self.world, self.me)):
+                return Turn(activity)
+            self.advance(frame)
+        return Turn(bodies.Activity("stay"))
+
+    def end_step(self, frame: Frame, turn: Turn) -> None:
+        """Whether the entry ends with this turn; its effects happen when it does."""
+        assert frame.steps is not None
+        assert isinstance(self.me.state, int)
+        if self.me.state == len(frame.steps):
+            return
+        entry = frame.steps[self.me.state]
+        path = self.entry_path(entry)
+        if not self.entry_ends(entry, path, turn.activity):
+            return
+        try:
+            outcome = self.consequence(entry, path, self.context())
+        except NothingFoundError:
+            return
+        self.perform(outcome, turn)
+        self.advance(frame)
+
+    def entry_ends(self, entry: Step, path: str, activity: bodies.Activity) -> bool:
+        """`for: n` turns, or until `until` holds, else until the activity is finished."""
+        if entry.for_ is None and entry.until is None:
+            return activity.finished(self.world, self.me)
+        if entry.for_ is not None:
+            turns = self.turns_of(entry)
+            if turns is not None and self.me.clock >= turns:
+                return True
+        try:
+            return entry.until is not None and holds(
+                self.expression(f"{path}.until", entry.until), self.context()
+            )
+        except NothingFoundError:
+            return False
+
+    def turns_of(self, entry: Step) -> int | None:
+        """How many turns `for:` asks for; None for `ever`."""
+        if entry.for_ == "ever":
+            return None
+        turns = evaluate(self.expression(f"{self.entry_path(entry)}.for", entry.for_), self.context())
+        return int(turns)
+
+    def advance(self, frame: Frame) -> None:
+        """Goes to the next entry."""
+        assert isinstance(self.me.state, int)
+        self.me.state += 1
+        self.me.clock = 0
+        self.skip_empty(frame)
+
+    def skip_empty(self, frame: Frame) -> None:
+        """`for: 0` means that the entry is skipped."""
+        assert frame.steps is not None
+        assert isinstance(self.me.state, int)
+        while self.me.state < len(frame.steps):
+            entry = frame.steps[self.me.state]
+            if self.me.clock > 0 or entry.for_ is None or self.turns_of(entry) != 0:
+                return
+            self.me.state += 1
+
+    def entry_path(self, entry: Step) -> str:
+        """Where an entry is written: by its name if it has one, else by its number."""
+        return f"{self.path}.steps[{entry.state or self.me.state}]"
+
+    # -- rules ---------------------------------------------------------------------------------------------
+
+    def first_that_holds(self, rules: tuple[ThenRule, ...], path: str) -> Consequence | None:
+        """Lists are read top to bottom, the first rule that holds fires."""
+        for number, rule in enumerate(rules):
+            found = self.fires(rule, f"{path}[{rule.id or number}]")
+            if found is not None:
+                return found
+        return None
+
+    def fires(self, rule: Rule, path: str) -> Consequence | None:
+        """What the rule will do, or None if one of its conditions is false or a value cannot be found."""
+        if rule.once and path in self.me.fired_once:
+            return None
+        if rule.after is not None and self.me.clock < rule.after:
+            return None
+        try:
+            context = self.heard(rule, path)
+            if context is None or not holds(self.when(rule, path), context):
+                return None
+            found = self.consequence(rule, path, context)
+        except NothingFoundError:
+            return None
+        # `chance` is drawn only if everything else holds.
+        lucky = rule.chance is None or chance.happens(
+            self.world.key, f"{path}.chance", self.world.t, rule.chance
+        )
+        if not lucky:
+            return None
+        if rule.once:
+            self.me.fired_once.add(path)
+        return found
+
+    def when(self, rule: Rule, path: str) -> Any:
+        """The `when` of a rule."""
+        return None if rule.when is None else self.expression(f"{path}.when", rule.when)
+
+    def heard(self, rule: Rule, path: str) -> Context | None:
+        """The context with `speaker` and `noun` of the first utterance that `hears` matches; None without one."""
+        context = self.context()
+        if not rule.hears:
+            return context
+        for heard in speech.in_speaking_order(self.world, self.me.inbox):
+            for number, source in enumerate(rule.hears):
+                if source == "any":
+                    return context.knowing(speaker=heard.speaker)
+                value = self.sources.text(f"{path}.hears[{number}]", source, self.me.frame)
+                context.value = value
+                captured = speech.match(pattern(value.tree, context), heard.text, self.world)
+                if captured is not None:
+                    return context.knowing(speaker=heard.speaker, **captured)
+        return None
+
+    def consequence(self, rule: Any, path: str, context: Context) -> Consequence:
+        """ "A rule computes first, then acts": all values from the state in which its condition held."""
+        found = Consequence(rule)
+        if isinstance(rule, FirstRule) and rule.do is not None:
+            found.activity = bodies.plan(self.expression(f"{path}.do", rule.do), context)
+        for name, source in rule.set.items():
+            found.registers[name] = evaluate(self.expression(f"{path}.set.{name}", source), context)
+        for number, source in enumerate(rule.cause):
+            site = f"{path}.cause[{number}]" if len(rule.cause) > 1 else f"{path}.cause"
+            found.causes.append(self.cause(site, source, context))
+        if rule.say is not None:
+            found.say = evaluate(self.sources.text(f"{path}.say", rule.say, self.me.frame), context)
+        return found
+
+    def cause(self, site: str, source: Any, context: Context) -> tuple[str, list[Entity], str | None]:
+        """An effect: its verb, what it is done to, and the status that `become` names."""
+        value = self.expression(site, source)
+        node: Any = value.tree
+        context = replace(context, value=value)
+        if isinstance(node, ast.Name):
+            return node.id, [self.me], None
+        subject = [self.me] if node.subject is None else as_list(of(node.subject, context))
+        status = None
+        if isinstance(node, ast.Call) and node.args:
+            status = node.args[0].id if isinstance(node.args[0], ast.Name) else str(of(node.args[0], context))
+        return node.name, subject, status
+
+    def perform(self, found: Consequence, turn: Turn) -> None:
+        """Effects in the order set, cause, say, goto."""
+        self.me.registers.update(found.registers)
+        for verb, targets, status in found.causes:
+            for target in targets:
+                affect(target, verb, status)
+        if found.say is not None and turn.say is None:
+            turn.say = found.say
+        if isinstance(found.rule, ThenRule):
+            goal = found.rule.goto or found.rule.goto_now
+            if goal is not None:
+                self.me.state, self.me.clock = goal, 0
+
+    # -- helpers -------------------------------------------------------------------------------------------
+
+    def context(self) -> Context:
+        """Questions asked inside the frame."""
+        return Context(self.world, self.me, in_frame=True)
+
+    def expression(self, site: str, source: Any) -> Any:
+        """A value written inside the frame."""
+        return self.sources.expression(site, source, self.me.frame)
+
+    def activity(self, site: str, source: str) -> bodies.Activity:
+        """The activity of a `do:`; one whose argument cannot be found is staying."""
+        try:
+            return bodies.plan(self.expression(site, source), self.context())
+        except NothingFoundError:
+            return bodies.Activity("stay")
+
+
+def affect(target: Entity, verb: str, status: str | None) -> None:
+    """One effect on one entity; what does not apply to its status changes nothing."""
+    if verb == "vanish":
+        target.cell = None
+    elif verb == "reset":
+        target.status = target.initial
+    elif verb == "become":
+        target.status = str(status)
+    elif verb == "unlock":
+        if target.status == "locked":
+            target.status = "shut" if target.type == "box" else "closed"
+    elif target.type == "box":
+        target.status = {"open": "opened", "close": "shut", "lock": "locked"}[verb]
+    else:
+        target.status = {"open": "open", "close": "closed", "lock": "locked"}[verb]
+    assert target.sort != "object" or target.status in TYPES[target.type].states

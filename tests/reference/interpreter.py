@@ -1,0 +1,267 @@
+"""The step: section by section in the order of the language reference."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from socialai_dsl.schema import Scenario
+from tests.reference import bodies, chance, geometry, speech
+from tests.reference.evaluate import Context, NothingFoundError, holds
+from tests.reference.frames import FrameRunner, Turn
+from tests.reference.picture import picture
+from tests.reference.room import Setup
+from tests.reference.source import Sources
+from tests.reference.vocabulary import Vocabulary
+from tests.reference.world import Entity, World, as_list
+
+Action = tuple[int, int, int, int]
+
+
+@dataclass
+class Result:
+    """What the agent perceives after a reset or a step, and how the step ended."""
+
+    image: np.ndarray
+    tokens: list[int]
+    reward: float = 0.0
+    terminated: bool = False
+    truncated: bool = False
+    heard: tuple[str, ...] = ()
+    outcome: int | str | None = None  # its id, else its place in `outcome`; deadly, timeout
+
+
+class Reference:
+    """Plays one scenario, slowly."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self.sources = Sources(scenario)
+        self.vocabulary = Vocabulary(scenario, self.sources)
+        self.history: list[list[int]] = []
+        self.world = World(0)
+
+    # -- reset ---------------------------------------------------------------------------------------------
+
+    def reset(
+        self,
+        seed: int = 0,
+        index: int = 0,
+        episode: int = 0,
+        test: bool = False,
+        layout: dict[str, Any] | None = None,
+    ) -> Result:
+        """Draws the room; at reset the history is empty."""
+        scenario = self.scenario
+        key = chance.episode(chance.TEST_SET if test else seed, index, episode)
+        self.world = World(
+            key,
+            nouns=scenario.grammar.nouns,
+            always_audible=frozenset(n for n, m in scenario.members().items() if m.audible == "always"),
+            npcs_hidden=scenario.observe.npcs == "hidden",
+            own_voice=scenario.observe.own_voice,
+            step_names={
+                name: [entry.state for entry in frame.steps]
+                for name, frame in scenario.frames.items()
+                if frame.steps is not None
+            },
+        )
+        setup = Setup(scenario, self.sources, self.world, layout or {})
+        setup.run()
+        self.canvas = scenario.room.canvas or (max(setup.sizes("width")), max(setup.sizes("height")))
+        for member in self.world.cast.values():
+            frame = self.sources.frame_of(member.frame)
+            if frame is not None and frame.steps is not None:
+                FrameRunner(self.sources, self.world, member).skip_empty(frame)
+        self.history = []
+        return Result(picture(self.world, self.canvas), [])
+
+    # -- step ----------------------------------------------------------------------------------------------
+
+    def step(self, action: Action) -> Result:
+        """One step. An action is (primitive, speak, template, noun); the primitive after the last is none."""
+        world = self.world
+        # Step 0: the clock. What is true of one step only is forgotten.
+        world.t += 1
+        world.lines = []
+        for member in world.cast.values():
+            member.utterance, member.action, member.poked = None, "none", False
+        for thing in world.things():
+            thing.toggled_by = []
+        # Step 1: the agent's body action. A scripted agent reads its `first` before.
+        runner = FrameRunner(self.sources, world, world.agent)
+        turn = runner.begin()
+        bodies.act(world, world.agent, self.primitive(action))
+        # Step 2: nothing in the language moves or counts by itself yet.
+        early = picture(world, self.canvas)
+        # Step 3: the agent's utterance is delivered; then a scripted agent's `then` is read.
+        self.utter(action)
+        runner.end(turn)
+        # Step 4: NPCs in cast order.
+        for npc in world.npcs:
+            self.npc_turn(npc)
+        # Steps 5 to 7: no memories, world rules or computed statuses yet.
+        self.remember()
+        # Step 8: outcome, then time.
+        result = self.judge()
+        # Step 9: the observation.
+        result.image = early if self.scenario.observe.image == "before_npcs" else picture(world, self.canvas)
+        result.tokens = [token for line in self.history for token in line]
+        result.heard = tuple(self.line(speaker, text) for speaker, text in world.lines)
+        return result
+
+    def primitive(self, action: Action) -> str:
+        """The word for the first number of an action."""
+        return self.scenario.actions[action[0]] if action[0] < len(self.scenario.actions) else "none"
+
+    def utter(self, action: Action) -> None:
+        """The agent speaks if it wants to."""
+        _, speaks, template, noun = action
+        if speaks:
+            text = self.scenario.grammar.utterance(template, noun)
+            value = speech.noun_value(self.scenario.grammar.nouns[noun])
+            speech.speak(self.world, self.world.agent, text, value)
+
+    def npc_turn(self, npc: Entity) -> None:
+        """Step 4 for one NPC: `first`, the activity, `then`; its utterance carries from where it stands after it."""
+        if npc.gone:
+            return
+        runner = FrameRunner(self.sources, self.world, npc)
+        turn = runner.begin()
+        # What `first` caused may have made it vanish; what has vanished does nothing.
+        if not npc.gone:
+            bodies.act(self.world, npc, turn.activity.primitive(self.world, npc))
+            runner.end(turn)
+        if turn.say is not None:
+            speech.speak(self.world, npc, turn.say)
+
+    def remember(self) -> None:
+        """Adds what was heard to the history; beyond its length the oldest whole utterances are dropped."""
+        self.history += [
+            self.vocabulary.tokens(self.line(speaker, text)) for speaker, text in self.world.lines
+        ]
+        while sum(map(len, self.history)) > self.vocabulary.length:
+            self.history.pop(0)
+
+    def line(self, speaker: Entity, text: str) -> str:
+        """A line as it is heard: `Name: text`, or the text alone where names are hidden."""
+        return text if self.scenario.observe.names == "hidden" else f"{speaker.name}: {text}"
+
+    def judge(self) -> Result:
+        """How the step ended: deadly before everything, the first outcome that holds, then time."""
+        world, nothing = self.world, np.empty(0, dtype=np.uint8)
+        if world.agent.cell is not None and world.deadly(world.agent.cell):
+            return Result(nothing, [], terminated=True, outcome="deadly")
+        for number, outcome in enumerate(self.scenario.outcome):
+            kind = "success" if outcome.success is not None else "failure"
+            value = self.sources.expression(f"outcome[{outcome.id or number}].{kind}", getattr(outcome, kind))
+            try:
+                if not holds(value, Context(world)):
+                    continue
+            except NothingFoundError:
+                continue
+            paid = (
+                outcome.reward / 100 * (1 - 0.9 * world.t / self.scenario.horizon)
+                if kind == "success"
+                else 0.0
+            )
+            return Result(
+                nothing, [], paid, terminated=True, outcome=number if outcome.id is None else outcome.id
+            )
+        if world.t >= self.scenario.horizon:
+            return Result(nothing, [], truncated=True, outcome="timeout")
+        return Result(nothing, [])
+
+    # -- questions -----------------------------------------------------------------------------------------
+
+    def scripted_action(self) -> Action:
+        """What the agent's frame would do in the next step; the state stays as it is."""
+        world = copy.deepcopy(self.world)
+        world.t += 1
+        for member in world.cast.values():
+            member.utterance, member.action, member.poked = None, "none", False
+        runner = FrameRunner(self.sources, world, world.agent)
+        turn: Turn = runner.begin()
+        primitive = turn.activity.primitive(world, world.agent)
+        bodies.act(world, world.agent, primitive)
+        text = runner.end(turn)
+        actions = list(self.scenario.actions)
+        number = actions.index(primitive) if primitive in actions else len(actions)
+        return (number, 0, 0, 0) if text is None else (number, 1, *self.pair(text))
+
+    def pair(self, text: str) -> tuple[int, int]:
+        """The template and noun that say a text."""
+        grammar = self.scenario.grammar
+        for template in range(len(grammar.templates)):
+            for noun in range(len(grammar.nouns)):
+                if speech.canonical(grammar.utterance(template, noun)) == speech.canonical(text):
+                    return template, noun
+        raise ValueError(f"the grammar cannot say {text!r}")
+
+    def can_reach(self, a: str, b: str) -> bool:
+        """Whether one thing can get to another now; `doors[0]` names a member of a group."""
+        return geometry.can_reach(self.world, self.entity(a), self.entity(b))
+
+    def entity(self, name: str) -> Entity:
+        """An entity by its name in the scenario; a let that holds one counts too."""
+        found = self.world.lets.get(name) or self.world.cast.get(name) or self.world.objects.get(name)
+        if found is None:
+            group, _, number = name.rstrip("]").partition("[")
+            return as_list(self.world.objects[group])[int(number)]
+        return found
+
+    def describe(self) -> dict[str, Any]:
+        """The whole state in the scenario's own names, made of plain data."""
+        world = self.world
+        return {
+            "t": world.t,
+            "room": {"width": world.width, "height": world.height},
+            "cast": {name: self.describe_member(member) for name, member in world.cast.items()},
+            "objects": {
+                name: [self.describe_object(thing) for thing in as_list(group)]
+                for name, group in world.objects.items()
+            },
+            "let": {name: plain(value) for name, value in world.lets.items()},
+        }
+
+    def describe_member(self, member: Entity) -> dict[str, Any]:
+        """A member of the cast."""
+        return {
+            "at": plain(member.cell),
+            "facing": member.facing,
+            "color": member.color,
+            "name": member.name,
+            "kind_code": member.kind_code,
+            "state": self.state_name(member),
+            "clock": member.clock,
+            "registers": {name: plain(value) for name, value in member.registers.items()},
+            "gone": member.gone,
+            "was_poked": member.was_poked,
+            "once": sorted(member.fired_once),
+        }
+
+    def state_name(self, member: Entity) -> str | int | None:
+        """The state it is in; an entry of `steps` by its name or number, `finished` after the last."""
+        if not isinstance(member.state, int):
+            return member.state
+        names = self.world.step_names[str(member.frame)]
+        if member.state == len(names):
+            return "finished"
+        return names[member.state] or member.state
+
+    @staticmethod
+    def describe_object(thing: Entity) -> dict[str, Any]:
+        """An object."""
+        return {"at": plain(thing.cell), "color": thing.color, "state": thing.status, "gone": thing.gone}
+
+
+def plain(value: Any) -> Any:
+    """A value as data: entities by name, cells as lists."""
+    if isinstance(value, Entity):
+        return value.key if value.sort != "object" else f"{value.key}[{value.index}]"
+    if isinstance(value, tuple | list):
+        return [plain(item) for item in value]
+    return value

@@ -1,0 +1,375 @@
+"""Reset: draws the room, puts everything down, and computes what is fixed for the episode."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from socialai_dsl.grammar import ast
+from socialai_dsl.schema import CastMember, ObjectGroup, Scenario
+from tests.reference import chance
+from tests.reference.evaluate import Context, evaluate, of
+from tests.reference.places import region
+from tests.reference.source import Sources, Value
+from tests.reference.world import (
+    COLORS,
+    DIRECTIONS,
+    TYPES,
+    Cell,
+    Entity,
+    World,
+    as_list,
+    quadrant,
+    where,
+)
+
+
+class Setup:
+    """The drawing of one room. Attributes that others ask for are computed when first asked for."""
+
+    def __init__(self, scenario: Scenario, sources: Sources, world: World, layout: dict[str, Any]) -> None:
+        self.scenario, self.sources, self.world, self.layout = scenario, sources, world, layout
+        self.members = scenario.members()
+        self.drawn_cells: set[str] = set()
+        self.facing_known: set[str] = set()
+
+    # -- the whole of it -----------------------------------------------------------------------------------
+
+    def run(self) -> None:
+        """Sizes, entities, fixed things, placements in their order, then all that is drawn or computed once."""
+        self.draw_size()
+        self.make_entities()
+        self.build()
+        self.pin()
+        for name in self.order():
+            self.place(name)
+        for entity in self.world.entities():
+            self.compute_colors(entity)
+        for member in self.world.cast.values():
+            self.compute_facing(member)
+            self.compute_name(member)
+        for name in self.scenario.let:
+            self.compute_let(name)
+        for member in self.world.cast.values():
+            self.compute_slots(member)
+            self.compute_earshot(member)
+            self.compute_registers(member)
+
+    def context(self, me: Entity | None = None, **variables: Any) -> Context:
+        """Who asks during reset: outside any frame; a pick that finds nothing takes the first member."""
+        return Context(self.world, me, variables=variables, take_first=True, setup=self)
+
+    def draw(self, path: str, number: int, size: int) -> int:
+        """A draw at reset."""
+        return chance.choose(self.world.key, path, 0, number, size)
+
+    # -- room ----------------------------------------------------------------------------------------------
+
+    def draw_size(self) -> None:
+        """Width and height are drawn independently."""
+        pinned = self.layout.get("room") or {}
+        for side in ("width", "height"):
+            sizes = self.sizes(side)
+            chosen = sizes[self.draw(f"room.{side}", 0, len(sizes))]
+            setattr(self.world, side, pinned.get(side) or chosen)
+
+    def sizes(self, side: str) -> list[int]:
+        """The possible widths or heights."""
+        room = self.scenario.room
+        source = getattr(room, side)
+        source = room.size if source is None else source
+        return as_list(evaluate(self.sources.expression(f"room.{side}", source), self.context()))
+
+    def build(self) -> None:
+        """Fixed things stand in place of floor."""
+        for number, entry in enumerate(self.scenario.room.build):
+            for type_, place in entry.items():
+                value = self.sources.expression(f"room.build[{number}].{type_}", place)
+                for cell in region(value, self.context()):
+                    self.world.terrain[cell] = type_
+
+    # -- entities ------------------------------------------------------------------------------------------
+
+    def make_entities(self) -> None:
+        """Everything that will be put down, not placed yet."""
+        for name, group in self.scenario.objects.items():
+            size = group_size(group)
+            initial = group.state or TYPES[group.type].initial
+            things = [
+                Entity(name, "object", index, type=group.type, status=initial, initial=initial)
+                for index in range(size or 1)
+            ]
+            self.world.objects[name] = things[0] if size is None else things
+        kinds: list[str] = []
+        for name, member in self.members.items():
+            person = Entity(name, "agent" if name == "agent" else "npc", kind=member.kind or "peer")
+            person.view = member.view or 7
+            person.frame = member.frame
+            person.state = self.start_of(member.frame)
+            if name != "agent":
+                # "NPC status = index of its kind in order of first appearance in the cast."
+                if person.kind not in kinds:
+                    kinds.append(person.kind)
+                person.kind_code = kinds.index(person.kind) if member.kind_code is None else member.kind_code
+            self.world.cast[name] = person
+
+    def start_of(self, name: str | None) -> str | int | None:
+        """The first state of a frame, or the first entry of its steps."""
+        frame = self.sources.frame_of(name)
+        if frame is None:
+            return None
+        return 0 if frame.states is None else frame.start or next(iter(frame.states))
+
+    # -- placement -----------------------------------------------------------------------------------------
+
+    def order(self) -> list[str]:
+        """`order:` first, then objects, NPCs, the agent; but what a placement needs comes before it."""
+        cast = [*(name for name in self.members if name != "agent"), "agent"]
+        waiting = list(dict.fromkeys([*self.scenario.order, *self.scenario.objects, *cast]))
+        done: list[str] = []
+        while waiting:
+            ready = [name for name in waiting if not self.needs(name) & set(waiting) - {name}]
+            done.append((ready or waiting)[0])
+            waiting.remove(done[-1])
+        return done
+
+    def needs(self, name: str) -> set[str]:
+        """The entities that somebody's place, position or colour speaks of, through lets and facings too."""
+        found: set[str] = set()
+        for value in self.values_of(name, ("place", "at", "color")):
+            self.collect(value.tree, found, {name})
+        return found - {name}
+
+    def collect(self, tree: ast.Node, found: set[str], seen: set[str]) -> None:
+        """Adds the names of all entities that an expression speaks of."""
+        for node in tree.walk():
+            if not isinstance(node, ast.Name) or node.id in seen:
+                continue
+            if node.id in self.scenario.let:
+                seen.add(node.id)
+                self.collect(self.let_value(node.id).tree, found, seen)
+            elif node.id in self.scenario.objects or node.id in self.members:
+                seen.add(node.id)
+                found.add(node.id)
+                for value in self.values_of(node.id, ("facing",)):
+                    self.collect(value.tree, found, seen)
+
+    def values_of(self, name: str, keys: tuple[str, ...]) -> list[Value]:
+        """What is written under some keys of an object or a member."""
+        holder: Any = self.scenario.objects.get(name) or self.members[name]
+        prefix = "objects" if name in self.scenario.objects else "cast"
+        values = []
+        for key in keys:
+            for path, source in leaves(f"{prefix}.{name}.{key}", getattr(holder, key, None)):
+                values.append(self.sources.expression(path, source))
+        return values
+
+    def pin(self) -> None:
+        """What a layout pins is put down first."""
+        for entity in self.world.entities():
+            pinned = self.pinned(entity)
+            if pinned.get("at") is not None:
+                entity.cell = (pinned["at"][0], pinned["at"][1])
+                self.drawn_cells.add(repr((entity.key, entity.index)))
+            entity.color = pinned.get("color", entity.color)
+            entity.name = pinned.get("name", entity.name)
+            entity.status = pinned.get("state") or entity.status
+            if pinned.get("facing"):
+                entity.facing = pinned["facing"]
+                self.facing_known.add(entity.key)
+        for name, given in (self.layout.get("let") or {}).items():
+            if given is None:
+                continue
+            owner, _, register = name.partition(".")
+            if register:
+                self.world.cast[owner].registers[register] = self.decode(given)
+            else:
+                self.world.lets[name] = self.decode(given)
+
+    def pinned(self, entity: Entity) -> dict[str, Any]:
+        """What a layout says of an entity."""
+        given = self.layout.get(entity.key)
+        if isinstance(given, list):
+            given = given[entity.index] if entity.index < len(given) else None
+        return given or {}
+
+    def decode(self, given: Any) -> Any:
+        """A value of a layout: `doors[0]`, a name, a cell as a list, or the value itself."""
+        if isinstance(given, list):
+            return tuple(given)
+        if not isinstance(given, str):
+            return given
+        member = re.fullmatch(r"(\w+)\[(\d+)\]", given)
+        if member:
+            return as_list(self.world.objects[member[1]])[int(member[2])]
+        return self.world.objects.get(given) or self.world.cast.get(given) or given
+
+    def place(self, name: str) -> None:
+        """Draws the cell of each member of a group, or of a member of the cast."""
+        if name in self.scenario.objects:
+            group = self.scenario.objects[name]
+            for thing in as_list(self.world.objects[name]):
+                self.put_down(thing, f"objects.{name}", group)
+        else:
+            self.put_down(self.world.cast[name], f"cast.{name}", self.members[name])
+
+    def put_down(self, entity: Entity, path: str, holder: ObjectGroup | CastMember) -> None:
+        """One uniform draw from the free cells that satisfy the place; if there is none it is not in the room."""
+        if repr((entity.key, entity.index)) in self.drawn_cells:
+            return
+        if holder.at is not None:
+            cells = [self.exact_cell(path, holder.at, entity)]
+            cells = [cell for cell in cells if self.world.inside(cell) and not self.taken(cell)]
+        else:
+            written = leaves(f"{path}.place", holder.place) or [(f"{path}.place", "anywhere")]
+            site, source = written[entity.index % len(written)]
+            value = self.sources.expression(site, source)
+            cells = [cell for cell in region(value, self.context(entity)) if not self.taken(cell)]
+        if cells:
+            entity.cell = cells[self.draw(f"{path}.cell", entity.index, len(cells))]
+
+    def exact_cell(self, path: str, at: Any, entity: Entity) -> Cell:
+        """`at: [x, y]`, or one of a list of them."""
+        path, pair = (
+            (f"{path}.at[{entity.index}]", at[entity.index])
+            if isinstance(at[0], tuple)
+            else (f"{path}.at", at)
+        )
+        x, y = (
+            evaluate(self.sources.expression(f"{path}[{axis}]", source), self.context(entity))
+            for axis, source in enumerate(pair)
+        )
+        return x, y
+
+    def taken(self, cell: Cell) -> bool:
+        """Whether something was put there, or fixed things stand there."""
+        return cell in self.world.terrain or any(entity.cell == cell for entity in self.world.entities())
+
+    # -- what is drawn or computed once --------------------------------------------------------------------
+
+    def compute_colors(self, entity: Entity) -> None:
+        """The colour of an entity; for `distinct` those of its whole group."""
+        if entity.color is not None:
+            return
+        if entity.sort == "object":
+            path, written = f"objects.{entity.key}", self.scenario.objects[entity.key].color
+        else:
+            path, written = f"cast.{entity.key}", self.members[entity.key].color
+            written = "random" if written is None else written
+        if written is None:
+            entity.color = TYPES[entity.type].color
+            return
+        sources = leaves(f"{path}.color", written)
+        site, source = sources[entity.index % len(sources)]
+        if source == "random":
+            entity.color = COLORS[self.draw(f"{path}.color", entity.index, len(COLORS))]
+        elif source == "distinct":
+            self.distinct_colors(path, as_list(self.world.objects[entity.key]))
+        else:
+            found = evaluate(self.sources.expression(site, source), self.context(entity, it=entity))
+            # "Group attributes (`doors.color`) give one each."
+            entity.color = found[entity.index % len(found)] if isinstance(found, list) else found
+
+    def distinct_colors(self, path: str, group: list[Entity]) -> None:
+        """One after another, each among the colours that are not taken yet."""
+        left = [color for color in COLORS if color not in [thing.color for thing in group]]
+        for thing in group:
+            if thing.color is None:
+                thing.color = left.pop(self.draw(f"{path}.color", thing.index, len(left)))
+
+    def compute_name(self, member: Entity) -> None:
+        """What precedes its lines: an expression, a text, or by default its key, capitalised."""
+        if member.name is not None or member.sort == "object":
+            return
+        written = self.members[member.key].name
+        if written is None:
+            member.name = member.key.capitalize()
+            return
+        value = self.sources.name(f"cast.{member.key}.name", written)
+        found = evaluate(value, self.context(member))
+        member.name = str(written) if isinstance(found, Entity | list) else str(found)
+
+    def compute_facing(self, member: Entity) -> None:
+        """A direction, `random` (the default), or `toward(x)`."""
+        if member.sort == "object" or member.key in self.facing_known:
+            return
+        self.facing_known.add(member.key)
+        written = self.members[member.key].facing
+        if written is None or written == "random":
+            member.facing = DIRECTIONS[self.draw(f"cast.{member.key}.facing", 0, 4)]
+            return
+        value = self.sources.expression(f"cast.{member.key}.facing", written)
+        if isinstance(value.tree, ast.Call) and value.tree.name == "toward":
+            context = self.context(member)
+            context.value = value
+            goal = where(of(value.tree.args[0], context))
+            if member.cell is not None and goal is not None:
+                member.facing = quadrant(member.cell, goal)
+        else:
+            member.facing = evaluate(value, self.context(member))
+
+    def let_value(self, name: str) -> Value:
+        """The tree of a `let`."""
+        return self.sources.expression(f"let.{name}", self.scenario.let[name])
+
+    def compute_let(self, name: str) -> None:
+        """Once per episode."""
+        if name not in self.world.lets:
+            self.world.lets[name] = evaluate(self.let_value(name), self.context())
+
+    def compute_slots(self, member: Entity) -> None:
+        """Text and bool slots stay expressions, read at every use; all others are computed now."""
+        frame = self.sources.frame_of(member.frame)
+        if frame is None or member.slots:
+            return
+        for name, type_ in frame.slots.items():
+            path, source = f"cast.{member.key}.with.{name}", self.members[member.key].with_[name]
+            if type_ == "text":
+                member.slots[name] = self.sources.text(path, source)
+            elif type_ == "bool":
+                member.slots[name] = self.sources.expression(path, source)
+            elif type_ == "utterance":
+                member.slots[name] = evaluate(self.sources.text(path, source), self.context(member))
+            else:
+                member.slots[name] = evaluate(self.sources.expression(path, source), self.context(member))
+
+    def compute_earshot(self, member: Entity) -> None:
+        """How far its voice carries: its own earshot, else the scenario's."""
+        own = self.members[member.key].earshot
+        path, source = (
+            ("earshot", self.scenario.earshot) if own is None else (f"cast.{member.key}.earshot", own)
+        )
+        if source in ("next_to", "room"):
+            self.world.earshot[member.key] = str(source)
+        else:
+            self.world.earshot[member.key] = evaluate(self.sources.expression(path, source), self.context())
+
+    def compute_registers(self, member: Entity) -> None:
+        """The start values of a frame's `let`, one copy per member that follows it."""
+        frame = self.sources.frame_of(member.frame)
+        for name, source in (frame.let if frame else {}).items():
+            if name not in member.registers:
+                path = f"{member.key}/frames.{member.frame}.let.{name}"
+                context = self.context(member)
+                context.in_frame = True
+                member.registers[name] = evaluate(
+                    self.sources.expression(path, source, member.frame), context
+                )
+
+
+def group_size(group: ObjectGroup) -> int | None:
+    """How many; None for a single object."""
+    if group.count is not None:
+        return group.count
+    return len(group.at) if group.at and isinstance(group.at[0], tuple) else None
+
+
+def leaves(path: str, source: Any) -> list[tuple[str, Any]]:
+    """The scalars of a value with their paths; a list of one is written without its number."""
+    if source is None:
+        return []
+    if not isinstance(source, tuple):
+        return [(path, source)]
+    if len(source) == 1 and not isinstance(source[0], tuple):
+        return [(path, source[0])]
+    return [leaf for number, item in enumerate(source) for leaf in leaves(f"{path}[{number}]", item)]

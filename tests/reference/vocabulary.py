@@ -1,0 +1,285 @@
+"""Every word that can be heard in a scenario, numbered by first appearance, and how long the history can become."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from socialai_dsl.grammar import ast
+from socialai_dsl.schema import Scenario
+from tests.reference.evaluate import weighed
+from tests.reference.source import Sources, Value
+from tests.reference.speech import words
+from tests.reference.world import COLORS, DIRECTIONS
+
+PADDING, UNKNOWN = 0, 1
+LONGEST = 256
+PICKING = ("pick", "first", "nearest")
+
+
+class Vocabulary:
+    """Words to ids: 0 pads, 1 is unknown. Made before `observe:` is applied."""
+
+    def __init__(self, scenario: Scenario, sources: Sources) -> None:
+        self.scenario, self.sources, self.members = scenario, sources, scenario.members()
+        self.ids: dict[str, int] = {}
+        self.ranges: dict[tuple[str, str], tuple[int, int]] = {}  # of registers that are being worked out
+        for text in self.in_order_of_appearance():
+            for word in words(text):
+                self.ids.setdefault(word, len(self.ids) + 2)
+        self.length = self.longest_history()
+
+    def tokens(self, line: str) -> list[int]:
+        """The ids of a line's words."""
+        return [self.ids.get(word, UNKNOWN) for word in words(line)]
+
+    def in_order_of_appearance(self) -> Iterator[str]:
+        """Texts of the grammar, names of the cast, then all that members can say."""
+        grammar = self.scenario.grammar
+        for template in grammar.templates:
+            yield template.replace("<noun>", " ")
+        yield from map(str, grammar.nouns)
+        for name in self.members:
+            yield from self.names_of(name)
+        for name in self.members:
+            for value in self.sayings(name):
+                for piece in self.pieces(value.tree, name):
+                    yield from piece
+
+    # -- what can be said ----------------------------------------------------------------------------------
+
+    def names_of(self, member: str) -> list[str]:
+        """All names that a member can bear."""
+        written = self.members[member].name
+        if written is None:
+            return [member.capitalize()]
+        tree = self.sources.name(f"cast.{member}.name", written).tree
+        if isinstance(tree, ast.Name) and tree.id not in self.scenario.let:
+            return [tree.id]
+        return self.values(tree, member)
+
+    def sayings(self, member: str) -> list[Value]:
+        """The texts of a member's frame, in order of its states or steps."""
+        frame_name = self.members[member].frame
+        frame = self.sources.frame_of(frame_name)
+        if frame is None:
+            return []
+        rules: list[Any] = list(frame.steps or ())
+        for state in (frame.states or {}).values():
+            rules += [*state.first, *state.then]
+        return [
+            self.sources.text(f"vocabulary.{frame_name}", rule.say, frame_name)
+            for rule in rules
+            if rule.say is not None
+        ]
+
+    def pieces(self, tree: Any, member: str) -> list[list[str]]:
+        """A text as a row of pieces, each a list of what it can read."""
+        if not isinstance(tree, ast.Text):
+            return [self.values(tree, member)]
+        row: list[list[str]] = []
+        for part in tree.parts:
+            slot = self.text_slot(part, member)
+            if isinstance(part, str):
+                row.append([part])
+            elif slot is not None:
+                row += self.pieces(slot, member)
+            else:
+                row.append(self.values(part, member))
+        return row
+
+    def text_slot(self, part: Any, member: str) -> ast.Node | None:
+        """The text that fills a slot of type text or utterance, if the part names one."""
+        frame = self.sources.frame_of(self.members[member].frame)
+        if frame is None or not isinstance(part, ast.Name):
+            return None
+        if frame.slots.get(part.id) not in ("text", "utterance"):
+            return None
+        return self.sources.text(f"cast.{member}.with.{part.id}", self.members[member].with_[part.id]).tree
+
+    # -- the values an expression can have -----------------------------------------------------------------
+
+    def values(self, tree: Any, member: str) -> list[str]:
+        """All texts that a `<...>` part can read, in the order of its type."""
+        if isinstance(tree, ast.Attribute):
+            if tree.name == "color":
+                return list(COLORS)
+            if tree.name == "facing":
+                return list(DIRECTIONS)
+            if tree.name == "name":
+                return self.names_of_subject(tree.subject, member)
+        if isinstance(tree, ast.Text):
+            texts = [""]
+            for piece in self.pieces(tree, member):
+                texts = [start + end for start in texts for end in piece]
+            return texts
+        options = self.options(tree, member)
+        if options is None:
+            low, high = self.bounds(tree, member)
+            return [str(number) for number in range(low, high + 1)]
+        for domain in (COLORS, DIRECTIONS):
+            if options and all(option in domain for option in options):
+                return list(domain)
+        if options and all(option.lstrip("-").isdigit() for option in options):
+            return [str(number) for number in range(min(map(int, options)), max(map(int, options)) + 1)]
+        return options
+
+    def names_of_subject(self, subject: Any, member: str) -> list[str]:
+        """The names that `subject.name` can read."""
+        if isinstance(subject, ast.Name) and subject.id in self.members:
+            return self.names_of(subject.id)
+        if isinstance(subject, ast.Name) and subject.id == "self":
+            return self.names_of(member)
+        mentioned = [
+            node.id for node in subject.walk() if isinstance(node, ast.Name) and node.id in self.members
+        ]
+        everyone = mentioned or list(self.members)
+        return list(dict.fromkeys(name for one in everyone for name in self.names_of(one)))
+
+    def options(self, tree: Any, member: str) -> list[str] | None:
+        """The words that an expression can be, or None if it is a number that is computed."""
+        if isinstance(tree, ast.Name):
+            source = self.declared(tree.id, member)
+            if source is not None:
+                return self.options(source, member)
+            if tree.id == "colors":
+                return list(COLORS)
+            if tree.id in ("noun", "nouns"):
+                return [str(noun) for noun in self.scenario.grammar.nouns]
+            assigned = self.assigned(tree.id, member)
+            if assigned:
+                found = [None if self.computes(tree_) else self.options(tree_, member) for tree_ in assigned]
+                return (
+                    None
+                    if None in found
+                    else list(dict.fromkeys(word for some in found for word in some or ()))
+                )
+            return None if tree.id in ("t", "W", "H") else [tree.id]
+        if isinstance(tree, ast.Number):
+            return [str(tree.value)]
+        if isinstance(tree, ast.Text):
+            return self.values(tree, member)
+        if isinstance(tree, ast.Alternatives):
+            found = [self.options(option, member) or [] for option, _ in weighed(tree)]
+            return list(dict.fromkeys(word for words_ in found for word in words_))
+        if isinstance(tree, ast.Quantifier) and tree.name in PICKING:
+            return self.options(tree.group, member)
+        if isinstance(tree, ast.Call) and tree.name in PICKING:
+            return self.options(tree.args[0], member)
+        if isinstance(tree, ast.Attribute):
+            return self.values(tree, member) if tree.name in ("color", "facing", "name") else None
+        return None
+
+    def declared(self, name: str, member: str) -> ast.Node | None:
+        """The tree of a let or slot."""
+        frame = self.sources.frame_of(self.members[member].frame)
+        if frame is not None and name in frame.slots:
+            source = self.members[member].with_[name]
+            return self.sources.expression(f"cast.{member}.with.{name}", source).tree
+        if name in self.scenario.let:
+            return self.sources.expression(f"let.{name}", self.scenario.let[name]).tree
+        return None
+
+    def assigned(self, name: str, member: str) -> list[ast.Node]:
+        """All that a register of the member's frame can be given: its start and every `set`."""
+        frame_name = self.members[member].frame
+        frame = self.sources.frame_of(frame_name)
+        if frame is None or name not in frame.let:
+            return []
+        entries: list[Any] = list(frame.steps or ())
+        for state in (frame.states or {}).values():
+            entries += [*state.first, *state.then]
+        sources = [frame.let[name], *(entry.set[name] for entry in entries if name in entry.set)]
+        return [
+            self.sources.expression(f"vocabulary.{frame_name}", source, frame_name).tree for source in sources
+        ]
+
+    @staticmethod
+    def computes(tree: ast.Node) -> bool:
+        """Whether a value is the result of arithmetic."""
+        return any(isinstance(node, ast.Arithmetic | ast.Negative) for node in tree.walk())
+
+    def register_bounds(self, name: str, member: str) -> tuple[int, int]:
+        """The range of a register: what its `set`s can make of it in as many steps as there are."""
+        assigned = self.assigned(name, member)
+        self.ranges[member, name] = self.bounds(assigned[0], member)
+        for _ in range(self.scenario.horizon):
+            low, high = self.ranges[member, name]
+            found = [self.bounds(tree, member) for tree in assigned[1:]]
+            wider = min([low, *(a for a, _ in found)]), max([high, *(b for _, b in found)])
+            if wider == (low, high):
+                break
+            self.ranges[member, name] = wider
+        return self.ranges.pop((member, name))
+
+    def bounds(self, tree: Any, member: str) -> tuple[int, int]:
+        """The least and greatest value of a computed number."""
+        if isinstance(tree, ast.Number):
+            return tree.value, tree.value
+        if isinstance(tree, ast.Interval):
+            return self.bounds(tree.low, member)[0], self.bounds(tree.high, member)[1]
+        if isinstance(tree, ast.Quantifier) and tree.name == "count":
+            return 0, self.group_size(tree.group)
+        if isinstance(tree, ast.Quantifier):
+            return self.bounds(tree.group, member)
+        if isinstance(tree, ast.Call) and tree.name == "pick":
+            return self.bounds(tree.args[0], member)
+        if isinstance(tree, ast.Name):
+            if tree.id == "t":
+                return 0, self.scenario.horizon
+            if (member, tree.id) in self.ranges:
+                return self.ranges[member, tree.id]
+            if self.assigned(tree.id, member):
+                return self.register_bounds(tree.id, member)
+            if tree.id == "noun":
+                numbers = [int(noun) for noun in self.scenario.grammar.nouns if str(noun).isdigit()]
+                return min(numbers), max(numbers)
+            source = self.declared(tree.id, member)
+            assert source is not None, f"the range of {tree.id} is not worked out by the reference"
+            return self.bounds(source, member)
+        if isinstance(tree, ast.Arithmetic):
+            a, b = self.bounds(tree.left, member), self.bounds(tree.right, member)
+            if tree.op == "+":
+                return a[0] + b[0], a[1] + b[1]
+            if tree.op == "-":
+                return a[0] - b[1], a[1] - b[0]
+            if tree.op == "*":
+                products = [x * y for x in a for y in b]
+                return min(products), max(products)
+        if isinstance(tree, ast.Attribute) and tree.name == "noun":
+            return self.bounds(ast.Name("noun"), member)
+        raise AssertionError(f"the range of {tree} is not worked out by the reference")
+
+    def group_size(self, group: Any) -> int:
+        """How many members a group has at most."""
+        from tests.reference.room import group_size
+
+        if isinstance(group, ast.Name) and group.id in self.scenario.objects:
+            return group_size(self.scenario.objects[group.id]) or 1
+        if isinstance(group, ast.Name) and group.id == "colors":
+            return len(COLORS)
+        return len(weighed(group))
+
+    # -- length --------------------------------------------------------------------------------------------
+
+    def longest_history(self) -> int:
+        """The number of tokens kept: every speaker's longest line at every step, in eights, 8 to 256."""
+        per_step = sum(self.longest_line(name) for name in self.members if name != "agent")
+        if self.scenario.observe.own_voice:
+            grammar = self.scenario.grammar
+            template = max(len(words(text.replace("<noun>", " "))) for text in grammar.templates)
+            noun = max(len(words(str(text))) for text in grammar.nouns)
+            per_step += template + noun + max(len(words(name)) for name in self.names_of("agent"))
+        bound = self.scenario.horizon * per_step
+        return min(LONGEST, max(8, (bound + 7) // 8 * 8))
+
+    def longest_line(self, member: str) -> int:
+        """The words of a member's longest line, its name included; 0 if it says nothing."""
+        texts = self.sayings(member)
+        if not texts:
+            return 0
+        name = max(len(words(name)) for name in self.names_of(member))
+        return name + max(
+            sum(max(len(words(text)) for text in piece) for piece in self.pieces(value.tree, member))
+            for value in texts
+        )

@@ -1,0 +1,258 @@
+"""What exists in an episode: entities with their state, the room they are in, and plain geometry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+Cell = tuple[int, int]
+
+COLORS = ("red", "green", "blue", "purple", "yellow", "grey")
+DIRECTIONS = ("right", "down", "left", "up")
+AHEAD = {"right": (1, 0), "down": (0, 1), "left": (-1, 0), "up": (0, -1)}
+SIDES = ("top", "bottom", "left", "right")
+
+
+@dataclass(frozen=True)
+class ObjectType:
+    """How a type of object looks and behaves; the first status is the initial one unless said otherwise."""
+
+    code: int
+    states: tuple[str, ...]
+    initial: str
+    color: str = "grey"
+    walkable: tuple[str, ...] = ()
+    transparent: tuple[str, ...] = ()
+    toggled: dict[str, str] = field(default_factory=dict)
+    deadly: bool = False
+
+
+TYPES = {
+    "wall": ObjectType(2, ("solid",), "solid"),
+    "floor": ObjectType(3, ("plain",), "plain", walkable=("plain",), transparent=("plain",)),
+    "fence": ObjectType(18, ("solid",), "solid", transparent=("solid",)),
+    "lava": ObjectType(9, ("hot",), "hot", "red", ("hot",), ("hot",), deadly=True),
+    "platform": ObjectType(17, ("empty",), "empty", "purple", transparent=("empty",)),
+    "ball": ObjectType(6, ("plain", "tagged"), "plain", transparent=("plain", "tagged")),
+    "door": ObjectType(
+        4,
+        ("open", "closed", "locked"),
+        "closed",
+        walkable=("open",),
+        transparent=("open",),
+        toggled={"closed": "open", "open": "closed"},
+    ),
+    "remote_door": ObjectType(19, ("open", "closed"), "closed", walkable=("open",), transparent=("open",)),
+    "switch": ObjectType(
+        12,
+        ("idle", "pressed"),
+        "idle",
+        transparent=("idle", "pressed"),
+        toggled={"idle": "pressed", "pressed": "idle"},
+    ),
+    "lever": ObjectType(14, ("down", "up"), "down", "red", (), ("down", "up"), {"down": "up"}),
+    "box": ObjectType(
+        7,
+        ("shut", "opened", "locked"),
+        "shut",
+        transparent=("shut", "opened", "locked"),
+        toggled={"shut": "opened"},
+    ),
+    "apple": ObjectType(13, ("whole", "eaten"), "whole", "red", (), ("whole", "eaten"), {"whole": "eaten"}),
+}
+
+
+@dataclass
+class Heard:
+    """One utterance as it reached somebody."""
+
+    speaker: Entity
+    text: str
+    noun: str | int | None
+
+
+@dataclass(eq=False)
+class Entity:
+    """An object, an NPC or the agent. Without a cell it is gone (or not placed yet)."""
+
+    key: str
+    sort: str  # object, npc, agent
+    index: int = 0
+    cell: Cell | None = None
+    color: str | None = None
+    # objects
+    type: str = ""
+    status: str = ""
+    initial: str = ""
+    toggled_by: list[Entity] = field(default_factory=list)  # in this step
+    # the cast
+    facing: str = "right"
+    name: str | None = None
+    kind: str = "peer"
+    kind_code: int = 0
+    view: int = 7
+    frame: str | None = None
+    state: str | int | None = None
+    clock: int = 0
+    slots: dict[str, Any] = field(default_factory=dict)
+    registers: dict[str, Any] = field(default_factory=dict)
+    fired_once: set[str] = field(default_factory=set)
+    inbox: list[Heard] = field(default_factory=list)
+    utterance: str | None = None  # in this step
+    noun: str | int | None = None  # of the last utterance
+    action: str = "none"  # in this step
+    poked: bool = False
+    was_poked: bool = False
+
+    @property
+    def gone(self) -> bool:
+        """Whether it is not in the room."""
+        return self.cell is None
+
+    def __repr__(self) -> str:
+        return f"<{self.key}{[self.index]} at {self.cell}>"
+
+
+@dataclass
+class World:
+    """The whole state of an episode."""
+
+    key: int
+    t: int = 0
+    width: int = 0
+    height: int = 0
+    terrain: dict[Cell, str] = field(default_factory=dict)
+    objects: dict[str, Entity | list[Entity]] = field(default_factory=dict)
+    cast: dict[str, Entity] = field(default_factory=dict)
+    lets: dict[str, Any] = field(default_factory=dict)
+    nouns: tuple[str | int, ...] = ()
+    step_names: dict[str, list[str | None]] = field(default_factory=dict)  # per frame with `steps`
+    earshot: dict[str, str | int] = field(default_factory=dict)  # how far each voice carries
+    always_audible: frozenset[str] = frozenset()
+    npcs_hidden: bool = False
+    own_voice: bool = False
+    lines: list[tuple[Entity, str]] = field(default_factory=list)  # what the agent heard in this step
+
+    @property
+    def agent(self) -> Entity:
+        """The agent."""
+        return self.cast["agent"]
+
+    @property
+    def npcs(self) -> list[Entity]:
+        """All NPCs, in the order they act."""
+        return [member for member in self.cast.values() if member.sort == "npc"]
+
+    def things(self) -> list[Entity]:
+        """All objects, in file order."""
+        return [thing for group in self.objects.values() for thing in as_list(group)]
+
+    def entities(self) -> list[Entity]:
+        """Everything that can be somewhere."""
+        return self.things() + list(self.cast.values())
+
+    def inside(self, cell: Cell) -> bool:
+        """Whether the cell belongs to the room, walls included."""
+        return 0 <= cell[0] < self.width and 0 <= cell[1] < self.height
+
+    def on_border(self, cell: Cell) -> bool:
+        """Whether the cell is one of the room's wall cells."""
+        return self.inside(cell) and (cell[0] in (0, self.width - 1) or cell[1] in (0, self.height - 1))
+
+    def interior(self) -> list[Cell]:
+        """The cells within the walls, row by row."""
+        return [(x, y) for y in range(1, self.height - 1) for x in range(1, self.width - 1)]
+
+    def object_at(self, cell: Cell) -> Entity | None:
+        """The object in a cell."""
+        return next((thing for thing in self.things() if thing.cell == cell), None)
+
+    def body_at(self, cell: Cell) -> Entity | None:
+        """The NPC in a cell, else the agent."""
+        bodies = [*self.npcs, self.agent]
+        return next((body for body in bodies if body.cell == cell), None)
+
+    def _holds(self, cell: Cell, quality: str) -> bool:
+        if not self.inside(cell):
+            return False
+        thing = self.object_at(cell)
+        if thing is not None:
+            return thing.status in getattr(TYPES[thing.type], quality)
+        ground = self.terrain.get(cell)
+        if ground is not None:
+            return TYPES[ground].initial in getattr(TYPES[ground], quality)
+        return not self.on_border(cell)
+
+    def walkable(self, cell: Cell) -> bool:
+        """Whether a body can enter the cell, other bodies aside."""
+        return self._holds(cell, "walkable")
+
+    def transparent(self, cell: Cell) -> bool:
+        """Whether one can look through the cell."""
+        return self._holds(cell, "transparent")
+
+    def deadly(self, cell: Cell) -> bool:
+        """Whether the cell kills the agent."""
+        thing = self.object_at(cell)
+        ground = thing.type if thing is not None else self.terrain.get(cell)
+        return ground is not None and TYPES[ground].deadly
+
+
+def as_list(value: Any) -> list[Any]:
+    """A group as it is, a single thing as a group of one."""
+    return value if isinstance(value, list) else [value]
+
+
+def where(thing: Any) -> Cell | None:
+    """The cell of an entity, or a cell itself."""
+    return thing.cell if isinstance(thing, Entity) else thing
+
+
+def step_from(cell: Cell, direction: str) -> Cell:
+    """The next cell in a direction."""
+    dx, dy = AHEAD[direction]
+    return cell[0] + dx, cell[1] + dy
+
+
+def turned(direction: str, quarter_turns: int) -> str:
+    """A direction after turns to the right (negative: to the left)."""
+    return DIRECTIONS[(DIRECTIONS.index(direction) + quarter_turns) % 4]
+
+
+def distance(a: Cell, b: Cell) -> int:
+    """Manhattan distance."""
+    return abs(a[0] - b[0]) + abs(a[1] - b[1])
+
+
+def quadrant(start: Cell, goal: Cell) -> str:
+    """The direction from one cell to another; on the diagonals (+,+) right, (+,-) up, (-,-) left, (-,+) down."""
+    dx, dy = goal[0] - start[0], goal[1] - start[1]
+    if dx == dy == 0 or (dy > 0 and -dy <= dx < dy):
+        return "down"
+    if dx > 0 and -dx < dy <= dx:
+        return "right"
+    if dy < 0 and dy < dx <= -dy:
+        return "up"
+    return "left"
+
+
+def between(a: Cell, b: Cell) -> list[Cell]:
+    """The cells strictly between two cells of one row or column."""
+    dx, dy = (b[0] > a[0]) - (b[0] < a[0]), (b[1] > a[1]) - (b[1] < a[1])
+    return [(a[0] + k * dx, a[1] + k * dy) for k in range(1, distance(a, b))]
+
+
+def inward(world: World, thing: Entity) -> Cell | None:
+    """The cell in front of something: from the wall into the room, or the one an NPC or the agent faces."""
+    if thing.cell is None:
+        return None
+    if thing.sort != "object":
+        return step_from(thing.cell, thing.facing)
+    x, y = thing.cell
+    if not world.on_border(thing.cell):
+        return None
+    if y == 0:
+        return x, 1
+    if y == world.height - 1:
+        return x, y - 1
+    return (1, y) if x == 0 else (x - 1, y)
