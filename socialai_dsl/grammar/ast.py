@@ -93,6 +93,12 @@ class Call(Node):
     subject: Expr | None = None
     name_at: int = 0
 
+    def children(self) -> Iterator[Expr]:
+        """The subject, then the arguments: source order."""
+        if self.subject is not None:
+            yield self.subject
+        yield from self.args
+
 
 @dataclass(frozen=True, slots=True)
 class Quantifier(Node):
