@@ -35,7 +35,7 @@ def shape(node: ast.Expr | str) -> object:
         ("a in b | c", ("Member", "a", ("Alternatives", "b", "c"))),
         ("exit.color == red", ("==", ("color", "exit"), "red")),
         ("next_to(exit)", ("next_to", "exit")),
-        ("agent.would_see(c, left)", ("would_see", "c", "left", "agent")),
+        ("agent.would_see(c, left)", ("would_see", "agent", "c", "left")),
         (
             "pick(n in A | B where n != x.name)",
             ("pick", ("Alternatives", "A", "B"), ("!=", "n", ("name", "x"))),
@@ -43,9 +43,9 @@ def shape(node: ast.Expr | str) -> object:
         ("nearest(d in doors to me)", ("nearest", "doors", "me")),
         (
             "anywhere where not here.in_front_of(doors)",
-            ("Placed", "anywhere", ("Not", ("in_front_of", "doors", "here"))),
+            ("Placed", "anywhere", ("Not", ("in_front_of", "here", "doors"))),
         ),
-        ('agent.said("Here is <wanted>")', ("said", ["Here is ", "wanted"], "agent")),
+        ('agent.said("Here is <wanted>")', ("said", "agent", ["Here is ", "wanted"])),
         ("pick(doors).color", ("color", ("pick", "doors"))),
         ("-$n", ("Negative", "n")),
         ("a\n  and b", ("and", "a", "b")),
