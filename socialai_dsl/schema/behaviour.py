@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field
 
 from socialai_dsl.schema.base import Expression, Expressions, Model, TextLine, Texts, Word, _as_tuple
 
-SlotType = Literal["text", "utterance", "object", "npc", "cell", "direction", "color", "int", "bool", "noun"]
+SlotType = Literal["text", "utterance", "object", "npc", "direction", "color", "int", "bool", "noun"]
 
 
 class Effects(Model):

@@ -21,3 +21,6 @@ class Positions(Protocol):
 
     def key_span(self, path: DataPath) -> Span:
         """The place of the key at `path`; of the value, for an item of a list."""
+
+    def in_flow(self, path: DataPath) -> bool:
+        """Whether the part at `path` stands inside { } or [ ]."""

@@ -1,0 +1,94 @@
+"""The prelude: object types and utterance grammars that every scenario can use."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field
+
+from socialai_dsl.loader import read_document
+from socialai_dsl.schema import UtteranceGrammar
+from socialai_dsl.schema.base import Model, Word
+from socialai_dsl.semantics.entities import Prelude
+from socialai_dsl.semantics.terms import ObjectType
+
+_FOLDER = Path(__file__).parent / "prelude"
+
+Statuses = Annotated[tuple[Word, ...], BeforeValidator(lambda v: tuple(v) if isinstance(v, list) else v)]
+Channels = Annotated[tuple[int, int], BeforeValidator(lambda v: tuple(v) if isinstance(v, list) else v)]
+
+
+class ObjectTypeModel(Model):
+    """An object type as it is written in a library.
+
+    Attributes:
+        code: its number in the type channel of the view.
+        states: its statuses; the first is the initial one unless `initial` says otherwise.
+        walkable, transparent: statuses in which it can be entered, seen through.
+        toggled: status -> the status that a toggle makes of it.
+        deadly: entering it ends the episode.
+        shown: status -> what the status and orientation channels show.
+        color: where a scenario gives none; default random.
+    """
+
+    code: int = Field(ge=0, le=255)
+    states: Statuses = Field(min_length=1)
+    initial: Word | None = None
+    walkable: Statuses = ()
+    transparent: Statuses = ()
+    toggled: dict[Word, Word] = Field(default_factory=dict)
+    deadly: bool = False
+    shown: dict[Word, Channels] = Field(default_factory=dict)
+    color: Word = "random"
+
+    def compiled(self, name: str) -> ObjectType:
+        """The type with statuses as numbers."""
+        number = self.states.index
+        return ObjectType(
+            name=name,
+            code=self.code,
+            states=self.states,
+            initial=number(self.initial) if self.initial else 0,
+            walkable=frozenset(map(number, self.walkable)),
+            transparent=frozenset(map(number, self.transparent)),
+            toggled={number(before): number(after) for before, after in self.toggled.items()},
+            deadly=self.deadly,
+            shown={number(status): channels for status, channels in self.shown.items()},
+        )
+
+
+class ObjectLibrary(Model):
+    """A file of object types."""
+
+    library: Literal["objects"]
+    types: dict[Word, ObjectTypeModel]
+
+
+class GrammarLibrary(Model):
+    """A file of utterance grammars."""
+
+    library: Literal["grammars"]
+    grammars: dict[Word, UtteranceGrammar]
+
+
+@cache
+def prelude() -> Prelude:
+    """The object types that come with the language."""
+    library = ObjectLibrary.model_validate(read_document(_FOLDER / "objects.yaml").data)
+    return Prelude(
+        {name: model.compiled(name) for name, model in library.types.items()},
+        {name: model.color for name, model in library.types.items()},
+    )
+
+
+@cache
+def shared_grammars() -> dict[str, object]:
+    """The grammars that a scenario can name, as plain data."""
+    document = read_document(_FOLDER / "grammars.yaml")
+    GrammarLibrary.model_validate(document.data)
+    assert isinstance(document.data, dict), "internal: a library is a mapping"
+    grammars = document.data["grammars"]
+    assert isinstance(grammars, dict), "internal: a library has its model"
+    return dict(grammars)

@@ -1,0 +1,125 @@
+"""Parameters of a file: their values, and `$name` put in where it stands for a whole value."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
+from socialai_dsl.loader import Data, DataPath, Resolved
+from socialai_dsl.loader.scalars import read_plain
+
+Value = int | bool | float | str
+
+_WHOLE = re.compile(r"\$([A-Za-z_]\w*)")
+
+
+@dataclass(frozen=True)
+class Substituted:
+    """A document with its parameters put in.
+
+    Attributes:
+        data: a copy in which every value that was `$name` is the parameter's value.
+        values: parameter -> value, for those inside expressions.
+        paths: where a whole value was a parameter.
+    """
+
+    data: Mapping[str, object]
+    values: dict[str, Value] = field(default_factory=dict)
+    paths: frozenset[DataPath] = frozenset()
+
+
+def substitute(resolved: Resolved, bag: DiagnosticBag) -> Substituted:
+    """Put the parameters in: defaults, or what was given behind `?`. Reports S206."""
+    assert isinstance(resolved.data, dict), "internal: a file is a mapping"
+    values = _values(resolved, bag)
+    substitution = _Substitution(values, resolved, bag)
+    data = {key: part if key == "params" else substitution.of(part, (key,)) for key, part in resolved.data.items()}
+    return Substituted(data, values, frozenset(substitution.paths))
+
+
+def _values(resolved: Resolved, bag: DiagnosticBag) -> dict[str, Value]:
+    assert isinstance(resolved.data, dict), "internal: a file is a mapping"
+    declared = resolved.data.get("params")
+    declared = declared if isinstance(declared, dict) else {}
+    values: dict[str, Value] = {}
+    for name, declaration in declared.items():
+        default = declaration.get("default") if isinstance(declaration, dict) else declaration
+        choices = declaration.get("values") if isinstance(declaration, dict) else None
+        given = resolved.params.get(name)
+        if given is not None:
+            default = _given(name, given, default, choices, resolved, bag)
+        elif isinstance(choices, dict):
+            if str(default) not in choices:
+                near = did_you_mean(str(default), choices)
+                span = resolved.value_span(("params", name, "default"))
+                bag.error("S206", f"the default of `{name}` is none of its values", span, suggestion=near)
+            default = choices.get(str(default))
+        if isinstance(default, int | bool | float | str):
+            values[name] = default
+    for name in resolved.params:
+        if name not in declared:
+            near = did_you_mean(name, declared)
+            hint = None if near else "it has " + ", ".join(declared) if declared else "it has none"
+            message = f"`{resolved.name}` has no parameter `{name}`"
+            bag.error("S206", message, resolved.param_span(name), suggestion=near, hint=hint)
+    return values
+
+
+def _given(name: str, text: str, default: Data, choices: Data, resolved: Resolved, bag: DiagnosticBag) -> Data:
+    """The value that was asked for, read as YAML would read it."""
+    span = resolved.param_span(name)
+    if isinstance(choices, dict):
+        if text not in choices:
+            near = did_you_mean(text, choices)
+            hint = "one of " + ", ".join(choices)
+            bag.error("S206", f"`{text}` is none of the values of `{name}`", span, suggestion=near, hint=hint)
+        return choices.get(text)
+    value = read_plain(text).value
+    if isinstance(choices, list) and (value not in choices or isinstance(value, bool) != _any_bool(choices)):
+        hint = "one of " + ", ".join(map(str, choices))
+        bag.error("S206", f"`{text}` is none of the values of `{name}`", span, hint=hint)
+    elif choices is None and not _alike(value, default):
+        bag.error("S206", f"`{text}` is not of the kind of the default of `{name}`, `{default}`", span)
+    return value
+
+
+def _any_bool(choices: list[Data]) -> bool:
+    return any(isinstance(choice, bool) for choice in choices)
+
+
+def _alike(value: Data, default: Data) -> bool:
+    if isinstance(value, bool) or isinstance(default, bool):
+        return isinstance(value, bool) and isinstance(default, bool)
+    if isinstance(value, int | float) or isinstance(default, int | float):
+        return isinstance(value, int | float) and isinstance(default, int | float)
+    return isinstance(value, str)
+
+
+class _Substitution:
+    """Replaces whole values, and remembers where."""
+
+    def __init__(self, values: Mapping[str, Value], resolved: Resolved, bag: DiagnosticBag) -> None:
+        self._values = values
+        self._resolved = resolved
+        self._bag = bag
+        self.paths: list[DataPath] = []
+
+    def of(self, part: Data, path: DataPath) -> Data:
+        """A part with its parameters put in."""
+        if isinstance(part, dict):
+            return {key: self.of(value, (*path, key)) for key, value in part.items()}
+        if isinstance(part, list):
+            return [self.of(value, (*path, i)) for i, value in enumerate(part)]
+        match = _WHOLE.fullmatch(part) if isinstance(part, str) else None
+        if match is None:
+            return part
+        name = match.group(1)
+        if name not in self._values:
+            near = did_you_mean(name, self._values)
+            span = self._resolved.locate(path, 0, len(name) + 1)
+            self._bag.error("S206", f"unknown parameter `{name}`", span, suggestion=near)
+            return part
+        self.paths.append(path)
+        return self._values[name]

@@ -1,0 +1,257 @@
+"""Frames as their members play them: every rule and step with its values resolved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.grammar import ast
+from socialai_dsl.schema import FirstRule, Frame, Rule, State, Step, ThenRule
+from socialai_dsl.schema.behaviour import Effects
+from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics.activities import activity, effect
+from socialai_dsl.semantics.build import all_of, any_of
+from socialai_dsl.semantics.findings import FailedError, dotted, surviving
+from socialai_dsl.semantics.scope import Draws, PlayedFrame, Scope
+from socialai_dsl.semantics.terms import (
+    BOOL,
+    Activity,
+    Const,
+    Effect,
+    FramePlan,
+    Heard,
+    Line,
+    Pattern,
+    RulePlan,
+    Sited,
+    StatePlan,
+    StepPlan,
+    Term,
+    Type,
+)
+
+if TYPE_CHECKING:
+    from socialai_dsl.semantics.resolve import Resolver
+
+_INT = Type("int", 0, 0)
+_FOR_EVER = -1
+_ENDLESS = frozenset({"face", "stay", "choose"})
+"""Activities that never end by themselves."""
+
+
+@dataclass(frozen=True)
+class Spoken:
+    """The `say:` of a frame, by the path of the rule or step."""
+
+    lines: dict[DataPath, Line] = field(default_factory=dict)
+
+
+def say_paths(frame: Frame, name: str) -> Iterator[tuple[DataPath, str, Effects]]:
+    """Every rule and step of a frame in reading order: its path, its address and itself."""
+    base: DataPath = ("frames", name)
+    for state_name, state in (frame.states or {}).items():
+        for part, rules in (("first", state.first), ("then", state.then)):
+            for i, rule in enumerate(rules):
+                path = (*base, "states", state_name, part, i)
+                address = dotted(path[:-1]) + f"[{rule.id or i}]"
+                yield path, address, rule
+    for i, step in enumerate(frame.steps or ()):
+        path = (*base, "steps", i)
+        yield path, dotted(path[:-1]) + f"[{step.state or i}]", step
+
+
+def lines_of(resolver: Resolver, played: PlayedFrame) -> Spoken:
+    """What a member says in its frame; resolved first, so that others can hear it."""
+    spoken = Spoken()
+    for path, address, entry in say_paths(played.model, played.name):
+        if entry.say is not None:
+            with surviving():
+                scope = _scope(played, (*path, "say"), f"{address}.say")
+                spoken.lines[path] = resolver.utterances.line((*path, "say"), entry.say, scope)
+    return spoken
+
+
+def _scope(played: PlayedFrame, path: DataPath, address: str) -> Scope:
+    return Scope(path, Draws(f"{played.member}/{address}"), member=played.member, frame=played)
+
+
+def plan(resolver: Resolver, played: PlayedFrame, spoken: Spoken) -> FramePlan:
+    """The whole frame of one member."""
+    frame = played.model
+    span = resolver.findings.places.key_span(played.path)
+    addresses = {path: address for path, address, _ in say_paths(frame, played.name)}
+    planner = _Planner(resolver, played, spoken, addresses)
+    states = tuple(planner.state(name, state) for name, state in (frame.states or {}).items())
+    steps = tuple(planner.step(i, step) for i, step in enumerate(frame.steps or ()))
+    start = (frame.start or next(iter(frame.states), "")) if frame.states else ""
+    return FramePlan(played.member, played.name, played.number, span, start, states, steps)
+
+
+@dataclass(frozen=True)
+class _Planner:
+    """Makes the plans of one frame as one member plays it."""
+
+    resolver: Resolver
+    played: PlayedFrame
+    spoken: Spoken
+    addresses: dict[DataPath, str]
+
+    def state(self, name: str, state: State) -> StatePlan:
+        path = (*self.played.path, "states", name)
+        first = self._rules(state.first, (*path, "first"), name)
+        doing = self._activity((*path, "do"), state.do, dotted(path))
+        then = self._rules(state.then, (*path, "then"), name)
+        return StatePlan(name, first, doing, then, self.resolver.findings.places.key_span(path))
+
+    def _rules(self, rules: Sequence[ThenRule], path: DataPath, state: str) -> tuple[RulePlan, ...]:
+        plans = []
+        for i, rule in enumerate(rules):
+            with surviving():
+                plans.append(self._rule(rule, (*path, i), f"{state}.{path[-1]}[{i}]"))
+        return tuple(plans)
+
+    def _rule(self, rule: ThenRule, path: DataPath, place: str) -> RulePlan:
+        address = self.addresses[path]
+        hears, heard = self._hears(rule, path, address)
+        when = self._condition((*path, "when"), rule.when, address)
+        if heard is not None:
+            term = heard if when is None else all_of([heard, when.term])
+            span = self.resolver.findings.at((*path, "hears"))
+            when = Sited(term, f"{self.played.member}/{address}.when", when.span if when else span)
+        do = rule.do if isinstance(rule, FirstRule) else None
+        return RulePlan(
+            name=rule.id or f"{self.played.member}.{self.played.name}.{place}",
+            site=f"{self.played.member}/{address}",
+            span=self.resolver.findings.places.value_span(path),
+            hears=hears,
+            when=when,
+            after=rule.after or 0,
+            chance=rule.chance,
+            once=rule.once,
+            do=self._activity((*path, "do"), do, address) if do is not None else None,
+            sets=self._sets(rule, path, address),
+            causes=self._causes(rule, path, address),
+            say=self.spoken.lines.get(path),
+            goto=self._target(rule.goto, (*path, "goto")),
+            goto_now=self._target(rule.goto_now, (*path, "goto_now")),
+        )
+
+    def _hears(self, rule: Rule, path: DataPath, address: str) -> tuple[tuple[Pattern, ...], Term | None]:
+        """The patterns of `hears:`; if values in them have to be compared, a condition instead."""
+        if not rule.hears:
+            return (), None
+        found: list[tuple[Pattern, Term | None]] = []
+        resolver = self.resolver
+        single = not self.resolver.findings.is_list((*path, "hears"))
+        for i, raw in enumerate(rule.hears):
+            place: DataPath = (*path, "hears") if single else (*path, "hears", i)
+            with surviving():
+                text = resolver.findings.text(place, raw)
+                scope = _scope(self.played, place, f"{address}.hears")
+                found += resolver.utterances.patterns(text, scope, resolver.findings.at(place), True)
+        if all(condition is None for _, condition in found):
+            return tuple(pattern for pattern, _ in found), None
+        return (), any_of(all_of([Heard((p,)), *([c] if c is not None else [])]) for p, c in found)
+
+    def _condition(self, path: DataPath, raw: object, address: str) -> Sited | None:
+        if raw is None:
+            return None
+        scope = _scope(self.played, path, f"{address}.{path[-1]}")
+        with surviving():
+            term = self.resolver.written(path, raw, BOOL, scope)  # type: ignore[arg-type]
+            return Sited(term, scope.draws.site, self.resolver.findings.at(path))
+        return None
+
+    def _activity(self, path: DataPath, raw: str | None, address: str) -> Activity:
+        scope = _scope(self.played, path, f"{address}.do")
+        with surviving():
+            return activity(self.resolver, path, raw, scope)
+        return Activity("stay", (), scope.draws.site, self.resolver.findings.at(path))
+
+    def _sets(self, entry: Effects, path: DataPath, address: str) -> tuple[tuple[str, Sited], ...]:
+        made = []
+        for name, raw in entry.set.items():
+            place = (*path, "set", name)
+            with surviving():
+                made.append((f"{self.played.member}.{name}", self._set(name, raw, place, f"{address}.set.{name}")))
+        return tuple(made)
+
+    def _set(self, name: str, raw: object, path: DataPath, address: str) -> Sited:
+        resolver, frame = self.resolver, self.played.model
+        if name not in frame.let:
+            self._no_register(name, path)
+        register = resolver.registers.read(f"{self.played.member}.{name}")
+        scope = _scope(self.played, path, address)
+        expected = _INT if register.type.kind == "int" and not register.type.words else register.type
+        term = resolver.written(path, raw, expected, scope)  # type: ignore[arg-type]
+        resolver.registers.widen(f"{self.played.member}.{name}", term.type)
+        return Sited(term, scope.draws.site, resolver.findings.at(path))
+
+    def _no_register(self, name: str, path: DataPath) -> None:
+        findings, symbols = self.resolver.findings, self.resolver.symbols
+        span = findings.places.key_span(path)
+        if name in symbols.scenario.let or name in self.played.model.slots:
+            what = "is a slot" if name in self.played.model.slots else "is drawn once per episode"
+            hint = "only what the frame declares in its own `let` can be set"
+            findings.fail("S305", f"`{name}` {what} and cannot be set", span, hint=hint)
+        near = did_you_mean(name, self.played.model.let)
+        hint = None if near else f"declare it: `let: {{{name}: 0}}` in the frame"
+        findings.fail("S305", f"`{name}` is not declared in this frame's `let`", span, suggestion=near, hint=hint)
+
+    def _causes(self, entry: Effects, path: DataPath, address: str) -> tuple[Effect, ...]:
+        made = []
+        single = not self.resolver.findings.is_list((*path, "cause"))
+        for i, raw in enumerate(entry.cause):
+            place: DataPath = (*path, "cause") if single else (*path, "cause", i)
+            with surviving():
+                made.append(effect(self.resolver, place, raw, _scope(self.played, place, f"{address}.cause[{i}]")))
+        return tuple(made)
+
+    def _target(self, target: str | None, path: DataPath) -> str | None:
+        states = self.played.model.states or {}
+        if target is not None and target not in states:
+            findings = self.resolver.findings
+            near = did_you_mean(target, states)
+            message = f"no state `{target}` in frame `{self.played.name}`"
+            hint = None if near else "its states are " + ", ".join(states)
+            findings.error("S301", message, findings.at(path, 0, len(target)), suggestion=near, hint=hint)
+        return target
+
+    def step(self, index: int, step: Step) -> StepPlan:
+        path = (*self.played.path, "steps", index)
+        address = self.addresses[path]
+        doing = self._activity((*path, "do"), step.do, address)
+        duration = self._duration((*path, "for"), step.for_)
+        if step.do is not None and step.until is None and step.for_ is None and doing.name in _ENDLESS:
+            findings = self.resolver.findings
+            message = f"`{step.do}` never ends by itself: add `until:` or `for:`"
+            findings.error("S304", message, findings.at((*path, "do"), 0, len(step.do)))
+        return StepPlan(
+            name=f"{self.played.member}.{self.played.name}.steps[{index}]",
+            state=step.state,
+            activity=doing,
+            span=self.resolver.findings.places.value_span(path),
+            until=self._condition((*path, "until"), step.until, address),
+            duration=duration,
+            sets=self._sets(step, path, address),
+            causes=self._causes(step, path, address),
+            say=self.spoken.lines.get(path),
+        )
+
+    def _duration(self, path: DataPath, raw: object) -> int | None:
+        if raw is None:
+            return None
+        if raw == "ever":
+            return _FOR_EVER
+        findings = self.resolver.findings
+        try:
+            term = self.resolver.written(path, raw, _INT, _scope(self.played, path, dotted(path)))  # type: ignore[arg-type]
+        except FailedError:
+            return None
+        if not isinstance(term, Const) or not 0 <= term.value <= self.resolver.symbols.scenario.horizon:
+            message = "`for` is a known number of steps within the horizon, or `ever`"
+            findings.error("S106", message, findings.at(path))
+            return None
+        return term.value

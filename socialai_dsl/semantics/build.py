@@ -1,0 +1,133 @@
+"""Small constructors of terms, simplifying where the result is plain."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from socialai_dsl.semantics import terms
+from socialai_dsl.semantics.terms import BOOL, Compare, Const, Logic, Operation, Term, Type
+
+TRUE = Const(BOOL, 1)
+FALSE = Const(BOOL, 0)
+
+
+def integer(low: int, high: int | None = None) -> Type:
+    """The numbers from low to high."""
+    return Type("int", low, low if high is None else high)
+
+
+def number(value: int) -> Const:
+    """A known number."""
+    return Const(integer(value), value)
+
+
+def any_of(conditions: Iterable[Term]) -> Term:
+    """Whether one of them holds."""
+    return _joined("or", FALSE, TRUE, conditions)
+
+
+def all_of(conditions: Iterable[Term]) -> Term:
+    """Whether each of them holds."""
+    return _joined("and", TRUE, FALSE, conditions)
+
+
+def _joined(op: Any, neutral: Const, final: Const, conditions: Iterable[Term]) -> Term:
+    kept: list[Term] = []
+    for condition in conditions:
+        if condition == neutral:
+            continue
+        if condition == final and not kept:
+            return final
+        kept += condition.args if isinstance(condition, Logic) and condition.op == op else [condition]
+    if not kept:
+        return neutral
+    return kept[0] if len(kept) == 1 else Logic(op, tuple(kept))
+
+
+def between(term: Term, low: Term, high: Term) -> Term:
+    """low <= term <= high."""
+    return all_of([Compare("<=", low, term), Compare("<=", term, high)])
+
+
+def one_of(term: Term, values: Sequence[Const]) -> Term:
+    """Whether a term is one of some known values of its type."""
+    numbers = sorted({v.value for v in values})
+    if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
+        return between(term, Const(term.type, numbers[0]), Const(term.type, numbers[-1]))
+    return any_of(Compare("==", term, value) for value in values)
+
+
+def arithmetic(op: Any, *args: Term) -> Term:
+    """An operation on numbers with the range of its result; known values are computed."""
+    if all(isinstance(arg, Const) for arg in args):
+        return number(_compute(op, *(arg.value for arg in args if isinstance(arg, Const))))
+    return Operation(_range(op, *(arg.type for arg in args)), op, args)
+
+
+def _compute(op: str, *values: int) -> int:
+    a, b = values[0], values[-1]
+    match op:
+        case "+":
+            return a + b
+        case "-":
+            return a - b
+        case "*":
+            return a * b
+        case "//":
+            return a // b
+        case "%":
+            return a % b
+        case "min":
+            return min(values)
+        case "max":
+            return max(values)
+        case "abs":
+            return abs(a)
+        case "neg":
+            return -a
+    raise AssertionError(f"internal: unknown operation {op}")
+
+
+def _range(op: str, *types: Type) -> Type:
+    a, b = types[0], types[-1]
+    if op == "%":
+        low, high = (0, b.high - 1) if b.low > 0 else (b.low + 1, 0)
+        return integer(low, high)
+    if op == "abs":
+        return integer(0 if a.low <= 0 <= a.high else min(abs(a.low), abs(a.high)), max(abs(a.low), abs(a.high)))
+    if op == "//":
+        divisors = [d for d in (b.low, b.high, -1, 1) if b.low <= d <= b.high and d != 0]
+        results = [n // d for n in (a.low, a.high) for d in divisors]
+    elif op == "neg":
+        results = [-a.low, -a.high]
+    else:
+        results = [_compute(op, x, y) for x in (a.low, a.high) for y in (b.low, b.high)]
+    return integer(min(results), max(results))
+
+
+def walk(term: Any) -> Iterator[Term]:
+    """All terms in a term, a plan or a tuple of them, depth first."""
+    if isinstance(term, tuple | list):
+        for part in term:
+            yield from walk(part)
+    elif isinstance(term, _TERMS):
+        yield term
+        yield from _parts(term)
+    elif is_dataclass(term) and not isinstance(term, Type | terms.ObjectType | type):
+        yield from _parts(term)
+
+
+def _parts(value: Any) -> Iterator[Term]:
+    for field in fields(value):
+        part = getattr(value, field.name)
+        if not isinstance(part, str | int | Type):
+            yield from walk(part)
+
+
+_TERMS: tuple[type, ...] = (
+    terms.Const, terms.Read, terms.World, terms.FieldOf, terms.Here, terms.Variable, terms.Operation, terms.Measure,
+    terms.Compare, terms.Logic, terms.Not, terms.Test, terms.PokedNow, terms.Said, terms.Spoke, terms.Heard,
+    terms.InState, terms.Quantified,
+)  # fmt: skip

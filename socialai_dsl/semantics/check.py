@@ -1,0 +1,189 @@
+"""A scenario and its positions to a checked scenario: all mistakes of meaning, found in one go."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from socialai_dsl.diagnostics import DiagnosticBag
+from socialai_dsl.schema import PRIMITIVES, Scenario
+from socialai_dsl.schema.positions import DataPath, Positions
+from socialai_dsl.semantics import behaviour, checks, entities, setup
+from socialai_dsl.semantics.entities import AGENT, Prelude
+from socialai_dsl.semantics.findings import Findings, Scalar, surviving
+from socialai_dsl.semantics.ranges import Ranges
+from socialai_dsl.semantics.resolve import Resolver
+from socialai_dsl.semantics.room import room_plan, room_sizes
+from socialai_dsl.semantics.scope import PlayedFrame, at_every_step, reset_scope
+from socialai_dsl.semantics.terms import BOOL, Checked, FramePlan, Line, OutcomePlan, Sited, Type
+from socialai_dsl.semantics.utterances import MAX_TEXTS, number_of_texts, texts_of
+from socialai_dsl.semantics.vocabulary import words_in_order
+
+_MAX_ROUNDS = 12
+
+
+def check_meaning(
+    scenario: Scenario,
+    name: str,
+    places: Positions,
+    bag: DiagnosticBag,
+    prelude: Prelude,
+    data: object,
+    params: Mapping[str, Scalar] | None = None,
+    substituted: frozenset[DataPath] = frozenset(),
+) -> Checked | None:
+    """What a scenario means; None if something is wrong with it, which `bag` then says.
+
+    Types that follow from uses (`pick(left | right)`, registers that are set) are found by resolving again with
+    what the uses asked for, until nothing changes.
+
+    Args:
+        scenario: the models. name: what the result is called.
+        places: where the parts of the file stand. data: the document the models were made from.
+        prelude: object types. params: the values of the file's parameters.
+        substituted: paths of values that were a parameter as a whole.
+    """
+    words: dict[str, Type] = {}
+    ranges = Ranges(scenario)
+    for _ in range(_MAX_ROUNDS):
+        found = DiagnosticBag()
+        findings = Findings(found, places, params or {}, substituted, data)
+        run = _Run(scenario, findings, prelude, words, ranges.now)
+        checked = run.checked(name)
+        registers = run.resolver.registers
+        settled = registers.words == words
+        words = registers.words
+        if found.has_errors or (ranges.settled(registers.ranges) and settled):
+            break
+    for path in ranges.unbounded:
+        run.report_growth(path)
+    bag.extend(found)
+    return None if found.has_errors else checked
+
+
+@dataclass(frozen=True)
+class _Spoken:
+    """What the members say: by member, the frame it plays and its lines."""
+
+    frames: dict[str, behaviour.Spoken]
+
+    def lines(self, members: Mapping[str, object]) -> dict[str, list[Line]]:
+        """Member -> its lines in the order of its frame."""
+        return {name: list(self.frames[name].lines.values()) for name in members if name in self.frames}
+
+
+class _Run:
+    """One resolution of a whole scenario."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        findings: Findings,
+        prelude: Prelude,
+        words: Mapping[str, Type],
+        ranges: Mapping[str, Type],
+    ) -> None:
+        self._scenario = scenario
+        self._findings = findings
+        sizes = room_sizes(scenario, findings)
+        self._symbols = entities.symbols_of(scenario, prelude, sizes, findings)
+        self._played = entities.played_frames(self._symbols, findings)
+        self.resolver = Resolver(self._symbols, findings, self._played, words, ranges)
+
+    def checked(self, name: str) -> Checked | None:
+        """The checked scenario; None if it cannot be put together."""
+        scenario, resolver, findings = self._scenario, self.resolver, self._findings
+        entities.declare_registers(resolver)
+        checks.check_flow(scenario, findings)
+        spoken = self._spoken()
+        outcomes = tuple(self._outcomes())
+        plans = tuple(self._plans(spoken))
+        self._look_at_unused()
+        placed = setup.placings(resolver)
+        colors, turned = list(setup.colorings(resolver)), list(setup.facings(resolver))
+        drawn = resolver.registers.drawn()
+        in_order = setup.ordered(resolver, placed, colors, turned, drawn)
+        room = room_plan(resolver)
+        if findings.bag.has_errors:
+            return None
+        for plan in plans:
+            checks.check_shadowed(plan, findings)
+        inhabitants = tuple(entities.entities_of(resolver, placed))
+        if findings.bag.has_errors:
+            return None
+        names = [resolver.registers.read(f"{member}.name") for member in self._symbols.cast]
+        words = words_in_order(scenario.grammar, names, spoken.lines(self._symbols.cast))
+        return Checked(
+            name=name,
+            horizon=scenario.horizon,
+            actions=tuple(action for action in PRIMITIVES if action in scenario.actions),
+            templates=scenario.grammar.templates,
+            nouns=tuple(str(noun) for noun in scenario.grammar.nouns),
+            room=room,
+            entities=inhabitants,
+            setup=in_order,
+            frames=plans,
+            outcomes=outcomes,
+            words_in_order=words,
+            npcs_hidden=scenario.observe.npcs == "hidden",
+            picture_before_npcs=scenario.observe.image == "before_npcs",
+            names_shown=scenario.observe.names == "shown",
+            own_voice=scenario.observe.own_voice,
+        )
+
+    def _spoken(self) -> _Spoken:
+        """What everybody says, before what anybody hears."""
+        found = {member: behaviour.lines_of(self.resolver, played) for member, played in self._played.items()}
+        for member, spoken in found.items():
+            for line in spoken.lines.values():
+                if number_of_texts(line) > MAX_TEXTS:
+                    message = f"this can be {number_of_texts(line)} different texts; at most {MAX_TEXTS} are possible"
+                    self._findings.error("S212", message, line.span)
+                elif member != AGENT:
+                    self.resolver.npc_texts |= dict.fromkeys(texts_of(line))
+        return _Spoken(found)
+
+    def _plans(self, spoken: _Spoken) -> Iterator[FramePlan]:
+        # Members act in the order of their entities: the agent, then the cast as written.
+        for member in sorted(self._played, key=self._symbols.numbers.__getitem__):
+            yield behaviour.plan(self.resolver, self._played[member], spoken.frames[member])
+
+    def _look_at_unused(self) -> None:
+        """Frames that nobody plays are checked as if somebody did, so that no mistake waits for its first use."""
+        played = {frame.name for frame in self._played.values()}
+        npc = next((name for name in self._symbols.cast if name != AGENT), AGENT)
+        for name in self._scenario.frames:
+            if name not in played:
+                frame = entities.played_frame(self._symbols, self._findings, npc, name, {})
+                self._look_at(frame)
+
+    def _look_at(self, frame: PlayedFrame) -> None:
+        behaviour.plan(self.resolver, frame, behaviour.lines_of(self.resolver, frame))
+
+    def _outcomes(self) -> Iterator[OutcomePlan]:
+        findings = self._findings
+        for i, outcome in enumerate(self._scenario.outcome):
+            given = [key for key in ("success", "failure") if getattr(outcome, key) is not None]
+            path: DataPath = ("outcome", i)
+            if len(given) != 1:
+                code, what = ("S107", "has only one of") if given else ("S105", "needs")
+                message = f"an outcome {what} `success` and `failure`" if given else "an outcome needs `success` or `failure`"
+                findings.error(code, message, findings.places.value_span(path))
+                continue
+            kind = given[0]
+            span = findings.at((*path, kind))
+            scope = reset_scope((*path, kind))
+            with surviving():
+                raw = getattr(outcome, kind)
+                term = self.resolver.written((*path, kind), raw, BOOL, at_every_step(scope))
+                line = findings.places.key_span((*path, kind)).line
+                condition = Sited(term, scope.draws.site, span)
+                yield OutcomePlan(outcome.id or f"{kind}@{line}", kind == "success", outcome.reward, condition)
+
+    def report_growth(self, path: str) -> None:
+        """A register whose range has no end."""
+        member, name = path.split(".")
+        frame = self._played[member].name
+        span = self._findings.places.key_span(("frames", frame, "let", name))
+        hint = f"bound it: `set: {{{name}: min({name} * 2, 100)}}`"
+        self._findings.error("S106", f"`{name}` can grow without end", span, hint=hint)

@@ -1,0 +1,159 @@
+"""What can be wrong with a frame as a whole: its flow of states and steps, and rules that never fire."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.schema import Frame, Scenario, State
+from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics.build import walk
+from socialai_dsl.semantics.findings import Findings
+from socialai_dsl.semantics.terms import FramePlan, Logic, Quantified, RulePlan, Term
+
+
+def check_flow(scenario: Scenario, findings: Findings) -> None:
+    """Frames that have no form, states that do not exist or are never entered, circles within a step."""
+    for name, frame in scenario.frames.items():
+        path: DataPath = ("frames", name)
+        if _has_form(name, frame, path, findings):
+            if frame.states is not None:
+                _check_states(name, frame, frame.states, path, findings)
+            else:
+                _check_steps(frame, path, findings)
+
+
+def _has_form(name: str, frame: Frame, path: DataPath, findings: Findings) -> bool:
+    if frame.states is not None and frame.steps is not None:
+        span = findings.places.key_span((*path, "steps"))
+        hint = "use `steps` for what happens in a row, `states` for what branches"
+        findings.error("S308", "a frame has either `steps` or `states`", span, hint=hint)
+    elif not frame.states and not frame.steps:
+        findings.error("S105", f"frame `{name}` needs `steps` or `states`", findings.places.key_span(path))
+    elif frame.steps is not None and frame.start is not None:
+        span = findings.places.key_span((*path, "start"))
+        findings.error("S107", "`start` belongs to `states`; `steps` begin with the first", span)
+    else:
+        return True
+    return False
+
+
+def _check_states(name: str, frame: Frame, states: dict[str, State], path: DataPath, findings: Findings) -> None:
+    if frame.start is not None and frame.start not in states:
+        near = did_you_mean(frame.start, states)
+        span = findings.at((*path, "start"), 0, len(frame.start))
+        findings.error("S301", f"no state `{frame.start}` in frame `{name}`", span, suggestion=near)
+        return
+    targets = {state: _targets(body) for state, body in states.items()}
+    if any(target not in states for found in targets.values() for target in found):
+        return  # reported where it is written; which states are entered cannot be known
+    entered = _reachable(frame.start or next(iter(states)), targets)
+    for state in states:
+        if state not in entered:
+            span = findings.places.key_span((*path, "states", state))
+            findings.warning("W306", f"state `{state}` can never be entered", span, hint="no `goto` leads to it")
+    _check_circles(states, path, findings)
+
+
+def _targets(state: State) -> list[str]:
+    rules = (*state.first, *state.then)
+    return [target for rule in rules for target in (rule.goto, rule.goto_now) if target is not None]
+
+
+def _reachable(start: str, targets: dict[str, list[str]]) -> set[str]:
+    entered, waiting = {start}, [start]
+    while waiting:
+        for target in targets[waiting.pop()]:
+            if target not in entered:
+                entered.add(target)
+                waiting.append(target)
+    return entered
+
+
+def _check_circles(states: dict[str, State], path: DataPath, findings: Findings) -> None:
+    """`goto_now` reads the next state's `then` in the same step; it must come to an end."""
+    edges = {state: [rule.goto_now for rule in body.then if rule.goto_now] for state, body in states.items()}
+    reported: set[str] = set()
+    for state in states:
+        circle = _circle_from(state, edges, [])
+        if circle and not reported & set(circle):
+            reported |= set(circle)
+            index = next(i for i, rule in enumerate(states[circle[0]].then) if rule.goto_now == circle[1])
+            span = findings.at((*path, "states", circle[0], "then", index, "goto_now"), 0, len(circle[1]))
+            message = f"would go round within one step: {' -> '.join(circle)}"
+            findings.error("S312", message, span, hint="write `goto` where the next step may come first")
+
+
+def _circle_from(state: str, edges: dict[str, list[str]], trail: list[str]) -> list[str]:
+    if state in trail:
+        return [*trail[trail.index(state) :], state]
+    for target in edges[state]:
+        circle = _circle_from(target, edges, [*trail, state])
+        if circle:
+            return circle
+    return []
+
+
+def _check_steps(frame: Frame, path: DataPath, findings: Findings) -> None:
+    steps = frame.steps or ()
+    names: dict[str, int] = {}
+    for i, step in enumerate(steps):
+        if step.state is not None and step.state in names:
+            span = findings.at((*path, "steps", i, "state"), 0, len(step.state))
+            findings.error("S213", f"`{step.state}` is the name of step {names[step.state]} already", span)
+        if step.state is not None:
+            names.setdefault(step.state, i)
+        if step.for_ == "ever" and step.until is None and i + 1 < len(steps):
+            span = findings.places.value_span((*path, "steps", i + 1))
+            hint = "the step before it lasts for ever"
+            findings.warning("W306", "this step is never reached", span, hint=hint)
+            return
+
+
+def check_shadowed(plan: FramePlan, findings: Findings) -> None:
+    """Rules that never fire because one above them holds whenever they do."""
+    for state in plan.states:
+        _check_rules(state.first, findings)
+        _check_rules(state.then, findings)
+
+
+def _check_rules(rules: Sequence[RulePlan], findings: Findings) -> None:
+    for i, rule in enumerate(rules):
+        above = next((other for other in rules[:i] if _covers(other, rule)), None)
+        if above is not None:
+            message = f"this rule never fires: line {above.span.line} holds whenever it does"
+            findings.warning("W311", message, rule.span, hint="the first rule that holds is the only one that fires")
+
+
+def _covers(above: RulePlan, below: RulePlan) -> bool:
+    """Whether `above` certainly holds whenever `below` does."""
+    if above.once or above.chance is not None or above.after > below.after:
+        return False
+    return _hears_all(above, below) and _asks_less(above, below)
+
+
+def _hears_all(above: RulePlan, below: RulePlan) -> bool:
+    if not above.hears:
+        return True
+    if not below.hears:
+        return False
+    pairs = frozenset().union(*(p.pairs for p in above.hears))
+    texts = frozenset().union(*(p.said_by_npcs for p in above.hears))
+    return all(p.pairs <= pairs and p.said_by_npcs <= texts for p in below.hears)
+
+
+def _asks_less(above: RulePlan, below: RulePlan) -> bool:
+    if above.when is None:
+        return True
+    if below.when is None or _draws(above.when.term):
+        return False
+    return set(_conjuncts(above.when.term)) <= set(_conjuncts(below.when.term))
+
+
+def _conjuncts(term: Term) -> tuple[Term, ...]:
+    return term.args if isinstance(term, Logic) and term.op == "and" else (term,)
+
+
+def _draws(term: Term) -> bool:
+    return any(isinstance(part, Quantified) and part.op == "pick" for part in walk(term))
+

@@ -1,0 +1,176 @@
+"""Reporting mistakes at their place, and parsing the strings of a scenario file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any, NoReturn
+
+from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
+from socialai_dsl.grammar import ParseProblem, ast, parse_expression, parse_text
+from socialai_dsl.schema.positions import DataPath, Positions
+from socialai_dsl.source import Span
+
+Scalar = int | bool | float | str
+
+
+class FailedError(Exception):
+    """A value that means nothing; the reason has been reported."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Where findings go, and where the parts of the file stand.
+
+    Attributes:
+        bag: takes the findings.
+        places: path -> place in the file.
+        params: the file's parameters with their values, for `$name`.
+        substituted: paths whose whole value was a parameter; places inside them mean nothing.
+        data: the document, to tell one value from a list of one.
+    """
+
+    bag: DiagnosticBag
+    places: Positions
+    params: Mapping[str, Scalar] = field(default_factory=dict)
+    substituted: frozenset[DataPath] = frozenset()
+    data: object = None
+
+    def is_list(self, path: DataPath) -> bool:
+        """Whether a list is written at `path`."""
+        part: Any = self.data
+        for step in path:
+            if not isinstance(part, dict | list) or (isinstance(part, dict) and step not in part):
+                return False
+            part = part[step]
+        return isinstance(part, list)
+
+    def at(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
+        """The place of a character of the text at `path`."""
+        return self.places.locate(path, 0 if path in self.substituted else offset, width)
+
+    def node(self, path: DataPath, node: ast.Expr) -> Span:
+        """The place of a part of the expression at `path`."""
+        return self.at(path, *_extent(node))
+
+    def error(self, code: str, message: str, span: Span, **more: str | None) -> None:
+        """Report an error."""
+        self.bag.error(code, message, span, **more)
+
+    def warning(self, code: str, message: str, span: Span, **more: str | None) -> None:
+        """Report a warning."""
+        self.bag.warning(code, message, span, **more)
+
+    def fail(self, code: str, message: str, span: Span, **more: str | None) -> NoReturn:
+        """Report an error and give up the value it is in."""
+        self.bag.error(code, message, span, **more)
+        raise FailedError
+
+    def expression(self, path: DataPath, raw: Scalar) -> ast.Expr:
+        """The tree of the expression at `path`, its parameters replaced by their values."""
+        if isinstance(raw, bool):
+            return ast.Truth(raw)
+        if isinstance(raw, float):
+            self.fail("S204", f"`{raw:g}` is not a whole number", self.at(path))
+        if isinstance(raw, int):
+            return ast.Number(raw) if raw >= 0 else ast.Negative(ast.Number(-raw))
+        try:
+            return self._filled(parse_expression(raw), path)
+        except ParseProblem as problem:
+            self._problem(problem, path)
+
+    def text(self, path: DataPath, raw: str) -> ast.Text:
+        """The tree of the text at `path`, its parameters replaced by their values."""
+        try:
+            filled = self._filled(parse_text(raw), path)
+        except ParseProblem as problem:
+            self._problem(problem, path)
+        assert isinstance(filled, ast.Text), "internal: a text became something else"
+        return filled
+
+    def _problem(self, problem: ParseProblem, path: DataPath) -> NoReturn:
+        code = "S212" if problem.code == "S004" else problem.code
+        self.fail(code, str(problem), self.at(path, problem.offset), hint=problem.hint)
+
+    def _filled(self, tree: ast.Expr, path: DataPath) -> ast.Expr:
+        if not any(isinstance(node, ast.Parameter) for node in tree.walk()):
+            return tree
+        return self._replaced(tree, path)
+
+    def _replaced(self, node: ast.Expr, path: DataPath) -> ast.Expr:
+        if isinstance(node, ast.Parameter):
+            return self._parameter(node, path)
+        changes: dict[str, Any] = {}
+        for name in node.__dataclass_fields__:
+            value = getattr(node, name)
+            if isinstance(value, ast.Node):
+                changes[name] = self._replaced(value, path)  # type: ignore[arg-type]
+            elif isinstance(value, tuple):
+                changes[name] = tuple(
+                    self._replaced(item, path) if isinstance(item, ast.Node) else item  # type: ignore[arg-type]
+                    for item in value
+                )
+        return replace(node, **changes) if changes else node
+
+    def _parameter(self, node: ast.Parameter, path: DataPath) -> ast.Expr:
+        span = self.at(path, node.at, len(node.id) + 1)
+        if node.id not in self.params:
+            self.fail("S206", f"unknown parameter `{node.id}`", span, suggestion=did_you_mean(node.id, self.params))
+        value = self.params[node.id]
+        if isinstance(value, str):
+            try:
+                return _placed_at(parse_expression(value), node.at)
+            except ParseProblem as problem:
+                self.fail("S206", f"the value `{value}` of `{node.id}` is not an expression: {problem}", span)
+        if isinstance(value, float):
+            self.fail("S204", f"the parameter `{node.id}` is {value:g}, not a whole number", span)
+        return _placed_at(self.expression((), value), node.at)
+
+
+def _extent(node: ast.Expr) -> tuple[int, int]:
+    """Offset and width of what a caret should mark."""
+    match node:
+        case ast.Name(id=word):
+            return node.at, len(word)
+        case ast.Attribute(name=word) | ast.Call(name=word):
+            return node.name_at, len(word)
+        case ast.Parameter(id=word):
+            return node.at, len(word) + 1
+        case ast.Number(value=value):
+            return node.at, len(str(value))
+        case _:
+            return node.at, 1
+
+
+def _placed_at(node: ast.Expr, at: int) -> ast.Expr:
+    changes: dict[str, Any] = {}
+    for name in node.__dataclass_fields__:
+        value = getattr(node, name)
+        if name in ("at", "name_at"):
+            changes[name] = at
+        elif isinstance(value, ast.Node):
+            changes[name] = _placed_at(value, at)  # type: ignore[arg-type]
+        elif isinstance(value, tuple):
+            changes[name] = tuple(
+                _placed_at(item, at) if isinstance(item, ast.Node) else item  # type: ignore[arg-type]
+                for item in value
+            )
+    return replace(node, **changes)
+
+
+@contextmanager
+def surviving() -> Iterator[None]:
+    """Go on after a value that failed; its reason has been reported."""
+    try:
+        yield
+    except FailedError:
+        pass
+
+
+def dotted(path: DataPath) -> str:
+    """`("outcome", 0, "success")` as `outcome[0].success`."""
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text

@@ -1,0 +1,156 @@
+"""Registers: what is drawn or computed once at reset, each resolved when somebody first asks for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics import resolve_names
+from socialai_dsl.semantics.findings import FailedError, Scalar
+from socialai_dsl.semantics.scope import Scope
+from socialai_dsl.semantics.terms import Const, Drawn, Read, Sited, Term, Type
+from socialai_dsl.semantics.wording import described
+from socialai_dsl.source import Span
+
+if TYPE_CHECKING:
+    from socialai_dsl.semantics.resolve import Resolver
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """A register before it is resolved.
+
+    Attributes:
+        path: its name, `let.exit` or `wizard.goal`. label: how messages call it.
+        source, raw: the expression and where it stands. scope: what its names mean.
+        expected: its type, if its declaration says it.
+        constant: a known value needs no register.
+    """
+
+    path: str
+    label: str
+    source: DataPath
+    raw: Scalar
+    scope: Scope
+    expected: Type | None = None
+    constant: bool = False
+
+
+class Registers:
+    """All registers of a scenario.
+
+    Attributes:
+        words: types that uses settled for registers whose value is bare words, such as `pick(left | right)`.
+        ranges: for registers that are set, the range they were found to need.
+    """
+
+    def __init__(self, resolver: Resolver, words: Mapping[str, Type], ranges: Mapping[str, Type]) -> None:
+        self._resolver = resolver
+        self._declared: dict[str, Declaration] = {}
+        self._terms: dict[str, Term | None] = {}
+        self._drawn: dict[str, Drawn] = {}
+        self._busy: list[str] = []
+        self._settled: dict[str, tuple[Type, Span]] = {}
+        self.words = dict(words)
+        self._given_ranges = dict(ranges)
+        self.ranges: dict[str, Type] = {}
+
+    def declare(self, declaration: Declaration) -> None:
+        """Make a register known; it is resolved later."""
+        self._declared[declaration.path] = declaration
+
+    def known(self, path: str, value: Const) -> None:
+        """A register that is a known value."""
+        self._terms[path] = value
+
+    def __contains__(self, path: str) -> bool:
+        return path in self._declared or path in self._terms
+
+    def drawn(self) -> list[Drawn]:
+        """All registers that are not constants, in the order declared; those nobody asked for are resolved now."""
+        for path in self._declared:
+            try:
+                self.read(path)
+            except FailedError:
+                continue
+        return [self._drawn[path] for path in self._declared if path in self._drawn]
+
+    def read(self, path: str, expected: Type | None = None, span: Span | None = None) -> Term:
+        """The register (or its constant) as a term; `expected` and `span` are those of the use."""
+        if path in self._busy:
+            self._circle(path)
+        declaration = self._declared.get(path)
+        if declaration is not None and expected is not None and span is not None and self.is_wordy(path):
+            self._settle(declaration, expected, span)
+        if path not in self._terms:
+            assert declaration is not None, f"internal: no register {path}"
+            self._resolve(declaration)
+        term = self._terms[path]
+        if term is None:
+            raise FailedError
+        return term
+
+    def is_wordy(self, path: str) -> bool:
+        """Whether a register's value consists of bare words, so that its type depends on its uses."""
+        declaration = self._declared.get(path)
+        if declaration is None or declaration.expected is not None or not isinstance(declaration.raw, str):
+            return False
+        try:
+            node = self._resolver.findings.expression(declaration.source, declaration.raw)
+        except FailedError:
+            return False
+        return resolve_names.is_wordy(self._resolver, node, declaration.scope)
+
+    def _settle(self, declaration: Declaration, expected: Type, span: Span) -> None:
+        settled = self._settled.setdefault(declaration.path, (expected, span))
+        if (settled[0].kind, settled[0].words) != (expected.kind, expected.words):
+            first, place = settled
+            self._resolver.findings.fail(
+                "S209",
+                f"`{declaration.label}` is used as {described(expected)} here, but as {described(first)} before",
+                span,
+                hint=f"the other use is at line {place.line}, column {place.column}",
+            )
+        self.words[declaration.path] = expected
+
+    def widen(self, path: str, type_: Type) -> None:
+        """Make room in a register for the values it is set to."""
+        if type_.kind == "int" and not type_.words:
+            own = self.ranges.get(path) or self._drawn[path].value.term.type
+            self.ranges[path] = _union(own, type_)
+
+    def _resolve(self, declaration: Declaration) -> None:
+        path = declaration.path
+        self._terms[path] = None
+        self._busy.append(path)
+        try:
+            expected = declaration.expected or self.words.get(path)
+            term = self._resolver.written(declaration.source, declaration.raw, expected, declaration.scope)
+        finally:
+            self._busy.pop()
+        if declaration.constant and isinstance(term, Const):
+            self._terms[path] = term
+            return
+        widened = term.type
+        if path in self._given_ranges and widened.kind == "int" and not widened.words:
+            widened = _union(widened, self._given_ranges[path])
+        findings = self._resolver.findings
+        sited = Sited(term, declaration.scope.draws.site, findings.at(declaration.source))
+        self._terms[path] = Read(widened, path)
+        self._drawn[path] = Drawn(path, widened, sited)
+
+    def _circle(self, path: str) -> None:
+        circle = [self._declared[p] for p in self._busy[self._busy.index(path) :]]
+        labels = [d.label for d in circle]
+        needs = " and ".join(
+            f"`{a}` needs `{b}`" if a != b else f"`{a}` needs itself"
+            for a, b in zip(labels, labels[1:] + labels[:1], strict=True)
+        )
+        findings = self._resolver.findings
+        findings.fail("S208", needs, findings.places.key_span(circle[0].source))
+
+
+def _union(a: Type, b: Type) -> Type:
+    return replace(a, low=min(a.low, b.low), high=max(a.high, b.high))

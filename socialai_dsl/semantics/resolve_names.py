@@ -1,0 +1,287 @@
+"""What a bare name, and what `subject.name`, means."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.grammar import ast
+from socialai_dsl.semantics import resolve_calls
+from socialai_dsl.semantics.scope import Define, Draws, Macro, Scope
+from socialai_dsl.semantics.signatures import ACTIVITIES, EFFECTS, PLACES, QUANTIFIERS, VALUES, WORDS
+from socialai_dsl.semantics.terms import (
+    ACTION,
+    BOOL,
+    COLOR,
+    DIRECTION,
+    SIDE,
+    TURN,
+    Const,
+    FieldOf,
+    Here,
+    Term,
+    Type,
+    World,
+)
+from socialai_dsl.semantics.wording import described
+
+if TYPE_CHECKING:
+    from socialai_dsl.semantics.resolve import Resolver
+
+_VOCABULARIES = (COLOR, DIRECTION, ACTION, TURN, SIDE)
+
+
+def entity(number: int) -> Const:
+    """One of the room's inhabitants as a known value."""
+    return Const(Type("entity", number, number), number)
+
+
+def name(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope) -> Term:
+    """The meaning of a bare name: nearest declaration first, then the words of the language."""
+    word = node.id
+    if word in scope.variables:
+        return _variable(resolver, scope.variables[word], expected, scope)
+    found = _own(resolver, node, expected, scope) or _declared(resolver, node, expected, scope)
+    if found is not None:
+        return found
+    known = _language(resolver, node, scope)
+    if known is not None:
+        return known
+    term = _word(word, expected)
+    if term is not None:
+        return term
+    if word in VALUES and not VALUES[word].takes and word not in QUANTIFIERS:
+        return resolve_calls.without_arguments(resolver, word, None, node, scope)
+    if word in _statuses(resolver) and scope.member is not None:
+        return resolve_calls.without_arguments(resolver, word, None, node, scope)
+    return _unknown(resolver, node, expected, scope)
+
+
+def _variable(resolver: Resolver, bound: Term | Macro, expected: Type | None, scope: Scope) -> Term:
+    if not isinstance(bound, Macro):
+        return bound
+    # An argument is resolved where it is used, but means what it meant to the caller.
+    inner = replace(bound.scope, draws=scope.draws, outer=scope.outer, nested=scope.nested, within=scope.within)
+    return resolver.value(bound.node, expected, inner)
+
+
+def _own(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope) -> Term | None:
+    """A slot, register or definition of the frame; `self` and `it`."""
+    word, frame = node.id, scope.frame
+    if word == "it" and scope.it is not None:
+        return scope.it
+    if word == "self" and scope.member is not None:
+        return entity(resolver.symbols.numbers[scope.member])
+    if frame is None:
+        return None
+    if word in frame.texts:
+        return _substituted(resolver, node, expected, scope)
+    if word in frame.defines:
+        return expanded(resolver, frame.defines[word], {}, node, expected, scope)
+    register = f"{frame.member}.{word}"
+    if word in frame.model.let or word in frame.model.slots:
+        return resolver.registers.read(register, expected, resolver.findings.node(scope.path, node))
+    return None
+
+
+def _substituted(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope) -> Term:
+    """A slot that is put in wherever it is used: bool ones as conditions, texts only where something is said."""
+    frame = scope.frame
+    assert frame is not None, "internal: a slot outside a frame"
+    if frame.model.slots[node.id] != "bool":
+        message = f"`{node.id}` is a text: it can be said or heard, not computed with"
+        resolver.fail("S204", message, node, scope)
+    path = frame.texts[node.id]
+    if path is None:
+        return FieldOf(BOOL, entity(frame.number), "poked")
+    inner = with_scope(resolver, frame.member, node.id, scope)
+    return resolver.written(path, resolver.symbols.cast[frame.member].with_[node.id], BOOL, inner)
+
+
+def with_scope(resolver: Resolver, member: str, slot: str, user: Scope | None) -> Scope:
+    """The scope of what fills a slot of a member's frame, where it is substituted (`user`) or computed at reset."""
+    path = resolver.symbols.with_path(member, slot)
+    draws = Draws(f"cast.{member}.with.{slot}")
+    if user is None:
+        return Scope(path, draws, member=member, at_reset=True)
+    return Scope(path, draws, member=member, at_reset=user.at_reset, outer=user.draws, nested=user.nested)
+
+
+def _declared(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope) -> Term | None:
+    """What the scenario declares under this name."""
+    symbols, word = resolver.symbols, node.id
+    if word in symbols.scenario.let:
+        return resolver.registers.read(f"let.{word}", expected, resolver.findings.node(scope.path, node))
+    if word in symbols.defines:
+        return expanded(resolver, symbols.defines[word], {}, node, expected, scope)
+    if word in symbols.numbers:
+        return entity(symbols.numbers[word])
+    if word in symbols.objects:
+        objects = symbols.objects[word]
+        if objects.single:
+            return entity(objects.numbers[0])
+        resolver.fail(
+            "S204", f"`{word}` is a group of {len(objects.numbers)}, here one of them is needed", node, scope,
+            hint=f"`pick({word})` draws one, `any(x in {word} where ...)` asks for any",
+        )  # fmt: skip
+    return None
+
+
+def _language(resolver: Resolver, node: ast.Name, scope: Scope) -> Term | None:
+    """t, W, H, and the noun that was heard."""
+    symbols = resolver.symbols
+    match node.id:
+        case "t":
+            return World(Type("int", 0, symbols.scenario.horizon), "t")
+        case "W":
+            return _size("width", symbols.width)
+        case "H":
+            return _size("height", symbols.height)
+        case "noun" if scope.frame is not None and not scope.at_reset:
+            return World(symbols.nouns, "noun")
+    return None
+
+
+def _size(which: str, sizes: tuple[int, int]) -> Term:
+    low, high = sizes
+    if low == high:
+        return Const(Type("int", low, low), low)
+    return World(Type("int", low, high), "width" if which == "width" else "height")
+
+
+def _word(word: str, expected: Type | None) -> Term | None:
+    """A word of the expected type; without expectation, of the first vocabulary that has it."""
+    if expected is not None:
+        if word in expected.words:
+            return Const(expected, expected.low + expected.words.index(word))
+        if expected.kind == "text":
+            return Const(Type("text", 0, 0, (word,)), 0)
+    for type_ in _VOCABULARIES:
+        if word in type_.words and not (word == "none" and type_ is TURN):
+            return Const(type_, type_.low + type_.words.index(word))
+    return None
+
+
+def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope) -> Term:
+    word = node.id
+    if word == "here":
+        resolver.fail("S201", "`here` is the candidate cell; it means something only in a place", node, scope)
+    if word in ACTIVITIES or word in EFFECTS or word in PLACES:
+        kind = "an activity" if word in ACTIVITIES else "an effect" if word in EFFECTS else "a place"
+        resolver.fail("S204", f"`{word}` is {kind}; here a value is expected", node, scope)
+    if word in VALUES:
+        usage = f"{word}(...)"
+        resolver.fail("S211", f"`{word}` needs something in brackets: `{usage}`", node, scope)
+    near, place = suggestion(resolver, word, expected, scope)
+    what = f"unknown name `{word}`"
+    if expected is not None and expected.words and near in expected.words:
+        what = f"`{word}` is not {described(expected)}"
+    resolver.fail("S201", what, node, scope, suggestion=near, suggestion_place=place)
+
+
+def suggestion(resolver: Resolver, word: str, expected: Type | None, scope: Scope) -> tuple[str | None, str | None]:
+    """The name that was probably meant, and where it is declared."""
+    declared = resolver.symbols.declared()
+    candidates = [*scope.variables, *declared, *(expected.words if expected else ())]
+    if scope.frame is not None:
+        frame = scope.frame
+        candidates += [*frame.model.slots, *frame.model.let, *frame.defines]
+    near = did_you_mean(word, candidates) or did_you_mean(word, [*WORDS, *VALUES])
+    if near is None or near not in declared:
+        return near, None
+    kind = declared[near]
+    section = {"object": "objects"}.get(kind, kind)
+    span = resolver.findings.places.key_span((section, near))
+    return near, f"{kind}, line {span.line}"
+
+
+def is_bare(resolver: Resolver, node: ast.Expr, scope: Scope) -> bool:
+    """Whether a value takes its type from its use: a word that names nothing, a text, a number, a wordy `let`."""
+    if isinstance(node, ast.Name):
+        register = _register_of(resolver, node, scope)
+        if register is not None:
+            return resolver.registers.is_wordy(register)
+        return not _names_something(resolver, node.id, scope)
+    return isinstance(node, ast.Text)
+
+
+def _register_of(resolver: Resolver, node: ast.Name, scope: Scope) -> str | None:
+    if node.id in scope.variables:
+        return None
+    frame = scope.frame
+    if frame is not None and f"{frame.member}.{node.id}" in resolver.registers:
+        return f"{frame.member}.{node.id}"
+    return f"let.{node.id}" if node.id in resolver.symbols.scenario.let else None
+
+
+def _names_something(resolver: Resolver, word: str, scope: Scope) -> bool:
+    frame = scope.frame
+    if word in scope.variables or word in resolver.symbols.declared() or word in ("t", "W", "H", "self", "it"):
+        return True
+    if frame is not None and (word in frame.model.slots or word in frame.model.let or word in frame.defines):
+        return True
+    in_vocabulary = any(word in type_.words for type_ in _VOCABULARIES)
+    return word in VALUES and not in_vocabulary
+
+
+def is_wordy(resolver: Resolver, node: ast.Expr, scope: Scope) -> bool:
+    """Whether an expression comes down to bare words that several vocabularies have, such as `left`."""
+    match node:
+        case ast.Name(id=word):
+            several = sum(word in type_.words for type_ in _VOCABULARIES) > 1
+            return several and is_bare(resolver, node, scope)
+        case ast.Alternatives(options=options):
+            return any(is_wordy(resolver, option, scope) for option in options)
+        case ast.Arithmetic(op="*", right=right):
+            return is_wordy(resolver, right, scope)
+        case ast.Call(name="pick", args=(only,)):
+            return is_wordy(resolver, only, scope)
+        case ast.Quantifier(name="pick" | "first", group=group):
+            return is_wordy(resolver, group, scope)
+    return False
+
+
+def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
+    """`subject.name`."""
+    if isinstance(node.subject, ast.Name):
+        owner = node.subject.id
+        if owner == "here" and node.name in ("x", "y") and scope.here:
+            low, high = (resolver.symbols.width if node.name == "x" else resolver.symbols.height)
+            return Here(Type("int", 0, high - 1), "x" if node.name == "x" else "y")
+        register = f"{owner}.{node.name}"
+        builtin = node.name in VALUES
+        if owner not in scope.variables and not builtin and register in resolver.registers:
+            return resolver.registers.read(register)
+    return resolve_calls.without_arguments(resolver, node.name, node.subject, node, scope)
+
+
+def _statuses(resolver: Resolver) -> set[str]:
+    return {state for type_ in resolver.symbols.types.values() for state in type_.states}
+
+
+def expanded(
+    resolver: Resolver, define: Define, arguments: Mapping[str, ast.Expr], node: ast.Expr, expected: Type | None, scope: Scope
+) -> Term:  # fmt: skip
+    """The value of a definition where it is used; `arguments` are resolved in the user's scope."""
+    if len(arguments) != len(define.parameters):
+        wanted = ", ".join(define.parameters)
+        resolver.fail("S211", f"`{define.name}` takes ({wanted})", node, scope)
+    if define.name in scope.within:
+        circle = [*scope.within[scope.within.index(define.name) :], define.name]
+        needs = " and ".join(f"`{a}` needs `{b}`" for a, b in _pairs(circle))
+        resolver.findings.fail("S208", needs, resolver.findings.places.key_span(define.path))
+    inner = replace(
+        scope,
+        path=define.path,
+        frame=scope.frame if define.path[0] == "frames" else None,
+        member=scope.member if define.path[0] == "frames" else None,
+        variables={parameter: Macro(argument, scope) for parameter, argument in arguments.items()},
+        within=(*scope.within, define.name),
+    )
+    return resolver.written(define.path, define.raw, expected, inner)
+
+
+def _pairs(words: list[str]) -> Iterator[tuple[str, str]]:
+    return zip(words, words[1:], strict=False)

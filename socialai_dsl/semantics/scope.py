@@ -1,0 +1,207 @@
+"""The symbol table of a scenario, and what a name can mean at one place of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from socialai_dsl.grammar import ast
+from socialai_dsl.schema import CastMember, Frame, Scenario
+from socialai_dsl.schema.base import Expression
+from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics.findings import dotted
+from socialai_dsl.semantics.terms import Const, ObjectType, Term, Type
+
+DEFINE = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\(\s*([A-Za-z_]\w*(?:\s*,\s*[A-Za-z_]\w*)*)\s*\))?\s*")
+
+
+@dataclass(frozen=True)
+class Objects:
+    """An object, or a group of them: numbers of its entities, in order."""
+
+    name: str
+    type: ObjectType
+    numbers: range
+    single: bool
+
+
+@dataclass(frozen=True)
+class Define:
+    """A definition: its parameters, and where its expression stands."""
+
+    name: str
+    parameters: tuple[str, ...]
+    raw: Expression
+    path: DataPath
+
+
+@dataclass(frozen=True)
+class Symbols:
+    """Everything a scenario declares, by name.
+
+    Attributes:
+        cast: member -> its description with defaults filled in, the agent too, in the order written.
+        numbers: member -> number of its entity.
+        objects: name -> its entities.
+        types: the object types of the prelude. default_colors: type -> its colour where none is given.
+        width, height: least and largest size of the room.
+    """
+
+    scenario: Scenario
+    cast: Mapping[str, CastMember]
+    numbers: Mapping[str, int]
+    objects: Mapping[str, Objects]
+    types: Mapping[str, ObjectType]
+    defines: Mapping[str, Define]
+    width: tuple[int, int]
+    height: tuple[int, int]
+    default_colors: Mapping[str, str]
+
+    @property
+    def entities(self) -> int:
+        """How many entities there are."""
+        return len(self.numbers) + sum(len(o.numbers) for o in self.objects.values())
+
+    @property
+    def nouns(self) -> Type:
+        """The nouns of the grammar as a type."""
+        words = tuple(str(noun) for noun in self.scenario.grammar.nouns)
+        return Type("noun", 0, len(words) - 1, words)
+
+    def object_of(self, number: int) -> Objects | None:
+        """The group an entity belongs to; None for the cast."""
+        return next((o for o in self.objects.values() if number in o.numbers), None)
+
+    def member_of(self, number: int) -> str | None:
+        """The cast member with this number; None for objects."""
+        return next((name for name, n in self.numbers.items() if n == number), None)
+
+    def member_path(self, name: str, key: str) -> DataPath:
+        """Where a key of a cast member was written: there, or in `npc_defaults`."""
+        attribute = {"with": "with_"}.get(key, key)
+        own = self.scenario.cast[name]
+        if attribute in own.model_fields_set or name == "agent":
+            return ("cast", name, key)
+        if attribute in self.scenario.npc_defaults.model_fields_set:
+            return ("npc_defaults", key)
+        return ("cast", name, key)
+
+    def with_path(self, name: str, slot: str) -> DataPath:
+        """Where the value of a member's slot was written."""
+        own = slot in self.scenario.cast[name].with_
+        return ("cast", name, "with", slot) if own else ("npc_defaults", "with", slot)
+
+    def declared(self) -> dict[str, str]:
+        """Every name of the scenario and what it is: let, object, cast, define."""
+        found = {name: "let" for name in self.scenario.let}
+        found |= {name: "define" for name in self.defines}
+        found |= {name: "object" if o.single else "objects" for name, o in self.objects.items()}
+        return found | {name: "cast" for name in self.cast}
+
+
+@dataclass(frozen=True)
+class PlayedFrame:
+    """A frame as one member plays it.
+
+    Attributes:
+        member: who; `number` is its entity.
+        name, model: the frame.
+        defines: its definitions.
+        texts: slots that are substituted wherever they are used (text, utterance, bool) -> where they are filled;
+            None if nobody fills them, as when a frame is only looked at.
+    """
+
+    member: str
+    number: int
+    name: str
+    model: Frame
+    defines: Mapping[str, Define]
+    texts: Mapping[str, DataPath | None]
+
+    @property
+    def path(self) -> DataPath:
+        """Where the frame is written."""
+        return ("frames", self.name)
+
+
+class Draws:
+    """Numbers the picks of one value, in source order; `site` names the value (see draws.py)."""
+
+    def __init__(self, site: str) -> None:
+        self.site = site
+        self._next = 0
+
+    def number(self) -> int:
+        """The next ordinal."""
+        self._next += 1
+        return self._next - 1
+
+
+@dataclass(frozen=True)
+class Macro:
+    """An argument of a definition: an expression that is resolved where it is used, in its own scope."""
+
+    node: ast.Expr
+    scope: Scope
+
+
+@dataclass(frozen=True)
+class Scope:
+    """Where an expression stands and what its names can mean there.
+
+    Attributes:
+        path: of the expression's text in the document.
+        draws: numbers its picks; `outer` is the value that this one is part of, if its site differs.
+        member: whose attribute or frame it is (`self`).
+        frame: the frame it stands in.
+        variables: variables of quantifiers, and arguments of definitions.
+        at_reset: computed once, before the first step.
+        here: it is the `where` of a place, so `here` means the candidate cell.
+        it: the entity whose attribute is being computed.
+        within: names of the definitions it stands in, to find circles. nested: how many quantifiers it stands in.
+    """
+
+    path: DataPath
+    draws: Draws
+    member: str | None = None
+    frame: PlayedFrame | None = None
+    variables: Mapping[str, Term | Macro] = field(default_factory=dict)
+    at_reset: bool = False
+    here: bool = False
+    it: Const | None = None
+    outer: Draws | None = None
+    within: tuple[str, ...] = ()
+    nested: int = 0
+
+    def at(self, path: DataPath, site: str) -> Scope:
+        """The same names for another value."""
+        return replace(self, path=path, draws=Draws(site), outer=None)
+
+    def binding(self, name: str, term: Term | Macro) -> Scope:
+        """With one more variable."""
+        return replace(self, variables={**self.variables, name: term})
+
+    @property
+    def pick_site(self) -> str:
+        """The site a pick has to name itself: empty where it is the site of the whole value."""
+        return self.draws.site if self.outer is not None else ""
+
+
+def reset_scope(path: DataPath, site: str | None = None, member: str | None = None) -> Scope:
+    """The scope of a value computed at reset."""
+    return Scope(path, Draws(site or dotted(path)), member=member, at_reset=True)
+
+
+def at_every_step(scope: Scope) -> Scope:
+    """The same names for a value that is computed anew in every step."""
+    return replace(scope, at_reset=False)
+
+
+def parse_define(key: str) -> tuple[str, tuple[str, ...]] | None:
+    """`near(a, b)` as its name and parameters; None if it is not of this form."""
+    match = DEFINE.fullmatch(key)
+    if match is None:
+        return None
+    parameters = match.group(2)
+    return match.group(1), tuple(p.strip() for p in parameters.split(",")) if parameters else ()

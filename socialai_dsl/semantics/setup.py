@@ -1,0 +1,334 @@
+"""What is drawn at reset, in the order it is done: what something needs comes before it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.grammar import ast
+from socialai_dsl.schema import CastMember, ObjectGroup
+from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics import places, resolve_groups
+from socialai_dsl.semantics.build import walk
+from socialai_dsl.semantics.findings import FailedError, surviving
+from socialai_dsl.semantics.scope import Draws, Objects, Scope, reset_scope
+from socialai_dsl.semantics.terms import (
+    COLOR,
+    DIRECTION,
+    Coloring,
+    Const,
+    Drawn,
+    Facing,
+    FieldOf,
+    Measure,
+    Placing,
+    Read,
+    Setup,
+    Sited,
+    Term,
+    Test,
+    Type,
+)
+from socialai_dsl.semantics.wording import quoted
+
+if TYPE_CHECKING:
+    from socialai_dsl.semantics.resolve import Resolver
+
+_ENTITY = Type("entity", 0, 0)
+_FACING_TESTS = frozenset({"faces", "faces_toward", "eye_contact"})
+
+
+# -- placements --------------------------------------------------------------------------------------------------
+
+
+def placings(resolver: Resolver) -> dict[int, Placing]:
+    """Entity -> where it is put."""
+    found: dict[int, Placing] = {}
+    for name, member in resolver.symbols.cast.items():
+        with surviving():
+            placing = _member_placing(resolver, name, member)
+            found[placing.entity] = placing
+    for objects in resolver.symbols.objects.values():
+        with surviving():
+            for placing in _object_placings(resolver, objects):
+                found[placing.entity] = placing
+    return found
+
+
+def _member_placing(resolver: Resolver, name: str, member: CastMember) -> Placing:
+    key = "at" if member.at is not None else "place"
+    path = resolver.symbols.member_path(name, key)
+    spot = places.Spot(resolver.symbols.numbers[name], path, f"cast.{name}.cell", 0)
+    scope = reset_scope(path, f"cast.{name}.{key}", name)
+    if member.at is not None:
+        if member.place is not None:
+            _both_places(resolver, path)
+        return places.at(resolver, spot, member.at, scope)
+    return places.place(resolver, spot, member.place or "anywhere", scope)
+
+
+def _both_places(resolver: Resolver, path: DataPath) -> None:
+    span = resolver.findings.places.key_span(path)
+    resolver.findings.fail("S107", "only one of `place` and `at` can be given", span)
+
+
+def _object_placings(resolver: Resolver, objects: Objects) -> Iterator[Placing]:
+    group = resolver.symbols.scenario.objects[objects.name]
+    base: DataPath = ("objects", objects.name)
+    count = len(objects.numbers)
+    if group.at is not None:
+        if group.place is not None:
+            _both_places(resolver, (*base, "at"))
+        nested = any(isinstance(cell, tuple) for cell in group.at)
+        cells = [cell if isinstance(cell, tuple) else (cell,) for cell in group.at] if nested else [group.at]
+        _check_length(resolver, len(cells), count, (*base, "at"))
+        for i, cell in enumerate(cells):
+            path = (*base, "at", i) if nested else (*base, "at")
+            spot = _spot(objects, i, path, count)
+            yield places.at(resolver, spot, cell, _member_scope(resolver, objects, i, path, "at"))  # type: ignore[arg-type]
+        return
+    listed = group.place or ("anywhere",)
+    single = not (group.place and resolver.findings.is_list((*base, "place")))
+    if not single:
+        _check_length(resolver, len(listed), count, (*base, "place"))
+    for i in range(count):
+        path = (*base, "place") if single else (*base, "place", i)
+        raw = listed[0 if single else i]
+        scope = _member_scope(resolver, objects, i, path, "place")
+        yield places.place(resolver, _spot(objects, i, path, count), str(raw), scope)
+
+
+def _spot(objects: Objects, index: int, path: DataPath, count: int) -> places.Spot:
+    return places.Spot(objects.numbers[index], path, f"objects.{objects.name}.cell", index, index, count)
+
+
+def _member_scope(resolver: Resolver, objects: Objects, index: int, path: DataPath, key: str) -> Scope:
+    """The scope of a value of one member of a group, which is `it`."""
+    name = objects.name if objects.single else f"{objects.name}[{index}]"
+    it = Const(Type("entity", objects.numbers[index], objects.numbers[index]), objects.numbers[index])
+    return Scope(path, Draws(f"objects.{name}.{key}"), at_reset=True, it=it)
+
+
+def _check_length(resolver: Resolver, given: int, count: int, path: DataPath) -> None:
+    if given != count:
+        message = f"{given} given for {count}: a list has one for each member of the group"
+        resolver.findings.fail("S106", message, resolver.findings.at(path))
+
+
+# -- colours and directions --------------------------------------------------------------------------------------
+
+
+def colorings(resolver: Resolver) -> Iterator[Coloring]:
+    """The colour of every entity."""
+    for name, member in resolver.symbols.cast.items():
+        with surviving():
+            path = resolver.symbols.member_path(name, "color")
+            scope = reset_scope(path, f"cast.{name}.color", name)
+            value = None if member.color is None else _color(resolver, path, member.color, scope)
+            number = resolver.symbols.numbers[name]
+            yield Coloring(number, f"cast.{name}.color", 0, resolver.findings.at(path), value)
+    for objects in resolver.symbols.objects.values():
+        with surviving():
+            yield from _object_colors(resolver, objects, resolver.symbols.scenario.objects[objects.name])
+
+
+def _color(resolver: Resolver, path: DataPath, raw: object, scope: Scope) -> Sited | None:
+    """A colour; None for a random one."""
+    if raw == "random":
+        return None
+    term = resolver.written(path, raw, COLOR, scope)  # type: ignore[arg-type]
+    return Sited(term, scope.draws.site, resolver.findings.at(path))
+
+
+def _object_colors(resolver: Resolver, objects: Objects, group: ObjectGroup) -> Iterator[Coloring]:
+    base: DataPath = ("objects", objects.name, "color")
+    site = f"objects.{objects.name}.color"
+    count = len(objects.numbers)
+    given = group.color or (resolver.symbols.default_colors.get(objects.type.name, "random"),)
+    single = not (group.color and resolver.findings.is_list(base))
+    if not single:
+        _check_length(resolver, len(given), count, base)
+    distinct = single and given[0] == "distinct"
+    if distinct and count > COLOR.size:
+        message = f"{count} distinct colours are asked for; there are {COLOR.size}"
+        resolver.findings.fail("S106", message, resolver.findings.at(base))
+    for i, number in enumerate(objects.numbers):
+        path = base if single else (*base, i)
+        raw = given[0 if single else i]
+        span = resolver.findings.at(path)
+        if distinct:
+            yield Coloring(number, site, i, span, None, tuple(objects.numbers[:i]))
+            continue
+        scope = _member_scope(resolver, objects, i, path, "color")
+        value = _of_group(resolver, path, raw, i, count, scope) or _color(resolver, path, raw, scope)
+        yield Coloring(number, site, i, span, value)
+
+
+def _of_group(
+    resolver: Resolver, path: DataPath, raw: object, index: int, count: int, scope: Scope
+) -> Sited | None:
+    """`color: doors.color` gives each member the colour of its counterpart."""
+    if not isinstance(raw, str):
+        return None
+    node = resolver.findings.expression(path, raw)
+    if not isinstance(node, ast.Attribute) or not resolve_groups.is_group(resolver, node.subject, scope):
+        return None
+    others = resolve_groups.group(resolver, node.subject, None, scope)
+    if len(others.items) != count or node.name != "color":
+        message = f"`{quoted(node)}` gives {len(others.items)} values for {count}"
+        resolver.fail("S106", message, node, scope)
+    return Sited(FieldOf(COLOR, others.items[index], "color"), scope.draws.site, resolver.findings.at(path))
+
+
+def facings(resolver: Resolver) -> Iterator[Facing]:
+    """The direction of every member of the cast."""
+    for name, member in resolver.symbols.cast.items():
+        with surviving():
+            yield _facing(resolver, name, member)
+
+
+def _facing(resolver: Resolver, name: str, member: CastMember) -> Facing:
+    path = resolver.symbols.member_path(name, "facing")
+    span, site = resolver.findings.at(path), f"cast.{name}.facing"
+    number = resolver.symbols.numbers[name]
+    if member.facing is None or member.facing == "random":
+        return Facing(number, site, span)
+    scope = reset_scope(path, site, name)
+    node = resolver.findings.expression(path, member.facing)
+    if isinstance(node, ast.Call) and node.name == "toward" and node.subject is None:
+        if len(node.args) != 1:
+            resolver.fail("S211", "`toward` takes who or what to turn to: toward(agent)", node, scope)
+        return Facing(number, site, span, toward=resolver.value(node.args[0], _ENTITY, scope))
+    term = resolver.value(node, DIRECTION, scope)
+    return Facing(number, site, span, Sited(term, scope.draws.site, span))
+
+
+# -- the order ---------------------------------------------------------------------------------------------------
+
+
+def ordered(
+    resolver: Resolver,
+    placed: Mapping[int, Placing],
+    colors: Sequence[Coloring],
+    turned: Sequence[Facing],
+    drawn: Sequence[Drawn],
+) -> tuple[Setup, ...]:
+    """Everything drawn at reset: placements in their order, what they need before them, the rest after."""
+    items: dict[str, Setup] = {}
+    for number in _placement_order(resolver):
+        if number in placed:
+            items[f"cell {number}"] = placed[number]
+    items |= {f"color {coloring.entity}": coloring for coloring in colors}
+    items |= {drawing.path: drawing for drawing in drawn}
+    items |= {f"facing {facing.entity}": facing for facing in turned}
+    return tuple(_Sorter(resolver, items).sorted())
+
+
+def _placement_order(resolver: Resolver) -> list[int]:
+    """`order:` first, then objects, NPCs, the agent."""
+    symbols = resolver.symbols
+    numbers: dict[str, Sequence[int]] = {name: o.numbers for name, o in symbols.objects.items()}
+    numbers |= {name: (n,) for name, n in symbols.numbers.items() if n}
+    numbers["agent"] = (0,)
+    first: list[str] = []
+    for i, name in enumerate(symbols.scenario.order):
+        span = resolver.findings.at(("order", i), 0, len(name))
+        if name not in numbers:
+            near = did_you_mean(name, numbers)
+            resolver.findings.error("S201", f"unknown name `{name}`", span, suggestion=near)
+        elif name in first:
+            resolver.findings.error("S106", f"`{name}` is in the order twice", span)
+        else:
+            first.append(name)
+    return [n for name in dict.fromkeys([*first, *numbers]) for n in numbers[name]]
+
+
+class _Sorter:
+    """Depth-first: an item comes after everything it needs."""
+
+    def __init__(self, resolver: Resolver, items: Mapping[str, Setup]) -> None:
+        self._resolver = resolver
+        self._items = items
+        self._done: dict[str, Setup] = {}
+        self._path: list[str] = []
+
+    def sorted(self) -> Iterator[Setup]:
+        for key in self._items:
+            with surviving():
+                self._visit(key)
+        return iter(self._done.values())
+
+    def _visit(self, key: str) -> None:
+        if key in self._done or key not in self._items:
+            return
+        if key in self._path:
+            self._circle([*self._path[self._path.index(key) :], key])
+        self._path.append(key)
+        try:
+            for need in needs(self._items[key]):
+                self._visit(need)
+        finally:
+            self._path.pop()
+        self._done[key] = self._items[key]
+
+    def _circle(self, keys: list[str]) -> None:
+        names = [self._called(key) for key in keys]
+        pairs = zip(names, names[1:], strict=False)
+        message = " and ".join(f"{a} needs {b}" for a, b in pairs)
+        item = self._items[keys[0]]
+        span = item.value.span if isinstance(item, Drawn) else item.span
+        raise self._failed(message, span)
+
+    def _failed(self, message: str, span: object) -> FailedError:
+        self._resolver.findings.error("S208", message, span)  # type: ignore[arg-type]
+        return FailedError()
+
+    def _called(self, key: str) -> str:
+        kind, _, number = key.partition(" ")
+        if not number:
+            return f"`{key.removeprefix('let.')}`"
+        symbols = self._resolver.symbols
+        objects = symbols.object_of(int(number))
+        name = objects.name if objects is not None else symbols.member_of(int(number))
+        what = {"cell": "the place", "color": "the colour", "facing": "the direction"}[kind]
+        return f"{what} of `{name}`"
+
+
+def needs(item: Setup) -> list[str]:
+    """Keys of what has to be known before an item: registers, cells, colours, directions."""
+    found: dict[str, None] = {}
+    if isinstance(item, Coloring):
+        found |= {f"color {n}": None for n in item.distinct_from}
+    if isinstance(item, Facing) and item.toward is not None:
+        found |= {f"cell {n}": None for n in (item.entity, *_numbers(item.toward))}
+    if isinstance(item, Placing):
+        for region in item.regions:
+            for term in region.args if region.name in ("next_to", "in_front_of") else ():
+                found |= {f"cell {n}": None for n in _numbers(term)}
+                if region.name == "in_front_of":
+                    found |= {f"facing {n}": None for n in _numbers(term)}
+    for term in walk(item):
+        found |= dict.fromkeys(_needs(term))
+    return list(found)
+
+
+def _needs(term: Term) -> Iterator[str]:
+    match term:
+        case Read(path=path):
+            yield path
+        case FieldOf(entity=entity, name=name):
+            kind = {"x": "cell", "y": "cell", "dir": "facing", "color": "color"}.get(name)
+            yield from (f"{kind} {n}" for n in _numbers(entity) if kind)
+        case Test(name=name, subject=subject, object=other):
+            entities = [*_numbers(other), *(_numbers(subject) if subject is not None else ())]
+            yield from (f"cell {n}" for n in entities)
+            if name in _FACING_TESTS or name == "in_front_of":
+                yield from (f"facing {n}" for n in entities)
+        case Measure(args=args):
+            yield from (f"cell {n}" for arg in args for n in _numbers(arg))
+
+
+def _numbers(term: Term) -> range:
+    """The entities that a term can stand for."""
+    return range(term.type.low, term.type.high + 1)

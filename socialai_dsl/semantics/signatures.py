@@ -1,0 +1,159 @@
+"""The instruction set: every word that does something, in one table.
+
+Adding an instruction starts here: its name, what it stands on, what it takes and gives, where it may be used. The
+table feeds the resolver, the suggestions in messages and the language reference.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+Argument = Literal[
+    "entity", "entities", "int", "direction", "turn", "utterance", "state", "status", "action", "side", "group", "actions"
+]
+Subject = Literal["entity", "member", "agent", "object", "cell", "none"]
+Use = Literal["value", "place", "activity", "effect"]
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """One instruction.
+
+    Attributes:
+        name: the word.
+        subject: what stands before the dot; in a frame it may be left out and is then the NPC itself.
+        takes: its arguments; `entities` is one or a group, of which any one suffices.
+        gives: what it is, in words.
+        use: where it may stand.
+        doc: one line for the reference.
+        momentary: it speaks of the current step, so it means nothing before the first.
+        cell: `here` may be its subject as well.
+        optional: how many of the last arguments may be left out.
+    """
+
+    name: str
+    subject: Subject
+    takes: tuple[Argument, ...]
+    gives: str
+    use: Use
+    doc: str
+    momentary: bool = False
+    cell: bool = False
+    optional: int = 0
+
+
+def _value(
+    name: str,
+    subject: Subject,
+    takes: tuple[Argument, ...],
+    gives: str,
+    doc: str,
+    *,
+    momentary: bool = False,
+    cell: bool = False,
+) -> Signature:
+    return Signature(name, subject, takes, gives, "value", doc, momentary, cell)
+
+
+SIGNATURES: Final[tuple[Signature, ...]] = (
+    # conditions between two things
+    _value("at", "entity", ("entities",), "condition", "on the same cell", cell=True),
+    _value("next_to", "entity", ("entities",), "condition", "one cell away, not diagonally; no facing needed", cell=True),
+    _value("in_front_of", "entity", ("entities",), "condition", "on the cell that x faces, or before x in its wall", cell=True),
+    _value("faces", "entity", ("entities",), "condition", "x is on the cell ahead"),
+    _value("faces_toward", "entity", ("entities",), "condition", "turned to where face(x) would end"),
+    _value("eye_contact", "entity", ("entities",), "condition", "same row or column, each turned to the other"),
+    _value("in_line", "entity", ("entities",), "condition", "same row or same column"),
+    _value("can_reach", "entity", ("entities",), "condition", "a free path to x, or next to x, exists now"),
+    # what was said and done
+    _value("said", "agent", ("utterance",), "condition", "the agent said this in this step, however far away", momentary=True),
+    _value("spoke", "agent", (), "condition", "the agent said something in this step", momentary=True),
+    _value("noun", "agent", (), "noun", "the noun of what the agent said in this step", momentary=True),
+    _value("did", "agent", ("action",), "condition", "the agent's body action in this step", momentary=True),
+    _value("action", "agent", (), "action", "the agent's body action in this step; `none` if it only spoke", momentary=True),
+    _value("heard", "member", ("utterance",), "condition", "this NPC heard it since its last turn", momentary=True),
+    _value("poked", "entity", (), "condition", "the agent toggled at it in this step", momentary=True),
+    _value("was_poked", "entity", (), "condition", "the agent has toggled at it in this episode", momentary=True),
+    _value("is", "member", ("state",), "condition", "its frame is in this state", momentary=True),
+    _value("gone", "entity", (), "condition", "it has vanished", momentary=True),
+    # attributes
+    _value("color", "entity", (), "color", "its colour"),
+    _value("facing", "entity", (), "direction", "the direction it is turned to"),
+    _value("x", "entity", (), "number", "its column, 0 at the left", cell=True),
+    _value("y", "entity", (), "number", "its row, 0 at the top", cell=True),
+    _value("name", "member", (), "text", "its name"),
+    _value("kind", "entity", (), "text", "its kind, or the object's type"),
+    _value("index", "entity", (), "number", "its place in its group, from 0"),
+    # measures
+    _value("distance", "entity", ("entity",), "number", "Manhattan distance"),
+    _value("dir_to", "entity", ("entity",), "direction", "the quadrant in which x lies"),
+    # functions
+    _value("min", "none", ("int", "int"), "number", "the smaller"),
+    _value("max", "none", ("int", "int"), "number", "the larger"),
+    _value("abs", "none", ("int",), "number", "without its sign"),
+    _value("any", "none", ("group",), "condition", "any(x in group where ...): one of them does"),
+    _value("all", "none", ("group",), "condition", "all(x in group where ...): each of them does"),
+    _value("count", "none", ("group",), "number", "count(x in group where ...): how many do"),
+    _value("first", "none", ("group",), "one of them", "first(x in group where ...): the first that does"),
+    _value("pick", "none", ("group",), "one of them", "pick(group), pick(x in group where ...): drawn at random"),
+    _value("nearest", "none", ("group",), "one of them", "nearest(x in group to y): the nearest to y"),
+    # places
+    Signature("anywhere", "none", (), "place", "place", "all free cells of the room"),
+    Signature("nowhere", "none", (), "place", "place", "not in the room"),
+    Signature("left_half", "none", (), "place", "place", "x < W // 2"),
+    Signature("right_half", "none", (), "place", "place", "x > W // 2"),
+    Signature("top_half", "none", (), "place", "place", "y < H // 2"),
+    Signature("bottom_half", "none", (), "place", "place", "y > H // 2"),
+    Signature("column", "none", ("int",), "place", "place", "the column x, without the walls"),
+    Signature("row", "none", ("int",), "place", "place", "the row y, without the walls"),
+    Signature("rect", "none", ("int", "int", "int", "int"), "place", "place", "from (x0, y0) to (x1, y1), both included"),
+    Signature("wall", "none", ("side",), "place", "place", "in this wall, not in its corners"),
+    Signature("each_wall", "none", ("int",), "place", "place", "one in each wall, n cells from its corners", optional=1),
+    # activities
+    Signature("stay", "none", (), "activity", "activity", "do nothing"),
+    Signature("left", "none", (), "activity", "activity", "a quarter turn left"),
+    Signature("right", "none", (), "activity", "activity", "a quarter turn right"),
+    Signature("forward", "none", (), "activity", "activity", "one cell ahead"),
+    Signature("toggle", "none", (), "activity", "activity", "use what is ahead"),
+    Signature("face", "none", ("entity",), "activity", "activity", "turn towards x, a quarter turn a step"),
+    Signature("turn_to", "none", ("direction",), "activity", "activity", "turn to a direction, a quarter turn a step"),
+    Signature("turn", "none", ("turn",), "activity", "activity", "a quarter turn left or right"),
+    Signature("go_to", "none", ("entity",), "activity", "activity", "walk to the cell of x"),
+    Signature("go_next_to", "none", ("entity",), "activity", "activity", "walk to a cell next to x"),
+    Signature("use", "none", ("entity",), "activity", "activity", "go next to x, face it, toggle it"),
+    Signature("enter", "none", ("entity",), "activity", "activity", "open x if it is closed, then go in"),
+    Signature("choose", "none", ("actions",), "activity", "activity", "one of the actions at random: choose(a | b | 2 * c)"),
+    Signature("wander", "none", (), "activity", "activity", "choose(forward | left | right)"),
+    # effects
+    Signature("open", "object", (), "effect", "effect", "becomes open"),
+    Signature("close", "object", (), "effect", "effect", "becomes closed"),
+    Signature("lock", "object", (), "effect", "effect", "becomes locked"),
+    Signature("unlock", "object", (), "effect", "effect", "closed, if it was locked"),
+    Signature("reset", "object", (), "effect", "effect", "back to its initial status"),
+    Signature("vanish", "entity", (), "effect", "effect", "leaves the room; it is `gone`"),
+    Signature("become", "object", ("status",), "effect", "effect", "takes this status"),
+)  # fmt: skip
+
+VALUES: Final = {s.name: s for s in SIGNATURES if s.use == "value"}
+PLACES: Final = {s.name: s for s in SIGNATURES if s.use == "place"}
+ACTIVITIES: Final = {s.name: s for s in SIGNATURES if s.use == "activity"}
+EFFECTS: Final = {s.name: s for s in SIGNATURES if s.use == "effect"}
+QUANTIFIERS: Final = frozenset({"any", "all", "count", "first", "pick", "nearest"})
+
+SYNONYMS: Final = {
+    "press": "use", "push_button": "use", "open": "use", "pick": "use", "activate": "use", "interact": "use",
+    "walk": "go_to", "walk_to": "go_to", "go": "go_to", "move_to": "go_to", "move": "go_to", "goto": "go_to",
+    "approach": "go_next_to", "come_to": "go_next_to", "look": "face", "look_at": "face", "watch": "face",
+    "gaze": "face", "wait": "stay", "nothing": "stay", "none": "stay", "idle": "stay", "random": "wander",
+    "go_through": "enter", "rotate": "turn", "exit": "enter",
+}  # fmt: skip
+"""What authors write for an activity -> what it is called here."""
+
+WORDS: Final = frozenset(
+    [s.name for s in SIGNATURES if s.name not in ("name", "kind", "index")]
+    + ["here", "it", "self", "t", "W", "H", "cells", "colors", "nouns", "toward", "random", "distinct", "ever", "finished"]
+    + ["red", "green", "blue", "purple", "yellow", "grey", "up", "down", "pickup", "drop", "done", "none"]
+    + ["top", "bottom", "and", "or", "not", "in", "where", "to", "true", "false", "speaker", "room", "agent"]
+)  # fmt: skip
+"""Words that mean something already, so that nothing an author declares may be called so."""

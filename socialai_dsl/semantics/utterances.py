@@ -1,0 +1,270 @@
+"""What the agent can say, and which of it a text in the file means."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import product
+from typing import TYPE_CHECKING
+
+from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.grammar import ast
+from socialai_dsl.schema import UtteranceGrammar
+from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics import resolve_groups
+from socialai_dsl.semantics.build import all_of, any_of
+from socialai_dsl.semantics.findings import FailedError
+from socialai_dsl.semantics.scope import Draws, Scope
+from socialai_dsl.semantics.terms import Compare, Const, Heard, Line, Pattern, Read, Said, Term, Type
+from socialai_dsl.semantics.wording import described, quoted, spoken
+from socialai_dsl.source import Span
+
+if TYPE_CHECKING:
+    from socialai_dsl.semantics.resolve import Resolver
+
+MAX_TEXTS = 4096
+"""How many different texts one line may have."""
+
+_SAYABLE = ("text", "noun", "color", "int", "status", "direction", "action")
+
+
+def normal(text: str) -> str:
+    """What counts of a text when it is matched: not its case, nor a final . ! ? or blanks."""
+    return " ".join(text.casefold().strip().rstrip(".!?").split())
+
+
+class Utterances:
+    """Everything the agent can say: each template with each noun."""
+
+    def __init__(self, resolver: Resolver, grammar: UtteranceGrammar) -> None:
+        self._resolver = resolver
+        self._grammar = grammar
+        self._pairs: dict[str, set[tuple[int, int]]] = {}
+        for t, n in product(range(len(grammar.templates)), range(len(grammar.nouns))):
+            self._pairs.setdefault(normal(grammar.utterance(t, n)), set()).add((t, n))
+
+    # -- patterns --------------------------------------------------------------------------------------------
+
+    def said(self, node: ast.Expr, scope: Scope) -> Term:
+        """Whether the agent said one of the texts at `node` in this step."""
+        return any_of(
+            all_of([Said(pattern), *([given] if given is not None else [])])
+            for text in self._texts(node, scope)
+            for pattern, given in self.patterns(text, scope, self._resolver.findings.node(scope.path, node), False)
+        )
+
+    def heard(self, node: ast.Expr, scope: Scope) -> Term:
+        """Whether the NPC whose frame it is heard one of the texts at `node` since its last turn."""
+        return any_of(
+            all_of([Heard((pattern,)), *([given] if given is not None else [])])
+            for text in self._texts(node, scope)
+            for pattern, given in self.patterns(text, scope, self._resolver.findings.node(scope.path, node), True)
+        )
+
+    def _texts(self, node: ast.Expr, scope: Scope) -> list[ast.Text]:
+        resolver = self._resolver
+        options = node.options if isinstance(node, ast.Alternatives) else (node,)
+        texts = []
+        for option in options:
+            if isinstance(option, ast.Name):
+                option = self.slot_text(option.id, scope) or option
+            if not isinstance(option, ast.Text):
+                message = f'`{quoted(option)}` is not a text; what is said is quoted: "Open sesame"'
+                resolver.fail("S211", message, option, scope)
+            texts.append(option)
+        return texts
+
+    def slot_text(self, slot: str, scope: Scope) -> ast.Text | None:
+        """The text that fills a slot of type utterance or text, with its `<...>` parts; None if it is no such slot."""
+        frame = scope.frame
+        if frame is None or frame.model.slots.get(slot) not in ("text", "utterance") or slot in scope.variables:
+            return None
+        path = frame.texts.get(slot)
+        if path is None:
+            raise FailedError  # nobody fills it, which is reported where it is left empty
+        return self._resolver.findings.text(path, str(self._resolver.symbols.cast[frame.member].with_[slot]))
+
+    def patterns(
+        self, text: ast.Text, scope: Scope, span: Span, from_npcs: bool
+    ) -> list[tuple[Pattern, Term | None]]:
+        """The utterances that a text means, each with the condition on the values in it; `<noun>` is any noun.
+
+        Reports S401 if nobody can say it and S402 if some value in it cannot be said.
+        """
+        parts = [self._spoken_part(part, scope) for part in self._spliced(text, scope)]
+        found: list[tuple[Pattern, Term | None]] = []
+        unsayable: list[tuple[str, str]] = []
+        for choice in product(*(self._choices(part) for part in parts)):
+            said = "".join(word for word, _ in choice)
+            pairs = self._match(said)
+            by_npcs = frozenset(t for t in self._resolver.npc_texts if from_npcs and normal(t) == normal(said))
+            conditions = [condition for _, condition in choice if condition is not None]
+            if pairs or by_npcs:
+                found.append((Pattern(pairs, said, by_npcs), all_of(conditions) if conditions else None))
+            else:
+                unsayable.append((said, next((word for word, c in choice if c is not None), "")))
+        if unsayable:
+            self._report_unsayable(unsayable, parts, bool(found), span, from_npcs)
+        return found
+
+    def _spliced(self, text: ast.Text, scope: Scope) -> Iterator[str | ast.Expr]:
+        """The parts of a text, with texts that fill slots put in their place."""
+        for part in text.parts:
+            slot = self.slot_text(part.id, scope) if isinstance(part, ast.Name) else None
+            if slot is None:
+                yield part
+            else:
+                yield from slot.parts
+
+    def _spoken_part(self, part: str | ast.Expr, scope: Scope) -> str | None | Term:
+        """A piece of text, a value in it, or None for any noun."""
+        if isinstance(part, str):
+            return part
+        if isinstance(part, ast.Name) and part.id == "noun" and "noun" not in scope.variables:
+            return None
+        return sayable(self._resolver, part, scope)
+
+    def _choices(self, part: str | None | Term) -> list[tuple[str, Term | None]]:
+        if isinstance(part, str):
+            return [(part, None)]
+        if part is None:
+            return [("<noun>", None)]
+        if isinstance(part, Const):
+            return [(spoken(part.type, part.value), None)]
+        values = range(part.type.low, part.type.high + 1)
+        return [(spoken(part.type, v), Compare("==", part, Const(part.type, v))) for v in values]
+
+    def _match(self, said: str) -> frozenset[tuple[int, int]]:
+        if "<noun>" not in said:
+            return frozenset(self._pairs.get(normal(said), ()))
+        nouns = [str(noun) for noun in self._grammar.nouns]
+        return frozenset(pair for n in nouns for pair in self._pairs.get(normal(said.replace("<noun>", n)), ()))
+
+    def _report_unsayable(
+        self, unsayable: list[tuple[str, str]], parts: list[str | None | Term], some: bool, span: Span, from_npcs: bool
+    ) -> None:
+        findings = self._resolver.findings
+        said, word = unsayable[0]
+        value = next((p for p in parts if isinstance(p, Term) and not isinstance(p, Const)), None)
+        if value is not None and some:
+            name = f"`{value.path.rsplit('.', 1)[-1]}`" if isinstance(value, Read) else "the value in it"
+            message = f'{name} can be {word}, but "{said}" cannot be said with this grammar'
+            report = findings.error if isinstance(value, Read) else findings.warning
+            report("S402", message, span, hint="add what is missing to the nouns, or narrow what is drawn")
+            return
+        near = did_you_mean(said, [*self.all_texts(), *(self._resolver.npc_texts if from_npcs else ())])
+        findings.fail(
+            "S401",
+            f'nobody can say "{said}" with this grammar',
+            span,
+            suggestion=f'"{near}"' if near else None,
+            hint=None if near else "what can be said is a template of `grammar` with one of its nouns",
+        )
+
+    def all_texts(self) -> Iterator[str]:
+        """Every utterance as text."""
+        for t, n in product(range(len(self._grammar.templates)), range(len(self._grammar.nouns))):
+            yield self._grammar.utterance(t, n)
+
+    # -- lines -----------------------------------------------------------------------------------------------
+
+    def line(self, path: DataPath, raw: str, scope: Scope) -> Line:
+        """What a `say:` says: pieces and values. The agent can only say what its grammar has."""
+        findings = self._resolver.findings
+        text = findings.text(path, raw)
+        span = findings.at(path)
+        if len(text.parts) == 1 and isinstance(text.parts[0], ast.Name):
+            slot = self.slot_text(text.parts[0].id, scope)
+            if slot is not None:
+                # All of it is the slot's value, so its picks are drawn at the slot's site.
+                text, scope = slot, replace(self._slot_scope(text.parts[0].id, scope), outer=None)
+        line = Line(tuple(_merged(self._parts(text, scope))), scope.draws.site, span)
+        if scope.member == "agent":
+            return self._agents(line)
+        return line
+
+    def _parts(self, text: ast.Text, scope: Scope) -> Iterator[str | Term]:
+        for part in text.parts:
+            if isinstance(part, str):
+                yield part
+                continue
+            slot = self.slot_text(part.id, scope) if isinstance(part, ast.Name) else None
+            if slot is not None and isinstance(part, ast.Name) and scope.frame is not None:
+                yield from self._parts(slot, self._slot_scope(part.id, scope))
+                continue
+            term = sayable(self._resolver, part, scope)
+            yield spoken(term.type, term.value) if isinstance(term, Const) else term
+
+    def _slot_scope(self, slot: str, scope: Scope) -> Scope:
+        frame = scope.frame
+        assert frame is not None, "internal: a slot outside a frame"
+        path = frame.texts[slot]
+        assert path is not None, "internal: a slot without a value"
+        return Scope(path, Draws(f"cast.{frame.member}.with.{slot}"), member=frame.member, outer=scope.draws)
+
+    def _agents(self, line: Line) -> Line:
+        """The line in the grammar's own spelling."""
+        findings = self._resolver.findings
+        spelled: dict[str, str] = {normal(text): text for text in self.all_texts()}
+        for said in texts_of(line):
+            if normal(said) not in spelled:
+                near = did_you_mean(said, spelled.values())
+                message = f'the agent cannot say "{said}" with this grammar'
+                findings.fail("S401", message, line.span, suggestion=f'"{near}"' if near else None)
+        if len(line.parts) == 1 and isinstance(line.parts[0], str):
+            return Line((spelled[normal(line.parts[0])],), line.site, line.span)
+        return line
+
+
+def sayable(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
+    """A value inside a text: something that words stand for."""
+    if isinstance(node, ast.Compare | ast.Logic | ast.Not | ast.Member):
+        message = f"`{quoted(node)}` is a condition; only a value can be said"
+        resolver.fail("S402", message, node, scope)
+    if resolve_groups.is_group(resolver, node, scope):
+        message = f"`{quoted(node)}` is a group; `pick({quoted(node)})` says one of them"
+        resolver.fail("S402", message, node, scope)
+    term = resolver.value(node, None, scope)
+    if term.type.kind not in _SAYABLE:
+        what = described(term.type)
+        hint = f"say its colour or name: <{quoted(node)}.color>" if term.type.kind == "entity" else None
+        resolver.fail("S402", f"`{quoted(node)}` is {what}, which cannot be said", node, scope, hint=hint)
+    return term
+
+
+def texts_of(line: Line) -> list[str]:
+    """Every text that a line can be, in the order of its values; at most MAX_TEXTS."""
+    choices = [[part] if isinstance(part, str) else _words(part.type) for part in line.parts]
+    texts: list[str] = []
+    for words in product(*choices):
+        if len(texts) == MAX_TEXTS:
+            break
+        texts.append("".join(words))
+    return texts
+
+
+def number_of_texts(line: Line) -> int:
+    """How many texts a line can be."""
+    count = 1
+    for part in line.parts:
+        count *= 1 if isinstance(part, str) else part.type.size
+    return count
+
+
+def _words(type_: Type) -> list[str]:
+    return [spoken(type_, value) for value in range(type_.low, type_.high + 1)]
+
+
+def _merged(parts: Iterator[str | Term]) -> Iterator[str | Term]:
+    """The same with neighbouring pieces of text joined."""
+    text = ""
+    for part in parts:
+        if isinstance(part, str):
+            text += part
+            continue
+        if text:
+            yield text
+        text = ""
+        yield part
+    if text:
+        yield text
