@@ -80,6 +80,10 @@ class Positions(ABC):
         node = document.node(there)
         return node.key or node.value
 
+    def in_flow(self, path: DataPath) -> bool:
+        """Whether the part at `path` stands inside { } or [ ]."""
+        return self.node_span(path).flow
+
     def node_span(self, path: DataPath) -> NodeSpan:
         """All that is known about the place of the part at `path`."""
         document, there = self.find(path)
