@@ -348,7 +348,7 @@ def _status(resolver: Resolver, status: str, who: Term, node: ast.Expr, scope: S
 
 def status_of(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> FieldOf:
     """The status of one object, or of one of several objects of the same type."""
-    found = {resolver.symbols.object_of(n) for n in range(who.type.low, who.type.high + 1)}
+    found = [resolver.symbols.object_of(n) for n in range(who.type.low, who.type.high + 1)]
     types = {objects.type.name: objects.type for objects in found if objects is not None}
     if None in found or len(types) != 1:
         message = f"{described(who.type)} of different types has no common status" if types else "only objects have a status"
