@@ -131,6 +131,7 @@ class Session:
             detail = ", ".join(f"{name}: {old[name]} -> {new[name]}" for name in changed)
             raise CheckpointError(f"a run resumes only with the same settings; changed: {detail}")
 
+    @torch.no_grad()
     def _load_adam(self, checkpoint: Checkpoint) -> None:
         stored = checkpoint.part("adam")
         state: dict[int, dict[str, Tensor]] = {}
@@ -138,9 +139,13 @@ class Session:
             if not stored:
                 break
             values = {key: stored[f"{key}.{name}"] for key in _ADAM}
-            if any(values[key].shape != parameter.shape for key in _ADAM[1:]):
+            if values["step"].ndim or any(values[key].shape != parameter.shape for key in _ADAM[1:]):
                 raise ValueError(f"optimiser state of {name} has another shape")
-            state[index] = values
+            # Fused Adam walks all of them in the order they lie in memory, so they must lie like the parameter.
+            state[index] = {
+                key: value if key == "step" else torch.empty_like(parameter).copy_(value)
+                for key, value in values.items()
+            }
         self.optimizer.load_state_dict(
             {"state": state, "param_groups": self.optimizer.state_dict()["param_groups"]}
         )

@@ -13,7 +13,7 @@ import torch
 
 from trainer import checkpoint as checkpoints
 from trainer.config import TrainConfig
-from trainer.errors import ObservationError, TrainingStopped
+from trainer.errors import CheckpointError, ObservationError, TrainingStopped
 from trainer.metrics import MetricsLog, episode_metrics
 from trainer.ppo import update
 from trainer.rollout import collect
@@ -72,14 +72,17 @@ def train(
         session = Session.start(config, envs)
         folder = run_dir / CHECKPOINTS
         if resume:
+            if not folder.is_dir():
+                raise CheckpointError(f"{run_dir}: nothing to resume, there are no checkpoints")
             session.load(checkpoints.read(folder))
         with _explained(session, folder):
             run_dir.mkdir(parents=True, exist_ok=True)
             log = MetricsLog(run_dir, session.update, config.tensorboard)
-            with contextlib.closing(log):
-                if not resume:
-                    checkpoints.write(folder, session.checkpoint())
-                _loop(session, folder, log, progress)
+            if not resume:
+                checkpoints.write(folder, session.checkpoint())
+        with contextlib.closing(log):
+            _loop(session, folder, log, progress)
+        with _explained(session, folder):
             return checkpoints.write(folder, session.checkpoint())
 
 
@@ -90,22 +93,19 @@ def _loop(
     session.actor.net.train()
     counted, then = envs.counters(), began
     while session.update < config.updates:
-        rollout = collect(session.actor, envs, session.state, config, session.generator, session.bonus)
-        losses = update(session.actor, session.optimizer, rollout, config, session.generator)
-        session.update += 1
-        before, counted = counted, envs.counters()
-        before_time, then = then, time.perf_counter()
-        speed = config.frames_per_update / (then - before_time)
-        row = {
-            "frames": session.frames,
-            "frames_per_second": round(speed, 1),
-            **losses,
-            "bonus": rollout.bonus,
-        }
-        log.write(session.update, row | episode_metrics(rollout.tally, before, counted))
-        if session.update % config.checkpoint_every == 0 and session.update < config.updates:
-            log.sync()
-            checkpoints.write(folder, session.checkpoint())
+        with _explained(session, folder):
+            rollout = collect(session.actor, envs, session.state, config, session.generator, session.bonus)
+            losses = update(session.actor, session.optimizer, rollout, config, session.generator)
+            session.update += 1
+            before, counted = counted, envs.counters()
+            before_time, then = then, time.perf_counter()
+            speed = config.frames_per_update / (then - before_time)
+            row = {"frames": session.frames, "frames_per_second": round(speed, 1), **losses}
+            row |= {"bonus": rollout.bonus, **episode_metrics(rollout.tally, before, counted)}
+            log.write(session.update, row)
+            if session.update % config.checkpoint_every == 0 and session.update < config.updates:
+                log.sync()
+                checkpoints.write(folder, session.checkpoint())
         if progress is not None:
             left = (config.updates - session.update) * (then - began) / (session.update - first)
             success = rollout.tally.successes / rollout.tally.episodes if rollout.tally.episodes else None

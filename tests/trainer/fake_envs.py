@@ -121,8 +121,7 @@ class EchoEnvs(gym.vector.VectorEnv):
         if self.poison == "image":
             observation["image"][0, 0, 0, 0] = 99
         if self.poison == "tokens":
-            observation["tokens"] = observation["tokens"].copy()
-            observation["tokens"][0, 0] = 999
+            self._tokens[:, 0] = observation["tokens"][:, 0] = 999
         return observation, reward.astype(np.float64), terminated, truncated, infos
 
     def _say(self, which, words, last, kind):

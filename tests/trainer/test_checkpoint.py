@@ -1,0 +1,274 @@
+"""Checkpoints survive what may happen to files, and refuse what is not theirs without running any of it."""
+
+import hashlib
+import json
+import pickle
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import safetensors.torch
+import torch
+
+from tests.trainer.fake_envs import EchoEnvs
+from trainer import checkpoint as checkpoints
+from trainer.checkpoint import Checkpoint, read, restore_net, write
+from trainer.errors import CheckpointError
+from trainer.ppo import update
+from trainer.rollout import collect
+from trainer.session import Session, net_spec
+
+
+@pytest.fixture
+def session(small_config: Any) -> Session:
+    session = Session.start(small_config(explo="lang"), EchoEnvs(8))
+    rollout = collect(
+        session.actor, session.envs, session.state, session.config, session.generator, session.bonus
+    )
+    update(session.actor, session.optimizer, rollout, session.config, session.generator)
+    session.update = 1
+    return session
+
+
+def restored(path: Path, envs: Any) -> Any:
+    return restore_net(read(path), net_spec(envs), list(envs.program.vocabulary))
+
+
+def test_reading_gives_back_what_was_written(session: Session, tmp_path: Path) -> None:
+    written = session.checkpoint()
+    loaded = read(write(tmp_path, written))
+    assert loaded.meta == written.meta
+    assert loaded.tensors.keys() == written.tensors.keys()
+    for name, value in written.tensors.items():
+        assert torch.equal(loaded.tensors[name], value), name
+        assert loaded.tensors[name].dtype == value.dtype, name
+
+
+def test_everything_a_run_has_to_remember_is_in_it(session: Session) -> None:
+    parts = {name.split(".")[0] for name in session.checkpoint().tensors}
+    assert parts == {"net", "adam", "state", "bonus", "rng", "envs"}
+    adam = session.checkpoint().part("adam")
+    assert len(adam) == 3 * len(list(session.actor.net.parameters()))
+
+
+def test_only_the_two_newest_are_kept_and_leftovers_swept(session: Session, tmp_path: Path) -> None:
+    for number in range(4):
+        (tmp_path / "000000000000007.tmp").write_bytes(b"left by a killed process")
+        session.update = number
+        write(tmp_path, session.checkpoint())
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == ["000000000000128.safetensors", "000000000000192.safetensors"]
+    assert read(tmp_path).meta.update == 3
+
+
+def test_a_write_is_synced_before_it_is_renamed(
+    session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[str] = []
+    monkeypatch.setattr(checkpoints.os, "fsync", lambda _: calls.append("fsync"))
+    replace = Path.replace
+
+    def note(path: Path, target: Path) -> Path:
+        calls.append("rename")
+        return replace(path, target)
+
+    monkeypatch.setattr(Path, "replace", note)
+    write(tmp_path, session.checkpoint())
+    assert calls == ["fsync", "rename", "fsync"]
+
+
+@pytest.mark.parametrize("trials", [60, pytest.param(1000, marks=pytest.mark.slow)])
+def test_mutated_files_are_refused(trials: int, session: Session, tmp_path: Path) -> None:
+    path = write(tmp_path, session.checkpoint())
+    good = path.read_bytes()
+    rng = np.random.default_rng(0)
+    header = int.from_bytes(good[:8], "little")
+    for trial in range(trials):
+        data = bytearray(good)
+        where = int(rng.integers(0, 8 + header if trial % 2 else len(good)))
+        kind = trial % 5
+        if kind == 0:
+            data[where] ^= 1 << int(rng.integers(0, 8))
+        elif kind == 1:
+            del data[where:]
+        elif kind == 2:
+            del data[where : where + 1 + int(rng.integers(0, 40))]
+        elif kind == 3:
+            data[where:where] = rng.bytes(1 + int(rng.integers(0, 40)))
+        else:
+            data[where : where + 8] = rng.bytes(8)
+        if bytes(data) == good:
+            continue
+        path.write_bytes(data)
+        with pytest.raises(CheckpointError) as caught:
+            read(path)
+        assert str(path) in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+
+def signed(tensors: dict[str, torch.Tensor], metadata: dict[str, str]) -> bytes:
+    """A file by somebody who knows how the digest is made."""
+    blank = safetensors.torch.save(tensors, {"sha256": "0" * 64, **metadata})
+    place = b'"sha256":"'
+    return blank.replace(place + b"0" * 64, place + hashlib.sha256(blank).hexdigest().encode(), 1)
+
+
+def meta_of(session: Session, **changes: Any) -> dict[str, str]:
+    return {"meta": json.dumps(json.loads(session.checkpoint().meta.model_dump_json()) | changes)}
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"format": 2},
+        {"surprise": 1},
+        {"frames": -1},
+        {"vocabulary": 3},
+        {"action_sizes": [4, 2, 2]},
+        {"config": {"lr": "fast"}},
+    ],
+)
+def test_well_signed_files_of_another_form_are_refused(
+    session: Session, tmp_path: Path, changes: Any
+) -> None:
+    path = tmp_path / "x.safetensors"
+    path.write_bytes(signed(dict(session.checkpoint().tensors), meta_of(session, **changes)))
+    with pytest.raises(CheckpointError, match=r"x\.safetensors: made by another version"):
+        read(path)
+
+
+def tampered(session: Session, **changes: torch.Tensor | None) -> Checkpoint:
+    good = session.checkpoint()
+    tensors = {**good.tensors, **{name: value for name, value in changes.items() if value is not None}}
+    return Checkpoint(
+        good.meta, {name: value for name, value in tensors.items() if changes.get(name, value) is not None}
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"net.bias": torch.zeros(3)}, r"net|bias: got \(\(3,\)"),
+        ({"net.bias": torch.zeros(128, dtype=torch.float64)}, "float64"),
+        ({"net.bias": torch.full((128,), torch.nan)}, "not finite"),
+        ({"net.bias": None}, "first difference: bias"),
+        ({"net.backdoor": torch.zeros(1)}, "first difference: backdoor"),
+    ],
+)
+def test_weights_that_do_not_fit_are_refused(session: Session, changes: Any, message: str) -> None:
+    envs = session.envs
+    with pytest.raises(CheckpointError, match=message):
+        restore_net(tampered(session, **changes), net_spec(envs), envs.vocabulary)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["rng", "envs", "state.memory", "state.image", "bonus.keys", "adam.step.bias", "adam.exp_avg.bias"],
+)
+@pytest.mark.parametrize("value", [None, torch.zeros(3, 5)])
+def test_a_run_does_not_resume_from_incomplete_or_odd_state(
+    session: Session, small_config: Any, name: str, value: torch.Tensor | None
+) -> None:
+    fresh = Session.start(small_config(explo="lang"), EchoEnvs(8))
+    with pytest.raises(CheckpointError, match="cannot continue this run"):
+        fresh.load(tampered(session, **{name: value}))
+
+
+class Payload:
+    def __reduce__(self) -> Any:
+        return exec, ("import os; os.environ['PWNED'] = '1'",)
+
+
+def test_pickles_are_never_opened(tmp_path: Path) -> None:
+    opened: list[str] = []
+    watching = True
+
+    def audit(event: str, args: tuple[Any, ...]) -> None:
+        if watching and event in ("pickle.find_class", "exec", "compile"):
+            opened.append(event)
+
+    files = {"pickle": pickle.dumps(Payload()), "nothing": b"", "json": b"{}", "deep": b"[" * 100_000}
+    torch.save({"a": torch.zeros(2)}, tmp_path / "torch")
+    for name, data in files.items():
+        (tmp_path / name).write_bytes(data)
+    (tmp_path / "lies").write_bytes((2**60).to_bytes(8, "little") + b"{}")
+    nested = b'{"__metadata__":' + b"[" * 200_000 + b"}"
+    (tmp_path / "nested").write_bytes(len(nested).to_bytes(8, "little") + nested)
+    sys.addaudithook(audit)
+    try:
+        for name in (*files, "torch", "lies", "nested"):
+            with pytest.raises(CheckpointError):
+                read(tmp_path / name)
+    finally:
+        watching = False
+    assert opened == []
+
+
+def test_missing_files_and_empty_folders_are_checkpoint_errors(tmp_path: Path) -> None:
+    with pytest.raises(CheckpointError, match="cannot be read"):
+        read(tmp_path / "nowhere.safetensors")
+    with pytest.raises(CheckpointError, match="no checkpoint in this directory"):
+        read(tmp_path)
+
+
+def test_a_damaged_newest_file_falls_back_to_the_one_before(session: Session, tmp_path: Path) -> None:
+    older = write(tmp_path, session.checkpoint())
+    session.update = 2
+    newer = write(tmp_path, session.checkpoint())
+    newer.write_bytes(newer.read_bytes()[:-1])
+    with pytest.warns(UserWarning, match=f"damaged.*using {older.name} instead"):
+        assert read(tmp_path).meta.update == 1
+
+
+def test_words_are_moved_by_spelling(session: Session, tmp_path: Path) -> None:
+    path = write(tmp_path, session.checkpoint())
+    envs = EchoEnvs(2)
+    envs.program.vocabulary = ["<pad>", "<unk>", "say", "novel", "voice", *envs.vocabulary[4:-1]]
+    old = session.actor.net.dialogue.embedding.weight
+    with pytest.warns(UserWarning, match=r"never met: novel; words not used here: di"):
+        net = restored(path, envs)
+    new = net.dialogue.embedding.weight
+    assert torch.equal(new[2], old[3])
+    assert torch.equal(new[4], old[2])
+    assert torch.equal(new[5], old[4])
+
+
+def test_another_order_of_the_same_words_changes_nothing_but_the_rows(
+    session: Session, tmp_path: Path
+) -> None:
+    path = write(tmp_path, session.checkpoint())
+    envs = EchoEnvs(2)
+    envs.program.vocabulary = [*envs.vocabulary[:2], *reversed(envs.vocabulary[2:])]
+    with pytest.warns(UserWarning, match="same words in another order"):
+        net = restored(path, envs)
+    old = session.actor.net.dialogue.embedding.weight
+    assert torch.equal(net.dialogue.embedding.weight[2:], old[2:].flip(0))
+
+
+def test_other_actions_or_images_are_refused(session: Session, tmp_path: Path) -> None:
+    path = write(tmp_path, session.checkpoint())
+    with pytest.raises(CheckpointError, match=r"actions \(4, 2, 2, 4\).*has \(4, 2, 2, 5\)"):
+        restored(path, EchoEnvs(2, nouns=5))
+
+
+def test_a_file_does_not_choose_what_is_imported(session: Session) -> None:
+    good = session.checkpoint()
+    meta = good.meta.model_copy(update={"config": good.meta.config.model_copy(update={"net": "this:That"})})
+    envs = session.envs
+    with pytest.raises(CheckpointError, match="name it"):
+        restore_net(Checkpoint(meta, good.tensors), net_spec(envs), envs.vocabulary)
+    assert "this" not in sys.modules
+
+
+def test_a_run_resumes_only_with_the_same_settings_and_scenario(session: Session, small_config: Any) -> None:
+    good = session.checkpoint()
+    other = Session.start(small_config(explo="lang", lr=1e-3), EchoEnvs(8))
+    with pytest.raises(CheckpointError, match=r"changed: lr: 0\.0007 -> 0\.001"):
+        other.load(good)
+    envs = EchoEnvs(8)
+    envs.program.sha256 = "1" * 64
+    with pytest.raises(CheckpointError, match="scenario has changed"):
+        Session.start(small_config(explo="lang"), envs).load(good)
+    Session.start(small_config(explo="lang", frames=10_000, checkpoint_every=9), EchoEnvs(8)).load(good)

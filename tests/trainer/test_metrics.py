@@ -1,0 +1,60 @@
+"""Metrics are rates per episode, and a log is cut back to where a run resumes."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from trainer.metrics import MetricsLog, episode_metrics
+from trainer.rollout import EpisodeTally
+
+
+def test_rates_are_per_episode_that_ended() -> None:
+    before = {"outcomes": {"won": 3, "lost": 5}, "rules": {"asked": 10}, "episodes": 8}
+    after = {"outcomes": {"won": 4, "lost": 8}, "rules": {"asked": 22, "told": 2}, "episodes": 12}
+    got = episode_metrics(EpisodeTally(4, 1, 2, 3.0, 40), before, after)
+    assert got == {
+        "episodes": 4,
+        "success": 0.25,
+        "mean_return": 0.75,
+        "mean_length": 10.0,
+        "timeouts": 0.5,
+        "outcomes": {"won": 0.25, "lost": 0.75},
+        "rules": {"asked": 3.0, "told": 0.5},
+    }
+
+
+def test_without_an_episode_there_are_no_rates() -> None:
+    counters = {"outcomes": {"won": 3}, "rules": {"asked": 10}, "episodes": 8}
+    got = episode_metrics(EpisodeTally(), counters, counters)
+    assert got["episodes"] == 0
+    assert got["success"] is None
+    assert got["outcomes"] == {"won": None}
+
+
+def updates(run_dir: Path) -> list[int]:
+    return [json.loads(line)["update"] for line in (run_dir / "metrics.jsonl").read_text().splitlines()]
+
+
+@pytest.mark.parametrize("tail", ["", '{"update": 5, "los', '{"update": 5, "los\n'])
+def test_a_log_is_cut_back(tail: str, tmp_path: Path) -> None:
+    log = MetricsLog(tmp_path, 0, tensorboard=False)
+    for update in range(1, 5):
+        log.write(update, {"loss": 0.5})
+    log.close()
+    with (tmp_path / "metrics.jsonl").open("a") as file:
+        file.write(tail)
+    MetricsLog(tmp_path, 2, tensorboard=False).close()
+    assert updates(tmp_path) == [1, 2]
+    log = MetricsLog(tmp_path, 2, tensorboard=False)
+    log.write(3, {"loss": 0.25})
+    log.sync()
+    log.close()
+    assert updates(tmp_path) == [1, 2, 3]
+
+
+def test_numbers_json_does_not_know_are_not_written(tmp_path: Path) -> None:
+    log = MetricsLog(tmp_path, 0, tensorboard=False)
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        log.write(1, {"loss": float("nan")})
+    log.close()

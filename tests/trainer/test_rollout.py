@@ -1,0 +1,179 @@
+"""Rollouts record what happened, and shared encodings equal those of each frame on its own."""
+
+from math import tanh
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from tests.trainer.fake_envs import EchoEnvs
+from trainer.actor import Actor
+from trainer.errors import ObservationError, TrainingStopped
+from trainer.nets import build_net
+from trainer.rollout import Rollout, collect, ended_info, final_observation
+from trainer.session import Session, net_spec
+
+
+class Witness(EchoEnvs):
+    """Remembers everything it was asked and gave."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.seen: list[dict[str, np.ndarray]] = []
+        self.steps: list[tuple[Any, ...]] = []
+
+    def reset(self, **options: Any) -> Any:
+        observation, infos = super().reset(**options)
+        self.seen.append({key: value.copy() for key, value in observation.items()})
+        return observation, infos
+
+    def step(self, actions: np.ndarray) -> Any:
+        result = super().step(actions)
+        self.seen.append({key: value.copy() for key, value in result[0].items()})
+        self.steps.append((actions.copy(), *result[1:]))
+        return result
+
+
+def play(config: Any, envs: EchoEnvs, rollouts: int = 1) -> tuple[Session, Rollout]:
+    session = Session.start(config, envs)
+    for _ in range(rollouts):
+        bonus = session.bonus
+        rollout = collect(session.actor, envs, session.state, config, session.generator, bonus)
+    return session, rollout
+
+
+def test_what_is_recorded_is_what_happened(small_config: Any) -> None:
+    envs = Witness(8)
+    session, rollout = play(small_config(), envs)
+    for t, (actions, reward, terminated, truncated, _) in enumerate(envs.steps):
+        assert (rollout.actions[t].numpy() == actions).all()
+        assert (rollout.rewards[t] == reward).all()
+        assert (rollout.terminated[t] == terminated).all()
+        assert (rollout.truncated[t] == truncated).all()
+        following = session.state.starts if t + 1 == len(envs.steps) else rollout.starts[t + 1]
+        assert (following == (terminated | truncated)).all()
+        pairs = session.actor.pairs.data[rollout.pair_rows[t]]
+        assert (session.actor.images.data[pairs[:, 0]] == envs.seen[t]["image"]).all()
+        assert (session.actor.histories.data[pairs[:, 1]] == envs.seen[t]["tokens"]).all()
+    assert rollout.starts[0].all()
+    ended = rollout.terminated | rollout.truncated
+    assert rollout.tally.episodes == ended.sum() == envs.counters()["episodes"]
+    assert rollout.tally.timeouts == rollout.truncated.sum()
+    assert rollout.tally.successes == envs.counters()["outcomes"]["right"]
+    assert rollout.tally.total_length + session.state.lengths.sum() == ended.size
+    assert rollout.tally.total_return + session.state.returns.sum() == pytest.approx(rollout.rewards.sum())
+
+
+@pytest.mark.parametrize("net", ["fast", "paper"])
+@pytest.mark.parametrize("length", [8, 40])
+def test_values_equal_those_of_a_plain_recurrent_loop(net: str, length: int, small_config: Any) -> None:
+    """No sharing, no streaming: one frame at a time, histories from the first word, memory emptied at starts."""
+    envs = Witness(8, length=length, chatter=0.5, limit=10, lethal=False)
+    session, rollout = play(small_config(net=net, horizon=24), envs)
+    model = session.actor.net
+    memory = model.memory.initial(8)
+    with torch.no_grad():
+        for t in range(24):
+            features = torch.stack([plain_features(model, envs.seen[t], e) for e in range(8)])
+            memory = memory * torch.from_numpy(~rollout.starts[t])[:, None]
+            memory = model.memory.step(features, memory)
+            logits, values = model.heads(memory[0])
+            assert torch.allclose(values, rollout.values[t], atol=1e-5), f"step {t}"
+            first = torch.log_softmax(logits[:, :4], 1).gather(1, rollout.actions[t][:, :1])
+            assert torch.allclose(first, rollout.log_probs[t][:, :1], atol=1e-5), f"step {t}"
+
+
+def plain_features(model: Any, observation: dict[str, np.ndarray], e: int) -> torch.Tensor:
+    words = observation["tokens"][e]
+    heard = torch.from_numpy(words[words > 0].astype(np.int64))
+    gru = model.dialogue.gru
+    text = gru(model.dialogue.embedding(heard))[1] if len(heard) else torch.zeros(1, model.dialogue.size)
+    image, only = torch.from_numpy(observation["image"][e : e + 1].copy()), torch.zeros(1, dtype=torch.int64)
+    features: torch.Tensor = model.perceive(model.prepare(image), text, only, only)[0]
+    return features
+
+
+def test_time_outs_are_bootstrapped_with_the_value_of_their_last_observation(small_config: Any) -> None:
+    envs = Witness(8, limit=4)
+    config = small_config(bootstrap_timeouts=True)
+    session, rollout = play(config, envs)
+    model, memory = session.actor.net, session.actor.net.memory.initial(8)
+    checked = 0
+    with torch.no_grad():
+        for t in range(config.horizon):
+            memory = memory * torch.from_numpy(~rollout.starts[t])[:, None]
+            features = torch.stack([plain_features(model, envs.seen[t], e) for e in range(8)])
+            memory = model.memory.step(features, memory)
+            for e in np.flatnonzero(rollout.truncated[t]):
+                final = plain_features(model, envs.steps[t][4]["final_obs"], int(e))
+                _, value = model.heads(model.memory.step(final[None], memory[:, e : e + 1])[0])
+                assert rollout.bootstrap[t, e] == pytest.approx(value.item(), abs=1e-5)
+                checked += 1
+    assert checked > 0
+    assert (rollout.bootstrap[~rollout.truncated] == 0).all()
+    _, terminal = play(small_config(), EchoEnvs(8, limit=4))
+    assert terminal.truncated.any()
+    assert (terminal.bootstrap == 0).all()
+
+
+def test_the_bonus_is_paid_on_top_and_does_not_count_as_return(small_config: Any) -> None:
+    config = small_config(explo="lang")
+    envs = Witness(8)
+    session, rollout = play(config, envs)
+    paid = rollout.rewards - np.array([step[1] for step in envs.steps])
+    assert paid.max() == pytest.approx(0.6 * tanh(7 / 40)), "the paper's bonus for a first visit"
+    assert rollout.bonus == pytest.approx(paid.mean())
+    returns = rollout.tally.total_return + session.state.returns.sum()
+    assert returns == pytest.approx(sum(step[1].sum() for step in envs.steps))
+
+
+@pytest.mark.parametrize("poison", ["image", "tokens"])
+def test_observations_outside_their_bounds_are_refused(poison: str, small_config: Any) -> None:
+    envs = EchoEnvs(8)
+    session = Session.start(small_config(), envs)
+    envs.poison = poison
+    with pytest.raises(ObservationError, match=poison):
+        collect(session.actor, envs, session.state, session.config, session.generator, None)
+
+
+def test_a_reward_that_is_not_finite_stops_the_run(small_config: Any) -> None:
+    envs = EchoEnvs(8)
+    session = Session.start(small_config(), envs)
+    envs.poison = "reward"
+    with pytest.raises(TrainingStopped, match="reward"):
+        collect(session.actor, envs, session.state, session.config, session.generator, None)
+
+
+def test_ids_may_be_left_to_the_actor() -> None:
+    envs = EchoEnvs(5, chatter=0.5, length=8)
+    net = build_net("fast", net_spec(envs), 0)
+    given, own = Actor(net, 8), Actor(net, 8)
+    observation, _ = envs.reset(seed=0)
+    for _ in range(12):
+        ids = (envs.image_ids(), envs.history_ids())
+        one, other = (
+            given.see(observation["image"], observation["tokens"], ids),
+            own.see(**named(observation)),
+        )
+        assert torch.equal(one[1], other[1])
+        observation, *_ = envs.step(np.tile([3, 0, 0, 0], (5, 1)))
+
+
+def named(observation: dict[str, np.ndarray]) -> dict[str, Any]:
+    return {"images": observation["image"], "tokens": observation["tokens"]}
+
+
+def test_both_forms_of_gymnasium_s_end_information_are_understood() -> None:
+    images, tokens = np.arange(3 * 4).reshape(3, 2, 2, 1), np.arange(6).reshape(3, 2)
+    wanted = np.array([0, 2])
+    arrays = {"final_obs": {"image": images, "tokens": tokens}}
+    objects = np.array([{"image": images[e], "tokens": tokens[e]} if e != 1 else None for e in range(3)])
+    for infos in (arrays, {"final_obs": objects}):
+        final = final_observation(infos, wanted)
+        assert (final["image"] == images[wanted]).all()
+        assert (final["tokens"] == tokens[wanted]).all()
+    success, default = np.array([True, False, False]), np.zeros(3, np.bool_)
+    assert (ended_info({"success": success}, "success", default) == success).all()
+    assert (ended_info({"final_info": {"success": success}}, "success", default) == success).all()
+    assert (ended_info({}, "success", default) == default).all()

@@ -1,0 +1,264 @@
+"""Training learns, resumes exactly, and stops cleanly with its last good checkpoint."""
+
+import json
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from tests.trainer.fake_envs import EchoEnvs
+from trainer import checkpoint as checkpoints
+from trainer import train as training
+from trainer.checkpoint import read
+from trainer.config import TrainConfig
+from trainer.errors import CheckpointError, TrainingStopped
+from trainer.evaluate import evaluate
+from trainer.policies import CheckpointPolicy
+from trainer.train import Progress, train
+
+ROOT = Path(__file__).parents[2]
+
+
+class Stop(Exception):  # noqa: N818 - it interrupts, as KeyboardInterrupt does
+    """The process went away."""
+
+
+def stop_after(update: int) -> Any:
+    def progress(seen: Progress) -> None:
+        if seen.update == update:
+            raise Stop
+
+    return progress
+
+
+def rows(run_dir: Path) -> list[dict[str, Any]]:
+    lines = (run_dir / "metrics.jsonl").read_text().splitlines()
+    return [{k: v for k, v in json.loads(line).items() if k != "frames_per_second"} for line in lines]
+
+
+def test_it_learns_to_repeat_a_word_it_heard(tmp_path: Path) -> None:
+    config = TrainConfig(
+        frames=60_000, num_envs=128, horizon=16, lr=2e-3, threads=1, tensorboard=False, explo="none"
+    )
+    envs = EchoEnvs(128)
+    path = train(config, envs, tmp_path)
+    result = evaluate(CheckpointPolicy.load(path, envs, seed=1), envs, 300)
+    assert result.success_rate > 0.9, f"only {result.success_rate:.0%} of the episodes succeeded"
+    first, last = rows(tmp_path)[0], rows(tmp_path)[-1]
+    assert first["success"] < 0.3, "the task must not be easy by chance"
+    assert last["success"] > 0.9
+    assert last["outcomes"]["right"] == pytest.approx(last["success"])
+
+
+@pytest.mark.parametrize(("net", "explo"), [("fast", "lang"), ("fast", "cell"), ("paper-reference", "none")])
+def test_a_run_stopped_three_times_ends_with_the_same_bits(
+    net: str, explo: str, tmp_path: Path, small_config: Any
+) -> None:
+    updates = 9 if net == "fast" else 4
+    config = small_config(net=net, explo=explo, frames=64 * updates, bootstrap_timeouts=True)
+    whole = read(train(config, EchoEnvs(8, chatter=0.3), tmp_path / "whole"))
+    stops = np.sort(np.random.default_rng(0).choice(np.arange(1, updates), 3, replace=False)).tolist()
+    for index, stop in enumerate(stops):
+        with pytest.raises(Stop):
+            train(config, EchoEnvs(8, chatter=0.3), tmp_path / "parts", stop_after(stop), resume=index > 0)
+    parts = read(train(config, EchoEnvs(8, chatter=0.3), tmp_path / "parts", resume=True))
+    assert parts.meta == whole.meta
+    for name, value in whole.tensors.items():
+        assert torch.equal(parts.tensors[name], value), f"{name} differs after stops at {stops}"
+    assert rows(tmp_path / "parts") == rows(tmp_path / "whole")
+
+
+def test_a_finished_run_can_be_resumed_for_longer(tmp_path: Path, small_config: Any) -> None:
+    whole = read(train(small_config(frames=64 * 5), EchoEnvs(8), tmp_path / "whole"))
+    train(small_config(frames=64 * 3), EchoEnvs(8), tmp_path / "parts")
+    longer = read(train(small_config(frames=64 * 5), EchoEnvs(8), tmp_path / "parts", resume=True))
+    assert all(torch.equal(longer.tensors[name], value) for name, value in whole.tensors.items())
+
+
+def test_progress_and_metrics_are_complete(tmp_path: Path, small_config: Any) -> None:
+    seen: list[Progress] = []
+    config = small_config(frames=300, tensorboard=True)
+    path = train(config, EchoEnvs(8), tmp_path, seen.append)
+    assert path == tmp_path / "checkpoints" / f"{320:015d}.safetensors"
+    assert [progress.frames for progress in seen] == [64, 128, 192, 256, 320]
+    assert all(progress.total_frames == 320 for progress in seen)
+    assert seen[-1].remaining_seconds == 0
+    assert seen[0].remaining_seconds > 0
+    assert all(progress.frames_per_second > 0 for progress in seen)
+    assert [progress.success_rate for progress in seen] == [row["success"] for row in rows(tmp_path)]
+    row = rows(tmp_path)[-1]
+    assert set(row) == {
+        "update", "frames", "loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "grad_norm",
+        "explained_variance", "bonus", "episodes", "success", "mean_return", "mean_length", "timeouts", "outcomes",
+        "rules",
+    }  # fmt: skip
+    assert sum(row["outcomes"].values()) == pytest.approx(1)
+    assert row["timeouts"] == pytest.approx(row["outcomes"]["time_out"])
+    assert row["rules"]["speaks"] > 0
+    assert list(tmp_path.glob("events.out.tfevents.*"))
+
+
+class Poisoned(EchoEnvs):
+    """Turns bad in its 17th step, that is in the third rollout of eight steps."""
+
+    def __init__(self, kind: str) -> None:
+        super().__init__(8)
+        self.kind, self.steps = kind, 0
+
+    def step(self, actions: np.ndarray) -> Any:
+        self.steps += 1
+        self.poison = self.kind if self.steps >= 17 else None
+        return super().step(actions)
+
+
+def check_stopped(run_dir: Path, message: str, caught: Any) -> None:
+    text = str(caught.value)
+    assert message in text
+    assert "training stopped after 128 frames (update 2)" in text
+    assert "\n" not in text
+    kept = read(run_dir / "checkpoints")
+    assert kept.meta.update == 2
+    assert str(run_dir / "checkpoints") in text
+    assert all(bool(torch.isfinite(value).all()) for value in kept.part("net").values())
+    assert [row["update"] for row in rows(run_dir)] == [1, 2]
+
+
+@pytest.mark.parametrize(
+    ("kind", "message"), [("reward", "a reward"), ("image", "image:"), ("tokens", "tokens:")]
+)
+def test_bad_environments_stop_the_run_at_once(
+    kind: str, message: str, tmp_path: Path, small_config: Any
+) -> None:
+    with pytest.raises(TrainingStopped) as caught:
+        train(small_config(), Poisoned(kind), tmp_path)
+    check_stopped(tmp_path, message, caught)
+
+
+@pytest.mark.parametrize(
+    ("place", "message"),
+    [("weight", "the network's output"), ("loss", "the loss"), ("gradient", "a gradient")],
+)
+def test_numbers_that_are_not_finite_stop_the_run_at_once(
+    place: str, message: str, tmp_path: Path, small_config: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from trainer import ppo
+
+    real, calls = ppo.ppo_loss, 0
+
+    def poisoned(batch: Any, logits: torch.Tensor, values: torch.Tensor, *rest: Any) -> Any:
+        nonlocal calls
+        calls += 1
+        if place == "gradient" and calls == 10:
+            values.register_hook(lambda grad: grad * torch.inf)
+        if place == "loss" and calls == 10:
+            values = values / 0
+        return real(batch, logits, values, *rest)
+
+    def spoil(session: Any) -> Any:
+        def progress(seen: Progress) -> None:
+            if seen.update == 2 and place == "weight":
+                with torch.no_grad():
+                    session[0].actor.net.film.bias[0] = torch.nan
+
+        return progress
+
+    sessions: list[Any] = []
+    start = training.Session.start
+    monkeypatch.setattr(ppo, "ppo_loss", poisoned)
+    monkeypatch.setattr(
+        training.Session, "start", lambda *rest: sessions.append(start(*rest)) or sessions[-1]
+    )
+    with pytest.raises(TrainingStopped) as caught:
+        train(small_config(), EchoEnvs(8), tmp_path, spoil(sessions))
+    check_stopped(tmp_path, message, caught)
+
+
+def test_a_full_disk_stops_the_run_and_spares_the_last_checkpoint(tmp_path: Path) -> None:
+    """A child process may write files of 100 kB at most from its second checkpoint on, as on a full disk."""
+    script = f"""
+import resource, sys
+sys.path.insert(0, {str(ROOT)!r})
+from pathlib import Path
+from tests.trainer.fake_envs import EchoEnvs
+from trainer.config import TrainConfig
+from trainer.errors import TrainingStopped
+from trainer.train import train
+
+config = TrainConfig(num_envs=8, horizon=8, minibatches=2, epochs=1, frames=1000, threads=1, tensorboard=False,
+                     checkpoint_every=3)
+
+def fill(progress):
+    if progress.update == 4:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+
+try:
+    train(config, EchoEnvs(8), Path({str(tmp_path)!r}), fill)
+except TrainingStopped as error:
+    print(error)
+    sys.exit(7)
+"""
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
+    assert result.returncode == 7, result.stderr
+    assert "training stopped after 384 frames (update 6): cannot write" in result.stdout
+    assert read(tmp_path / "checkpoints").meta.update == 3
+    assert not list((tmp_path / "checkpoints").glob("*.tmp"))
+    assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] != 100_000
+
+
+@pytest.mark.parametrize("kills", [2, pytest.param(50, marks=[pytest.mark.slow, pytest.mark.timeout(900)])])
+def test_a_killed_run_resumes_to_the_same_bits(kills: int, tmp_path: Path, small_config: Any) -> None:
+    """SIGKILL at arbitrary moments, checkpoints after every update so that many kills hit a write."""
+    script = f"""
+import sys
+sys.path.insert(0, {str(ROOT)!r})
+from pathlib import Path
+from tests.trainer.fake_envs import EchoEnvs
+from trainer.config import TrainConfig
+from trainer.train import train
+
+config = TrainConfig.model_validate_json(sys.argv[1])
+run_dir = Path({str(tmp_path / "killed")!r})
+train(config, EchoEnvs(8), run_dir, lambda progress: print(progress.update, flush=True),
+      resume=any((run_dir / "checkpoints").glob("*.safetensors")))
+"""
+    config = small_config(frames=64 * 10 * (kills + 1), epochs=1, checkpoint_every=1)
+    rng = np.random.default_rng(0)
+    while True:
+        command = [sys.executable, "-c", script, config.model_dump_json()]
+        child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        assert child.stdout is not None
+        if child.stdout.readline() and kills > 0:
+            time.sleep(float(rng.random()) * 0.15)
+            child.send_signal(signal.SIGKILL)
+            kills -= 1
+        child.communicate(timeout=120)
+        if child.returncode != -signal.SIGKILL:
+            break
+    assert child.returncode == 0
+    whole = read(train(config, EchoEnvs(8), tmp_path / "whole"))
+    killed = read(tmp_path / "killed" / "checkpoints")
+    assert all(torch.equal(killed.tensors[name], value) for name, value in whole.tensors.items())
+    assert rows(tmp_path / "killed") == rows(tmp_path / "whole")
+    assert len(list((tmp_path / "killed" / "checkpoints").iterdir())) == checkpoints.KEPT
+
+
+def test_resuming_nothing_is_an_error(tmp_path: Path, small_config: Any) -> None:
+    with pytest.raises(CheckpointError, match="nothing to resume"):
+        train(small_config(), EchoEnvs(8), tmp_path, resume=True)
+
+
+def test_the_number_of_environments_has_to_fit(tmp_path: Path, small_config: Any) -> None:
+    with pytest.raises(ValueError, match="got 4 environments, expected num_envs = 8"):
+        train(small_config(), EchoEnvs(4), tmp_path)
+
+
+def test_torch_s_threads_are_as_before(tmp_path: Path, small_config: Any) -> None:
+    train(small_config(threads=2, frames=64), EchoEnvs(8), tmp_path)
+    assert torch.get_num_threads() == 1
