@@ -10,7 +10,18 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 
-TEXT_SIDE = {"source", "diagnostics", "draws", "grammar", "schema", "semantics", "loader", "frontend"}
+TEXT_SIDE = {
+    "source",
+    "diagnostics",
+    "draws",
+    "grammar",
+    "schema",
+    "semantics",
+    "loader",
+    "library",
+    "parameters",
+    "frontend",
+}
 
 # layer -> (layers of socialai_dsl it may import, third-party packages it may import)
 MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
@@ -20,11 +31,13 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "grammar": ({"source", "diagnostics"}, {"lark"}),
     "schema": ({"source", "diagnostics", "grammar"}, {"pydantic", "pydantic_core"}),
     "semantics": ({"source", "diagnostics", "draws", "grammar", "schema"}, set()),
-    "loader": (TEXT_SIDE - {"frontend"}, {"yaml", "pydantic", "pydantic_core"}),
+    "loader": (TEXT_SIDE - {"frontend", "library", "parameters"}, {"yaml", "pydantic", "pydantic_core"}),
+    "library": (TEXT_SIDE - {"frontend", "parameters"}, {"pydantic"}),
+    "parameters": (TEXT_SIDE - {"frontend", "library"}, set()),
     "frontend": (TEXT_SIDE, set()),
     "program": ({"source", "listing"}, {"numpy"}),
     "listing": ({"source", "program"}, {"numpy"}),
-    "compiler": (TEXT_SIDE - {"loader", "frontend"} | {"program"}, {"numpy"}),
+    "compiler": (TEXT_SIDE - {"loader", "library", "parameters", "frontend"} | {"program"}, {"numpy"}),
     "engine": ({"program", "draws"}, {"numpy", "numba", "llvmlite"}),
     "envs": (TEXT_SIDE | {"program", "compiler", "engine"}, {"numpy", "gymnasium", "PIL"}),
     "_gymnasium_hook": ({"envs"}, set()),

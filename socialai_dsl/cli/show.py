@@ -26,6 +26,5 @@ def execute(arguments: argparse.Namespace) -> Exit:
         return Exit.GOOD
     import yaml
 
-    document = scenario.model_dump(mode="json", by_alias=True, exclude_unset=True)
-    print(yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=100), end="")
+    print(yaml.safe_dump(scenario.resolved.data, sort_keys=False, allow_unicode=True, width=100), end="")
     return Exit.GOOD
