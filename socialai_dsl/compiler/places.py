@@ -62,8 +62,7 @@ class Places:
             case "anywhere":
                 block.emit(Op.B_FLOOR, board)
             case "wall":
-                assert region.side is not None
-                block.emit(Op.B_WALL, board, _SIDES[region.side], region.margin)
+                self._wall(board, region)
             case "next_to":
                 block.emit(Op.B_NEXT_TO, board, self.to.value(region.args[0]))
                 self._only_floor(board)
@@ -73,6 +72,22 @@ class Places:
             case _:
                 self._rectangle(board, region)
         return board
+
+    def _wall(self, board: int, region: Region) -> None:
+        """One side of the room, known or drawn (then `region.args` holds it as a number, like Side)."""
+        block = self.to.block
+        if region.side is not None:
+            block.emit(Op.B_WALL, board, _SIDES[region.side], region.margin)
+            return
+        drawn = self.to.value(region.args[0])
+        done = Label()
+        for side in Side:
+            following = Label()
+            block.test(Op.IF_EQ, drawn, constant(side), following)
+            block.emit(Op.B_WALL, board, side, region.margin)
+            block.skip(done)
+            block.bind(following)
+        block.bind(done)
 
     def _only_floor(self, board: int) -> None:
         floor = self._board()

@@ -45,12 +45,6 @@ def _require(condition: bool, message: str) -> None:
 def _sizes(program: Program) -> dict[Header, int]:
     h = program.header
     width, height = h(Header.CANVAS_WIDTH), h(Header.CANVAS_HEIGHT)
-    lines = h(Header.LINE_AT)
-    tokens = h(Header.LINES) and max(
-        int(program.words[lines + LineColumn.COLUMNS * k + LineColumn.FIRST_TOKEN])
-        + int(program.words[lines + LineColumn.COLUMNS * k + LineColumn.TOKENS])
-        for k in range(h(Header.LINES))
-    )
     return {
         Header.CODE_AT: 4 * h(Header.INSTRUCTIONS),
         Header.ACTION_AT: h(Header.PRIMITIVES) + 1,
@@ -62,7 +56,6 @@ def _sizes(program: Program) -> dict[Header, int]:
         Header.STATE_AT: h(Header.STATES) * (1 + 2 * (h(Header.CLASSES) + 1)),
         Header.OUTCOME_AT: h(Header.CLASSES) * 8,
         Header.LINE_AT: h(Header.LINES) * LineColumn.COLUMNS,
-        Header.TOKEN_AT: tokens,
         Header.SITE_AT: 2 * h(Header.SITES),
     }
 
@@ -177,6 +170,7 @@ def _frames(program: Program) -> None:
 
 def _lines(program: Program) -> None:
     h = program.header
+    tokens_end = h(Header.SITE_AT)
     _require(len(program.lines) == h(Header.LINES) < 32767, "lines without texts")
     _require(h(Header.TOKENS) >= 8, "no room for a history")
     for number in range(h(Header.LINES)):

@@ -453,9 +453,9 @@ class ObjectType:
     initial: int
     walkable: frozenset[int]
     transparent: frozenset[int]
-    toggled: dict[int, int]
+    toggled: dict[int, int] = field(hash=False)
     deadly: bool = False
-    shown: dict[int, tuple[int, int]] = field(default_factory=dict)
+    shown: dict[int, tuple[int, int]] = field(default_factory=dict, hash=False)
 
 
 @dataclass(frozen=True, slots=True)
