@@ -1,6 +1,10 @@
 """This module names the ways a command can end, and the errors that end it."""
 
+from collections.abc import Iterable
 from enum import IntEnum
+from pathlib import Path
+
+from socialai_dsl.diagnostics import Diagnostic
 
 
 class Exit(IntEnum):
@@ -20,3 +24,11 @@ class UsageError(Exception):
 
 class RunFailed(Exception):  # noqa: N818 - it says what happened
     """Training broke down although everything was asked for rightly."""
+
+
+def is_usage(diagnostics: Iterable[Diagnostic]) -> bool:
+    """Whether all that is wrong lies in how a scenario was named, or in a file that cannot be read (S007).
+
+    Such findings point into the name itself, which is no file.
+    """
+    return all(d.code == "S007" or not Path(d.span.file).is_file() for d in diagnostics)

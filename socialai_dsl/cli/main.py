@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from socialai_dsl.cli import bench, evaluate, new, play, run, schema, show, validate
-from socialai_dsl.cli.errors import Exit, RunFailed, UsageError
+from socialai_dsl.cli.errors import Exit, RunFailed, UsageError, is_usage
 from socialai_dsl.diagnostics import ScenarioError, render_text
 
 _COMMANDS: Final = {
@@ -78,11 +78,8 @@ def _guarded(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> int
 
 def _explain(program: str, error: Exception) -> Exit:
     if isinstance(error, ScenarioError):
-        print(
-            render_text(error.diagnostics, error.sources, color=sys.stderr.isatty()),
-            file=sys.stderr,
-        )
-        return Exit.FINDINGS
+        print(render_text(error.diagnostics, error.sources, color=sys.stderr.isatty()), file=sys.stderr)
+        return Exit.USAGE if is_usage(error.diagnostics) else Exit.FINDINGS
     if isinstance(error, UsageError | RunFailed):
         print(f"{program}: {error}", file=sys.stderr)
         return Exit.USAGE if isinstance(error, UsageError) else Exit.FINDINGS

@@ -1,9 +1,14 @@
 """This module is `socialai show`: it prints what a scenario is once everything it builds on is put together."""
 
 import argparse
-from typing import Final
+import json
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.errors import Exit
+
+if TYPE_CHECKING:
+    from socialai_dsl.frontend import LoadedScenario
 
 SUMMARY: Final = "print a scenario after extends and variants, or the program it compiles to"
 
@@ -13,18 +18,47 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "scenario", metavar="SCENARIO", help="a path or a name, with +variants and ?parameters"
     )
-    parser.add_argument("--program", action="store_true", help="print the compiled program's listing instead")
+    choice = parser.add_mutually_exclusive_group()
+    choice.add_argument("--program", action="store_true", help="print the compiled program's listing instead")
+    choice.add_argument("--origin", action="store_true", help="print where each value was written instead")
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
-    """Print the resolved scenario as YAML, or its listing."""
+    """Print the resolved scenario as YAML, its listing, or its values with their origins."""
     import socialai_dsl
 
     scenario = socialai_dsl.load(arguments.scenario)
     if arguments.program:
         print(socialai_dsl.compile(scenario).listing())
-        return Exit.GOOD
-    import yaml
+    elif arguments.origin:
+        for line in _origins(scenario):
+            print(line)
+    else:
+        import yaml
 
-    print(yaml.safe_dump(scenario.resolved.data, sort_keys=False, allow_unicode=True, width=100), end="")
+        print(yaml.safe_dump(scenario.resolved.data, sort_keys=False, allow_unicode=True, width=100), end="")
     return Exit.GOOD
+
+
+def _origins(scenario: "LoadedScenario") -> Iterator[str]:
+    """One line for each value that is no container: its place, its path, itself."""
+    for path, value in _leaves(scenario.resolved.data, ()):
+        written = json.dumps(value, ensure_ascii=False)
+        yield f"{scenario.resolved.origin(path)}: {_dotted(path)} = {written}"
+
+
+def _leaves(value: Any, path: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Any]]:
+    if isinstance(value, dict) and value:
+        for key, part in value.items():
+            yield from _leaves(part, (*path, key))
+    elif isinstance(value, list) and value:
+        for index, part in enumerate(value):
+            yield from _leaves(part, (*path, index))
+    else:
+        yield path, value
+
+
+def _dotted(path: tuple[str | int, ...]) -> str:
+    """`("then", 0, "say")` -> `then[0].say`, as variants write it."""
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
+    return text.removeprefix(".")

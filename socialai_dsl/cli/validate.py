@@ -6,14 +6,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.errors import Exit, UsageError, is_usage
 from socialai_dsl.cli.reporters import REPORTERS, Checked
+from socialai_dsl.diagnostics import ScenarioError
 
 SUMMARY: Final = "check scenario files and folders of them"
 
 _SUFFIXES: Final = frozenset({".yaml", ".yml"})
-# What a name on the command line may be found to be when it is no scenario at all.
-_NOT_A_SCENARIO: Final = frozenset({"S007", "S504", "S508"})
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,7 +64,6 @@ def _check(name: str) -> Checked:
         with open(name, "rb") as file:  # raises OSError where the file cannot be read: usage, not a finding
             file.read(1)
     result = frontend.check(name)
-    codes = {diagnostic.code for diagnostic in result.diagnostics}
-    if result.scenario is None and codes and codes <= _NOT_A_SCENARIO and not Path(name).exists():
-        raise UsageError("; ".join(diagnostic.text for diagnostic in result.diagnostics))
+    if result.has_errors and is_usage(result.diagnostics):
+        raise ScenarioError(result.diagnostics, result.sources)
     return Checked(name, tuple(result.diagnostics), dict(result.sources))

@@ -30,10 +30,15 @@ def ending_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> Callab
     return lambda *options: main(["validate", "x.yaml", *options])
 
 
-def test_findings(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
-    finding = Diagnostic("S101", "unknown key `horizn`", Span("a.yaml", 2, 1, 6))
-    assert ending_with(monkeypatch, ScenarioError([finding]))() == 1
-    assert capsys.readouterr().err == "a.yaml:2:1: S101 unknown key `horizn`\n"
+@pytest.mark.parametrize(("file", "code"), [("a.yaml", 1), ("the name on the command line", 2)])
+def test_findings(
+    file: str, code: int, monkeypatch: pytest.MonkeyPatch, capsys: Capture, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.yaml").write_text("")
+    finding = Diagnostic("S501", "no such path", Span(file, 2, 1, 6))
+    assert ending_with(monkeypatch, ScenarioError([finding]))() == code
+    assert capsys.readouterr().err == f"{file}:2:1: S501 no such path\n"
 
 
 def test_usage(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
