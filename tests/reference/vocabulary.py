@@ -246,6 +246,10 @@ class Vocabulary:
             if tree.op == "*":
                 products = [x * y for x in a for y in b]
                 return min(products), max(products)
+        if isinstance(tree, ast.Call) and tree.name in ("min", "max"):
+            choose = min if tree.name == "min" else max
+            lows, highs = zip(*(self.bounds(arg, member) for arg in tree.args), strict=True)
+            return choose(lows), choose(highs)
         if isinstance(tree, ast.Attribute) and tree.name == "noun":
             return self.bounds(ast.Name("noun"), member)
         raise AssertionError(f"the range of {tree} is not worked out by the reference")
