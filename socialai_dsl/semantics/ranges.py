@@ -24,13 +24,17 @@ class Ranges:
         self.unbounded: list[str] = []
         self._growth: dict[str, int] = {}
         self._rounds = 0
+        self._wide: dict[str, Type] | None = None
         self._steps = scenario.horizon * _setters(scenario)
 
     def settled(self, needed: Mapping[str, Type]) -> bool:
         """Take note of the ranges that a resolution asked for; whether it had them already."""
         self._rounds += 1
-        if all(_within(type_, self.now.get(path)) for path, type_ in needed.items()):
-            return True
+        fits = all(_within(type_, self.now.get(path)) for path, type_ in needed.items())
+        if self._wide is not None:
+            return self._narrowed(fits)
+        if fits:
+            return self._rounds <= _WIDEN_AFTER + 1 or not self._narrow(needed)
         if self._rounds <= _WIDEN_AFTER:
             self._growth = {path: _excess(type_, self.now.get(path)) for path, type_ in needed.items()}
             self.now = dict(needed)
@@ -40,6 +44,20 @@ class Ranges:
             return False
         self.unbounded = [p for p, t in needed.items() if _excess(t, self.now[p]) > self._growth[p]]
         return True
+
+    def _narrow(self, needed: Mapping[str, Type]) -> bool:
+        """After widening, try what is really needed: `min(asked + 1, 9)` never leaves 0..9. Whether that is less."""
+        self._wide = self.now
+        self.now = dict(needed)
+        return self.now != self._wide
+
+    def _narrowed(self, fits: bool) -> bool:
+        """Whether the narrower ranges hold; if not, the wide ones are taken after all."""
+        if fits or self.now is self._wide:
+            return True
+        assert self._wide is not None
+        self.now = self._wide
+        return False
 
     def _widened(self, needed: Type, now: Type) -> Type:
         """A range that still grows, by as much as it can in a whole episode."""
