@@ -9,6 +9,7 @@ from socialai_dsl.schema import Scenario
 from socialai_dsl.semantics.terms import Type
 
 _WIDEN_AFTER = 4
+_MOST_ROUNDS = 12
 
 
 class Ranges:
@@ -31,8 +32,8 @@ class Ranges:
         """Take note of the ranges that a resolution asked for; whether it had them already."""
         self._rounds += 1
         fits = all(_within(type_, self.now.get(path)) for path, type_ in needed.items())
-        if self._wide is not None:
-            return self._narrowed(fits)
+        if self._wide is not None and (not fits or self.now is self._wide):
+            return self._back()
         if fits:
             return self._rounds <= _WIDEN_AFTER + 1 or not self._narrow(needed)
         if self._rounds <= _WIDEN_AFTER:
@@ -47,17 +48,17 @@ class Ranges:
 
     def _narrow(self, needed: Mapping[str, Type]) -> bool:
         """After widening, try what is really needed: `min(asked + 1, 9)` never leaves 0..9. Whether that is less."""
-        self._wide = self.now
-        self.now = dict(needed)
-        return self.now != self._wide
+        if self._rounds > _MOST_ROUNDS or needed == self.now:
+            return False
+        self._wide, self.now = self.now, dict(needed)
+        return True
 
-    def _narrowed(self, fits: bool) -> bool:
-        """Whether the narrower ranges hold; if not, the wide ones are taken after all."""
-        if fits or self.now is self._wide:
-            return True
+    def _back(self) -> bool:
+        """The narrower ranges do not hold: the last ones that did are taken. Whether they are taken already."""
         assert self._wide is not None
+        done = self.now is self._wide
         self.now = self._wide
-        return False
+        return done
 
     def _widened(self, needed: Type, now: Type) -> Type:
         """A range that still grows, by as much as it can in a whole episode."""
