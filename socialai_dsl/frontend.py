@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity
+from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity, did_you_mean
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
 from socialai_dsl.loader import Resolved, resolve
 from socialai_dsl.parameters import Substituted, substitute
@@ -17,6 +17,11 @@ from socialai_dsl.semantics.terms import Checked
 from socialai_dsl.source import Source
 
 SUFFIXES = (".yaml", ".yml")
+
+_MAY_FOLLOW = frozenset(
+    {"S105", "S201", "S204", "S205", "S206", "S301", "S302", "S303", "S305", "S310", "S401", "S402"}
+)
+"""What may be wrong only because a part of the file was left out, which has been reported."""
 
 
 @dataclass(frozen=True)
@@ -147,15 +152,21 @@ def _checked_scenario(resolved: Resolved, bag: DiagnosticBag) -> tuple[Checked |
     filled = substitute(resolved, bag)
     data = _with_grammar(filled, resolved, bag)
     abstract = data.get("abstract") is True
-    # A parameter that has no value would be reported again wherever its place is looked at.
     failed = bag.has_errors
-    scenario = model_of(Scenario, data, resolved, bag, partial=abstract)
-    if scenario is None or abstract or failed:
-        return None, None if failed else scenario
+    shaped = model_of(Scenario, data, resolved, bag, partial=abstract)
+    if shaped.model is None or abstract or failed:
+        return None, None if bag.has_errors else shaped.model
+    found = DiagnosticBag()
     checked = check_meaning(
-        scenario, resolved.name, resolved, bag, prelude(), data, filled.values, filled.paths
+        shaped.model, resolved.name, shaped.places, found, prelude(), shaped.data, filled.values, filled.paths
     )  # fmt: skip
-    return checked, scenario
+    if not bag.has_errors:
+        bag.extend(found)
+        return checked, shaped.model
+    bag.extend(
+        d for d in found if d.severity is Severity.ERROR and not (shaped.lost and d.code in _MAY_FOLLOW)
+    )
+    return None, None
 
 
 def _with_grammar(filled: Substituted, resolved: Resolved, bag: DiagnosticBag) -> dict[str, object]:
@@ -167,8 +178,6 @@ def _with_grammar(filled: Substituted, resolved: Resolved, bag: DiagnosticBag) -
     shared = shared_grammars()
     if name in shared:
         return {**data, "grammar": shared[name]}
-    from socialai_dsl.diagnostics import did_you_mean
-
     span = resolved.value_span(("grammar",))
     near = did_you_mean(name, shared)
     hint = None if near else "shared are " + ", ".join(shared) + "; else write `templates` and `nouns`"

@@ -35,7 +35,9 @@ def substitute(resolved: Resolved, bag: DiagnosticBag) -> Substituted:
     assert isinstance(resolved.data, dict), "internal: a file is a mapping"
     values = _values(resolved, bag)
     substitution = _Substitution(values, resolved, bag)
-    data = {key: part if key == "params" else substitution.of(part, (key,)) for key, part in resolved.data.items()}
+    data = {
+        key: part if key == "params" else substitution.of(part, (key,)) for key, part in resolved.data.items()
+    }
     return Substituted(data, values, frozenset(substitution.paths))
 
 
@@ -67,7 +69,9 @@ def _values(resolved: Resolved, bag: DiagnosticBag) -> dict[str, Value]:
     return values
 
 
-def _given(name: str, text: str, default: Data, choices: Data, resolved: Resolved, bag: DiagnosticBag) -> Data:
+def _given(
+    name: str, text: str, default: Data, choices: Data, resolved: Resolved, bag: DiagnosticBag
+) -> Data:
     """The value that was asked for, read as YAML would read it."""
     span = resolved.param_span(name)
     if isinstance(choices, dict):

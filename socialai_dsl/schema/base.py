@@ -41,4 +41,6 @@ class Model(BaseModel):
         allow_inf_nan=False,
         populate_by_name=True,
         protected_namespaces=(),
+        # Only the root is ever validated; building every model by itself would triple the time to start.
+        defer_build=True,
     )

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NoReturn, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import resolve_groups
-from socialai_dsl.semantics.resolve_calls import ENTITY, status_of
+from socialai_dsl.semantics.findings import FailedError
+from socialai_dsl.semantics.resolve_attributes import ENTITY, status_of
 from socialai_dsl.semantics.scope import Scope
 from socialai_dsl.semantics.signatures import ACTIVITIES, EFFECTS, SYNONYMS
 from socialai_dsl.semantics.terms import ACTION, DIRECTION, TURN, Activity, Const, Effect, FieldOf, Term
-from socialai_dsl.semantics.wording import quoted
+from socialai_dsl.semantics.wording import quoted, wrong_count
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
@@ -33,10 +34,9 @@ def activity(resolver: Resolver, path: DataPath, raw: str | None, scope: Scope) 
     name, args = _head(resolver, node, scope)
     signature = ACTIVITIES.get(name)
     if signature is None:
-        _unknown(resolver, name, args, node, scope)
+        raise _unknown(resolver, name, args, node, scope)
     if len(args) != len(signature.takes):
-        takes = ", ".join(signature.takes) or "nothing"
-        resolver.fail("S211", f"`{name}` takes {takes} in brackets; {len(args)} given", node, scope)
+        raise resolver.fail("S211", wrong_count(signature, len(args)), node, scope)
     if name == "wander":
         actions = tuple(Const(ACTION, ACTION.words.index(word)) for word in _WANDERING)
         return Activity("choose", actions, site, span, (1, 1, 1), scope.draws.number())
@@ -53,29 +53,31 @@ def _head(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[str, tuple[
             return name, ()
         case ast.Call(name=name, args=args, subject=None):
             return name, args
-    resolver.fail(
+    raise resolver.fail(
         "S205", f"`{quoted(node)}` is not an activity", node, scope, hint="activities are " + ", ".join(ACTIVITIES)
     )  # fmt: skip
 
 
-def _unknown(resolver: Resolver, name: str, args: tuple[ast.Expr, ...], node: ast.Expr, scope: Scope) -> NoReturn:
+def _unknown(
+    resolver: Resolver, name: str, args: tuple[ast.Expr, ...], node: ast.Expr, scope: Scope
+) -> FailedError:
     given = f"({', '.join(map(quoted, args))})" if args else ""
     synonym = SYNONYMS.get(name)
     if synonym:
         takes = ACTIVITIES[synonym].takes
         usage = synonym + (given or "(x)" if takes else "")
         purpose = {"use": "to toggle something ", "enter": "to go through something "}.get(synonym, "")
-        resolver.fail("S205", f"unknown activity `{name}`; {purpose}write `{usage}`", node, scope)
+        return resolver.fail("S205", f"unknown activity `{name}`; {purpose}write `{usage}`", node, scope)
     near = did_you_mean(name, ACTIVITIES)
     hint = None if near else "activities are " + ", ".join(ACTIVITIES)
-    resolver.fail("S205", f"unknown activity `{name}`", node, scope, suggestion=near, hint=hint)
+    return resolver.fail("S205", f"unknown activity `{name}`", node, scope, suggestion=near, hint=hint)
 
 
 def _argument(resolver: Resolver, name: str, node: ast.Expr, expected: Any, scope: Scope) -> Term:
     if expected is ENTITY and resolve_groups.is_group(resolver, node, scope):
         group = quoted(node)
         hint = f"`{name}(nearest(x in {group} to self))`, or draw one in `let` with `pick({group})`"
-        resolver.fail("S204", f"`{group}` is a group: say which of them", node, scope, hint=hint)
+        raise resolver.fail("S204", f"`{group}` is a group: say which of them", node, scope, hint=hint)
     return resolver.value(node, expected, scope)
 
 
@@ -83,7 +85,9 @@ def _choice(resolver: Resolver, path: DataPath, node: ast.Expr, scope: Scope) ->
     ordinal = scope.draws.number()
     members = resolve_groups.group(resolver, node, ACTION, scope)
     if members.type != ACTION:
-        resolver.fail("S204", f"`{quoted(node)}` are not actions; write choose(forward | left)", node, scope)
+        raise resolver.fail(
+            "S204", f"`{quoted(node)}` are not actions; write choose(forward | left)", node, scope
+        )
     weights = {item: members.items.count(item) for item in members.items}
     span = resolver.findings.at(path)
     return Activity("choose", tuple(weights), scope.draws.site, span, tuple(weights.values()), ordinal)
@@ -99,18 +103,19 @@ def effect(resolver: Resolver, path: DataPath, raw: object, scope: Scope) -> Eff
             pass
         case ast.Name(id=name) | ast.Call(name=name) if name in EFFECTS:
             example = f"self.{name}" if EFFECTS[name].subject == "entity" else f"door.{name}"
-            resolver.fail("S211", f"`{name}` needs what it is about: `{example}`", node, scope)
+            raise resolver.fail("S211", f"`{name}` needs what it is about: `{example}`", node, scope)
         case _:
             message = f"`{quoted(node)}` is not an effect"
-            resolver.fail("S205", message, node, scope, hint="effects are x.open, x.close, x.vanish, ...")
+            raise resolver.fail(
+                "S205", message, node, scope, hint="effects are x.open, x.close, x.vanish, ..."
+            )
     signature = EFFECTS.get(name)
     if signature is None:
         near = did_you_mean(name, EFFECTS)
         hint = None if near else "effects are " + ", ".join(EFFECTS)
-        resolver.fail("S205", f"unknown effect `{name}`", node, scope, suggestion=near, hint=hint)
+        raise resolver.fail("S205", f"unknown effect `{name}`", node, scope, suggestion=near, hint=hint)
     if len(args) != len(signature.takes):
-        takes = ", ".join(signature.takes) or "nothing"
-        resolver.fail("S211", f"`{name}` takes {takes} in brackets; {len(args)} given", node, scope)
+        raise resolver.fail("S211", wrong_count(signature, len(args)), node, scope)
     entities = _entities(resolver, subject, scope)
     value = None
     if signature.subject == "object":
@@ -125,7 +130,12 @@ def _entities(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[Term, .
 
 
 def _new_status(
-    resolver: Resolver, name: str, entities: tuple[Term, ...], args: tuple[ast.Expr, ...], node: ast.Expr, scope: Scope
+    resolver: Resolver,
+    name: str,
+    entities: tuple[Term, ...],
+    args: tuple[ast.Expr, ...],
+    node: ast.Expr,
+    scope: Scope,
 ) -> Term | None:
     """The status that `become` gives; for the others, only whether the object can have what they make of it."""
     fields: list[FieldOf] = [status_of(resolver, entity, node, scope) for entity in entities]
@@ -135,5 +145,5 @@ def _new_status(
     status = _STATUS_AFTER.get(name)
     if status is not None and status not in type_.words:
         message = f"`{name}` cannot happen to it: it is {' or '.join(type_.words)}"
-        resolver.fail("S204", message, node, scope, hint="`x.become(status)` sets a status")
+        raise resolver.fail("S204", message, node, scope, hint="`x.become(status)` sets a status")
     return None

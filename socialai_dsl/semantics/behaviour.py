@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
-from socialai_dsl.grammar import ast
 from socialai_dsl.schema import FirstRule, Frame, Rule, State, Step, ThenRule
 from socialai_dsl.schema.behaviour import Effects
 from socialai_dsl.schema.positions import DataPath
@@ -101,7 +100,7 @@ class _Planner:
     def state(self, name: str, state: State) -> StatePlan:
         path = (*self.played.path, "states", name)
         first = self._rules(state.first, (*path, "first"), name)
-        doing = self._activity((*path, "do"), state.do, dotted(path))
+        doing = self._activity((*path, "do"), state.do, dotted(path)) or self._staying(path)
         then = self._rules(state.then, (*path, "then"), name)
         return StatePlan(name, first, doing, then, self.resolver.findings.places.key_span(path))
 
@@ -164,24 +163,29 @@ class _Planner:
             return Sited(term, scope.draws.site, self.resolver.findings.at(path))
         return None
 
-    def _activity(self, path: DataPath, raw: str | None, address: str) -> Activity:
-        scope = _scope(self.played, path, f"{address}.do")
+    def _activity(self, path: DataPath, raw: str | None, address: str) -> Activity | None:
+        """The activity; None if it means nothing, which has been reported."""
         with surviving():
-            return activity(self.resolver, path, raw, scope)
-        return Activity("stay", (), scope.draws.site, self.resolver.findings.at(path))
+            return activity(self.resolver, path, raw, _scope(self.played, path, f"{address}.do"))
+        return None
+
+    def _staying(self, path: DataPath) -> Activity:
+        return Activity("stay", (), "", self.resolver.findings.at(path))
 
     def _sets(self, entry: Effects, path: DataPath, address: str) -> tuple[tuple[str, Sited], ...]:
         made = []
         for name, raw in entry.set.items():
             place = (*path, "set", name)
             with surviving():
-                made.append((f"{self.played.member}.{name}", self._set(name, raw, place, f"{address}.set.{name}")))
+                made.append(
+                    (f"{self.played.member}.{name}", self._set(name, raw, place, f"{address}.set.{name}"))
+                )
         return tuple(made)
 
     def _set(self, name: str, raw: object, path: DataPath, address: str) -> Sited:
         resolver, frame = self.resolver, self.played.model
         if name not in frame.let:
-            self._no_register(name, path)
+            raise self._no_register(name, path)
         register = resolver.registers.read(f"{self.played.member}.{name}")
         scope = _scope(self.played, path, address)
         expected = _INT if register.type.kind == "int" and not register.type.words else register.type
@@ -189,16 +193,18 @@ class _Planner:
         resolver.registers.widen(f"{self.played.member}.{name}", term.type)
         return Sited(term, scope.draws.site, resolver.findings.at(path))
 
-    def _no_register(self, name: str, path: DataPath) -> None:
+    def _no_register(self, name: str, path: DataPath) -> FailedError:
         findings, symbols = self.resolver.findings, self.resolver.symbols
         span = findings.places.key_span(path)
         if name in symbols.scenario.let or name in self.played.model.slots:
             what = "is a slot" if name in self.played.model.slots else "is drawn once per episode"
-            hint = "only what the frame declares in its own `let` can be set"
-            findings.fail("S305", f"`{name}` {what} and cannot be set", span, hint=hint)
+            cure = "only what the frame declares in its own `let` can be set"
+            return findings.fail("S305", f"`{name}` {what} and cannot be set", span, hint=cure)
         near = did_you_mean(name, self.played.model.let)
         hint = None if near else f"declare it: `let: {{{name}: 0}}` in the frame"
-        findings.fail("S305", f"`{name}` is not declared in this frame's `let`", span, suggestion=near, hint=hint)
+        return findings.fail(
+            "S305", f"`{name}` is not declared in this frame's `let`", span, suggestion=near, hint=hint
+        )
 
     def _causes(self, entry: Effects, path: DataPath, address: str) -> tuple[Effect, ...]:
         made = []
@@ -206,7 +212,9 @@ class _Planner:
         for i, raw in enumerate(entry.cause):
             place: DataPath = (*path, "cause") if single else (*path, "cause", i)
             with surviving():
-                made.append(effect(self.resolver, place, raw, _scope(self.played, place, f"{address}.cause[{i}]")))
+                made.append(
+                    effect(self.resolver, place, raw, _scope(self.played, place, f"{address}.cause[{i}]"))
+                )
         return tuple(made)
 
     def _target(self, target: str | None, path: DataPath) -> str | None:
@@ -224,14 +232,15 @@ class _Planner:
         address = self.addresses[path]
         doing = self._activity((*path, "do"), step.do, address)
         duration = self._duration((*path, "for"), step.for_)
-        if step.do is not None and step.until is None and step.for_ is None and doing.name in _ENDLESS:
+        endless = doing is not None and doing.name in _ENDLESS
+        if step.do is not None and step.until is None and step.for_ is None and endless:
             findings = self.resolver.findings
             message = f"`{step.do}` never ends by itself: add `until:` or `for:`"
             findings.error("S304", message, findings.at((*path, "do"), 0, len(step.do)))
         return StepPlan(
             name=f"{self.played.member}.{self.played.name}.steps[{index}]",
             state=step.state,
-            activity=doing,
+            activity=doing or self._staying(path),
             span=self.resolver.findings.places.value_span(path),
             until=self._condition((*path, "until"), step.until, address),
             duration=duration,

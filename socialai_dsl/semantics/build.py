@@ -6,8 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.terms import BOOL, Compare, Const, Logic, Operation, Term, Type
+from socialai_dsl.semantics.terms import BOOL, Compare, Const, Logic, ObjectType, Operation, Term, Type
 
 TRUE = Const(BOOL, 1)
 FALSE = Const(BOOL, 0)
@@ -47,7 +46,7 @@ def _joined(op: Any, neutral: Const, final: Const, conditions: Iterable[Term]) -
 
 
 def between(term: Term, low: Term, high: Term) -> Term:
-    """low <= term <= high."""
+    """Low <= term <= high."""
     return all_of([Compare("<=", low, term), Compare("<=", term, high)])
 
 
@@ -96,7 +95,9 @@ def _range(op: str, *types: Type) -> Type:
         low, high = (0, b.high - 1) if b.low > 0 else (b.low + 1, 0)
         return integer(low, high)
     if op == "abs":
-        return integer(0 if a.low <= 0 <= a.high else min(abs(a.low), abs(a.high)), max(abs(a.low), abs(a.high)))
+        return integer(
+            0 if a.low <= 0 <= a.high else min(abs(a.low), abs(a.high)), max(abs(a.low), abs(a.high))
+        )
     if op == "//":
         divisors = [d for d in (b.low, b.high, -1, 1) if b.low <= d <= b.high and d != 0]
         results = [n // d for n in (a.low, a.high) for d in divisors]
@@ -112,10 +113,10 @@ def walk(term: Any) -> Iterator[Term]:
     if isinstance(term, tuple | list):
         for part in term:
             yield from walk(part)
-    elif isinstance(term, _TERMS):
+    elif isinstance(term, Term):
         yield term
         yield from _parts(term)
-    elif is_dataclass(term) and not isinstance(term, Type | terms.ObjectType | type):
+    elif is_dataclass(term) and not isinstance(term, Type | ObjectType | type):
         yield from _parts(term)
 
 
@@ -124,10 +125,3 @@ def _parts(value: Any) -> Iterator[Term]:
         part = getattr(value, field.name)
         if not isinstance(part, str | int | Type):
             yield from walk(part)
-
-
-_TERMS: tuple[type, ...] = (
-    terms.Const, terms.Read, terms.World, terms.FieldOf, terms.Here, terms.Variable, terms.Operation, terms.Measure,
-    terms.Compare, terms.Logic, terms.Not, terms.Test, terms.PokedNow, terms.Said, terms.Spoke, terms.Heard,
-    terms.InState, terms.Quantified,
-)  # fmt: skip

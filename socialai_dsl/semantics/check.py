@@ -11,6 +11,7 @@ from socialai_dsl.schema.positions import DataPath, Positions
 from socialai_dsl.semantics import behaviour, checks, entities, setup
 from socialai_dsl.semantics.entities import AGENT, Prelude
 from socialai_dsl.semantics.findings import Findings, Scalar, surviving
+from socialai_dsl.semantics.inhabitants import entities_of
 from socialai_dsl.semantics.ranges import Ranges
 from socialai_dsl.semantics.resolve import Resolver
 from socialai_dsl.semantics.room import room_plan, room_sizes
@@ -38,9 +39,13 @@ def check_meaning(
     what the uses asked for, until nothing changes.
 
     Args:
-        scenario: the models. name: what the result is called.
-        places: where the parts of the file stand. data: the document the models were made from.
-        prelude: object types. params: the values of the file's parameters.
+        scenario: the models.
+        name: what the result is called.
+        places: where the parts of the file stand.
+        bag: takes the findings.
+        prelude: object types.
+        data: the document the models were made from.
+        params: the values of the file's parameters.
         substituted: paths of values that were a parameter as a whole.
     """
     words: dict[str, Type] = {}
@@ -94,6 +99,7 @@ class _Run:
         """The checked scenario; None if it cannot be put together."""
         scenario, resolver, findings = self._scenario, self.resolver, self._findings
         entities.declare_registers(resolver)
+        entities.check_slots(resolver)
         checks.check_flow(scenario, findings)
         spoken = self._spoken()
         outcomes = tuple(self._outcomes())
@@ -104,13 +110,11 @@ class _Run:
         drawn = resolver.registers.drawn()
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)
         room = room_plan(resolver)
+        inhabitants = tuple(entities_of(resolver, placed))
         if findings.bag.has_errors:
             return None
         for plan in plans:
             checks.check_shadowed(plan, findings)
-        inhabitants = tuple(entities.entities_of(resolver, placed))
-        if findings.bag.has_errors:
-            return None
         names = [resolver.registers.read(f"{member}.name") for member in self._symbols.cast]
         words = words_in_order(scenario.grammar, names, spoken.lines(self._symbols.cast))
         return Checked(
@@ -167,7 +171,11 @@ class _Run:
             path: DataPath = ("outcome", i)
             if len(given) != 1:
                 code, what = ("S107", "has only one of") if given else ("S105", "needs")
-                message = f"an outcome {what} `success` and `failure`" if given else "an outcome needs `success` or `failure`"
+                message = (
+                    f"an outcome {what} `success` and `failure`"
+                    if given
+                    else "an outcome needs `success` or `failure`"
+                )
                 findings.error(code, message, findings.places.value_span(path))
                 continue
             kind = given[0]
@@ -178,7 +186,9 @@ class _Run:
                 term = self.resolver.written((*path, kind), raw, BOOL, at_every_step(scope))
                 line = findings.places.key_span((*path, kind)).line
                 condition = Sited(term, scope.draws.site, span)
-                yield OutcomePlan(outcome.id or f"{kind}@{line}", kind == "success", outcome.reward, condition)
+                yield OutcomePlan(
+                    outcome.id or f"{kind}@{line}", kind == "success", outcome.reward, condition
+                )
 
     def report_growth(self, path: str) -> None:
         """A register whose range has no end."""

@@ -38,7 +38,9 @@ def _has_form(name: str, frame: Frame, path: DataPath, findings: Findings) -> bo
     return False
 
 
-def _check_states(name: str, frame: Frame, states: dict[str, State], path: DataPath, findings: Findings) -> None:
+def _check_states(
+    name: str, frame: Frame, states: dict[str, State], path: DataPath, findings: Findings
+) -> None:
     if frame.start is not None and frame.start not in states:
         near = did_you_mean(frame.start, states)
         span = findings.at((*path, "start"), 0, len(frame.start))
@@ -51,7 +53,9 @@ def _check_states(name: str, frame: Frame, states: dict[str, State], path: DataP
     for state in states:
         if state not in entered:
             span = findings.places.key_span((*path, "states", state))
-            findings.warning("W306", f"state `{state}` can never be entered", span, hint="no `goto` leads to it")
+            findings.warning(
+                "W306", f"state `{state}` can never be entered", span, hint="no `goto` leads to it"
+            )
     _check_circles(states, path, findings)
 
 
@@ -122,7 +126,9 @@ def _check_rules(rules: Sequence[RulePlan], findings: Findings) -> None:
         above = next((other for other in rules[:i] if _covers(other, rule)), None)
         if above is not None:
             message = f"this rule never fires: line {above.span.line} holds whenever it does"
-            findings.warning("W311", message, rule.span, hint="the first rule that holds is the only one that fires")
+            findings.warning(
+                "W311", message, rule.span, hint="the first rule that holds is the only one that fires"
+            )
 
 
 def _covers(above: RulePlan, below: RulePlan) -> bool:
@@ -156,4 +162,3 @@ def _conjuncts(term: Term) -> tuple[Term, ...]:
 
 def _draws(term: Term) -> bool:
     return any(isinstance(part, Quantified) and part.op == "pick" for part in walk(term))
-

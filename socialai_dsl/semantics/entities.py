@@ -11,10 +11,19 @@ from socialai_dsl.schema import CastMember, Scenario
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.findings import Findings, dotted, surviving
 from socialai_dsl.semantics.registers import Declaration
-from socialai_dsl.semantics.scope import Define, Objects, PlayedFrame, Scope, Symbols, parse_define, reset_scope
+from socialai_dsl.semantics.resolve_names import slot_truth
+from socialai_dsl.semantics.scope import (
+    Define,
+    Objects,
+    PlayedFrame,
+    Scope,
+    Symbols,
+    at_every_step,
+    parse_define,
+    reset_scope,
+)
 from socialai_dsl.semantics.signatures import WORDS
-from socialai_dsl.semantics.terms import COLOR, DIRECTION, Const, Entity, ObjectType, Placing, Term, Type
-from socialai_dsl.semantics.places import lies_in_wall
+from socialai_dsl.semantics.terms import COLOR, DIRECTION, Const, ObjectType, Type
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
@@ -70,7 +79,9 @@ def _count(count: int | None, at: Sequence[object] | None) -> int | None:
 def _unknown_type(name: str, types: Mapping[str, ObjectType], findings: Findings, path: DataPath) -> None:
     near = did_you_mean(name, types)
     hint = None if near else "types are " + ", ".join(types)
-    findings.error("S309", f"unknown object type `{name}`", findings.at(path, 0, len(name)), suggestion=near, hint=hint)
+    findings.error(
+        "S309", f"unknown object type `{name}`", findings.at(path, 0, len(name)), suggestion=near, hint=hint
+    )
 
 
 def _defines(written: Mapping[str, object], path: DataPath, findings: Findings) -> dict[str, Define]:
@@ -105,9 +116,13 @@ def _check_names(scenario: Scenario, findings: Findings) -> None:
                 part = {"slot": "slots", "register": "let", "definition": "define"}[kind]
                 span = findings.places.key_span(("frames", frame_name, part, key))
                 if name in WORDS or name in ("name", "kind", "index"):
-                    findings.error("S213", f"`{name}` is a word of the language; call the {kind} something else", span)
+                    findings.error(
+                        "S213", f"`{name}` is a word of the language; call the {kind} something else", span
+                    )
                 elif name in own:
-                    findings.error("S213", f"`{name}` is the name of a {own[name]} of this frame already", span)
+                    findings.error(
+                        "S213", f"`{name}` is the name of a {own[name]} of this frame already", span
+                    )
                 own.setdefault(name, kind)
 
 
@@ -159,6 +174,21 @@ def played_frame(
     return PlayedFrame(member, symbols.numbers[member], frame_name, frame, defines, texts)
 
 
+def check_slots(resolver: Resolver) -> None:
+    """Everything that fills a slot is looked at, though the frame may never use it."""
+    for member, played in resolver.frames.items():
+        filled = resolver.symbols.cast[member].with_
+        for slot, path in played.texts.items():
+            if path is None:
+                continue
+            scope = at_every_step(reset_scope(path, f"cast.{member}.with.{slot}", member))
+            with surviving():
+                if played.model.slots[slot] == "bool":
+                    slot_truth(resolver, member, slot, scope)
+                else:
+                    resolver.utterances.parts(resolver.findings.text(path, str(filled[slot])), scope)
+
+
 def _check_no_slots(name: str, member: CastMember, symbols: Symbols, findings: Findings) -> None:
     own = symbols.scenario.cast[name].with_
     for slot in own:
@@ -172,7 +202,10 @@ def _check_slots(name: str, member: CastMember, symbols: Symbols, findings: Find
     assert member.frame is not None, "internal: only for members with a frame"
     slots = symbols.scenario.frames[member.frame].slots
     for slot, type_ in slots.items():
-        if slot not in member.with_ and did_you_mean(slot, [s for s in member.with_ if s not in slots]) is None:
+        if (
+            slot not in member.with_
+            and did_you_mean(slot, [s for s in member.with_ if s not in slots]) is None
+        ):
             findings.error(
                 "S302", f"frame `{member.frame}` has a slot `{slot}` ({type_}) that `{name}` does not fill",
                 findings.places.key_span(("cast", name)), hint=f"add `with: {{{slot}: ...}}`",
@@ -214,7 +247,9 @@ def declare_name(resolver: Resolver, name: str, member: CastMember) -> None:
         resolver.registers.known(f"{name}.name", known)
         return
     raw = str(raw) if isinstance(raw, int) else raw
-    resolver.registers.declare(Declaration(f"{name}.name", f"{name}.name", path, raw, scope, text, constant=True))
+    resolver.registers.declare(
+        Declaration(f"{name}.name", f"{name}.name", path, raw, scope, text, constant=True)
+    )
 
 
 def is_plain_name(resolver: Resolver, raw: str) -> bool:
@@ -229,7 +264,14 @@ def declare_frame(resolver: Resolver, played: PlayedFrame) -> None:
     symbols, member = resolver.symbols, played.member
     nouns = symbols.nouns
     entity, number = Type("entity", 0, 0), Type("int", 0, 0)
-    types = {"object": entity, "npc": entity, "direction": DIRECTION, "color": COLOR, "int": number, "noun": nouns}
+    types = {
+        "object": entity,
+        "npc": entity,
+        "direction": DIRECTION,
+        "color": COLOR,
+        "int": number,
+        "noun": nouns,
+    }
     for slot, kind in played.model.slots.items():
         if kind in SUBSTITUTED or slot not in symbols.cast[member].with_:
             continue
@@ -242,83 +284,3 @@ def declare_frame(resolver: Resolver, played: PlayedFrame) -> None:
         scope = reset_scope(path, f"{member}/{dotted(path)}", member)
         framed = Scope(path, scope.draws, member, played, at_reset=True)
         resolver.registers.declare(Declaration(f"{member}.{name}", name, path, raw, framed))
-
-
-# -- the list of entities ----------------------------------------------------------------------------------------
-
-
-def entities_of(resolver: Resolver, placings: Mapping[int, Placing]) -> Iterator[Entity]:
-    """The agent, the NPCs in cast order, the objects in file order."""
-    symbols = resolver.symbols
-    kinds: list[str] = []
-    for name in (AGENT, *(n for n in symbols.cast if n != AGENT)):
-        member = symbols.cast[name]
-        kind = member.kind or "peer"
-        if name != AGENT and kind not in kinds:
-            kinds.append(kind)
-        near, far = _voice(resolver, name, member)
-        code = member.kind_code
-        with surviving():
-            number = symbols.numbers[name]
-            yield Entity(
-                number=number,
-                key=name,
-                index=None,
-                role="agent" if name == AGENT else "npc",
-                span=resolver.findings.places.key_span(("cast", name)),
-                kind="" if name == AGENT else kind,
-                kind_code=0 if name == AGENT else code if code is not None else kinds.index(kind),
-                name=resolver.registers.read(f"{name}.name"),
-                near=near,
-                far=far,
-                audible=member.audible == "always",
-                in_wall=number in placings and lies_in_wall(resolver, placings[number]),
-            )
-    for objects in symbols.objects.values():
-        yield from _objects(resolver, objects, placings)
-
-
-def _objects(resolver: Resolver, objects: Objects, placings: Mapping[int, Placing]) -> Iterator[Entity]:
-    state = resolver.symbols.scenario.objects[objects.name].state
-    status = objects.type.initial
-    if state is not None:
-        if state in objects.type.states:
-            status = objects.type.states.index(state)
-        else:
-            path = ("objects", objects.name, "state")
-            findings = resolver.findings
-            findings.error(
-                "S204", f"a {objects.type.name} is never `{state}`; it is {' or '.join(objects.type.states)}",
-                findings.at(path, 0, len(state)), suggestion=did_you_mean(state, objects.type.states),
-            )  # fmt: skip
-    for index, number in enumerate(objects.numbers):
-        yield Entity(
-            number=number,
-            key=objects.name,
-            index=None if objects.single else index,
-            role="object",
-            span=resolver.findings.places.key_span(("objects", objects.name)),
-            type=objects.type,
-            status=status,
-            in_wall=number in placings and lies_in_wall(resolver, placings[number]),
-        )
-
-
-def _voice(resolver: Resolver, name: str, member: CastMember) -> tuple[int, int]:
-    """Least and greatest Manhattan distance at which a voice is heard."""
-    symbols = resolver.symbols
-    if member.earshot is None:
-        path, raw = ("earshot",), symbols.scenario.earshot
-    else:
-        path, raw = symbols.member_path(name, "earshot"), member.earshot
-    if raw == "next_to":
-        return 1, 1
-    if raw == "room":
-        return 0, symbols.width[1] + symbols.height[1]
-    with surviving():
-        term: Term = resolver.written(path, raw, Type("int", 0, 0), reset_scope(path))
-        if isinstance(term, Const) and term.value >= 0:
-            return 0, term.value
-        findings = resolver.findings
-        findings.error("S204", "`earshot` is next_to, room, or a known number of cells", findings.at(path))
-    return 1, 1

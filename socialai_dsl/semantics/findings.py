@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Any, NoReturn
+from typing import Any
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.grammar import ParseProblem, ast, parse_expression, parse_text
@@ -41,7 +41,8 @@ class Findings:
         """Whether a list is written at `path`."""
         part: Any = self.data
         for step in path:
-            if not isinstance(part, dict | list) or (isinstance(part, dict) and step not in part):
+            known = range(len(part)) if isinstance(part, list) else part if isinstance(part, dict) else ()
+            if step not in known:
                 return False
             part = part[step]
         return isinstance(part, list)
@@ -62,36 +63,37 @@ class Findings:
         """Report a warning."""
         self.bag.warning(code, message, span, **more)
 
-    def fail(self, code: str, message: str, span: Span, **more: str | None) -> NoReturn:
-        """Report an error and give up the value it is in."""
+    def fail(self, code: str, message: str, span: Span, **more: str | None) -> FailedError:
+        """Report an error; raising the result gives up the value it is in."""
         self.bag.error(code, message, span, **more)
-        raise FailedError
+        return FailedError()
 
     def expression(self, path: DataPath, raw: Scalar) -> ast.Expr:
         """The tree of the expression at `path`, its parameters replaced by their values."""
         if isinstance(raw, bool):
             return ast.Truth(raw)
         if isinstance(raw, float):
-            self.fail("S204", f"`{raw:g}` is not a whole number", self.at(path))
+            raise self.fail("S204", f"`{raw:g}` is not a whole number", self.at(path))
         if isinstance(raw, int):
             return ast.Number(raw) if raw >= 0 else ast.Negative(ast.Number(-raw))
         try:
             return self._filled(parse_expression(raw), path)
         except ParseProblem as problem:
-            self._problem(problem, path)
+            raise self._problem(problem, path) from None
 
     def text(self, path: DataPath, raw: str) -> ast.Text:
         """The tree of the text at `path`, its parameters replaced by their values."""
         try:
             filled = self._filled(parse_text(raw), path)
         except ParseProblem as problem:
-            self._problem(problem, path)
+            raise self._problem(problem, path) from None
         assert isinstance(filled, ast.Text), "internal: a text became something else"
         return filled
 
-    def _problem(self, problem: ParseProblem, path: DataPath) -> NoReturn:
+    def _problem(self, problem: ParseProblem, path: DataPath) -> FailedError:
         code = "S212" if problem.code == "S004" else problem.code
-        self.fail(code, str(problem), self.at(path, problem.offset), hint=problem.hint)
+        hint = problem.hint if problem.hint and problem.hint not in str(problem) else None
+        return self.fail(code, str(problem), self.at(path, problem.offset), hint=hint)
 
     def _filled(self, tree: ast.Expr, path: DataPath) -> ast.Expr:
         if not any(isinstance(node, ast.Parameter) for node in tree.walk()):
@@ -116,15 +118,18 @@ class Findings:
     def _parameter(self, node: ast.Parameter, path: DataPath) -> ast.Expr:
         span = self.at(path, node.at, len(node.id) + 1)
         if node.id not in self.params:
-            self.fail("S206", f"unknown parameter `{node.id}`", span, suggestion=did_you_mean(node.id, self.params))
+            raise self.fail(
+                "S206", f"unknown parameter `{node.id}`", span, suggestion=did_you_mean(node.id, self.params)
+            )
         value = self.params[node.id]
         if isinstance(value, str):
             try:
                 return _placed_at(parse_expression(value), node.at)
             except ParseProblem as problem:
-                self.fail("S206", f"the value `{value}` of `{node.id}` is not an expression: {problem}", span)
+                message = f"the value `{value}` of `{node.id}` is not an expression: {problem}"
+                raise self.fail("S206", message, span) from None
         if isinstance(value, float):
-            self.fail("S204", f"the parameter `{node.id}` is {value:g}, not a whole number", span)
+            raise self.fail("S204", f"the parameter `{node.id}` is {value:g}, not a whole number", span)
         return _placed_at(self.expression((), value), node.at)
 
 
@@ -159,13 +164,9 @@ def _placed_at(node: ast.Expr, at: int) -> ast.Expr:
     return replace(node, **changes)
 
 
-@contextmanager
-def surviving() -> Iterator[None]:
+def surviving() -> suppress:
     """Go on after a value that failed; its reason has been reported."""
-    try:
-        yield
-    except FailedError:
-        pass
+    return suppress(FailedError)
 
 
 def dotted(path: DataPath) -> str:

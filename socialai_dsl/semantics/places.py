@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, NoReturn
+from typing import TYPE_CHECKING, Literal
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.base import Expression
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import resolve_groups
+from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.scope import Scope
 from socialai_dsl.semantics.signatures import PLACES
 from socialai_dsl.semantics.terms import (
@@ -53,8 +54,13 @@ def at(resolver: Resolver, spot: Spot, pair: Sequence[Expression], scope: Scope)
     """An exact cell, `at: [x, y]`."""
     findings = resolver.findings
     if len(pair) != 2:
-        findings.fail("S104", f"`at` is a cell [x, y]; {len(pair)} numbers given", findings.at(spot.path))
-    x, y = (resolver.written((*spot.path, i), raw, _INT, _inside(scope, spot.path, i)) for i, raw in enumerate(pair))
+        raise findings.fail(
+            "S104", f"`at` is a cell [x, y]; {len(pair)} numbers given", findings.at(spot.path)
+        )
+    x, y = (
+        resolver.written((*spot.path, i), raw, _INT, _inside(scope, spot.path, i))
+        for i, raw in enumerate(pair)
+    )
     return Placing(spot.entity, spot.site, spot.number, findings.at(spot.path), at=(x, y))
 
 
@@ -110,7 +116,7 @@ def region(resolver: Resolver, node: ast.Expr, scope: Scope, spot: Spot | None =
             return (Region("wall", (side,)),)
         case "each_wall":
             return (_each_wall(resolver, node, args, scope, spot),)
-    _unknown(resolver, name, node, scope)
+    raise _unknown(resolver, name, node, scope)
 
 
 def _head(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[str, tuple[ast.Expr, ...]]:
@@ -119,14 +125,16 @@ def _head(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[str, tuple[
             return name, ()
         case ast.Call(name=name, args=args, subject=None):
             return name, args
-    resolver.fail("S204", f"`{quoted(node)}` is not a place", node, scope, hint="places are " + ", ".join(PLACES))
+    raise resolver.fail(
+        "S204", f"`{quoted(node)}` is not a place", node, scope, hint="places are " + ", ".join(PLACES)
+    )
 
 
 def _takes(resolver: Resolver, node: ast.Expr, args: tuple[ast.Expr, ...], count: int, scope: Scope) -> None:
     if len(args) != count:
         name = node.id if isinstance(node, ast.Name) else node.name if isinstance(node, ast.Call) else ""
         takes = ", ".join(PLACES[name].takes) if name in PLACES and count else "nothing" if not count else "x"
-        resolver.fail("S211", f"`{name}` takes {takes} in brackets; {len(args)} given", node, scope)
+        raise resolver.fail("S211", f"`{name}` takes {takes} in brackets; {len(args)} given", node, scope)
 
 
 def _targets(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[Term, ...]:
@@ -141,17 +149,21 @@ def _each_wall(
     """The wall of this member of the group: top, bottom, left, right in turn."""
     margin = resolver.value(args[0], _INT, scope) if args else Const(Type("int", 1, 1), 1)
     if len(args) > 1 or not isinstance(margin, Const) or margin.value < 1:
-        resolver.fail("S211", "`each_wall` takes a number, at least 1: cells from the corners", node, scope)
+        raise resolver.fail(
+            "S211", "`each_wall` takes a number, at least 1: cells from the corners", node, scope
+        )
     if spot is None or spot.count > len(_SIDES) or spot.count < 2:
         message = "`each_wall` is for a group of two to four, one in each wall"
-        resolver.fail("S204", message, node, scope, hint="give `count: 4`; for one thing write `wall(top)`")
+        raise resolver.fail(
+            "S204", message, node, scope, hint="give `count: 4`; for one thing write `wall(top)`"
+        )
     return Region("wall", side=_SIDES[spot.index], margin=margin.value)
 
 
-def _unknown(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> NoReturn:
+def _unknown(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> FailedError:
     near = did_you_mean(name, [*PLACES, "next_to", "in_front_of"])
     hint = None if near else "places are " + ", ".join([*PLACES, "next_to", "in_front_of"])
-    resolver.fail("S205", f"unknown place `{name}`", node, scope, suggestion=near, hint=hint)
+    return resolver.fail("S205", f"unknown place `{name}`", node, scope, suggestion=near, hint=hint)
 
 
 def lies_in_wall(resolver: Resolver, placing: Placing) -> bool:

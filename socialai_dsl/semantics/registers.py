@@ -80,7 +80,7 @@ class Registers:
     def read(self, path: str, expected: Type | None = None, span: Span | None = None) -> Term:
         """The register (or its constant) as a term; `expected` and `span` are those of the use."""
         if path in self._busy:
-            self._circle(path)
+            raise self._circle(path)
         declaration = self._declared.get(path)
         if declaration is not None and expected is not None and span is not None and self.is_wordy(path):
             self._settle(declaration, expected, span)
@@ -107,7 +107,7 @@ class Registers:
         settled = self._settled.setdefault(declaration.path, (expected, span))
         if (settled[0].kind, settled[0].words) != (expected.kind, expected.words):
             first, place = settled
-            self._resolver.findings.fail(
+            raise self._resolver.findings.fail(
                 "S209",
                 f"`{declaration.label}` is used as {described(expected)} here, but as {described(first)} before",
                 span,
@@ -141,7 +141,7 @@ class Registers:
         self._terms[path] = Read(widened, path)
         self._drawn[path] = Drawn(path, widened, sited)
 
-    def _circle(self, path: str) -> None:
+    def _circle(self, path: str) -> FailedError:
         circle = [self._declared[p] for p in self._busy[self._busy.index(path) :]]
         labels = [d.label for d in circle]
         needs = " and ".join(
@@ -149,7 +149,7 @@ class Registers:
             for a, b in zip(labels, labels[1:] + labels[:1], strict=True)
         )
         findings = self._resolver.findings
-        findings.fail("S208", needs, findings.places.key_span(circle[0].source))
+        return findings.fail("S208", needs, findings.places.key_span(circle[0].source))
 
 
 def _union(a: Type, b: Type) -> Type:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NoReturn
 
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.positions import DataPath
@@ -88,7 +87,7 @@ class Resolver:
                 return self.fit(Const(BOOL, int(truth)), expected, node, scope)
             case ast.Text(plain=plain):
                 if plain is None:
-                    self.fail("S204", "a text with <...> can only be said or heard", node, scope)
+                    raise self.fail("S204", "a text with <...> can only be said or heard", node, scope)
                 return self._as_text(plain, expected, node, scope)
             case ast.Name():
                 return self.fit(resolve_names.name(self, node, expected, scope), expected, node, scope)
@@ -109,18 +108,20 @@ class Resolver:
             case ast.Arithmetic() | ast.Negative():
                 return self.fit(self._arithmetic(node, scope), expected, node, scope)
             case ast.Alternatives() | ast.Interval():
-                self.fail(
+                raise self.fail(
                     "S204", f"`{quoted(node)}` is a choice of several, here one is needed", node, scope,
                     hint=f"to draw one write `pick({quoted(node)})`; to ask for any of them write `in`",
                 )  # fmt: skip
             case ast.Placed():
-                self.fail("S210", "`where` belongs in a place or inside pick(x in group where ...)", node, scope)
+                raise self.fail(
+                    "S210", "`where` belongs in a place or inside pick(x in group where ...)", node, scope
+                )
             case _:
                 raise AssertionError(f"internal: no meaning for {type(node).__name__}")
 
-    def fail(self, code: str, message: str, node: ast.Expr, scope: Scope, **more: str | None) -> NoReturn:
-        """Report what is wrong with a part of an expression, and give the expression up."""
-        self.findings.fail(code, message, self.findings.node(scope.path, node), **more)
+    def fail(self, code: str, message: str, node: ast.Expr, scope: Scope, **more: str | None) -> FailedError:
+        """Report what is wrong with a part of an expression; raising the result gives the expression up."""
+        return self.findings.fail(code, message, self.findings.node(scope.path, node), **more)
 
     def fit(self, term: Term, expected: Type | None, node: ast.Expr, scope: Scope) -> Term:
         """The term itself if it is of the expected type, or the word of that type it stands for."""
@@ -136,7 +137,7 @@ class Resolver:
             hint = "write `true` or `false`"
         elif expected.words and expected.kind not in ("noun", "bool"):
             hint = f"one of {words_of(expected)}"
-        self.fail("S204", message, node, scope, hint=hint)
+        raise self.fail("S204", message, node, scope, hint=hint)
 
     def _as_text(self, text: str, expected: Type | None, node: ast.Expr, scope: Scope) -> Term:
         if expected is None or expected.kind == "text":
@@ -200,7 +201,7 @@ class Resolver:
                 if spoken(left.type, i) == spoken(right.type, j)
             )
         message = f"{described(left.type)} and {described(right.type)} cannot be compared"
-        self.fail("S204", message, node, scope)
+        raise self.fail("S204", message, node, scope)
 
     def _membership(self, node: ast.Member, scope: Scope) -> Term:
         options = self._options(node.right)
@@ -241,7 +242,7 @@ class Resolver:
             left, right = self.value(node.left, INT, scope), self.value(node.right, INT, scope)
             if node.op in ("//", "%") and right.type.low <= 0 <= right.type.high:
                 message = f"`{quoted(node.right)}` can be 0, and nothing can be divided by 0"
-                self.fail("S204", message, node.right, scope)
+                raise self.fail("S204", message, node.right, scope)
         return arithmetic(node.op, left, right)
 
     def _operands(self, node: ast.Arithmetic, scope: Scope) -> tuple[Term, Term]:
@@ -284,5 +285,7 @@ def _same_kind(actual: Type, expected: Type) -> bool:
     if actual.kind != expected.kind:
         return False
     if actual.kind == "int":
-        return bool(actual.words) == bool(expected.words) and (not actual.words or actual.words == expected.words)
+        return bool(actual.words) == bool(expected.words) and (
+            not actual.words or actual.words == expected.words
+        )
     return actual.kind != "status" or actual.words == expected.words

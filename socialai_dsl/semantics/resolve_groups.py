@@ -69,8 +69,10 @@ def group(resolver: Resolver, node: ast.Expr, expected: Type | None, scope: Scop
     if isinstance(single, Const):
         return Group(single.type, (single,))
     message = f"`{quoted(node)}` is {described(single.type)}, here a group is needed"
-    hint = "a group is the name of objects with `count`, `colors`, `nouns`, a range 1..3, or alternatives a | b"
-    resolver.fail("S204", message, node, scope, hint=hint)
+    hint = (
+        "a group is the name of objects with `count`, `colors`, `nouns`, a range 1..3, or alternatives a | b"
+    )
+    raise resolver.fail("S204", message, node, scope, hint=hint)
 
 
 def _values(type_: Type) -> tuple[Const, ...]:
@@ -83,9 +85,13 @@ def _interval(resolver: Resolver, node: ast.Interval, scope: Scope) -> Group:
     type_ = Type("int", low.type.low, high.type.high)
     known = isinstance(low, Const) and isinstance(high, Const)
     if type_.size < 1:
-        resolver.fail("S106", f"the range {quoted(node)} is empty: its end is below its start", node, scope)
+        raise resolver.fail(
+            "S106", f"the range {quoted(node)} is empty: its end is below its start", node, scope
+        )
     if type_.size > MAX_GROUP:
-        resolver.fail("S106", f"a range has at most {MAX_GROUP} values, this one {type_.size}", node, scope)
+        raise resolver.fail(
+            "S106", f"a range has at most {MAX_GROUP} values, this one {type_.size}", node, scope
+        )
     return Group(type_, _values(type_), None if known else (low, high))
 
 
@@ -100,7 +106,9 @@ def _alternatives(
     for weight, option in parts:
         members = group(resolver, option, _open(expected), scope)
         if members.bounds is not None:
-            resolver.fail("S204", f"the ends of `{quoted(option)}` are not known numbers", option, scope)
+            raise resolver.fail(
+                "S204", f"the ends of `{quoted(option)}` are not known numbers", option, scope
+            )
         items += members.items * weight
     return _joined(resolver, node, items, scope)
 
@@ -113,9 +121,11 @@ def _open(expected: Type | None) -> Type | None:
 
 def _weighted(resolver: Resolver, option: ast.Expr, scope: Scope) -> tuple[int, ast.Expr]:
     match option:
-        case ast.Arithmetic(op="*", left=ast.Number(value=weight), right=right) if not isinstance(right, ast.Number):
+        case ast.Arithmetic(op="*", left=ast.Number(value=weight), right=right) if not isinstance(
+            right, ast.Number
+        ):
             if not 1 <= weight <= MAX_WEIGHT:
-                resolver.fail("S106", f"a weight is from 1 to {MAX_WEIGHT}", option, scope)
+                raise resolver.fail("S106", f"a weight is from 1 to {MAX_WEIGHT}", option, scope)
             return weight, right
     return 1, option
 
@@ -125,7 +135,7 @@ def _joined(resolver: Resolver, node: ast.Expr, items: list[Const], scope: Scope
     kinds = {item.type.kind for item in items}
     if len(kinds) > 1:
         first, second = (described(item.type) for item in _different(items))
-        resolver.fail("S204", f"`{quoted(node)}` mixes {first} with {second}", node, scope)
+        raise resolver.fail("S204", f"`{quoted(node)}` mixes {first} with {second}", node, scope)
     if kinds == {"text"}:
         words = tuple(dict.fromkeys(spoken(item.type, item.value) for item in items))
         type_ = Type("text", 0, len(words) - 1, words)
@@ -146,16 +156,16 @@ def quantified(resolver: Resolver, node: ast.Quantifier, expected: Type | None, 
     """`pick(x in group where condition to target)` and its kin."""
     if node.name not in QUANTIFIERS:
         near = did_you_mean(node.name, QUANTIFIERS)
-        resolver.fail("S205", f"`{node.name}(x in ...)` is not known", node, scope, suggestion=near)
+        raise resolver.fail("S205", f"`{node.name}(x in ...)` is not known", node, scope, suggestion=near)
     if node.var in WORDS or node.var in resolver.symbols.declared():
         message = f"the variable `{node.var}` has a name that means something already"
-        resolver.fail("S213", message, node, scope, hint="call it by a letter, such as `d`")
+        raise resolver.fail("S213", message, node, scope, hint="call it by a letter, such as `d`")
     if node.name == "nearest" and node.to is None:
-        resolver.fail("S211", "`nearest` needs `to`: nearest(d in doors to agent)", node, scope)
+        raise resolver.fail("S211", "`nearest` needs `to`: nearest(d in doors to agent)", node, scope)
     if node.name != "nearest" and node.to is not None:
-        resolver.fail("S211", f"`to` belongs to `nearest`, not to `{node.name}`", node, scope)
+        raise resolver.fail("S211", f"`to` belongs to `nearest`, not to `{node.name}`", node, scope)
     if node.name in ("any", "all") and node.where is None:
-        resolver.fail("S211", f"`{node.name}` needs `where` and a condition", node, scope)
+        raise resolver.fail("S211", f"`{node.name}` needs `where` and a condition", node, scope)
     chooses = node.name in ("pick", "first", "nearest")
     members = group(resolver, node.group, _open(expected) if chooses else None, scope)
     ordinal = scope.draws.number() if node.name == "pick" else 0
@@ -201,8 +211,10 @@ def any_member(
     """Whether a relation holds to any member of the group at `node`."""
     members = group(resolver, node, None, scope)
     if members.type.kind != "entity":
-        message = f"`{quoted(node)}` is {described(members.type)}, here somebody or something in the room is needed"
-        resolver.fail("S204", message, node, scope)
+        message = (
+            f"`{quoted(node)}` is {described(members.type)}, here somebody or something in the room is needed"
+        )
+        raise resolver.fail("S204", message, node, scope)
     variable = _named("each", scope)
     condition = relation(name, subject, Variable(members.type, variable))
     return made("any", members, variable, condition, scope)

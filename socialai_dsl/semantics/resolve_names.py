@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics import resolve_calls
+from socialai_dsl.semantics import resolve_attributes
+from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.scope import Define, Draws, Macro, Scope
 from socialai_dsl.semantics.signatures import ACTIVITIES, EFFECTS, PLACES, QUANTIFIERS, VALUES, WORDS
 from socialai_dsl.semantics.terms import (
@@ -25,11 +27,12 @@ from socialai_dsl.semantics.terms import (
     Type,
     World,
 )
-from socialai_dsl.semantics.wording import described
+from socialai_dsl.semantics.wording import described, usage, words_of
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
 
+_YES_AND_NO = ("yes", "no", "on", "off", "y", "n", "never", "always")
 _VOCABULARIES = (COLOR, DIRECTION, ACTION, TURN, SIDE)
 
 
@@ -53,17 +56,19 @@ def name(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope
     if term is not None:
         return term
     if word in VALUES and not VALUES[word].takes and word not in QUANTIFIERS:
-        return resolve_calls.without_arguments(resolver, word, None, node, scope)
+        return resolve_attributes.without_arguments(resolver, word, None, node, scope)
     if word in _statuses(resolver) and scope.member is not None:
-        return resolve_calls.without_arguments(resolver, word, None, node, scope)
-    return _unknown(resolver, node, expected, scope)
+        return resolve_attributes.without_arguments(resolver, word, None, node, scope)
+    raise _unknown(resolver, node, expected, scope)
 
 
 def _variable(resolver: Resolver, bound: Term | Macro, expected: Type | None, scope: Scope) -> Term:
     if not isinstance(bound, Macro):
         return bound
     # An argument is resolved where it is used, but means what it meant to the caller.
-    inner = replace(bound.scope, draws=scope.draws, outer=scope.outer, nested=scope.nested, within=scope.within)
+    inner = replace(
+        bound.scope, draws=scope.draws, outer=scope.outer, nested=scope.nested, within=scope.within
+    )
     return resolver.value(bound.node, expected, inner)
 
 
@@ -92,20 +97,26 @@ def _substituted(resolver: Resolver, node: ast.Name, expected: Type | None, scop
     assert frame is not None, "internal: a slot outside a frame"
     if frame.model.slots[node.id] != "bool":
         message = f"`{node.id}` is a text: it can be said or heard, not computed with"
-        resolver.fail("S204", message, node, scope)
-    path = frame.texts[node.id]
-    if path is None:
-        return FieldOf(BOOL, entity(frame.number), "poked")
-    inner = with_scope(resolver, frame.member, node.id, scope)
-    return resolver.written(path, resolver.symbols.cast[frame.member].with_[node.id], BOOL, inner)
+        raise resolver.fail("S204", message, node, scope)
+    if frame.texts[node.id] is None:
+        return FieldOf(BOOL, entity(frame.number), "poked")  # any condition will do: nobody plays this frame
+    return slot_truth(resolver, frame.member, node.id, with_scope(resolver, frame.member, node.id, scope))
 
 
-def with_scope(resolver: Resolver, member: str, slot: str, user: Scope | None) -> Scope:
-    """The scope of what fills a slot of a member's frame, where it is substituted (`user`) or computed at reset."""
+def slot_truth(resolver: Resolver, member: str, slot: str, scope: Scope) -> Term:
+    """The condition that fills a slot of type bool."""
+    raw = resolver.symbols.cast[member].with_[slot]
+    if isinstance(raw, str) and raw.casefold() in _YES_AND_NO:
+        truth = "true" if raw.casefold() in ("yes", "on", "y", "always") else "false"
+        span = resolver.findings.at(scope.path, 0, len(raw))
+        raise resolver.findings.fail("S204", f"slot `{slot}` is a bool: write `{truth}`", span)
+    return resolver.written(scope.path, raw, BOOL, scope)
+
+
+def with_scope(resolver: Resolver, member: str, slot: str, user: Scope) -> Scope:
+    """The scope of what fills a slot of a member's frame, where it is substituted."""
     path = resolver.symbols.with_path(member, slot)
     draws = Draws(f"cast.{member}.with.{slot}")
-    if user is None:
-        return Scope(path, draws, member=member, at_reset=True)
     return Scope(path, draws, member=member, at_reset=user.at_reset, outer=user.draws, nested=user.nested)
 
 
@@ -122,7 +133,7 @@ def _declared(resolver: Resolver, node: ast.Name, expected: Type | None, scope: 
         objects = symbols.objects[word]
         if objects.single:
             return entity(objects.numbers[0])
-        resolver.fail(
+        raise resolver.fail(
             "S204", f"`{word}` is a group of {len(objects.numbers)}, here one of them is needed", node, scope,
             hint=f"`pick({word})` draws one, `any(x in {word} where ...)` asks for any",
         )  # fmt: skip
@@ -164,24 +175,32 @@ def _word(word: str, expected: Type | None) -> Term | None:
     return None
 
 
-def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope) -> Term:
+def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope) -> FailedError:
     word = node.id
     if word == "here":
-        resolver.fail("S201", "`here` is the candidate cell; it means something only in a place", node, scope)
+        return resolver.fail(
+            "S201", "`here` is the candidate cell; it means something only in a place", node, scope
+        )
     if word in ACTIVITIES or word in EFFECTS or word in PLACES:
         kind = "an activity" if word in ACTIVITIES else "an effect" if word in EFFECTS else "a place"
-        resolver.fail("S204", f"`{word}` is {kind}; here a value is expected", node, scope)
+        return resolver.fail("S204", f"`{word}` is {kind}; here a value is expected", node, scope)
     if word in VALUES:
-        usage = f"{word}(...)"
-        resolver.fail("S211", f"`{word}` needs something in brackets: `{usage}`", node, scope)
+        return resolver.fail(
+            "S211", f"`{word}` needs something in brackets: `{usage(VALUES[word])}`", node, scope
+        )
     near, place = suggestion(resolver, word, expected, scope)
-    what = f"unknown name `{word}`"
-    if expected is not None and expected.words and near in expected.words:
-        what = f"`{word}` is not {described(expected)}"
-    resolver.fail("S201", what, node, scope, suggestion=near, suggestion_place=place)
+    message, hint = f"unknown name `{word}`", None
+    if expected is not None and expected.words and expected.kind not in ("bool", "noun"):
+        message = f"unknown name `{word}`, where {described(expected)} is expected"
+        hint = None if near else "one of " + words_of(expected)
+    elif expected is not None and expected.kind == "bool" and word.casefold() in _YES_AND_NO:
+        message = f"`{word}` means nothing here; a truth is written `true` or `false`"
+    return resolver.fail("S201", message, node, scope, suggestion=near, suggestion_place=place, hint=hint)
 
 
-def suggestion(resolver: Resolver, word: str, expected: Type | None, scope: Scope) -> tuple[str | None, str | None]:
+def suggestion(
+    resolver: Resolver, word: str, expected: Type | None, scope: Scope
+) -> tuple[str | None, str | None]:
     """The name that was probably meant, and where it is declared."""
     declared = resolver.symbols.declared()
     candidates = [*scope.variables, *declared, *(expected.words if expected else ())]
@@ -218,7 +237,11 @@ def _register_of(resolver: Resolver, node: ast.Name, scope: Scope) -> str | None
 
 def _names_something(resolver: Resolver, word: str, scope: Scope) -> bool:
     frame = scope.frame
-    if word in scope.variables or word in resolver.symbols.declared() or word in ("t", "W", "H", "self", "it"):
+    if (
+        word in scope.variables
+        or word in resolver.symbols.declared()
+        or word in ("t", "W", "H", "self", "it")
+    ):
         return True
     if frame is not None and (word in frame.model.slots or word in frame.model.let or word in frame.defines):
         return True
@@ -248,13 +271,13 @@ def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
     if isinstance(node.subject, ast.Name):
         owner = node.subject.id
         if owner == "here" and node.name in ("x", "y") and scope.here:
-            low, high = (resolver.symbols.width if node.name == "x" else resolver.symbols.height)
+            _, high = resolver.symbols.width if node.name == "x" else resolver.symbols.height
             return Here(Type("int", 0, high - 1), "x" if node.name == "x" else "y")
         register = f"{owner}.{node.name}"
         builtin = node.name in VALUES
         if owner not in scope.variables and not builtin and register in resolver.registers:
             return resolver.registers.read(register)
-    return resolve_calls.without_arguments(resolver, node.name, node.subject, node, scope)
+    return resolve_attributes.without_arguments(resolver, node.name, node.subject, node, scope)
 
 
 def _statuses(resolver: Resolver) -> set[str]:
@@ -262,16 +285,21 @@ def _statuses(resolver: Resolver) -> set[str]:
 
 
 def expanded(
-    resolver: Resolver, define: Define, arguments: Mapping[str, ast.Expr], node: ast.Expr, expected: Type | None, scope: Scope
-) -> Term:  # fmt: skip
+    resolver: Resolver,
+    define: Define,
+    arguments: Mapping[str, ast.Expr],
+    node: ast.Expr,
+    expected: Type | None,
+    scope: Scope,
+) -> Term:
     """The value of a definition where it is used; `arguments` are resolved in the user's scope."""
     if len(arguments) != len(define.parameters):
         wanted = ", ".join(define.parameters)
-        resolver.fail("S211", f"`{define.name}` takes ({wanted})", node, scope)
+        raise resolver.fail("S211", f"`{define.name}` takes ({wanted})", node, scope)
     if define.name in scope.within:
         circle = [*scope.within[scope.within.index(define.name) :], define.name]
-        needs = " and ".join(f"`{a}` needs `{b}`" for a, b in _pairs(circle))
-        resolver.findings.fail("S208", needs, resolver.findings.places.key_span(define.path))
+        needs = " and ".join(f"`{a}` needs `{b}`" for a, b in pairwise(circle))
+        raise resolver.findings.fail("S208", needs, resolver.findings.places.key_span(define.path))
     inner = replace(
         scope,
         path=define.path,
@@ -281,7 +309,3 @@ def expanded(
         within=(*scope.within, define.name),
     )
     return resolver.written(define.path, define.raw, expected, inner)
-
-
-def _pairs(words: list[str]) -> Iterator[tuple[str, str]]:
-    return zip(words, words[1:], strict=False)

@@ -52,7 +52,9 @@ def _range(findings: Findings, path: DataPath, raw: Expression) -> Sizes:
     except FailedError:
         return _ASSUMED
     except ValueError:
-        findings.error("S204", f"`{path[-1]}` is a number of cells such as 8, or a range such as 5..8", findings.at(path))
+        findings.error(
+            "S204", f"`{path[-1]}` is a number of cells such as 8, or a range such as 5..8", findings.at(path)
+        )
         return _ASSUMED
     if not SMALLEST <= low <= high <= LARGEST:
         message = f"a room has {SMALLEST} to {LARGEST} cells each way, walls included; {low}..{high} given"
@@ -110,5 +112,7 @@ def _regions(
             reads = [t for t in walk(region.args) if not isinstance(t, World) and hasattr(t, "path")]
             if reads or region.name in ("next_to", "in_front_of") or (region.name == "wall" and region.args):
                 message = "what is built into the room depends on its size alone"
-                findings.fail("S204", message, findings.at(path), hint="use W and H, and put what is drawn in `objects`")
+                raise findings.fail(
+                    "S204", message, findings.at(path), hint="use W and H, and put what is drawn in `objects`"
+                )
             yield type_, region, findings.at(path)

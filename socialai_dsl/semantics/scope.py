@@ -94,10 +94,10 @@ class Symbols:
 
     def declared(self) -> dict[str, str]:
         """Every name of the scenario and what it is: let, object, cast, define."""
-        found = {name: "let" for name in self.scenario.let}
-        found |= {name: "define" for name in self.defines}
+        found = dict.fromkeys(self.scenario.let, "let")
+        found |= dict.fromkeys(self.defines, "define")
         found |= {name: "object" if o.single else "objects" for name, o in self.objects.items()}
-        return found | {name: "cast" for name in self.cast}
+        return found | dict.fromkeys(self.cast, "cast")
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
@@ -70,7 +71,7 @@ def _member_placing(resolver: Resolver, name: str, member: CastMember) -> Placin
 
 def _both_places(resolver: Resolver, path: DataPath) -> None:
     span = resolver.findings.places.key_span(path)
-    resolver.findings.fail("S107", "only one of `place` and `at` can be given", span)
+    raise resolver.findings.fail("S107", "only one of `place` and `at` can be given", span)
 
 
 def _object_placings(resolver: Resolver, objects: Objects) -> Iterator[Placing]:
@@ -113,7 +114,7 @@ def _member_scope(resolver: Resolver, objects: Objects, index: int, path: DataPa
 def _check_length(resolver: Resolver, given: int, count: int, path: DataPath) -> None:
     if given != count:
         message = f"{given} given for {count}: a list has one for each member of the group"
-        resolver.findings.fail("S106", message, resolver.findings.at(path))
+        raise resolver.findings.fail("S106", message, resolver.findings.at(path))
 
 
 # -- colours and directions --------------------------------------------------------------------------------------
@@ -152,7 +153,7 @@ def _object_colors(resolver: Resolver, objects: Objects, group: ObjectGroup) -> 
     distinct = single and given[0] == "distinct"
     if distinct and count > COLOR.size:
         message = f"{count} distinct colours are asked for; there are {COLOR.size}"
-        resolver.findings.fail("S106", message, resolver.findings.at(base))
+        raise resolver.findings.fail("S106", message, resolver.findings.at(base))
     for i, number in enumerate(objects.numbers):
         path = base if single else (*base, i)
         raw = given[0 if single else i]
@@ -177,7 +178,7 @@ def _of_group(
     others = resolve_groups.group(resolver, node.subject, None, scope)
     if len(others.items) != count or node.name != "color":
         message = f"`{quoted(node)}` gives {len(others.items)} values for {count}"
-        resolver.fail("S106", message, node, scope)
+        raise resolver.fail("S106", message, node, scope)
     return Sited(FieldOf(COLOR, others.items[index], "color"), scope.draws.site, resolver.findings.at(path))
 
 
@@ -198,7 +199,7 @@ def _facing(resolver: Resolver, name: str, member: CastMember) -> Facing:
     node = resolver.findings.expression(path, member.facing)
     if isinstance(node, ast.Call) and node.name == "toward" and node.subject is None:
         if len(node.args) != 1:
-            resolver.fail("S211", "`toward` takes who or what to turn to: toward(agent)", node, scope)
+            raise resolver.fail("S211", "`toward` takes who or what to turn to: toward(agent)", node, scope)
         return Facing(number, site, span, toward=resolver.value(node.args[0], _ENTITY, scope))
     term = resolver.value(node, DIRECTION, scope)
     return Facing(number, site, span, Sited(term, scope.draws.site, span))
@@ -263,7 +264,7 @@ class _Sorter:
         if key in self._done or key not in self._items:
             return
         if key in self._path:
-            self._circle([*self._path[self._path.index(key) :], key])
+            raise self._circle([*self._path[self._path.index(key) :], key])
         self._path.append(key)
         try:
             for need in needs(self._items[key]):
@@ -272,17 +273,12 @@ class _Sorter:
             self._path.pop()
         self._done[key] = self._items[key]
 
-    def _circle(self, keys: list[str]) -> None:
+    def _circle(self, keys: list[str]) -> FailedError:
         names = [self._called(key) for key in keys]
-        pairs = zip(names, names[1:], strict=False)
-        message = " and ".join(f"{a} needs {b}" for a, b in pairs)
+        message = " and ".join(f"{a} needs {b}" for a, b in pairwise(names))
         item = self._items[keys[0]]
         span = item.value.span if isinstance(item, Drawn) else item.span
-        raise self._failed(message, span)
-
-    def _failed(self, message: str, span: object) -> FailedError:
-        self._resolver.findings.error("S208", message, span)  # type: ignore[arg-type]
-        return FailedError()
+        return self._resolver.findings.fail("S208", message, span)
 
     def _called(self, key: str) -> str:
         kind, _, number = key.partition(" ")

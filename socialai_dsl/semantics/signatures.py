@@ -10,7 +10,18 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 Argument = Literal[
-    "entity", "entities", "int", "direction", "turn", "utterance", "state", "status", "action", "side", "group", "actions"
+    "entity",
+    "entities",
+    "int",
+    "direction",
+    "turn",
+    "utterance",
+    "state",
+    "status",
+    "action",
+    "side",
+    "group",
+    "actions",
 ]
 Subject = Literal["entity", "member", "agent", "object", "cell", "none"]
 Use = Literal["value", "place", "activity", "effect"]
@@ -59,19 +70,19 @@ def _value(
 SIGNATURES: Final[tuple[Signature, ...]] = (
     # conditions between two things
     _value("at", "entity", ("entities",), "condition", "on the same cell", cell=True),
-    _value("next_to", "entity", ("entities",), "condition", "one cell away, not diagonally; no facing needed", cell=True),
-    _value("in_front_of", "entity", ("entities",), "condition", "on the cell that x faces, or before x in its wall", cell=True),
+    _value("next_to", "entity", ("entities",), "condition", "one cell away, whatever the facing", cell=True),
+    _value("in_front_of", "entity", ("entities",), "condition", "on the cell before x", cell=True),
     _value("faces", "entity", ("entities",), "condition", "x is on the cell ahead"),
     _value("faces_toward", "entity", ("entities",), "condition", "turned to where face(x) would end"),
     _value("eye_contact", "entity", ("entities",), "condition", "same row or column, each turned to the other"),
     _value("in_line", "entity", ("entities",), "condition", "same row or same column"),
     _value("can_reach", "entity", ("entities",), "condition", "a free path to x, or next to x, exists now"),
     # what was said and done
-    _value("said", "agent", ("utterance",), "condition", "the agent said this in this step, however far away", momentary=True),
+    _value("said", "agent", ("utterance",), "condition", "said in this step, however far away", momentary=True),
     _value("spoke", "agent", (), "condition", "the agent said something in this step", momentary=True),
-    _value("noun", "agent", (), "noun", "the noun of what the agent said in this step", momentary=True),
+    _value("noun", "agent", (), "noun", "the noun of what it said in this step", momentary=True),
     _value("did", "agent", ("action",), "condition", "the agent's body action in this step", momentary=True),
-    _value("action", "agent", (), "action", "the agent's body action in this step; `none` if it only spoke", momentary=True),
+    _value("action", "agent", (), "action", "its body action in this step, or `none`", momentary=True),
     _value("heard", "member", ("utterance",), "condition", "this NPC heard it since its last turn", momentary=True),
     _value("poked", "entity", (), "condition", "the agent toggled at it in this step", momentary=True),
     _value("was_poked", "entity", (), "condition", "the agent has toggled at it in this episode", momentary=True),
@@ -107,9 +118,9 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     Signature("bottom_half", "none", (), "place", "place", "y > H // 2"),
     Signature("column", "none", ("int",), "place", "place", "the column x, without the walls"),
     Signature("row", "none", ("int",), "place", "place", "the row y, without the walls"),
-    Signature("rect", "none", ("int", "int", "int", "int"), "place", "place", "from (x0, y0) to (x1, y1), both included"),
+    Signature("rect", "none", ("int", "int", "int", "int"), "place", "place", "from (x0, y0) to (x1, y1)"),
     Signature("wall", "none", ("side",), "place", "place", "in this wall, not in its corners"),
-    Signature("each_wall", "none", ("int",), "place", "place", "one in each wall, n cells from its corners", optional=1),
+    Signature("each_wall", "none", ("int",), "place", "place", "one in each wall, n off the corners", optional=1),
     # activities
     Signature("stay", "none", (), "activity", "activity", "do nothing"),
     Signature("left", "none", (), "activity", "activity", "a quarter turn left"),
@@ -123,7 +134,7 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     Signature("go_next_to", "none", ("entity",), "activity", "activity", "walk to a cell next to x"),
     Signature("use", "none", ("entity",), "activity", "activity", "go next to x, face it, toggle it"),
     Signature("enter", "none", ("entity",), "activity", "activity", "open x if it is closed, then go in"),
-    Signature("choose", "none", ("actions",), "activity", "activity", "one of the actions at random: choose(a | b | 2 * c)"),
+    Signature("choose", "none", ("actions",), "activity", "activity", "one at random: choose(a | b | 2 * c)"),
     Signature("wander", "none", (), "activity", "activity", "choose(forward | left | right)"),
     # effects
     Signature("open", "object", (), "effect", "effect", "becomes open"),
@@ -150,9 +161,19 @@ SYNONYMS: Final = {
 }  # fmt: skip
 """What authors write for an activity -> what it is called here."""
 
+VALUE_SYNONYMS: Final = {
+    "near": "next_to", "close_to": "next_to", "beside": "next_to", "adjacent": "next_to", "adjacent_to": "next_to",
+    "by": "next_to", "reaches": "at", "on": "at", "in_cell": "at", "looks_at": "faces", "looking_at": "faces",
+    "says": "said", "say": "said", "hears": "heard", "colour": "color", "direction": "facing", "dir": "facing",
+    "type": "kind", "disappeared": "gone", "vanished": "gone", "does": "did", "in_state": "is", "state": "is",
+    "number": "index", "toggled": "poked", "dist": "distance", "distance_to": "distance",
+}  # fmt: skip
+"""What authors write for a condition or value -> what it is called here."""
+
 WORDS: Final = frozenset(
     [s.name for s in SIGNATURES if s.name not in ("name", "kind", "index")]
-    + ["here", "it", "self", "t", "W", "H", "cells", "colors", "nouns", "toward", "random", "distinct", "ever", "finished"]
+    + ["here", "it", "self", "t", "W", "H", "cells", "colors", "nouns", "toward", "random", "distinct", "ever"]
+    + ["finished"]
     + ["red", "green", "blue", "purple", "yellow", "grey", "up", "down", "pickup", "drop", "done", "none"]
     + ["top", "bottom", "and", "or", "not", "in", "where", "to", "true", "false", "speaker", "room", "agent"]
 )  # fmt: skip

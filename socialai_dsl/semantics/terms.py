@@ -64,7 +64,7 @@ class Read:
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """A fact of the world: t, width, height, action (the agent's this step), noun (of its last utterance, this step)."""
+    """A fact of the world: t, width, height, action (the agent's this step), noun (of its utterance this step)."""
 
     type: Type
     name: Literal["t", "width", "height", "action", "noun"]
@@ -143,7 +143,8 @@ class Not:
 @dataclass(frozen=True, slots=True)
 class Test:
     """A relation of two entities: at (same cell), next_to, faces, faces_toward, in_front_of, eye_contact, in_line,
-    can_reach; or of the candidate cell (`subject` is None: here.next_to(x), here.at(x), here.in_front_of(x))."""
+    can_reach; or of the candidate cell (`subject` is None: here.next_to(x), here.at(x), here.in_front_of(x)).
+    """
 
     name: Literal[
         "at", "next_to", "faces", "faces_toward", "in_front_of", "eye_contact", "in_line", "can_reach"
@@ -208,9 +209,9 @@ class InState:
 class Quantified:
     """any, all, count, first, nearest, pick over the constants `items`; `condition` may hold Variable(name).
 
-    pick and first give an item (`type` is the items'); count an int; any and all a bool; nearest the item with the least
-    distance to `to`. `ordinal` numbers the picks of one value in source order (draws.py); `site` is empty unless the pick
-    comes from a slot that is substituted into a larger value: then it is the site of the slot's value.
+    pick and first give an item (`type` is the items'); count an int; any and all a bool; nearest the item with
+    the least distance to `to`. `ordinal` numbers the picks of one value in source order (draws.py); `site` is empty
+    unless the pick comes from a slot that is substituted into a larger value: then it is the site of the slot.
     """
 
     type: Type
@@ -313,7 +314,8 @@ class Placing:
 @dataclass(frozen=True, slots=True)
 class Activity:
     """One body action a turn: stay, left, right, forward, toggle, face(x), turn_to(dir), turn(left|right), go_to(x),
-    go_next_to(x), use(x), enter(x), choose(...); `weights` go with the args of choose."""
+    go_next_to(x), use(x), enter(x), choose(...); `weights` go with the args of choose.
+    """
 
     name: Literal[
         "stay",
@@ -419,7 +421,8 @@ class Drawn:
 @dataclass(frozen=True, slots=True)
 class Coloring:
     """Colour of an entity at reset: random (value None), or a value; `distinct_from` are the members of the group drawn
-    before it, whose colours it must not have."""
+    before it, whose colours it must not have.
+    """
 
     entity: int
     site: str

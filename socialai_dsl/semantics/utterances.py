@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING
@@ -50,7 +50,9 @@ class Utterances:
         return any_of(
             all_of([Said(pattern), *([given] if given is not None else [])])
             for text in self._texts(node, scope)
-            for pattern, given in self.patterns(text, scope, self._resolver.findings.node(scope.path, node), False)
+            for pattern, given in self.patterns(
+                text, scope, self._resolver.findings.node(scope.path, node), False
+            )
         )
 
     def heard(self, node: ast.Expr, scope: Scope) -> Term:
@@ -58,7 +60,9 @@ class Utterances:
         return any_of(
             all_of([Heard((pattern,)), *([given] if given is not None else [])])
             for text in self._texts(node, scope)
-            for pattern, given in self.patterns(text, scope, self._resolver.findings.node(scope.path, node), True)
+            for pattern, given in self.patterns(
+                text, scope, self._resolver.findings.node(scope.path, node), True
+            )
         )
 
     def _texts(self, node: ast.Expr, scope: Scope) -> list[ast.Text]:
@@ -70,14 +74,18 @@ class Utterances:
                 option = self.slot_text(option.id, scope) or option
             if not isinstance(option, ast.Text):
                 message = f'`{quoted(option)}` is not a text; what is said is quoted: "Open sesame"'
-                resolver.fail("S211", message, option, scope)
+                raise resolver.fail("S211", message, option, scope)
             texts.append(option)
         return texts
 
     def slot_text(self, slot: str, scope: Scope) -> ast.Text | None:
         """The text that fills a slot of type utterance or text, with its `<...>` parts; None if it is no such slot."""
         frame = scope.frame
-        if frame is None or frame.model.slots.get(slot) not in ("text", "utterance") or slot in scope.variables:
+        if (
+            frame is None
+            or frame.model.slots.get(slot) not in ("text", "utterance")
+            or slot in scope.variables
+        ):
             return None
         path = frame.texts.get(slot)
         if path is None:
@@ -97,7 +105,9 @@ class Utterances:
         for choice in product(*(self._choices(part) for part in parts)):
             said = "".join(word for word, _ in choice)
             pairs = self._match(said)
-            by_npcs = frozenset(t for t in self._resolver.npc_texts if from_npcs and normal(t) == normal(said))
+            by_npcs = frozenset(
+                t for t in self._resolver.npc_texts if from_npcs and normal(t) == normal(said)
+            )
             conditions = [condition for _, condition in choice if condition is not None]
             if pairs or by_npcs:
                 found.append((Pattern(pairs, said, by_npcs), all_of(conditions) if conditions else None))
@@ -116,7 +126,7 @@ class Utterances:
             else:
                 yield from slot.parts
 
-    def _spoken_part(self, part: str | ast.Expr, scope: Scope) -> str | None | Term:
+    def _spoken_part(self, part: str | ast.Expr, scope: Scope) -> str | Term | None:
         """A piece of text, a value in it, or None for any noun."""
         if isinstance(part, str):
             return part
@@ -124,7 +134,7 @@ class Utterances:
             return None
         return sayable(self._resolver, part, scope)
 
-    def _choices(self, part: str | None | Term) -> list[tuple[str, Term | None]]:
+    def _choices(self, part: str | Term | None) -> list[tuple[str, Term | None]]:
         if isinstance(part, str):
             return [(part, None)]
         if part is None:
@@ -138,10 +148,17 @@ class Utterances:
         if "<noun>" not in said:
             return frozenset(self._pairs.get(normal(said), ()))
         nouns = [str(noun) for noun in self._grammar.nouns]
-        return frozenset(pair for n in nouns for pair in self._pairs.get(normal(said.replace("<noun>", n)), ()))
+        return frozenset(
+            pair for n in nouns for pair in self._pairs.get(normal(said.replace("<noun>", n)), ())
+        )
 
     def _report_unsayable(
-        self, unsayable: list[tuple[str, str]], parts: list[str | None | Term], some: bool, span: Span, from_npcs: bool
+        self,
+        unsayable: list[tuple[str, str]],
+        parts: list[str | Term | None],
+        some: bool,
+        span: Span,
+        from_npcs: bool,
     ) -> None:
         findings = self._resolver.findings
         said, word = unsayable[0]
@@ -153,7 +170,7 @@ class Utterances:
             report("S402", message, span, hint="add what is missing to the nouns, or narrow what is drawn")
             return
         near = did_you_mean(said, [*self.all_texts(), *(self._resolver.npc_texts if from_npcs else ())])
-        findings.fail(
+        raise findings.fail(
             "S401",
             f'nobody can say "{said}" with this grammar',
             span,
@@ -173,24 +190,29 @@ class Utterances:
         findings = self._resolver.findings
         text = findings.text(path, raw)
         span = findings.at(path)
-        if len(text.parts) == 1 and isinstance(text.parts[0], ast.Name):
-            slot = self.slot_text(text.parts[0].id, scope)
+        only = text.parts[0] if len(text.parts) == 1 else None
+        if isinstance(only, ast.Name):
+            slot = self.slot_text(only.id, scope)
             if slot is not None:
                 # All of it is the slot's value, so its picks are drawn at the slot's site.
-                text, scope = slot, replace(self._slot_scope(text.parts[0].id, scope), outer=None)
-        line = Line(tuple(_merged(self._parts(text, scope))), scope.draws.site, span)
+                text, scope = slot, replace(self._slot_scope(only.id, scope), outer=None)
+        line = Line(tuple(_merged(self.parts(text, scope))), scope.draws.site, span)
         if scope.member == "agent":
             return self._agents(line)
         return line
 
-    def _parts(self, text: ast.Text, scope: Scope) -> Iterator[str | Term]:
+    def parts(self, text: ast.Text, scope: Scope) -> list[str | Term]:
+        """The pieces and values of a text."""
+        return list(self._each_part(text, scope))
+
+    def _each_part(self, text: ast.Text, scope: Scope) -> Iterator[str | Term]:
         for part in text.parts:
             if isinstance(part, str):
                 yield part
                 continue
             slot = self.slot_text(part.id, scope) if isinstance(part, ast.Name) else None
             if slot is not None and isinstance(part, ast.Name) and scope.frame is not None:
-                yield from self._parts(slot, self._slot_scope(part.id, scope))
+                yield from self.parts(slot, self._slot_scope(part.id, scope))
                 continue
             term = sayable(self._resolver, part, scope)
             yield spoken(term.type, term.value) if isinstance(term, Const) else term
@@ -210,7 +232,7 @@ class Utterances:
             if normal(said) not in spelled:
                 near = did_you_mean(said, spelled.values())
                 message = f'the agent cannot say "{said}" with this grammar'
-                findings.fail("S401", message, line.span, suggestion=f'"{near}"' if near else None)
+                raise findings.fail("S401", message, line.span, suggestion=f'"{near}"' if near else None)
         if len(line.parts) == 1 and isinstance(line.parts[0], str):
             return Line((spelled[normal(line.parts[0])],), line.site, line.span)
         return line
@@ -220,15 +242,17 @@ def sayable(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
     """A value inside a text: something that words stand for."""
     if isinstance(node, ast.Compare | ast.Logic | ast.Not | ast.Member):
         message = f"`{quoted(node)}` is a condition; only a value can be said"
-        resolver.fail("S402", message, node, scope)
+        raise resolver.fail("S402", message, node, scope)
     if resolve_groups.is_group(resolver, node, scope):
         message = f"`{quoted(node)}` is a group; `pick({quoted(node)})` says one of them"
-        resolver.fail("S402", message, node, scope)
+        raise resolver.fail("S402", message, node, scope)
     term = resolver.value(node, None, scope)
     if term.type.kind not in _SAYABLE:
         what = described(term.type)
         hint = f"say its colour or name: <{quoted(node)}.color>" if term.type.kind == "entity" else None
-        resolver.fail("S402", f"`{quoted(node)}` is {what}, which cannot be said", node, scope, hint=hint)
+        raise resolver.fail(
+            "S402", f"`{quoted(node)}` is {what}, which cannot be said", node, scope, hint=hint
+        )
     return term
 
 
@@ -255,7 +279,7 @@ def _words(type_: Type) -> list[str]:
     return [spoken(type_, value) for value in range(type_.low, type_.high + 1)]
 
 
-def _merged(parts: Iterator[str | Term]) -> Iterator[str | Term]:
+def _merged(parts: Iterable[str | Term]) -> Iterator[str | Term]:
     """The same with neighbouring pieces of text joined."""
     text = ""
     for part in parts:

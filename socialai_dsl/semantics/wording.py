@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from socialai_dsl.grammar import ast
+from socialai_dsl.semantics.signatures import Signature
 from socialai_dsl.semantics.terms import SIDE, TURN, Type
 
 _KINDS: Final = {
@@ -13,11 +14,41 @@ _KINDS: Final = {
     "direction": "a direction",
     "color": "a colour",
     "action": "an action",
-    "entity": "somebody or something in the room",
+    "entity": "an object or a member of the cast",
     "text": "a text",
     "noun": "a noun",
     "status": "a status",
 }
+
+
+_PLACEHOLDERS: Final = {
+    "entity": "x",
+    "entities": "x",
+    "int": "n",
+    "direction": "up",
+    "turn": "left",
+    "utterance": '"..."',
+    "state": "state",
+    "status": "status",
+    "action": "action",
+    "side": "top",
+    "group": "group",
+    "actions": "a | b",
+}
+
+
+def usage(signature: Signature) -> str:
+    """How an instruction is written: `next_to(x)`."""
+    if not signature.takes:
+        return signature.name
+    return f"{signature.name}({', '.join(_PLACEHOLDERS[kind] for kind in signature.takes)})"
+
+
+def wrong_count(signature: Signature, given: int) -> str:
+    """What to say when an instruction has too few or too many values in brackets."""
+    many = len(signature.takes)
+    takes = "nothing in brackets" if not many else f"{many} value{'s' if many > 1 else ''} in brackets"
+    return f"`{signature.name}` takes {takes}: `{usage(signature)}`; {given} given"
 
 
 def described(type_: Type) -> str:

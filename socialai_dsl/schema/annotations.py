@@ -1,0 +1,120 @@
+"""The models, looked at: what keys and what kind of value belong at a place, in words for authors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import UnionType
+from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel
+
+from socialai_dsl.schema.behaviour import CastMember, FirstRule, Frame, State, Step, ThenRule
+from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.schema.scenario import Outcome, Parameter, Scenario
+from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
+
+CALLED: Final[dict[type, str]] = {
+    Scenario: "a scenario",
+    Frame: "a frame",
+    State: "a state",
+    FirstRule: "a rule of `first`",
+    ThenRule: "a rule of `then`",
+    Step: "a step",
+    CastMember: "a member of the cast",
+    ObjectGroup: "an object",
+    Room: "the room",
+    Observe: "`observe`",
+    UtteranceGrammar: "a grammar",
+    Outcome: "an outcome",
+    Parameter: "a parameter",
+}
+"""How messages call what a model describes."""
+
+
+def keys_of(model: type) -> list[str]:
+    """The keys a mapping of this kind can have, as authors write them."""
+    assert issubclass(model, BaseModel), "internal: only models have keys"
+    return [field.alias or name for name, field in model.model_fields.items()]
+
+
+def home_of(key: str) -> str | None:
+    """Where a key that is misplaced would belong."""
+    homes = [called for model, called in CALLED.items() if key in keys_of(model)]
+    return " or ".join(dict.fromkeys(homes[:2])) if homes else None
+
+
+def model_at(model: type[BaseModel], path: DataPath) -> type[BaseModel] | None:
+    """The model of the mapping at `path`; None if there is none."""
+    for part in _unwrapped(annotation_at(model, path)):
+        if isinstance(part, type) and issubclass(part, BaseModel):
+            return part
+    return None
+
+
+def annotation_at(model: type[BaseModel], path: DataPath) -> Any:
+    """The annotation of the part of a model at `path`; Any if the model has no such part."""
+    annotation: Any = model
+    for step in path:
+        annotation = _step(annotation, step)
+    return annotation
+
+
+def _step(annotation: Any, step: str | int) -> Any:
+    for part in _unwrapped(annotation):
+        origin, arguments = get_origin(part), get_args(part)
+        if isinstance(part, type) and issubclass(part, BaseModel):
+            for name, field in part.model_fields.items():
+                if step in (name, field.alias):
+                    return (
+                        Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation
+                    )
+        elif origin is dict and isinstance(step, str):
+            return arguments[1]
+        elif origin in (tuple, list) and isinstance(step, int):
+            return (
+                arguments[0]
+                if arguments[-1:] == (...,) or origin is list
+                else arguments[min(step, len(arguments) - 1)]
+            )
+    return Any
+
+
+def _unwrapped(annotation: Any) -> Iterator[Any]:
+    """The branches of a union, without annotations around them."""
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        yield from _unwrapped(get_args(annotation)[0])
+    elif origin in (Union, UnionType):
+        for branch in get_args(annotation):
+            yield from _unwrapped(branch)
+    else:
+        yield annotation
+
+
+def literals(annotation: Any) -> list[object]:
+    """The words that a place is limited to."""
+    return [word for part in _unwrapped(annotation) if get_origin(part) is Literal for word in get_args(part)]
+
+
+_SCALARS: Final = {int: "a whole number", float: "a number", bool: "`true` or `false`", str: "a text"}
+
+
+def expectation(annotation: Any) -> str:
+    """What belongs there, in words."""
+    branches = [part for part in _unwrapped(annotation) if part is not type(None)]
+    if {int, bool, str} <= set(map(_hashable, branches)):
+        return "an expression"
+    for part in branches:
+        if part in _SCALARS:
+            return _SCALARS[part]
+        if isinstance(part, type) and issubclass(part, BaseModel):
+            return "a mapping with keys such as " + ", ".join(f"`{k}`" for k in keys_of(part)[:3])
+        if get_origin(part) is dict:
+            return "a mapping of names"
+        if get_origin(part) in (tuple, list):
+            return "a list"
+    return "something else"
+
+
+def _hashable(part: Any) -> Any:
+    return part if isinstance(part, type) else str(part)

@@ -1,0 +1,142 @@
+"""Going on after mistakes of shape: what was probably meant, so that the rest of the file is checked as well."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from socialai_dsl.diagnostics import DiagnosticBag
+from socialai_dsl.schema.positions import DataPath, Positions
+from socialai_dsl.source import Span
+
+
+@dataclass
+class Repaired:
+    """A document that has been changed into what was probably meant.
+
+    Attributes:
+        data: the document, changed.
+        renamed: path as it is now -> the key it is written under.
+        lost: paths of parts that were left out although they may have meant something.
+    """
+
+    data: Any
+    renamed: dict[DataPath, str] = field(default_factory=dict)
+    lost: list[DataPath] = field(default_factory=list)
+
+    def rename(self, path: DataPath, key: str) -> bool:
+        """Read the entry at `path` under another key; whether that key was free."""
+        parent = part_at(self.data, path[:-1])
+        if not isinstance(parent, dict) or key in parent:
+            return False
+        entries = [(key if k == path[-1] else k, value) for k, value in parent.items()]
+        parent.clear()
+        parent.update(entries)
+        self.renamed[(*path[:-1], key)] = str(path[-1])
+        return True
+
+    def leave_out(self, path: DataPath) -> None:
+        """Go on without the entry at `path`; an item of a list stays, since the others are known by their number."""
+        parent = part_at(self.data, path[:-1])
+        if isinstance(parent, dict) and path[-1] in parent:
+            del parent[path[-1]]
+            self.lost.append(path)
+
+
+def part_at(data: Any, path: DataPath) -> Any:
+    """The part of a document at a path that exists."""
+    for step in path:
+        data = data[step]
+    return data
+
+
+def copied(data: Any) -> Any:
+    """A copy whose mappings and lists are free to be changed."""
+    if isinstance(data, Mapping):
+        return {key: copied(value) for key, value in data.items()}
+    return [copied(value) for value in data] if isinstance(data, list) else data
+
+
+def fill_gaps(repaired: Repaired, places: Positions, bag: DiagnosticBag, path: DataPath = ()) -> None:
+    """Report every key and list item without a value, and what a comma inside { } has cut off."""
+    part = part_at(repaired.data, path)
+    if isinstance(part, list):
+        for i, item in enumerate(part):
+            if item is None:
+                _report_nothing((*path, i), places, bag)
+                part[i] = ""
+        children: list[str | int] = list(range(len(part)))
+    elif isinstance(part, dict):
+        _join_cut_values(repaired, part, path, places, bag)
+        children = list(part)
+    else:
+        return
+    for child in children:
+        fill_gaps(repaired, places, bag, (*path, child))
+
+
+def _join_cut_values(
+    repaired: Repaired, part: dict[str, Any], path: DataPath, places: Positions, bag: DiagnosticBag
+) -> None:
+    before: str | None = None
+    cut: dict[str, list[str]] = {}
+    for key, value in list(part.items()):
+        if value is not None:
+            before = key
+        elif (
+            before is not None
+            and isinstance(part[before], str)
+            and _looks_cut(key, part[before], path, places)
+        ):
+            cut.setdefault(before, []).append(key)
+            del part[key]
+        else:
+            _report_nothing((*path, key), places, bag)
+            repaired.leave_out((*path, key))
+    for key, pieces in cut.items():
+        head = part[key]
+        part[key] = ", ".join([head, *pieces])
+        hint = f'write `{key}: "{part[key]}"`, or put every key on a line of its own'
+        message = (
+            f"unknown key `{pieces[0]}`: inside {{ }} a comma ends the value, so `{key}` is only `{head}`"
+        )
+        bag.error("S102", message, places.key_span((*path, pieces[0])), hint=hint)
+
+
+def _looks_cut(key: str, before: str, path: DataPath, places: Positions) -> bool:
+    inside = places.in_flow((*path, key))
+    return inside and (not key.isidentifier() or before.count("(") > before.count(")"))
+
+
+def _report_nothing(path: DataPath, places: Positions, bag: DiagnosticBag) -> None:
+    key = path[-1]
+    what = "an item of this list is empty" if isinstance(key, int) else f"nothing is given for `{key}`"
+    bag.error("S104", what, places.key_span(path), hint="write a value, or leave the key out")
+
+
+@dataclass(frozen=True)
+class RenamedPlaces:
+    """Positions of a document some of whose keys are read under another name."""
+
+    places: Positions
+    renamed: Mapping[DataPath, str]
+
+    def locate(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
+        """The place of a character of the text at `path`."""
+        return self.places.locate(self._written(path), offset, width)
+
+    def value_span(self, path: DataPath) -> Span:
+        """The place of the value at `path`."""
+        return self.places.value_span(self._written(path))
+
+    def key_span(self, path: DataPath) -> Span:
+        """The place of the key at `path`."""
+        return self.places.key_span(self._written(path))
+
+    def in_flow(self, path: DataPath) -> bool:
+        """Whether the part at `path` stands inside { } or [ ]."""
+        return self.places.in_flow(self._written(path))
+
+    def _written(self, path: DataPath) -> DataPath:
+        return tuple(self.renamed.get(path[: i + 1], step) for i, step in enumerate(path))

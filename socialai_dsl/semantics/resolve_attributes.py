@@ -1,0 +1,234 @@
+"""Attributes and conditions without brackets, and the subjects of verbs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.grammar import ast
+from socialai_dsl.semantics import resolve_groups, resolve_names
+from socialai_dsl.semantics.build import arithmetic, number
+from socialai_dsl.semantics.findings import FailedError
+from socialai_dsl.semantics.scope import Scope
+from socialai_dsl.semantics.signatures import VALUE_SYNONYMS, VALUES, Signature
+from socialai_dsl.semantics.terms import (
+    ACTION,
+    BOOL,
+    COLOR,
+    DIRECTION,
+    Compare,
+    Const,
+    FieldOf,
+    Here,
+    PokedNow,
+    Spoke,
+    Term,
+    Type,
+    World,
+)
+from socialai_dsl.semantics.wording import described, quoted, usage
+
+if TYPE_CHECKING:
+    from socialai_dsl.semantics.resolve import Resolver
+
+ENTITY = Type("entity", 0, 0)
+"""Expected: somebody or something in the room."""
+
+
+def check_moment(resolver: Resolver, signature: Signature, node: ast.Expr, scope: Scope) -> None:
+    """Report what speaks of a step where there is none yet."""
+    if signature.momentary and scope.at_reset:
+        message = (
+            f"`{signature.name}` speaks of a step, but this value is computed once, before the first step"
+        )
+        raise resolver.fail("S204", message, node, scope, hint="a `define` is recomputed at every use")
+
+
+def subject_of(
+    resolver: Resolver, subject: ast.Expr | None, signature: Signature, node: ast.Expr, scope: Scope
+) -> Term | None:
+    """Who a verb is about: what stands before the dot, else the NPC itself. None: the candidate cell."""
+    if subject is None:
+        if scope.member is None:
+            example = "agent" if signature.subject != "object" else "door"
+            raise resolver.fail(
+                "S211", f"`{signature.name}` needs somebody: `{example}.{signature.name}`", node, scope
+            )
+        return resolve_names.entity(resolver.symbols.numbers[scope.member])
+    if isinstance(subject, ast.Name) and subject.id == "here" and "here" not in scope.variables:
+        if not scope.here:
+            raise resolver.fail(
+                "S201", "`here` is the candidate cell; it means something only in a place", subject, scope
+            )
+        if not signature.cell:
+            raise resolver.fail("S211", f"a cell cannot be asked for `{signature.name}`", node, scope)
+        return None
+    if resolve_groups.is_group(resolver, subject, scope):
+        group = quoted(subject)
+        letter = group[0] if group[0].isalpha() else "x"
+        asked = f"{letter}.{usage(signature)}"
+        hint = f"`any({letter} in {group} where {asked} ...)`, or `all`, `first`, `pick`"
+        raise resolver.fail("S204", f"`{group}` is a group: say which of them", subject, scope, hint=hint)
+    return resolver.value(subject, ENTITY, scope)
+
+
+def must_be_agent(resolver: Resolver, node: ast.Call | ast.Attribute | ast.Name, scope: Scope) -> None:
+    """Report what is known of the agent only, asked of somebody else."""
+    subject = None if isinstance(node, ast.Name) else node.subject
+    if subject is None and scope.member == "agent":
+        return
+    if not (isinstance(subject, ast.Name) and subject.id == "agent"):
+        name = node.id if isinstance(node, ast.Name) else node.name
+        hint = "what an NPC has heard is `heard(...)`, or `hears:` in a rule" if name == "said" else None
+        raise resolver.fail(
+            "S211", f"`{name}` is known of the agent only: `agent.{name}`", node, scope, hint=hint
+        )
+
+
+def without_arguments(
+    resolver: Resolver, name: str, subject: ast.Expr | None, node: ast.Expr, scope: Scope
+) -> Term:
+    """`subject.name` or `subject.name()`: an attribute, a condition, or a status."""
+    signature = VALUES.get(name)
+    statuses = {state for type_ in resolver.symbols.types.values() for state in type_.states}
+    if signature is None or signature.takes:
+        if name in statuses:
+            signature = Signature(name, "object", (), "condition", "value", "")
+        else:
+            raise _unknown_attribute(resolver, name, signature, statuses, node, scope)
+    check_moment(resolver, signature, node, scope)
+    if signature.subject == "agent":
+        assert isinstance(node, ast.Call | ast.Attribute | ast.Name), "internal: an attribute has a name"
+        must_be_agent(resolver, node, scope)
+        return _of_the_agent(resolver, name)
+    who = subject_of(resolver, subject, signature, node, scope)
+    if who is None:
+        return _cell_coordinate(resolver, name)
+    if signature.subject == "object":
+        return _status(resolver, name, who, node, scope)
+    return _attribute(resolver, name, who, node, scope)
+
+
+def _unknown_attribute(
+    resolver: Resolver,
+    name: str,
+    signature: Signature | None,
+    statuses: set[str],
+    node: ast.Expr,
+    scope: Scope,
+) -> FailedError:
+    if signature is not None:
+        return resolver.fail(
+            "S211", f"`{name}` needs something in brackets: `{usage(signature)}`", node, scope
+        )
+    synonym = VALUE_SYNONYMS.get(name)
+    if synonym:
+        return resolver.fail(
+            "S205", f"nothing here has a `{name}`; write `{usage(VALUES[synonym])}`", node, scope
+        )
+    known = [s.name for s in VALUES.values() if not s.takes and s.subject != "none"]
+    near = did_you_mean(name, [*known, *sorted(statuses)])
+    near = near or did_you_mean(name, [s.name for s in VALUES.values() if s.subject != "none"])
+    return resolver.fail("S205", f"nothing here has a `{name}`", node, scope, suggestion=near)
+
+
+def _of_the_agent(resolver: Resolver, name: str) -> Term:
+    match name:
+        case "spoke":
+            return Spoke()
+        case "noun":
+            return World(resolver.symbols.nouns, "noun")
+    assert name == "action", f"internal: the agent has no `{name}`"
+    return World(ACTION, "action")
+
+
+def _cell_coordinate(resolver: Resolver, name: str) -> Term:
+    high = (resolver.symbols.width if name == "x" else resolver.symbols.height)[1]
+    return Here(Type("int", 0, high - 1), "x" if name == "x" else "y")
+
+
+def _attribute(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: Scope) -> Term:
+    match name:
+        case "color":
+            return FieldOf(COLOR, who, "color")
+        case "facing":
+            return FieldOf(DIRECTION, who, "dir")
+        case "x" | "y":
+            high = (resolver.symbols.width if name == "x" else resolver.symbols.height)[1]
+            return FieldOf(Type("int", 0, high - 1), who, "x" if name == "x" else "y")
+        case "gone":
+            return FieldOf(BOOL, who, "gone")
+        case "was_poked":
+            return FieldOf(BOOL, who, "poked")
+        case "poked":
+            return PokedNow(who)
+        case "index":
+            return _index(resolver, who, node, scope)
+        case "kind":
+            return _kind(resolver, who, node, scope)
+    assert name == "name", f"internal: no meaning for the attribute `{name}`"
+    return _name(resolver, who, node, scope)
+
+
+def _name(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
+    member = resolver.symbols.member_of(who.value) if isinstance(who, Const) else None
+    if member is None:
+        raise resolver.fail("S204", "only a member of the cast has a name", node, scope)
+    return resolver.registers.read(f"{member}.name")
+
+
+def _kind(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
+    kinds = {_kind_of(resolver, n) for n in range(who.type.low, who.type.high + 1)}
+    if len(kinds) > 1:
+        raise resolver.fail("S204", "`kind` is known of one thing, or of things of one kind", node, scope)
+    return Const(Type("text", 0, 0, (kinds.pop(),)), 0)
+
+
+def _kind_of(resolver: Resolver, entity: int) -> str:
+    objects = resolver.symbols.object_of(entity)
+    if objects is not None:
+        return objects.type.name
+    member = resolver.symbols.member_of(entity)
+    assert member is not None, "internal: an entity is an object or in the cast"
+    return resolver.symbols.cast[member].kind or "peer"
+
+
+def _index(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
+    objects = resolver.symbols.object_of(who.type.low)
+    if objects is None or who.type.high not in objects.numbers:
+        raise resolver.fail("S204", "only a member of one group of objects has an `index`", node, scope)
+    first = objects.numbers[0]
+    if isinstance(who, Const):
+        return number(who.value - first)
+    return arithmetic("-", _as_number(who), number(first))
+
+
+def _as_number(term: Term) -> Term:
+    """An entity's number as a number."""
+    return replace(term, type=Type("int", term.type.low, term.type.high))
+
+
+def _status(resolver: Resolver, status: str, who: Term, node: ast.Expr, scope: Scope) -> Term:
+    field = status_of(resolver, who, node, scope)
+    if status not in field.type.words:
+        what = resolver.symbols.object_of(who.type.low)
+        assert what is not None, "internal: a status belongs to an object"
+        message = f"a {what.type.name} is never `{status}`; it is {' or '.join(field.type.words)}"
+        raise resolver.fail("S204", message, node, scope, suggestion=did_you_mean(status, field.type.words))
+    return Compare("==", field, Const(field.type, field.type.words.index(status)))
+
+
+def status_of(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> FieldOf:
+    """The status of one object, or of one of several objects of the same type."""
+    found = [resolver.symbols.object_of(n) for n in range(who.type.low, who.type.high + 1)]
+    types = {objects.type.name: objects.type for objects in found if objects is not None}
+    if None in found or len(types) != 1:
+        message = (
+            f"{described(who.type)} of different types has no common status"
+            if types
+            else "only objects have a status"
+        )
+        raise resolver.fail("S204", message, node, scope)
+    (type_,) = types.values()
+    return FieldOf(Type("status", 0, len(type_.states) - 1, type_.states), who, "status")
