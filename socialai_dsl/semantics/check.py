@@ -20,7 +20,7 @@ from socialai_dsl.semantics.terms import BOOL, Checked, FramePlan, Line, Outcome
 from socialai_dsl.semantics.utterances import MAX_TEXTS, number_of_texts, texts_of
 from socialai_dsl.semantics.vocabulary import words_in_order
 
-_MAX_ROUNDS = 12
+_MAX_ROUNDS = 24
 
 
 def check_meaning(

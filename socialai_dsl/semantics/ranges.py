@@ -8,8 +8,8 @@ from dataclasses import replace
 from socialai_dsl.schema import Scenario
 from socialai_dsl.semantics.terms import Type
 
-_WIDEN_AFTER = 4
-_MOST_ROUNDS = 12
+_WIDEN_AFTER = 12
+_MOST_ROUNDS = 20
 
 
 class Ranges:
