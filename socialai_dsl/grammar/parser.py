@@ -235,7 +235,10 @@ def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
         return ParseProblem("S210", "`where` belongs in a place or inside pick(x in group where ...)", offset)
     if token.type == "RPAR":
         return ParseProblem("S202", "something is missing before this bracket", offset)
-    return ParseProblem("S210", f"did not expect `{token}` here", offset)
+    hint = None
+    if token.type == "NAME":
+        hint = "between two names stands a dot, an operator, or a word such as `and`: `agent.next_to(exit)`"
+    return ParseProblem("S210", f"did not expect `{token}` here", offset, hint)
 
 
 def _wrong_symbol(text: str, offset: int) -> ParseProblem:

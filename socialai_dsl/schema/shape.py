@@ -265,7 +265,7 @@ def _length(finding: _Finding) -> str:
 
 def _cure(value: object) -> str | None:
     if isinstance(value, list):
-        return "alternatives inside an expression are written a | b"
+        return "conditions are joined with `and` or `or`, alternatives are written a | b"
     if isinstance(value, dict):
         return "a value with `{ }` or a colon in it has to be quoted"
     return None

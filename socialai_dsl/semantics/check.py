@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from socialai_dsl.diagnostics import DiagnosticBag
+from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag
 from socialai_dsl.schema import PRIMITIVES, Scenario
 from socialai_dsl.schema.positions import DataPath, Positions
 from socialai_dsl.semantics import behaviour, checks, entities, setup
@@ -50,20 +50,30 @@ def check_meaning(
     """
     words: dict[str, Type] = {}
     ranges = Ranges(scenario)
+    checked: Checked | None = None
     for _ in range(_MAX_ROUNDS):
         found = DiagnosticBag()
         findings = Findings(found, places, params or {}, substituted, data)
+        if AGENT not in scenario.cast:
+            findings.error("S105", "the cast has no `agent`", places.key_span(("cast",)), hint="add `agent: {}`")
+            break
         run = _Run(scenario, findings, prelude, words, ranges.now)
         checked = run.checked(name)
         registers = run.resolver.registers
         settled = registers.words == words
         words = registers.words
         if found.has_errors or (ranges.settled(registers.ranges) and settled):
+            for path in ranges.unbounded:
+                run.report_growth(path)
             break
-    for path in ranges.unbounded:
-        run.report_growth(path)
-    bag.extend(found)
+    bag.extend(_without_consequences(found))
     return None if found.has_errors else checked
+
+
+def _without_consequences(found: DiagnosticBag) -> Iterator[Diagnostic]:
+    """What is wrong with the grammar makes many a text impossible to say; that need not be said as well."""
+    wrong_grammar = any(d.code == checks.GRAMMAR_CODE for d in found)
+    return (d for d in found if not (wrong_grammar and d.code in ("S401", "S402")))
 
 
 @dataclass(frozen=True)
@@ -98,6 +108,7 @@ class _Run:
     def checked(self, name: str) -> Checked | None:
         """The checked scenario; None if it cannot be put together."""
         scenario, resolver, findings = self._scenario, self.resolver, self._findings
+        checks.check_grammar(scenario, findings)
         entities.declare_registers(resolver)
         entities.check_slots(resolver)
         checks.check_flow(scenario, findings)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from socialai_dsl.diagnostics import did_you_mean
@@ -10,6 +11,29 @@ from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.findings import Findings
 from socialai_dsl.semantics.terms import FramePlan, Logic, Quantified, RulePlan, Term
+
+GRAMMAR_CODE = "S104"
+"""The code of a template that cannot be filled."""
+
+
+def check_grammar(scenario: Scenario, findings: Findings) -> None:
+    """Templates with something else than <noun> to fill, and anything that is in the grammar twice."""
+    grammar = scenario.grammar
+    for i, template in enumerate(grammar.templates):
+        path: DataPath = ("grammar", "templates", i)
+        other = re.search(r"<(?!noun>)[^<>]*>|[<>]", template.replace("<noun>", " " * 6))
+        if other or template.count("<noun>") > 1:
+            offset = other.start() if other else template.rindex("<noun>")
+            message = f"a template has one `<noun>` to fill, and no `{other.group()}`" if other else \
+                "a template has only one `<noun>`"  # fmt: skip
+            findings.error(GRAMMAR_CODE, message, findings.at(path, offset))
+    for part, words in (("templates", grammar.templates), ("nouns", grammar.nouns)):
+        seen: set[str] = set()
+        for i, word in enumerate(words):
+            if str(word) in seen:
+                span = findings.at(("grammar", part, i), 0, len(str(word)))
+                findings.error("S213", f"`{word}` is in the {part} already", span)
+            seen.add(str(word))
 
 
 def check_flow(scenario: Scenario, findings: Findings) -> None:

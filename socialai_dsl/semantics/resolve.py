@@ -201,7 +201,9 @@ class Resolver:
                 if spoken(left.type, i) == spoken(right.type, j)
             )
         message = f"{described(left.type)} and {described(right.type)} cannot be compared"
-        raise self.fail("S204", message, node, scope)
+        colored = {left.type.kind, right.type.kind} == {"color", "entity"}
+        hint = "the colour of something is `x.color`" if colored else None
+        raise self.fail("S204", message, node, scope, hint=hint)
 
     def _membership(self, node: ast.Member, scope: Scope) -> Term:
         options = self._options(node.right)

@@ -253,6 +253,7 @@ class _Sorter:
         self._items = items
         self._done: dict[str, Setup] = {}
         self._path: list[str] = []
+        self._circular: set[str] = set()
 
     def sorted(self) -> Iterator[Setup]:
         for key in self._items:
@@ -264,7 +265,11 @@ class _Sorter:
         if key in self._done or key not in self._items:
             return
         if key in self._path:
-            raise self._circle([*self._path[self._path.index(key) :], key])
+            circle = self._path[self._path.index(key) :]
+            if self._circular & set(circle):
+                raise FailedError  # the same circle, entered elsewhere
+            self._circular |= set(circle)
+            raise self._circle([*circle, key])
         self._path.append(key)
         try:
             for need in needs(self._items[key]):
