@@ -29,16 +29,18 @@ class Curve:
         frames: frames seen so far.
         success: share of the training episodes that ended in this update and succeeded; nan where none ended.
         outcomes: outcome -> its share of those episodes.
+        successes: which outcomes are successes.
         test: frames, success rate and standard error of the evaluation, None if there was none.
     """
 
     frames: Sequence[float]
     success: Sequence[float]
     outcomes: Mapping[str, Sequence[float]]
+    successes: frozenset[str]
     test: tuple[float, float, float] | None = None
 
 
-def read_curve(metrics: Path, test: tuple[float, float, float] | None) -> Curve:
+def read_curve(metrics: Path, successes: frozenset[str], test: tuple[float, float, float] | None) -> Curve:
     """The curve that a run's `metrics.jsonl` describes."""
     rows = [json.loads(line) for line in metrics.read_text(encoding="utf-8").splitlines()]
     names = list(dict.fromkeys(name for row in rows for name in row["outcomes"]))
@@ -46,6 +48,7 @@ def read_curve(metrics: Path, test: tuple[float, float, float] | None) -> Curve:
         [float(row["frames"]) for row in rows],
         [_number(row["success"]) for row in rows],
         {name: [_number(row["outcomes"].get(name)) for row in rows] for name in names},
+        successes,
         test,
     )
 
@@ -124,8 +127,9 @@ def _draw_outcomes(axes: Axes, curve: Curve) -> None:
     shares = {name: values for name, values in shares.items() if np.nanmax(values, initial=0.0) > 0}
     if not shares:
         return
-    names = sorted(shares, key=lambda name: (_rank(name), -float(np.nanmean(shares[name]))))
-    colours = _colours(names)
+    ranks = {name: _rank(name, curve.successes) for name in shares}
+    names = sorted(shares, key=lambda name: (ranks[name], -float(np.nanmean(shares[name]))))
+    colours = _colours([ranks[name] for name in names])
     axes.stackplot(
         curve.frames,
         [np.nan_to_num(shares[name]) for name in names],
@@ -137,17 +141,16 @@ def _draw_outcomes(axes: Axes, curve: Curve) -> None:
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, frameon=False, reverse=True)
 
 
-def _rank(name: str) -> int:
+def _rank(name: str, successes: frozenset[str]) -> int:
     """Successes first, time-outs last."""
-    return 0 if name.startswith("success") else 2 if name == "timeout" else 1
+    return 0 if name in successes else 2 if name == "timeout" else 1
 
 
-def _colours(names: Sequence[str]) -> list[str]:
+def _colours(ranks: Sequence[int]) -> list[str]:
     palettes = (_SUCCESSES, _FAILURES, _GREYS)
     used = [0, 0, 0]
     colours = []
-    for name in names:
-        rank = _rank(name)
+    for rank in ranks:
         colours.append(palettes[rank][used[rank] % len(palettes[rank])])
         used[rank] += 1
     return colours

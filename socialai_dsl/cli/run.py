@@ -1,9 +1,9 @@
 """This module is `socialai-run`: check a scenario, train an agent on it, evaluate it, leave a folder of results."""
 
 import argparse
+import contextlib
 import json
 import sys
-import time
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -75,17 +75,21 @@ def execute(arguments: argparse.Namespace) -> Exit:
     require_trainer()
     settings = _resumed(arguments) if arguments.resume else _started(arguments)
     program = socialai_dsl.compile(socialai_dsl.load(settings.scenario))
+    written = _written(settings)
     folder = arguments.resume or create_run_folder(arguments.out, settings.scenario, settings.seed)
-    write_json(folder / SETTINGS, asdict(settings))
+    write_json(folder / SETTINGS, written)
     # With --json, standard output belongs to the result alone.
     stream = sys.stderr if arguments.json else sys.stdout
     print(f"{settings.scenario}: {_size(program)}; writing to {folder}", file=stream, flush=True)
 
     agent, training = settings.agent, _NOT_TRAINED
     if settings.agent == "ppo":
-        start = time.perf_counter()
-        agent = str(train_agent(settings, folder, bool(arguments.resume), stream))
-        training = _training_figures(folder, time.perf_counter() - start)
+        try:
+            agent = str(train_agent(settings, folder, bool(arguments.resume), stream))
+        except UsageError:
+            _discard_unstarted(folder)
+            raise
+        training = _training_figures(folder)
     label = f"agent {settings.agent}, seed {settings.seed}"
     evaluation, episode = evaluate_agent(
         agent, settings.scenario, program, settings.eval_episodes, settings.device, label
@@ -102,7 +106,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     write_text(folder / "transcript.txt", episode.transcript())
     episode.save_film(folder / "episode.gif")
     if settings.agent == "ppo":
-        _draw_curve(settings, folder, result)
+        _draw_curve(settings, program, folder, result)
     write_json(folder / RESULT, result)  # last, so that its presence means a complete run
     print(json.dumps(result, indent=2, ensure_ascii=False) if arguments.json else _table(result, folder))
     return Exit.GOOD
@@ -111,15 +115,34 @@ def execute(arguments: argparse.Namespace) -> Exit:
 _NOT_TRAINED: Final = {"frames": 0, "train_seconds": 0.0, "frames_per_second": None}
 
 
-def _training_figures(folder: Path, seconds: float) -> dict[str, Any]:
-    """Frames of the whole run, and seconds and speed of this part of it."""
+def _discard_unstarted(folder: Path) -> None:
+    """Take back the folder of a run that could not even begin, so that the same command can be given again."""
+    if not (folder / "checkpoints").exists():
+        (folder / SETTINGS).unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # it holds files of the user's
+            folder.rmdir()
+
+
+def _written(settings: Settings) -> dict[str, Any]:
+    """The settings as their file holds them, with every number of the trainer for readers."""
+    from socialai_dsl.cli.agents import train_config
+
+    if settings.agent != "ppo":
+        return asdict(settings)
+    return asdict(settings) | {"trainer": train_config(settings).model_dump()}
+
+
+def _training_figures(folder: Path) -> dict[str, Any]:
+    """Frames, seconds and speed of the whole run, all its parts together if it was resumed."""
     lines = (folder / "metrics.jsonl").read_text(encoding="utf-8").splitlines()
-    rows = [json.loads(line) for line in lines]
-    per_frame = sum(1 / row["frames_per_second"] for row in rows) / len(rows)
+    seconds, frames = 0.0, 0
+    for row in map(json.loads, lines):
+        seconds += (row["frames"] - frames) / row["frames_per_second"]
+        frames = row["frames"]
     return {
-        "frames": rows[-1]["frames"],
+        "frames": frames,
         "train_seconds": round(seconds, 3),
-        "frames_per_second": round(1 / per_frame, 1),
+        "frames_per_second": round(frames / seconds, 1),
     }
 
 
@@ -164,21 +187,25 @@ def _resumed(arguments: argparse.Namespace) -> Settings:
     if not (folder / SETTINGS).is_file():
         raise UsageError(f"--resume: {folder} is not a run's folder, it has no {SETTINGS}")
     content = read_json(folder / SETTINGS)
+    content.pop("trainer", None)
     try:
-        settings = TypeAdapter(Settings).validate_python(content, strict=True)
+        # As JSON, because strict validation of a dataclass takes no dict from Python.
+        settings = TypeAdapter(Settings).validate_json(json.dumps(content), strict=True)
     except ValidationError as error:
         first = error.errors()[0]
-        raise UsageError(f"{folder / SETTINGS}: {first['loc'][0]}: {first['msg']}") from None
+        place = ".".join(str(part) for part in first["loc"])
+        raise UsageError(f"{folder / SETTINGS}: {place}: {first['msg']}") from None
     if settings.agent != "ppo":
         raise UsageError(f"--resume: the agent {settings.agent!r} of {folder} is not trained")
     return replace(settings, frames=arguments.frames or settings.frames)
 
 
-def _draw_curve(settings: Settings, folder: Path, result: dict[str, Any]) -> None:
+def _draw_curve(settings: Settings, program: "Program", folder: Path, result: dict[str, Any]) -> None:
     from socialai_dsl.cli.curve import draw_learning_curve, read_curve
 
     test = (result["frames"], result["eval"]["success_rate"], result["eval"]["success_rate_se"])
-    curve = read_curve(folder / "metrics.jsonl", test)
+    successes = frozenset(outcome.name for outcome in program.outcome_table if outcome.success)
+    curve = read_curve(folder / "metrics.jsonl", successes, test)
     title = f"{settings.scenario}, {settings.agent}, seed {settings.seed}"
     draw_learning_curve(curve, title, folder / "learning_curve.png")
 

@@ -9,6 +9,7 @@ from PIL import Image
 from socialai_dsl.cli.curve import Curve, draw_learning_curve, smooth
 
 NAN = float("nan")
+WINS = frozenset({"success@3"})
 
 
 def test_smoothing_is_the_mean_of_the_last_known_values() -> None:
@@ -22,10 +23,12 @@ def test_smoothing_knows_nothing_before_the_first_value() -> None:
 @pytest.mark.parametrize(
     "curve",
     [
-        Curve([100, 200, 300], [NAN, 0.2, 0.4], {"success@3": [NAN, 0.2, 0.4], "timeout": [NAN, 0.8, 0.6]}),
-        Curve([100], [0.5], {}, test=(100, 0.5, 0.02)),
-        Curve([], [], {}),
-        Curve([100, 200], [NAN, NAN], {"success@3": [NAN, NAN]}),
+        Curve(
+            [100, 200, 300], [NAN, 0.2, 0.4], {"success@3": [NAN, 0.2, 0.4], "timeout": [NAN, 0.8, 0.6]}, WINS
+        ),
+        Curve([100], [0.5], {}, WINS, test=(100, 0.5, 0.02)),
+        Curve([], [], {}, WINS),
+        Curve([100, 200], [NAN, NAN], {"success@3": [NAN, NAN]}, WINS),
     ],
     ids=["usual", "one update", "nothing", "no episode ended"],
 )
