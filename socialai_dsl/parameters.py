@@ -49,15 +49,10 @@ def _values(resolved: Resolved, bag: DiagnosticBag) -> dict[str, Value]:
     for name, declaration in declared.items():
         default = declaration.get("default") if isinstance(declaration, dict) else declaration
         choices = declaration.get("values") if isinstance(declaration, dict) else None
-        given = resolved.params.get(name)
-        if given is not None:
-            default = _given(name, given, default, choices, resolved, bag)
-        elif isinstance(choices, dict):
-            if str(default) not in choices:
-                near = did_you_mean(str(default), choices)
-                span = resolved.value_span(("params", name, "default"))
-                bag.error("S206", f"the default of `{name}` is none of its values", span, suggestion=near)
-            default = choices.get(str(default))
+        if isinstance(choices, dict):
+            default = _labelled(name, default, choices, resolved, bag)
+        if name in resolved.params:
+            default = _given(name, default, choices, resolved, bag)
         if isinstance(default, int | bool | float | str):
             values[name] = default
     for name in resolved.params:
@@ -69,23 +64,35 @@ def _values(resolved: Resolved, bag: DiagnosticBag) -> dict[str, Value]:
     return values
 
 
-def _given(
-    name: str, text: str, default: Data, choices: Data, resolved: Resolved, bag: DiagnosticBag
+def _labelled(
+    name: str, default: Data, choices: dict[str, Data], resolved: Resolved, bag: DiagnosticBag
 ) -> Data:
-    """The value that was asked for, read as YAML would read it."""
-    span = resolved.param_span(name)
+    """The value that the default, a label, stands for."""
+    if str(default) not in choices:
+        near = did_you_mean(str(default), choices)
+        span = resolved.value_span(("params", name, "default"))
+        bag.error("S206", f"the default of `{name}` is none of its values", span, suggestion=near)
+    return choices.get(str(default), default)
+
+
+def _given(name: str, default: Data, choices: Data, resolved: Resolved, bag: DiagnosticBag) -> Data:
+    """The value that was asked for, read as YAML would read it; the default if it cannot be had."""
+    text, span = resolved.params[name], resolved.param_span(name)
     if isinstance(choices, dict):
         if text not in choices:
             near = did_you_mean(text, choices)
-            hint = "one of " + ", ".join(choices)
+            hint = None if near else "one of " + ", ".join(choices)
             bag.error("S206", f"`{text}` is none of the values of `{name}`", span, suggestion=near, hint=hint)
-        return choices.get(text)
+        return choices.get(text, default)
     value = read_plain(text).value
     if isinstance(choices, list) and (value not in choices or isinstance(value, bool) != _any_bool(choices)):
         hint = "one of " + ", ".join(map(str, choices))
         bag.error("S206", f"`{text}` is none of the values of `{name}`", span, hint=hint)
-    elif choices is None and not _alike(value, default):
-        bag.error("S206", f"`{text}` is not of the kind of the default of `{name}`, `{default}`", span)
+        return default
+    if choices is None and not _alike(value, default):
+        message = f"`{text}` is not of the kind of the default of `{name}`, `{default}`"
+        bag.error("S206", message, span)
+        return default
     return value
 
 

@@ -120,7 +120,7 @@ def effect(resolver: Resolver, path: DataPath, raw: object, scope: Scope) -> Eff
     value = None
     if signature.subject == "object":
         value = _new_status(resolver, name, entities, args, node, scope)
-    return Effect(cast(Any, name), entities, resolver.findings.at(path), value)
+    return Effect(cast(Any, name), entities, resolver.findings.at(path), value, scope.draws.site)
 
 
 def _entities(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[Term, ...]:

@@ -55,7 +55,9 @@ def check_meaning(
         found = DiagnosticBag()
         findings = Findings(found, places, params or {}, substituted, data)
         if AGENT not in scenario.cast:
-            findings.error("S105", "the cast has no `agent`", places.key_span(("cast",)), hint="add `agent: {}`")
+            findings.error(
+                "S105", "the cast has no `agent`", places.key_span(("cast",)), hint="add `agent: {}`"
+            )
             break
         run = _Run(scenario, findings, prelude, words, ranges.now)
         checked = run.checked(name)

@@ -55,7 +55,7 @@ class Ranges:
 
     def _back(self) -> bool:
         """The narrower ranges do not hold: the last ones that did are taken. Whether they are taken already."""
-        assert self._wide is not None
+        assert self._wide is not None, "internal: nothing was narrowed"
         done = self.now is self._wide
         self.now = self._wide
         return done

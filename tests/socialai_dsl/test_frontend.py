@@ -1,0 +1,213 @@
+"""From a name to a checked scenario or to findings."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from socialai_dsl.diagnostics import ScenarioError
+from socialai_dsl.frontend import check, check_files, load
+
+ROOT = Path(__file__).parent.parent.parent
+SHIPPED = sorted(ROOT.glob("scenarios/talkitout*.yaml"))
+SMALL = ROOT / "tests" / "diagnostics" / "small.yaml"
+
+
+@pytest.fixture
+def write(tmp_path):
+    def written(text, name="mine.yaml"):
+        file = tmp_path / name
+        file.write_text(text)
+        return file
+
+    return written
+
+
+def small(**changes):
+    text = SMALL.read_text()
+    for old, new in changes.values():
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return text
+
+
+@pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)
+def test_shipped_scenarios_are_right_and_short(file):
+    result = check(file)
+    assert result.diagnostics == ()
+    assert result.checked is not None
+    assert len(file.read_text().splitlines()) < 60
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "talkitout+unsocial",
+        "talkitout+oracle",
+        "talkitout+as_coded",
+        "talkitout_no_liar+oracle",
+        "talkitout_no_liar+as_coded+unsocial",
+    ],
+)
+def test_variants_resolve(name):
+    loaded = load(name)
+    assert loaded.name == name
+    assert loaded.checked.name == name
+
+
+def test_the_no_liar_variant_has_one_guide_called_john():
+    checked = load("talkitout_no_liar").checked
+    assert [e.key for e in checked.entities[:3]] == ["agent", "wizard", "honest"]
+    assert checked.entities[2].name.type.words == ("John",)
+
+
+def test_load_raises_everything_at_once(write):
+    file = write(
+        small(
+            a=("horizon: 50", "horizont: 50"),
+            b=("goto: acquainted", "goto: acquaintd"),
+            c=("(exit)", "(exitt)"),
+        )
+    )
+    with pytest.raises(ScenarioError) as caught:
+        load(file)
+    assert [d.code for d in caught.value.diagnostics] == ["S101", "S301", "S201"]
+    assert any(name.endswith("mine.yaml") for name in caught.value.sources)
+
+
+def test_mistakes_of_shape_do_not_hide_those_of_meaning(write):
+    file = write(small(a=("horizon: 50", "horizon: soon"), b=("(exit)", "(exitt)")))
+    assert [d.code for d in check(file).diagnostics] == ["S104", "S201"]
+
+
+def test_what_follows_from_a_lost_part_is_not_reported(write):
+    file = write(small(a=("let:\n  exit: pick(doors)\n", "let: exit\n")))
+    assert [d.code for d in check(file).diagnostics] == ["S104"]
+
+
+def test_a_renamed_section_is_read_and_its_mistakes_are_found_in_place(write):
+    file = write(small(a=("outcome:", "outcomes:"), b=("(exit)", "(exitt)")))
+    found = check(file).diagnostics
+    assert [(d.code, d.span.line) for d in found] == [("S101", 29), ("S201", 30)]
+
+
+def test_warnings_do_not_keep_a_scenario_from_running(write):
+    text = small(a=("cast:\n", "  lazy:\n    states: {a: {}, b: {}}\ncast:\n"))
+    loaded = load(write(text))
+    assert [d.code for d in loaded.warnings] == ["W306"]
+
+
+def test_a_variant_of_any_scenario_is_right_but_cannot_run():
+    result = check(ROOT / "scenarios" / "unsocial.yaml")
+    assert result.diagnostics == ()
+    assert result.checked is None
+    with pytest.raises(ScenarioError, match="S108"):
+        load(ROOT / "scenarios" / "unsocial.yaml")
+
+
+def test_an_abstract_scenario_is_checked_for_its_shape_alone(write):
+    assert check(write("scenario: base\nabstract: true\nlet: {exit: pick(doors)}\n")).diagnostics == ()
+    found = check(write("scenario: base\nabstract: true\nlett: {exit: pick(doors)}\n")).diagnostics
+    assert [d.code for d in found] == ["S101"]
+
+
+def test_the_prelude_is_a_library_like_any_other():
+    for library in (ROOT / "socialai_dsl" / "prelude").glob("*.yaml"):
+        assert check(library).diagnostics == ()
+
+
+def test_folders_are_checked_file_by_file(tmp_path):
+    shutil.copy(SMALL, tmp_path / "b.yaml")
+    (tmp_path / "inner").mkdir()
+    shutil.copy(SMALL, tmp_path / "inner" / "a.yml")
+    (tmp_path / "notes.txt").write_text("no scenario")
+    results = list(check_files([tmp_path, tmp_path / "b.yaml"]))
+    assert [Path(r.name).name for r in results] == ["b.yaml", "a.yml"]
+    assert all(r.checked for r in results)
+
+
+# -- parameters ----------------------------------------------------------------------------------------------------
+
+PARAMS = """params:
+  pause: {default: 2, values: [0, 2, 5]}
+  wall: {default: top, values: {top: wall(top), any: wall(pick(top | left))}}
+  who: Zed
+  share: 0.5
+let:
+  number: $pause + 1
+"""
+
+
+def with_params():
+    return small(
+        a=("let:\n", PARAMS),
+        b=("place: each_wall(2), color: distinct", "place: $wall, color: distinct"),
+        c=("name: pick(John | Jack)", "name: $who"),
+        d=("say: I am fine.", "chance: $share, say: I am fine."),
+    )
+
+
+def test_parameters_stand_for_whole_values_and_inside_expressions(write):
+    loaded = load(write(with_params()))
+    honest = loaded.checked.entities[1]
+    assert honest.name.type.words == ("Zed",)
+    assert loaded.checked.frames[0].states[0].then[0].chance == 0.5
+    (number,) = [s for s in loaded.checked.setup if getattr(s, "path", "") == "let.number"]
+    assert number.value.term.value == 3
+
+
+def test_parameters_are_set_behind_the_name(write):
+    loaded = load(f"{write(with_params())}?pause=5&who=Amy&wall=any")
+    assert loaded.checked.entities[1].name.type.words == ("Amy",)
+    (number,) = [s for s in loaded.checked.setup if getattr(s, "path", "") == "let.number"]
+    assert number.value.term.value == 6
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ("pauze=5", "has no parameter `pauze`; did you mean `pause`?"),
+        ("pause=3", "`3` is none of the values of `pause`"),
+        ("wall=tops", "`tops` is none of the values of `wall`; did you mean `top`?"),
+        ("share=much", "`much` is not of the kind of the default of `share`"),
+    ],
+)
+def test_wrong_parameters(write, asked, message):
+    found = check(f"{write(with_params())}?{asked}").diagnostics
+    assert [d.code for d in found] == ["S206"]
+    assert message in found[0].text
+
+
+def test_mistakes_inside_a_parameters_value_are_shown_where_it_is_used(write):
+    text = small(a=("let:\n", "params: {where: rect(1)}\nlet:\n"), b=("place: each_wall(2)", "place: $where"))
+    (found,) = check(write(text)).diagnostics
+    assert (found.code, found.span.column) == ("S211", 40)
+
+
+# -- speed ---------------------------------------------------------------------------------------------------------
+
+
+def test_checking_needs_none_of_the_heavy_libraries():
+    code = (
+        "import sys; from socialai_dsl.frontend import check; assert check('talkitout').checked; "
+        "print([m for m in ('numba', 'torch', 'gymnasium', 'numpy') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_checking_again_is_quick():
+    check("talkitout")
+    best = min(_seconds() for _ in range(5))
+    assert best < 0.1, f"{best * 1000:.0f} ms"
+
+
+def _seconds():
+    start = time.process_time()
+    check("talkitout")
+    return time.process_time() - start
