@@ -70,7 +70,12 @@ class TrainConfig(BaseModel):
         "fast", min_length=1, description="fast, paper, paper-reference, or my.module:MyNet of the user's"
     )
     device: str = Field("cpu", min_length=1, description="torch device the network runs on")
-    threads: int = Field(0, ge=0, description="CPU threads of torch; 0 leaves torch's own choice")
+    threads: int = Field(
+        0,
+        ge=0,
+        description="CPU threads that share each minibatch; 0 = one per core, at most 4. Part of what makes two runs "
+        "equal to the bit",
+    )
     checkpoint_every: int = Field(50, ge=1, description="updates between checkpoints")
     tensorboard: bool = Field(True, description="also write TensorBoard events")
 

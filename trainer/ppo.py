@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from trainer import actions as heads
 from trainer.actor import Actor
 from trainer.config import TrainConfig
-from trainer.distinct import prefix_tree
+from trainer.crew import Crew
 from trainer.errors import TrainingStopped
+from trainer.minibatch import Batch, Minibatch, make_minibatch
 from trainer.nets import ActorCritic
 from trainer.rollout import Rollout
 
@@ -50,17 +52,6 @@ def compute_gae(
         running = deltas[t] + gamma * gae_lambda * goes_on[t] * running
         advantages[t] = running
     return advantages
-
-
-@dataclass(frozen=True)
-class Batch:
-    """Frames the loss is taken over, all (N, ...): see `Rollout`; `returns` are the targets of the value."""
-
-    actions: Tensor
-    log_probs: Tensor
-    values: Tensor
-    advantages: Tensor
-    returns: Tensor
 
 
 @dataclass(frozen=True)
@@ -129,78 +120,7 @@ def ppo_loss(
         )
 
 
-@dataclass(frozen=True)
-class Minibatch:
-    """Whole environments of a rollout with their distinct frames, prepared once and used in every epoch.
-
-    Attributes:
-        batch: the frames, time-major: N = T * B.
-        starts: bool (T, B). memory: (2, B, M) before the first step.
-        prepared: the net's view of the distinct images.
-        tokens, parents, offsets: prefix tree of the distinct histories.
-        image_index, text_index: int64 (P,), image and tree state of each distinct pair.
-        frame_index: int64 (N,), pair of each frame.
-    """
-
-    batch: Batch
-    starts: Tensor
-    memory: Tensor
-    prepared: Any
-    tokens: Tensor
-    parents: Tensor
-    offsets: list[int]
-    image_index: Tensor
-    text_index: Tensor
-    frame_index: Tensor
-
-    def evaluate(self, net: ActorCritic) -> tuple[Tensor, Tensor]:
-        """Logits (N, sum of sizes) and values (N,) of the frames under the present weights."""
-        text = net.dialogue(self.tokens, self.parents, self.offsets)
-        features = net.perceive(self.prepared, text, self.image_index, self.text_index)
-        steps, count = self.starts.shape
-        frames = features.index_select(0, self.frame_index).view(steps, count, -1)
-        logits, values = net.heads(net.memory(frames, self.starts, self.memory).flatten(0, 1))
-        return logits, values
-
-
-def make_minibatch(
-    actor: Actor, rollout: Rollout, advantages: Tensor, returns: Tensor, envs: Tensor, stretch: int
-) -> Minibatch:
-    """Cut the environments `envs`, int64 (B,), out of a rollout, in stretches of `stretch` steps side by side."""
-
-    def cut(array: Tensor) -> Tensor:
-        """(T, E, ...) to (stretch, T / stretch * B, ...)."""
-        chosen = array.index_select(1, envs.to(array.device))
-        return chosen.view(-1, stretch, *chosen.shape[1:]).transpose(0, 1).flatten(1, 2)
-
-    pair_rows, frame_index = np.unique(cut(torch.from_numpy(rollout.pair_rows)).numpy(), return_inverse=True)
-    pairs = actor.pairs.data[pair_rows]
-    image_rows, image_index = np.unique(pairs[:, 0], return_inverse=True)
-    history_rows, history_index = np.unique(pairs[:, 1], return_inverse=True)
-    tree = prefix_tree(actor.histories.data[history_rows])
-    device = actor.device
-
-    def move(array: np.ndarray[Any, Any]) -> Tensor:
-        return torch.from_numpy(np.ascontiguousarray(array)).to(device)
-
-    return Minibatch(
-        Batch(
-            cut(rollout.actions).flatten(0, 1),
-            cut(rollout.log_probs).flatten(0, 1),
-            cut(rollout.values).flatten(),
-            cut(advantages).flatten(),
-            cut(returns).flatten(),
-        ),
-        cut(torch.from_numpy(rollout.starts)).to(device),
-        rollout.memories.index_select(2, envs.to(device)).transpose(0, 1).flatten(1, 2),
-        actor.net.prepare(move(actor.images.data[image_rows])),
-        move(tree.tokens),
-        move(tree.parents),
-        tree.offsets,
-        move(image_index),
-        move(tree.leaves[history_index]),
-        move(frame_index.reshape(-1)),
-    )
+_STATISTICS = ("loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "grad_norm")
 
 
 def update(
@@ -209,10 +129,12 @@ def update(
     rollout: Rollout,
     config: TrainConfig,
     generator: torch.Generator,
+    crew: Crew,
 ) -> dict[str, float]:
     """Improve the network on one rollout: `epochs` passes over `minibatches` groups of whole environments.
 
-    The groups are drawn anew for each rollout and visited in a new order in each epoch.
+    The groups are drawn anew for each rollout and visited in a new order in each epoch. The threads of the crew
+    share each group's environments between them.
 
     Returns:
         Means over the minibatches of `LossParts` and of the gradient's norm before clipping, by name, and the
@@ -221,27 +143,19 @@ def update(
     Raises:
         TrainingStopped: a loss or a gradient is not finite; the weights are as the last good step left them.
     """
-    net = actor.net
-    device = actor.device
-    raw = compute_gae(
-        torch.from_numpy(rollout.rewards).to(device, torch.float32),
-        rollout.values,
-        rollout.next_value,
-        torch.from_numpy(rollout.terminated).to(device),
-        torch.from_numpy(rollout.truncated).to(device),
-        torch.from_numpy(rollout.bootstrap).to(device, torch.float32),
-        config.gamma,
-        config.gae_lambda,
-    )
+    raw = _advantages(actor, rollout, config)
     returns = raw + rollout.values
     advantages = (raw - raw.mean()) / (raw.std(correction=0) + 1e-8) if config.normalize_advantages else raw
-    order = torch.randperm(raw.shape[1], generator=generator)
-    groups = [
-        make_minibatch(actor, rollout, advantages, returns, group, config.bptt or config.horizon)
-        for group in order.tensor_split(config.minibatches)
-    ]
+    stretch = config.bptt or config.horizon
+
+    def prepare(envs: Tensor) -> Minibatch:
+        return make_minibatch(actor, rollout, advantages, returns, envs, stretch)
+
+    order = torch.randperm(config.num_envs, generator=generator)
+    parts = [crew.shares(group) for group in order.tensor_split(config.minibatches)]
+    groups = [crew.map(prepare, part) for part in parts]
     steps = [
-        _step(net, optimizer, groups[index], config)
+        _step(actor.net, optimizer, groups[index], config, crew)
         for _ in range(config.epochs)
         for index in torch.randperm(len(groups), generator=generator).tolist()
     ]
@@ -250,22 +164,52 @@ def update(
     return dict(zip(_STATISTICS, means, strict=True)) | {"explained_variance": 1 - float(unexplained)}
 
 
-_STATISTICS = ("loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "grad_norm")
+def _advantages(actor: Actor, rollout: Rollout, config: TrainConfig) -> Tensor:
+    """`compute_gae` of a rollout, on the network's device."""
+
+    def move(array: NDArray[Any]) -> Tensor:
+        return torch.from_numpy(array).to(actor.device)
+
+    return compute_gae(
+        move(rollout.rewards).float(),
+        rollout.values,
+        rollout.next_value,
+        move(rollout.terminated),
+        move(rollout.truncated),
+        move(rollout.bootstrap).float(),
+        config.gamma,
+        config.gae_lambda,
+    )
 
 
 def _step(
-    net: ActorCritic, optimizer: torch.optim.Optimizer, minibatch: Minibatch, config: TrainConfig
+    net: ActorCritic,
+    optimizer: torch.optim.Optimizer,
+    shares: list[Minibatch],
+    config: TrainConfig,
+    crew: Crew,
 ) -> Tensor:
-    """One gradient step; returns `_STATISTICS`."""
-    logits, values = minibatch.evaluate(net)
-    loss = ppo_loss(minibatch.batch, logits, values, net.spec.action_sizes, config)
-    if not bool(torch.isfinite(loss.total)):
+    """One gradient step on a group of environments, given in shares; returns `_STATISTICS`."""
+    parameters = list(net.parameters())
+    total = sum(len(share.batch.returns) for share in shares)
+
+    def differentiate(share: Minibatch) -> tuple[Tensor, Sequence[Tensor | None]]:
+        logits, values = share.evaluate(net)
+        loss = ppo_loss(share.batch, logits, values, net.spec.action_sizes, config)
+        weight = len(share.batch.returns) / total
+        gradients = torch.autograd.grad(loss.total * weight, parameters, allow_unused=True)
+        parts = (loss.total, loss.policy, loss.value, loss.entropy, loss.approx_kl, loss.clip_fraction)
+        return torch.stack([part.detach() for part in parts]) * weight, gradients
+
+    results = crew.map(differentiate, shares)
+    statistics = torch.stack([share[0] for share in results]).sum(0)
+    if not bool(torch.isfinite(statistics[0])):
         raise TrainingStopped("the loss is not a finite number")
-    optimizer.zero_grad()
-    loss.total.backward()  # type: ignore[no-untyped-call]
-    norm = nn.utils.clip_grad_norm_(net.parameters(), config.max_grad_norm)
+    for parameter, *gradients in zip(parameters, *(share[1] for share in results), strict=True):
+        present = [gradient for gradient in gradients if gradient is not None]
+        parameter.grad = sum(present[1:], start=present[0]) if present else None
+    norm = nn.utils.clip_grad_norm_(parameters, config.max_grad_norm)
     if not bool(torch.isfinite(norm)):
         raise TrainingStopped("a gradient is not a finite number")
     optimizer.step()
-    parts = (loss.total, loss.policy, loss.value, loss.entropy, loss.approx_kl, loss.clip_fraction, norm)
-    return torch.stack([part.detach() for part in parts])
+    return torch.cat((statistics, norm[None]))

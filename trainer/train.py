@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import torch
-
 from trainer import checkpoint as checkpoints
 from trainer.config import TrainConfig
+from trainer.crew import Crew
 from trainer.errors import CheckpointError, ObservationError, TrainingStopped
 from trainer.metrics import MetricsLog, episode_metrics
 from trainer.ppo import update
@@ -68,26 +67,30 @@ def train(
         TrainingStopped: something is not finite or out of bounds, or the disk is full; the last good checkpoint
             is intact.
     """
-    with _threads(config.threads):
-        session = Session.start(config, envs)
-        folder = run_dir / CHECKPOINTS
-        if resume:
-            if not folder.is_dir():
-                raise CheckpointError(f"{run_dir}: nothing to resume, there are no checkpoints")
-            session.load(checkpoints.read(folder))
-        with _explained(session, folder):
-            run_dir.mkdir(parents=True, exist_ok=True)
-            log = MetricsLog(run_dir, session.update, config.tensorboard)
-            if not resume:
-                checkpoints.write(folder, session.checkpoint())
-        with contextlib.closing(log):
-            _loop(session, folder, log, progress)
-        with _explained(session, folder):
-            return checkpoints.write(folder, session.checkpoint())
+    session = Session.start(config, envs)
+    folder = run_dir / CHECKPOINTS
+    if resume:
+        if not folder.is_dir():
+            raise CheckpointError(f"{run_dir}: nothing to resume, there are no checkpoints")
+        session.load(checkpoints.read(folder))
+    with _explained(session, folder):
+        run_dir.mkdir(parents=True, exist_ok=True)
+        log = MetricsLog(run_dir, session.update, config.tensorboard)
+        if not resume:
+            checkpoints.write(folder, session.checkpoint())
+    divisible = session.actor.net.distinct and session.actor.device.type == "cpu"
+    with contextlib.closing(log), Crew(config.threads, divisible) as crew:
+        _loop(session, folder, log, crew, progress)
+    with _explained(session, folder):
+        return checkpoints.write(folder, session.checkpoint())
 
 
 def _loop(
-    session: Session, folder: Path, log: MetricsLog, progress: Callable[[Progress], None] | None
+    session: Session,
+    folder: Path,
+    log: MetricsLog,
+    crew: Crew,
+    progress: Callable[[Progress], None] | None,
 ) -> None:
     config, envs, began, first = session.config, session.envs, time.perf_counter(), session.update
     session.actor.net.train()
@@ -95,7 +98,7 @@ def _loop(
     while session.update < config.updates:
         with _explained(session, folder):
             rollout = collect(session.actor, envs, session.state, config, session.generator, session.bonus)
-            losses = update(session.actor, session.optimizer, rollout, config, session.generator)
+            losses = update(session.actor, session.optimizer, rollout, config, session.generator, crew)
             session.update += 1
             before, counted = counted, envs.counters()
             before_time, then = then, time.perf_counter()
@@ -124,15 +127,3 @@ def _explained(session: Session, folder: Path) -> Iterator[None]:
         reason = f"cannot write: {error}" if isinstance(error, OSError) else str(error)
         where = f"training stopped after {session.frames} frames (update {session.update})"
         raise TrainingStopped(f"{where}: {reason}; {kept}") from error
-
-
-@contextlib.contextmanager
-def _threads(count: int) -> Iterator[None]:
-    """Let torch use `count` CPU threads meanwhile; 0 leaves its choice."""
-    before = torch.get_num_threads()
-    try:
-        if count:
-            torch.set_num_threads(count)
-        yield
-    finally:
-        torch.set_num_threads(before)

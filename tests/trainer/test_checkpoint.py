@@ -15,6 +15,7 @@ import torch
 from tests.trainer.fake_envs import EchoEnvs
 from trainer import checkpoint as checkpoints
 from trainer.checkpoint import Checkpoint, read, restore_net, write
+from trainer.crew import Crew
 from trainer.errors import CheckpointError
 from trainer.ppo import update
 from trainer.rollout import collect
@@ -27,7 +28,7 @@ def session(small_config: Any) -> Session:
     rollout = collect(
         session.actor, session.envs, session.state, session.config, session.generator, session.bonus
     )
-    update(session.actor, session.optimizer, rollout, session.config, session.generator)
+    update(session.actor, session.optimizer, rollout, session.config, session.generator, Crew(1))
     session.update = 1
     return session
 

@@ -11,7 +11,9 @@ from torch import Tensor
 
 from tests.trainer.fake_envs import EchoEnvs
 from trainer.config import TrainConfig
-from trainer.ppo import Batch, compute_gae, make_minibatch, ppo_loss, update
+from trainer.crew import Crew
+from trainer.minibatch import Batch, make_minibatch
+from trainer.ppo import compute_gae, ppo_loss, update
 from trainer.rollout import collect
 from trainer.session import Session
 
@@ -189,7 +191,7 @@ def test_an_update_makes_the_better_action_likelier(small_config: Any) -> None:
     rollout.next_value.zero_()
     rollout.terminated[:], rollout.truncated[:] = True, False
     before = rollout.log_probs[..., 0][favoured].mean().item()
-    update(session.actor, session.optimizer, rollout, config, session.generator)
+    update(session.actor, session.optimizer, rollout, config, session.generator, Crew(1))
     group = torch.arange(config.num_envs)
     minibatch = make_minibatch(session.actor, rollout, rollout.values, rollout.values, group, config.horizon)
     logits, _ = minibatch.evaluate(session.actor.net)
@@ -200,7 +202,7 @@ def test_an_update_makes_the_better_action_likelier(small_config: Any) -> None:
 def test_statistics_are_finite_and_complete(small_config: Any) -> None:
     config = small_config()
     session, rollout = played(config)
-    statistics = update(session.actor, session.optimizer, rollout, config, session.generator)
+    statistics = update(session.actor, session.optimizer, rollout, config, session.generator, Crew(1))
     assert set(statistics) == {
         "loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "grad_norm", "explained_variance"
     }  # fmt: skip

@@ -45,7 +45,7 @@ def rows(run_dir: Path) -> list[dict[str, Any]]:
 
 def test_it_learns_to_repeat_a_word_it_heard(tmp_path: Path) -> None:
     config = TrainConfig(
-        frames=60_000, num_envs=128, horizon=16, lr=2e-3, threads=1, tensorboard=False, explo="none"
+        frames=45_000, num_envs=128, horizon=16, lr=2e-3, threads=1, tensorboard=False, explo="none"
     )
     envs = EchoEnvs(128)
     path = train(config, envs, tmp_path)
@@ -228,7 +228,7 @@ run_dir = Path({str(tmp_path / "killed")!r})
 train(config, EchoEnvs(8), run_dir, lambda progress: print(progress.update, flush=True),
       resume=any((run_dir / "checkpoints").glob("*.safetensors")))
 """
-    config = small_config(frames=64 * 10 * (kills + 1), epochs=1, checkpoint_every=1)
+    config = small_config(frames=64 * 6 * (kills + 1), epochs=1, checkpoint_every=1)
     rng = np.random.default_rng(0)
     while True:
         command = [sys.executable, "-c", script, config.model_dump_json()]

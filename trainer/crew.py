@@ -1,0 +1,71 @@
+"""This module spreads work over CPU threads that share nothing but the network's weights."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from types import TracebackType
+from typing import Self, TypeVar
+
+import torch
+from torch import Tensor
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+# More threads than this wait for Python's interpreter lock rather than compute.
+_AUTOMATIC_LIMIT = 4
+
+
+def available_cores() -> int:
+    """CPU cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Crew:
+    """Threads that each differentiate their share of a minibatch.
+
+    A recurrent network is thousands of small operations. Split inside each operation, as torch does, they spend
+    their time meeting at barriers, and on a busy machine they stand still; whole shares meet once per step. Each
+    thread, the caller's included, therefore runs torch on one core while the crew is open.
+
+    Attributes:
+        threads: how many.
+    """
+
+    def __init__(self, threads: int, divisible: bool = True) -> None:
+        wanted = threads or min(available_cores(), _AUTOMATIC_LIMIT)
+        self.threads = wanted if divisible else 1
+        self._inside = 1 if divisible else wanted
+        self._before = torch.get_num_threads()
+        self._pool = ThreadPoolExecutor(
+            max(self.threads - 1, 1), initializer=torch.set_num_threads, initargs=(1,)
+        )
+
+    def __enter__(self) -> Self:
+        torch.set_num_threads(self._inside)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._pool.shutdown()
+        torch.set_num_threads(self._before)
+
+    def shares(self, envs: Tensor) -> list[Tensor]:
+        """Split environments, int64 (B,), evenly among the threads; no share is empty."""
+        return list(envs.tensor_split(min(self.threads, len(envs))))
+
+    def map(self, function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
+        """Apply the function to all items at once, one thread each, the caller's taking the first."""
+        first, *others = items
+        futures = [self._pool.submit(function, item) for item in others]
+        try:
+            result = function(first)
+        finally:
+            others_done = [future.exception() for future in futures]
+        for error in others_done:
+            if error is not None:
+                raise error
+        return [result, *(future.result() for future in futures)]
