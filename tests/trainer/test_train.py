@@ -57,12 +57,14 @@ def test_it_learns_to_repeat_a_word_it_heard(tmp_path: Path) -> None:
     assert last["outcomes"]["right"] == pytest.approx(last["success"])
 
 
-@pytest.mark.parametrize(("net", "explo"), [("fast", "lang"), ("fast", "cell"), ("paper-reference", "none")])
+@pytest.mark.parametrize(
+    ("net", "explo", "threads"), [("fast", "lang", 1), ("fast", "cell", 2), ("paper-reference", "none", 1)]
+)
 def test_a_run_stopped_three_times_ends_with_the_same_bits(
-    net: str, explo: str, tmp_path: Path, small_config: Any
+    net: str, explo: str, threads: int, tmp_path: Path, small_config: Any
 ) -> None:
     updates = 9 if net == "fast" else 4
-    config = small_config(net=net, explo=explo, frames=64 * updates, bootstrap_timeouts=True)
+    config = small_config(net=net, explo=explo, threads=threads, frames=64 * updates, bootstrap_timeouts=True)
     whole = read(train(config, EchoEnvs(8, chatter=0.3), tmp_path / "whole"))
     stops = np.sort(np.random.default_rng(0).choice(np.arange(1, updates), 3, replace=False)).tolist()
     for index, stop in enumerate(stops):

@@ -1,0 +1,81 @@
+"""Work is shared between threads without changing its result or hiding its errors."""
+
+import threading
+from typing import Any
+
+import pytest
+import torch
+
+from tests.trainer.fake_envs import EchoEnvs
+from trainer.crew import Crew, available_cores
+from trainer.ppo import update
+from trainer.rollout import collect
+from trainer.session import Session
+
+
+def test_results_come_in_order_from_as_many_threads_as_items() -> None:
+    meet = threading.Barrier(3, timeout=20)
+
+    def work(item: int) -> tuple[int, int, int]:
+        meet.wait()
+        return item, threading.get_ident(), torch.get_num_threads()
+
+    with Crew(3) as crew:
+        results = crew.map(work, [5, 6, 7])
+    assert [item for item, _, _ in results] == [5, 6, 7]
+    assert len({thread for _, thread, _ in results}) == 3
+    assert results[0][1] == threading.get_ident()
+    assert {inside for _, _, inside in results} == {1}
+
+
+@pytest.mark.parametrize("bad", [0, 1])
+def test_an_error_in_any_thread_is_the_caller_s(bad: int) -> None:
+    def work(item: int) -> int:
+        if item == bad:
+            raise KeyError(item)
+        return item
+
+    with Crew(2) as crew, pytest.raises(KeyError):
+        crew.map(work, [0, 1])
+
+
+def test_torch_s_threads_are_as_before() -> None:
+    torch.set_num_threads(2)
+    with Crew(1):
+        assert torch.get_num_threads() == 1
+    assert torch.get_num_threads() == 2
+    with Crew(3, divisible=False) as crew:
+        assert torch.get_num_threads() == 3, "work that cannot be shared uses torch's own threads"
+        assert crew.threads == 1
+    assert torch.get_num_threads() == 2
+
+
+def test_shares_cover_everything_and_none_is_empty() -> None:
+    with Crew(4) as crew:
+        assert [share.tolist() for share in crew.shares(torch.arange(6))] == [[0, 1], [2, 3], [4], [5]]
+        assert [share.tolist() for share in crew.shares(torch.arange(2))] == [[0], [1]]
+
+
+def test_the_automatic_number_of_threads_is_that_of_the_cores() -> None:
+    with Crew(0) as crew:
+        assert crew.threads == min(available_cores(), 4)
+
+
+@pytest.mark.parametrize("net", ["fast", "paper"])
+@pytest.mark.parametrize("loss", ["joint", "per_head"])
+def test_shared_updates_are_those_of_one_thread(net: str, loss: str, small_config: Any) -> None:
+    config = small_config(net=net, loss=loss, num_envs=9, epochs=1, minibatches=1, adam_eps=1e-2)
+    weights, statistics = [], []
+    for threads in (1, 2, 2):
+        session = Session.start(config, EchoEnvs(9))
+        rollout = collect(session.actor, session.envs, session.state, config, session.generator, None)
+        with Crew(threads) as crew:
+            statistics.append(
+                update(session.actor, session.optimizer, rollout, config, session.generator, crew)
+            )
+        weights.append({name: value.clone() for name, value in session.actor.net.state_dict().items()})
+    one, two, again = weights
+    for name, value in one.items():
+        assert torch.allclose(value, two[name], atol=1e-6), name
+        assert torch.equal(two[name], again[name]), f"{name} depends on the threads' timing"
+    assert statistics[0] == pytest.approx(statistics[1], rel=1e-3, abs=1e-5)
