@@ -64,8 +64,8 @@ def test_the_automatic_number_of_threads_is_that_of_the_cores() -> None:
 @pytest.mark.parametrize("net", ["fast", "paper"])
 @pytest.mark.parametrize("loss", ["joint", "per_head"])
 def test_shared_updates_are_those_of_one_thread(net: str, loss: str, small_config: Any) -> None:
-    config = small_config(net=net, loss=loss, num_envs=9, epochs=1, minibatches=1, adam_eps=1e-2)
-    weights, statistics = [], []
+    config = small_config(net=net, loss=loss, num_envs=9, epochs=1, minibatches=1)
+    gradients, statistics = [], []
     for threads in (1, 2, 2):
         session = Session.start(config, EchoEnvs(9))
         rollout = collect(session.actor, session.envs, session.state, config, session.generator, None)
@@ -73,9 +73,8 @@ def test_shared_updates_are_those_of_one_thread(net: str, loss: str, small_confi
             statistics.append(
                 update(session.actor, session.optimizer, rollout, config, session.generator, crew)
             )
-        weights.append({name: value.clone() for name, value in session.actor.net.state_dict().items()})
-    one, two, again = weights
-    for name, value in one.items():
-        assert torch.allclose(value, two[name], atol=1e-6), name
-        assert torch.equal(two[name], again[name]), f"{name} depends on the threads' timing"
+        gradients.append(torch.cat([p.grad.flatten() for p in session.actor.net.parameters()]))
+    one, two, again = gradients
+    assert (one - two).norm() < 1e-3 * one.norm()
+    assert torch.equal(two, again), "the result depends on the threads' timing"
     assert statistics[0] == pytest.approx(statistics[1], rel=1e-3, abs=1e-5)
