@@ -27,8 +27,8 @@ class Repaired:
 
     def rename(self, path: DataPath, key: str) -> bool:
         """Read the entry at `path` under another key; whether that key was free."""
-        parent = part_at(self.data, path[:-1])
-        if not isinstance(parent, dict) or key in parent:
+        parent = self._parent(path)
+        if parent is None or key in parent:
             return False
         entries = [(key if k == path[-1] else k, value) for k, value in parent.items()]
         parent.clear()
@@ -38,10 +38,20 @@ class Repaired:
 
     def leave_out(self, path: DataPath) -> None:
         """Go on without the entry at `path`; an item of a list stays, since the others are known by their number."""
-        parent = part_at(self.data, path[:-1])
-        if isinstance(parent, dict) and path[-1] in parent:
+        parent = self._parent(path)
+        if parent is not None:
             del parent[path[-1]]
-            self.lost.append(path)
+        self.lost.append(path)
+
+    def _parent(self, path: DataPath) -> dict[str | int, Any] | None:
+        """The mapping that holds the entry at `path`; None if there is no such entry, or not any more."""
+        part = self.data
+        for step in path[:-1]:
+            known = range(len(part)) if isinstance(part, list) else part if isinstance(part, dict) else ()
+            if step not in known:
+                return None
+            part = part[step]
+        return part if isinstance(part, dict) and path[-1] in part else None
 
 
 def part_at(data: Any, path: DataPath) -> Any:

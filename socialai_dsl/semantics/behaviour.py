@@ -186,11 +186,11 @@ class _Planner:
         resolver, frame = self.resolver, self.played.model
         if name not in frame.let:
             raise self._no_register(name, path)
-        register = resolver.registers.read(f"{self.played.member}.{name}")
+        register = resolver.registers.read(self.played.register(name))
         scope = _scope(self.played, path, address)
         expected = _INT if register.type.kind == "int" and not register.type.words else register.type
         term = resolver.written(path, raw, expected, scope)  # type: ignore[arg-type]
-        resolver.registers.widen(f"{self.played.member}.{name}", term.type)
+        resolver.registers.widen(self.played.register(name), term.type)
         return Sited(term, scope.draws.site, resolver.findings.at(path))
 
     def _no_register(self, name: str, path: DataPath) -> FailedError:

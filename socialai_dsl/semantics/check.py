@@ -171,10 +171,12 @@ class _Run:
         npc = next((name for name in self._symbols.cast if name != AGENT), AGENT)
         for name in self._scenario.frames:
             if name not in played:
-                frame = entities.played_frame(self._symbols, self._findings, npc, name, {})
-                self._look_at(frame)
+                self._look_at(
+                    entities.played_frame(self._symbols, self._findings, npc, name, {}, looked_at=True)
+                )
 
     def _look_at(self, frame: PlayedFrame) -> None:
+        entities.declare_frame(self.resolver, frame)
         behaviour.plan(self.resolver, frame, behaviour.lines_of(self.resolver, frame))
 
     def _outcomes(self) -> Iterator[OutcomePlan]:
@@ -205,8 +207,8 @@ class _Run:
 
     def report_growth(self, path: str) -> None:
         """A register whose range has no end."""
-        member, name = path.split(".")
-        frame = self._played[member].name
-        span = self._findings.places.key_span(("frames", frame, "let", name))
+        source = self.resolver.registers.source(path)
+        name = source[-1]
+        span = self._findings.places.key_span(source)
         hint = f"bound it: `set: {{{name}: min({name} * 2, 100)}}`"
         self._findings.error("S106", f"`{name}` can grow without end", span, hint=hint)

@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 
 AGENT = "agent"
 
+_TAKEN = frozenset({"name", "kind", "index", "cell", "frame", "clock"})
+"""What a member of the cast has already, so that no slot or register of its frame may be called so."""
+
 
 @dataclass(frozen=True)
 class Prelude:
@@ -115,7 +118,7 @@ def _check_names(scenario: Scenario, findings: Findings) -> None:
                 name = (parse_define(key) or (key, ()))[0]
                 part = {"slot": "slots", "register": "let", "definition": "define"}[kind]
                 span = findings.places.key_span(("frames", frame_name, part, key))
-                if name in WORDS or name in ("name", "kind", "index"):
+                if name in WORDS or name in _TAKEN:
                     findings.error(
                         "S213", f"`{name}` is a word of the language; call the {kind} something else", span
                     )
@@ -161,7 +164,12 @@ def played_frames(symbols: Symbols, findings: Findings) -> dict[str, PlayedFrame
 
 
 def played_frame(
-    symbols: Symbols, findings: Findings, member: str, frame_name: str, filled: Mapping[str, object]
+    symbols: Symbols,
+    findings: Findings,
+    member: str,
+    frame_name: str,
+    filled: Mapping[str, object],
+    looked_at: bool = False,
 ) -> PlayedFrame:
     """A frame as a member plays it; slots that are not `filled` have no text."""
     frame = symbols.scenario.frames[frame_name]
@@ -171,7 +179,7 @@ def played_frame(
         if type_ in SUBSTITUTED
     }
     defines = _defines(frame.define, ("frames", frame_name, "define"), findings)
-    return PlayedFrame(member, symbols.numbers[member], frame_name, frame, defines, texts)
+    return PlayedFrame(member, symbols.numbers[member], frame_name, frame, defines, texts, looked_at)
 
 
 def check_slots(resolver: Resolver) -> None:
@@ -273,7 +281,7 @@ def declare_frame(resolver: Resolver, played: PlayedFrame) -> None:
         "noun": nouns,
     }
     for slot, kind in played.model.slots.items():
-        if kind in SUBSTITUTED or slot not in symbols.cast[member].with_:
+        if kind in SUBSTITUTED or played.looked_at or slot not in symbols.cast[member].with_:
             continue
         path = symbols.with_path(member, slot)
         scope = reset_scope(path, f"cast.{member}.with.{slot}", member)
@@ -283,4 +291,5 @@ def declare_frame(resolver: Resolver, played: PlayedFrame) -> None:
         path = (*played.path, "let", name)
         scope = reset_scope(path, f"{member}/{dotted(path)}", member)
         framed = Scope(path, scope.draws, member, played, at_reset=True)
-        resolver.registers.declare(Declaration(f"{member}.{name}", name, path, raw, framed))
+        register = played.register(name)
+        resolver.registers.declare(Declaration(register, name, path, raw, framed, imagined=played.looked_at))

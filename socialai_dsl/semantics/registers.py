@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,7 @@ class Declaration:
         source, raw: the expression and where it stands. scope: what its names mean.
         expected: its type, if its declaration says it.
         constant: a known value needs no register.
+        imagined: it is only looked at, and never drawn.
     """
 
     path: str
@@ -36,6 +38,7 @@ class Declaration:
     scope: Scope
     expected: Type | None = None
     constant: bool = False
+    imagined: bool = False
 
 
 class Registers:
@@ -68,14 +71,17 @@ class Registers:
     def __contains__(self, path: str) -> bool:
         return path in self._declared or path in self._terms
 
+    def source(self, path: str) -> DataPath:
+        """Where a register is declared."""
+        return self._declared[path].source
+
     def drawn(self) -> list[Drawn]:
         """All registers that are not constants, in the order declared; those nobody asked for are resolved now."""
         for path in self._declared:
-            try:
+            with suppress(FailedError):
                 self.read(path)
-            except FailedError:
-                continue
-        return [self._drawn[path] for path in self._declared if path in self._drawn]
+        kept = [path for path, declaration in self._declared.items() if not declaration.imagined]
+        return [self._drawn[path] for path in kept if path in self._drawn]
 
     def read(self, path: str, expected: Type | None = None, span: Span | None = None) -> Term:
         """The register (or its constant) as a term; `expected` and `span` are those of the use."""

@@ -170,7 +170,8 @@ def _is_in_state(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
     """`dancer.is(watching)`: the state is a bare word, looked up in the member's frame."""
     member = _member(resolver, node.subject, node, scope)
     argument = node.args[0]
-    frame = resolver.frames.get(member)
+    own = scope.frame is not None and node.subject is None
+    frame = scope.frame if own else resolver.frames.get(member)
     if frame is None:
         raise resolver.fail("S310", f"`{member}` follows no frame, so it has no states", node, scope)
     states = list(frame.model.states or ())

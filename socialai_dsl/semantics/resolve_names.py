@@ -21,7 +21,6 @@ from socialai_dsl.semantics.terms import (
     SIDE,
     TURN,
     Const,
-    FieldOf,
     Here,
     Term,
     Type,
@@ -85,10 +84,11 @@ def _own(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope
         return _substituted(resolver, node, expected, scope)
     if word in frame.defines:
         return expanded(resolver, frame.defines[word], {}, node, expected, scope)
-    register = f"{frame.member}.{word}"
-    if word in frame.model.let or word in frame.model.slots:
-        return resolver.registers.read(register, expected, resolver.findings.node(scope.path, node))
-    return None
+    if word not in frame.model.let and word not in frame.model.slots:
+        return None
+    if frame.register(word) not in resolver.registers:
+        raise FailedError  # a slot that nobody fills, which is reported where it is left empty
+    return resolver.registers.read(frame.register(word), expected, resolver.findings.node(scope.path, node))
 
 
 def _substituted(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope) -> Term:
@@ -99,7 +99,7 @@ def _substituted(resolver: Resolver, node: ast.Name, expected: Type | None, scop
         message = f"`{node.id}` is a text: it can be said or heard, not computed with"
         raise resolver.fail("S204", message, node, scope)
     if frame.texts[node.id] is None:
-        return FieldOf(BOOL, entity(frame.number), "poked")  # any condition will do: nobody plays this frame
+        raise FailedError  # nobody fills it, which is reported where it is left empty
     return slot_truth(resolver, frame.member, node.id, with_scope(resolver, frame.member, node.id, scope))
 
 
@@ -230,8 +230,8 @@ def _register_of(resolver: Resolver, node: ast.Name, scope: Scope) -> str | None
     if node.id in scope.variables:
         return None
     frame = scope.frame
-    if frame is not None and f"{frame.member}.{node.id}" in resolver.registers:
-        return f"{frame.member}.{node.id}"
+    if frame is not None and frame.register(node.id) in resolver.registers:
+        return frame.register(node.id)
     return f"let.{node.id}" if node.id in resolver.symbols.scenario.let else None
 
 

@@ -110,6 +110,7 @@ class PlayedFrame:
         defines: its definitions.
         texts: slots that are substituted wherever they are used (text, utterance, bool) -> where they are filled;
             None if nobody fills them, as when a frame is only looked at.
+        looked_at: nobody plays it; it is checked all the same.
     """
 
     member: str
@@ -118,6 +119,11 @@ class PlayedFrame:
     model: Frame
     defines: Mapping[str, Define]
     texts: Mapping[str, DataPath | None]
+    looked_at: bool = False
+
+    def register(self, name: str) -> str:
+        """The path of one of its registers."""
+        return f"{self.name} of nobody.{name}" if self.looked_at else f"{self.member}.{name}"
 
     @property
     def path(self) -> DataPath:

@@ -185,3 +185,14 @@ def test_growth_without_end_is_a_mistake(mistakes):
 
 def test_a_constant_is_no_pick(meaning):
     assert isinstance(register(meaning, "pick(1..3)", 2)[1].term, Const)
+
+
+def test_registers_of_an_unplayed_frame_are_looked_at_but_never_drawn(meaning, mistakes):
+    def frames(change):
+        rule = {"when": "goal.locked", "set": {"n": change}}
+        return {"idle": {"slots": {"goal": "object"}, "let": {"n": 0}, "states": {"a": {"then": [rule]}}}}
+
+    assert not any(
+        str(getattr(s, "path", "")).split(".")[-1] == "n" for s in meaning(frames=frames("n + 1")).setup
+    )
+    assert [line[:4] for line in mistakes(frames=frames("m + 1"))] == ["S201"]
