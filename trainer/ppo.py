@@ -206,10 +206,26 @@ def _step(
     if not bool(torch.isfinite(statistics[0])):
         raise TrainingStopped("the loss is not a finite number")
     for parameter, *gradients in zip(parameters, *(share[1] for share in results), strict=True):
-        present = [gradient for gradient in gradients if gradient is not None]
-        parameter.grad = sum(present[1:], start=present[0]) if present else None
+        _add_up(parameter, gradients)
     norm = nn.utils.clip_grad_norm_(parameters, config.max_grad_norm)
     if not bool(torch.isfinite(norm)):
         raise TrainingStopped("a gradient is not a finite number")
     optimizer.step()
     return torch.cat((statistics, norm[None]))
+
+
+def _add_up(parameter: Tensor, gradients: Sequence[Tensor | None]) -> None:
+    """Store the sum of the shares' gradients, in memory of its own that is laid out like the parameter.
+
+    Autograd may return one tensor for two parameters, which clipping would then scale twice, and in another
+    layout, which fused Adam does not expect.
+    """
+    present = [gradient for gradient in gradients if gradient is not None]
+    if not present:
+        parameter.grad = None
+        return
+    if parameter.grad is None:
+        parameter.grad = torch.empty_like(parameter)
+    parameter.grad.copy_(present[0])
+    for gradient in present[1:]:
+        parameter.grad.add_(gradient)

@@ -1,5 +1,6 @@
 """Advantages and losses have the values worked out by hand."""
 
+import copy
 from dataclasses import replace
 from math import exp, log
 from typing import Any
@@ -197,6 +198,39 @@ def test_an_update_makes_the_better_action_likelier(small_config: Any) -> None:
     logits, _ = minibatch.evaluate(session.actor.net)
     chosen = torch.log_softmax(logits[:, :4], 1)[:, 2].view(rollout.values.shape)[favoured]
     assert chosen.mean().item() > before
+
+
+@pytest.mark.parametrize("net", ["fast", "paper"])
+def test_a_step_is_adam_s_on_the_clipped_gradient(net: str, small_config: Any) -> None:
+    """The same step by PyTorch's plain means: backward, clip, unfused Adam."""
+    config = small_config(net=net, minibatches=1, epochs=1, max_grad_norm=0.01)
+    session, rollout = played(config)
+    model = session.actor.net
+    twin = copy.deepcopy(model)
+    optimizer = torch.optim.Adam(twin.parameters(), lr=config.lr, eps=config.adam_eps, foreach=False)
+    statistics = update(session.actor, session.optimizer, rollout, config, session.generator, Crew(1))
+
+    gains = compute_gae(
+        torch.from_numpy(rollout.rewards).float(), rollout.values, rollout.next_value,
+        torch.from_numpy(rollout.terminated), torch.from_numpy(rollout.truncated), torch.zeros(8, 8), 0.99, 0.95,
+    )  # fmt: skip
+    scaled = (gains - gains.mean()) / (gains.std(correction=0) + 1e-8)
+    everything = make_minibatch(session.actor, rollout, scaled, gains + rollout.values, torch.arange(8), 8)
+    logits, values = everything.evaluate(twin)
+    loss = ppo_loss(everything.batch, logits, values, model.spec.action_sizes, config)
+    loss.total.backward()  # type: ignore[no-untyped-call]
+    norm = torch.nn.utils.clip_grad_norm_(twin.parameters(), config.max_grad_norm)
+    optimizer.step()
+    assert statistics["grad_norm"] == pytest.approx(norm.item(), rel=1e-4)
+    for (name, got), expected in zip(model.named_parameters(), twin.parameters(), strict=True):
+        assert got.grad is not None
+        assert expected.grad is not None
+        assert got.grad.stride() == got.stride(), (
+            f"{name}: fused Adam needs gradients laid out like the weights"
+        )
+        scale = expected.grad.norm() + 1e-6
+        assert (got.grad - expected.grad).norm() < 1e-3 * scale, f"{name}: gradient"
+        assert (got - expected).abs().max() < 2e-5, f"{name}: step"
 
 
 def test_statistics_are_finite_and_complete(small_config: Any) -> None:
