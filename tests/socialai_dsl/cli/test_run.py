@@ -1,0 +1,138 @@
+"""`socialai-run` and `socialai evaluate` from end to end, on a scenario that trains in seconds."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PIL import Image
+
+from socialai_dsl.cli.main import main, run_main
+
+Capture = pytest.CaptureFixture[str]
+
+QUICK = ["--frames", "1500", "--envs", "32", "--eval-episodes", "30", "--device", "cpu"]
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> Path:
+    """A folder with the scenario of `socialai new`."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "corridor"]) == 0
+    capsys.readouterr()
+    return tmp_path
+
+
+def result_of(run: str) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(Path(run, "result.json").read_text(encoding="utf-8"))
+    return content
+
+
+def test_a_run_leaves_everything_it_promises(capsys: Capture) -> None:
+    assert run_main(["corridor.yaml", *QUICK, "--seed", "3"]) == 0
+    (run,) = Path("runs/corridor").iterdir()
+    assert run.name.endswith("-s3")
+    left = {path.name.split(".out.tfevents")[0] for path in run.iterdir()}
+    assert left == {
+        "config.json",
+        "metrics.jsonl",
+        "checkpoints",
+        "events",
+        "learning_curve.png",
+        "episode.gif",
+        "transcript.txt",
+        "result.json",
+    }
+    result = result_of(str(run))
+    assert set(result) == {
+        "scenario",
+        "agent",
+        "seed",
+        "frames",
+        "train_seconds",
+        "frames_per_second",
+        "eval",
+        "program_sha256",
+        "versions",
+    }
+    assert result["frames"] >= 1500
+    assert result["eval"]["episodes"] == 30
+    with Image.open(run / "episode.gif") as film:
+        steps = int(Path(run, "transcript.txt").read_text().split(" after ")[1].split(" steps")[0])
+        assert film.n_frames <= steps + 1  # type: ignore[attr-defined]
+    assert "of 30 test episodes" in capsys.readouterr().out
+
+
+def test_json_prints_the_result_and_nothing_else(capsys: Capture) -> None:
+    assert run_main(["corridor.yaml", *QUICK, "--out", "here", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == result_of("here")
+
+
+def test_a_run_is_resumed_and_says_no_to_another_scenario(capsys: Capture) -> None:
+    assert run_main(["corridor.yaml", *QUICK, "--out", "here"]) == 0
+    assert run_main(["--resume", "here", "--frames", "4000"]) == 0
+    assert result_of("here")["frames"] >= 4000
+    assert run_main(["corridor.yaml", "--resume", "here"]) == 2
+    assert run_main(["corridor.yaml", "--out", "here"]) == 2
+    assert "holds a run already" in capsys.readouterr().err
+
+
+def test_a_resumed_run_equals_one_that_never_stopped() -> None:
+    assert run_main(["corridor.yaml", *QUICK, "--out", "stopped"]) == 0
+    assert run_main(["--resume", "stopped", "--frames", "4000"]) == 0
+    assert run_main(["corridor.yaml", *QUICK, "--frames", "4000", "--out", "straight"]) == 0
+    assert result_of("stopped")["eval"] == result_of("straight")["eval"]
+
+
+def test_random_play_is_the_same_every_time() -> None:
+    for name in ("one", "two"):
+        assert run_main(["corridor.yaml", "--agent", "random", "--eval-episodes", "60", "--out", name]) == 0
+    assert result_of("one") == result_of("two")
+    assert result_of("one")["frames"] == 0
+    assert not Path("one", "learning_curve.png").exists()
+
+
+def test_an_oracle_needs_a_script(capsys: Capture) -> None:
+    assert run_main(["corridor.yaml", "--agent", "oracle"]) == 2
+    assert "corridor" in capsys.readouterr().err
+
+
+def test_a_trained_agent_is_evaluated_elsewhere(capsys: Capture) -> None:
+    assert run_main(["corridor.yaml", *QUICK, "--out", "here"]) == 0
+    own = result_of("here")["eval"]
+    capsys.readouterr()
+    command = ["evaluate", "here", "--on", "corridor.yaml", "--on", "corridor.yaml+unsocial"]
+    assert main([*command, "--episodes", "30", "--device", "cpu", "--json"]) == 0
+    same, hidden = json.loads(capsys.readouterr().out)
+    assert same["eval"] == own
+    assert hidden["scenario"] == "corridor.yaml+unsocial"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "expected a scenario"),
+        (["corridor.yaml", "--agent", "nobody"], "--agent: expected ppo, random, oracle, human or"),
+        (["corridor.yaml", "--agent", "random", "--frames", "10"], "is not trained"),
+        (["corridor.yaml", "--net", "huge"], "net: got 'huge'"),
+        (["--resume", "nowhere"], "is not a run's folder"),
+        (["nowhere.yaml"], "there is no such file"),
+        (["corridor.yaml", "--agent", "corridor.yaml"], "corridor.yaml"),
+    ],
+)
+def test_wrong_usage(arguments: list[str], message: str, capsys: Capture) -> None:
+    assert run_main(arguments) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_scenario_with_mistakes_is_not_run(capsys: Capture) -> None:
+    Path("broken.yaml").write_text(Path("corridor.yaml").read_text().replace("horizon:", "horizn:"))
+    assert run_main(["broken.yaml"]) == 1
+    assert "broken.yaml:3:1: S101" in capsys.readouterr().err
+    assert not Path("runs").exists()
+
+
+def test_unwritable_output(capsys: Capture) -> None:
+    Path("file").write_text("")
+    assert run_main(["corridor.yaml", *QUICK, "--out", "file/run"]) == 2
+    assert "file/run" in capsys.readouterr().err
