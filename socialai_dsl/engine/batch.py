@@ -1,0 +1,179 @@
+"""A batch of environments in memory: programs one behind the other, state, ports, and the threads that serve them."""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.engine.kernel import BAD_ACTION, Task, serve
+from socialai_dsl.engine.picture import view_table
+from socialai_dsl.engine.pointers import make_book
+from socialai_dsl.engine.state import Key, Link, Ports, State, Tables, empty_ports, empty_state, no_pins
+from socialai_dsl.program import VIEW, Header
+
+_ROWS_WORTH_A_THREAD: Final = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A program and how it is linked into a batch.
+
+    Attributes:
+        words: the program, int32.
+        rules: number of counted rules.
+        outcomes: number of ways to end, deadly and time-out included.
+        actions: Body of each body action of the batch.
+        templates, nouns: the program's own index of each of the batch's, -1 if it has no such.
+        tokens: the batch's id of each token id of the program.
+    """
+
+    words: NDArray[np.int32]
+    rules: int
+    outcomes: int
+    actions: Sequence[int]
+    templates: Sequence[int]
+    nouns: Sequence[int]
+    tokens: Sequence[int]
+
+
+class Batch:
+    """Environments that are stepped together.
+
+    Attributes:
+        state, ports: arrays, one row for each environment.
+        tables: programs, views and pools.
+        first_counters: the first counter of each program.
+    """
+
+    def __init__(
+        self,
+        parts: Sequence[Part],
+        pools: Sequence[Sequence[int]],
+        pool_of_row: Sequence[int],
+        length: int,
+        threads: int,
+    ) -> None:
+        """Allocate everything; every row must be reset before its first step.
+
+        Args:
+            parts: the programs.
+            pools: sets of programs, by number; an episode draws one of its pool.
+            pool_of_row: for each environment the number of its pool.
+            length: tokens in a history.
+            threads: how many threads share the work.
+        """
+        rows = len(pool_of_row)
+        headers = [part.words for part in parts]
+        registers = max(int(words[Header.REGISTERS]) for words in headers)
+        board = max(
+            int(words[Header.CANVAS_WIDTH] * words[Header.CANVAS_HEIGHT] + 1 + words[Header.CANVAS_HEIGHT])
+            for words in headers
+        )
+        words, views, offsets, self.first_counters = _link(parts)
+        starts = np.cumsum([0, *map(len, pools)])
+        self.tables = Tables(words, views, np.array([offsets[i] for pool in pools for i in pool], np.int64))
+        self.state: State = empty_state(rows, registers, board, length, VIEW)
+        counters = int(sum(int(header[Header.COUNTERS]) for header in headers))
+        self.ports: Ports = empty_ports(self.state, counters, threads)
+        for row, pool in enumerate(pool_of_row):
+            self.state.keys[row, Key.POOL] = int(starts[pool]) | len(pools[pool]) << 32
+            self.state.keys[row, Key.PROGRAM] = offsets[pools[pool][0]]
+        self._rows = rows
+        self._book = self._make_book()
+        self._cuts = _cut(rows, threads)
+        self._executor = ThreadPoolExecutor(len(self._cuts) - 1) if len(self._cuts) > 1 else None
+
+    def step(self, task: Task) -> int:
+        """Step all rows with `ports.actions`; how many episodes ended, or BAD_ACTION and nothing happened."""
+        if self._executor is None:
+            return serve(self._book, int(task), 0, 0, self._rows)
+        if not self.actions_fit():
+            return BAD_ACTION
+        return self._share(task)
+
+    def actions_fit(self) -> bool:
+        """Whether all actions are inside the action space."""
+        return serve(self._book, int(Task.CHECK), 0, 0, self._rows) != BAD_ACTION
+
+    def reset(self, pins: NDArray[np.int16] | None = None) -> None:
+        """Start the episodes that the keys of the rows `ports.chosen` name, from their layouts (`ports.layout`)."""
+        registers = self.state.registers.shape[1]
+        self.ports = self.ports._replace(pins=no_pins(registers) if pins is None else pins)
+        self._book = self._make_book()
+        self._share(Task.RESET)
+
+    def script(self) -> None:
+        """Let `ports.actions` be what the agents' frames would do now."""
+        self._share(Task.SCRIPT)
+
+    def close(self) -> None:
+        """Let the threads go."""
+        if self._executor is not None:
+            self._executor.shutdown()
+            self._executor = None
+
+    def _make_book(self) -> Any:
+        return make_book((*self.tables, *self.state, *self.ports))
+
+    def _share(self, task: Task) -> int:
+        if self._executor is None:
+            return serve(self._book, int(task), 0, 0, self._rows)
+        others = [
+            self._executor.submit(serve, self._book, int(task), thread, first, last)
+            for thread, (first, last) in enumerate(self._cuts[1:], 1)
+        ]
+        ended = serve(self._book, int(task), 0, *self._cuts[0])
+        return ended + sum(other.result() for other in others)
+
+
+def _cut(rows: int, threads: int) -> list[tuple[int, int]]:
+    """Nearly equal ranges of rows, one for each thread that is worth its while."""
+    threads = max(1, min(threads, rows // _ROWS_WORTH_A_THREAD))
+    edges = [rows * thread // threads for thread in range(threads + 1)]
+    return list(pairwise(edges))
+
+
+def _link(
+    parts: Sequence[Part],
+) -> tuple[NDArray[np.int32], NDArray[np.uint16], list[int], list[int]]:
+    """Lay programs and their links one behind the other: words, views, offset and first counter of each program."""
+    words: list[NDArray[np.int32]] = []
+    views: dict[tuple[int, int], int] = {}
+    offsets, first_counters = [], []
+    offset, counter, poses = 0, 0, 0
+    for number, part in enumerate(parts):
+        canvas = int(part.words[Header.CANVAS_WIDTH]), int(part.words[Header.CANVAS_HEIGHT])
+        if canvas not in views:
+            views[canvas] = poses
+            poses += canvas[0] * canvas[1] * 4
+        link = np.zeros(Link.END, np.int32)
+        link[Link.NUMBER] = number
+        link[Link.COUNTERS] = counter
+        link[Link.RULES] = part.rules
+        link[Link.OUTCOMES] = part.outcomes
+        link[Link.VIEWS] = views[canvas]
+        link[Link.ACTIONS], link[Link.TEMPLATES] = len(part.actions), len(part.templates)
+        link[Link.NOUNS] = len(part.nouns)
+        tables = np.array([*part.actions, *part.templates, *part.nouns], np.int32)
+        words += [_with_tokens(part), link, tables]
+        offsets.append(offset)
+        first_counters.append(counter)
+        offset += len(part.words) + len(link) + len(tables)
+        counter += int(part.words[Header.COUNTERS])
+    return np.concatenate(words), np.concatenate([view_table(*c) for c in views]), offsets, first_counters
+
+
+def _with_tokens(part: Part) -> NDArray[np.int32]:
+    """The program's words with the batch's token ids."""
+    words = part.words.copy()
+    lines = int(words[Header.LINES])
+    if lines:
+        table = words[words[Header.LINE_AT] :][: 3 * lines].reshape(lines, 3)
+        start = int(words[Header.TOKEN_AT])
+        end = start + int((table[:, 0] + table[:, 1]).max())
+        words[start:end] = np.asarray(part.tokens, np.int32)[words[start:end]]
+    return words

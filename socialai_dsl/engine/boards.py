@@ -1,0 +1,156 @@
+"""The room as drawn: what each cell looks like, and which cells nobody can enter."""
+
+import numpy as np
+
+from socialai_dsl.engine.entities import column, field, is_at, is_present
+from socialai_dsl.engine.jit import inline, outline, stay_outline
+from socialai_dsl.engine.state import Row
+from socialai_dsl.program import EntityColumn, Field, Flag, Header, Register, TypeColumn
+
+
+@inline
+def solid_line(row: Row, y: int) -> int:
+    """Where the solid cells of a line of the room are in the board."""
+    return row.program[Header.CANVAS_WIDTH] * row.program[Header.CANVAS_HEIGHT] + 1 + y
+
+
+@inline
+def _set_solid(row: Row, x: int, y: int, solid: bool) -> None:
+    """Let nobody, or anybody, enter this cell."""
+    bit = np.int64(1) << x
+    line = solid_line(row, y)
+    if solid:
+        row.board[line] = row.board[line] | bit
+    else:
+        row.board[line] = row.board[line] & ~bit
+
+
+@inline
+def is_solid(row: Row, x: int, y: int) -> bool:
+    """Whether nobody can enter this cell because of walls or objects; off the canvas nobody can."""
+    width = row.program[Header.CANVAS_WIDTH]
+    height = row.program[Header.CANVAS_HEIGHT]
+    if x < 0 or x >= width or y < 0 or y >= height:
+        return True
+    return (row.board[solid_line(row, y)] >> x) & 1 == 1
+
+
+@inline
+def is_deadly(row: Row, x: int, y: int) -> bool:
+    """Whether the thing in this cell (which must be on the canvas) is deadly."""
+    mask = row.program[Header.DEADLY]
+    if mask == 0:
+        return False
+    code = row.board[y * row.program[Header.CANVAS_WIDTH] + x] & 0xFF
+    return code < 32 and (mask >> code) & 1 == 1
+
+
+@inline
+def room_table(row: Row) -> int:
+    """Offset of the template of this room."""
+    width = row.program[Header.CANVAS_WIDTH]
+    height = row.program[Header.CANVAS_HEIGHT]
+    return row.program[Header.ROOM_AT] + row.registers[Register.ROOM] * (width * height + 1 + 2 * height)
+
+
+@inline
+def npcs_are_hidden(row: Row) -> bool:
+    """Whether the agent perceives no NPC."""
+    return row.program[Header.FLAGS] & Flag.NPCS_HIDDEN != 0
+
+
+@inline
+def type_row(row: Row, entity: int) -> int:
+    """Offset of the entity's row in the type table, by its status."""
+    line = column(row, entity, EntityColumn.TYPE) + field(row, entity, Field.STATUS)
+    return row.program[Header.TYPE_AT] + TypeColumn.COLUMNS * line
+
+
+@inline
+def object_look(row: Row, entity: int) -> int:
+    """Packed cell that shows an object."""
+    table = type_row(row, entity)
+    return (
+        row.program[table + TypeColumn.CODE]
+        | field(row, entity, Field.COLOR) << 8
+        | row.program[table + TypeColumn.STATUS] << 16
+        | row.program[table + TypeColumn.ORIENTATION] << 24
+    )
+
+
+@inline
+def npc_look(row: Row, entity: int) -> int:
+    """Packed cell that shows an NPC. Its status register is added to its kind, which serves kinds drawn at reset."""
+    table = row.program[Header.TYPE_AT] + TypeColumn.COLUMNS * column(row, entity, EntityColumn.TYPE)
+    return (
+        row.program[table + TypeColumn.CODE]
+        | field(row, entity, Field.COLOR) << 8
+        | (column(row, entity, EntityColumn.KIND) + field(row, entity, Field.STATUS)) << 16
+        | field(row, entity, Field.DIR) << 24
+    )
+
+
+@inline
+def draw_object(row: Row, entity: int, cell: int, x: int, y: int) -> None:
+    """Let the cell show this object and be solid as it is."""
+    row.board[cell] = object_look(row, entity)
+    _set_solid(row, x, y, row.program[type_row(row, entity) + TypeColumn.WALKABLE] == 0)
+
+
+@outline
+def draw_cell(row: Row, x: int, y: int) -> None:
+    """Draw one cell anew: the room, over it the lowest object there, over it the lowest NPC if NPCs are shown."""
+    stay_outline()
+    width = row.program[Header.CANVAS_WIDTH]
+    height = row.program[Header.CANVAS_HEIGHT]
+    if x < 0 or x >= width or y < 0 or y >= height:
+        return
+    cell = y * width + x
+    table = room_table(row)
+    row.board[cell] = row.program[table + cell]
+    _set_solid(row, x, y, (row.program[table + width * height + 1 + y] >> x) & 1 == 1)
+    npcs = row.program[Header.NPCS]
+    for entity in range(npcs + 1, row.program[Header.ENTITIES]):
+        if is_at(row, entity, x, y):
+            draw_object(row, entity, cell, x, y)
+            break
+    if npcs_are_hidden(row):
+        return
+    for entity in range(1, npcs + 1):
+        if is_at(row, entity, x, y):
+            row.board[cell] = npc_look(row, entity)
+            break
+
+
+@inline
+def draw_entity(row: Row, entity: int) -> None:
+    """Draw the cell of an entity anew, if it has one."""
+    if field(row, entity, Field.X) >= 0:
+        draw_cell(row, field(row, entity, Field.X), field(row, entity, Field.Y))
+
+
+@inline
+def draw_all(row: Row) -> None:
+    """Draw every entity into the bare room; gives what `draw_cell` gives for each cell."""
+    width = row.program[Header.CANVAS_WIDTH]
+    npcs = row.program[Header.NPCS]
+    for entity in range(row.program[Header.ENTITIES] - 1, npcs, -1):
+        if is_present(row, entity):
+            x = field(row, entity, Field.X)
+            y = field(row, entity, Field.Y)
+            draw_object(row, entity, y * width + x, x, y)
+    if npcs_are_hidden(row):
+        return
+    for entity in range(npcs, 0, -1):
+        if is_present(row, entity):
+            cell = field(row, entity, Field.Y) * width + field(row, entity, Field.X)
+            row.board[cell] = npc_look(row, entity)
+
+
+@inline
+def copy_room(row: Row) -> None:
+    """Copy the bare room of this size: its cells and its solid rows."""
+    size = row.program[Header.CANVAS_WIDTH] * row.program[Header.CANVAS_HEIGHT] + 1
+    table = room_table(row)
+    for i in range(size + row.program[Header.CANVAS_HEIGHT]):
+        row.board[i] = row.program[table + i]

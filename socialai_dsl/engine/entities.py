@@ -1,0 +1,162 @@
+"""Where entities are and how they stand to each other: the facts that tests and activities are made of."""
+
+from socialai_dsl.engine.jit import inline
+from socialai_dsl.engine.state import Row
+from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, EntityColumn, Field, Header, Register
+
+
+@inline
+def field(row: Row, entity: int, name: int) -> int:
+    """One register of an entity."""
+    return row.registers[FIRST_ENTITY + ENTITY_FIELDS * entity + name]
+
+
+@inline
+def set_field(row: Row, entity: int, name: int, value: int) -> None:
+    """Write one register of an entity."""
+    row.registers[FIRST_ENTITY + ENTITY_FIELDS * entity + name] = value
+
+
+@inline
+def column(row: Row, entity: int, name: int) -> int:
+    """One word of the entity table."""
+    return row.program[row.program[Header.ENTITY_AT] + EntityColumn.COLUMNS * entity + name]
+
+
+@inline
+def is_present(row: Row, entity: int) -> bool:
+    """Whether the entity is in the room."""
+    return field(row, entity, Field.GONE) == 0 and field(row, entity, Field.X) >= 0
+
+
+@inline
+def is_npc(row: Row, entity: int) -> bool:
+    """Whether the entity is an NPC."""
+    return 1 <= entity <= row.program[Header.NPCS]
+
+
+@inline
+def is_at(row: Row, entity: int, x: int, y: int) -> bool:
+    """Whether the entity is in the room and in this cell."""
+    return (
+        field(row, entity, Field.X) == x
+        and field(row, entity, Field.Y) == y
+        and field(row, entity, Field.GONE) == 0
+    )
+
+
+@inline
+def npc_at(row: Row, x: int, y: int) -> int:
+    """The lowest NPC in this cell, 0 if there is none."""
+    for npc in range(1, row.program[Header.NPCS] + 1):
+        if is_at(row, npc, x, y):
+            return npc
+    return 0
+
+
+@inline
+def object_at(row: Row, x: int, y: int) -> int:
+    """The lowest object in this cell, 0 if there is none."""
+    for entity in range(row.program[Header.NPCS] + 1, row.program[Header.ENTITIES]):
+        if is_at(row, entity, x, y):
+            return entity
+    return 0
+
+
+@inline
+def step_x(direction: int) -> int:
+    """How x changes one cell ahead in this direction."""
+    return (1 - direction) * (1 - (direction & 1))
+
+
+@inline
+def step_y(direction: int) -> int:
+    """How y changes one cell ahead in this direction."""
+    return (2 - direction) * (direction & 1)
+
+
+@inline
+def distance(row: Row, a: int, b: int) -> int:
+    """Manhattan distance of two entities."""
+    return abs(field(row, a, Field.X) - field(row, b, Field.X)) + abs(
+        field(row, a, Field.Y) - field(row, b, Field.Y)
+    )
+
+
+@inline
+def quadrant(row: Row, a: int, b: int) -> int:
+    """Direction in which b lies from a; on the diagonals SE is right, NE up, NW left, SW down."""
+    dx = field(row, b, Field.X) - field(row, a, Field.X)
+    dy = field(row, b, Field.Y) - field(row, a, Field.Y)
+    if abs(dx) > abs(dy):
+        return 0 if dx > 0 else 2
+    if abs(dy) > abs(dx):
+        return 1 if dy > 0 else 3
+    if dx > 0:
+        return 0 if dy > 0 else 3
+    if dx < 0:
+        return 1 if dy > 0 else 2
+    return 1
+
+
+@inline
+def front_direction(row: Row, entity: int) -> int:
+    """Direction of the cell in front of an entity: into the room if it lies in a wall, else where it faces."""
+    if column(row, entity, EntityColumn.IN_WALL) == 1:
+        x = field(row, entity, Field.X)
+        y = field(row, entity, Field.Y)
+        if y == 0:
+            return 1
+        if y == row.registers[Register.HEIGHT] - 1:
+            return 3
+        if x == 0:
+            return 0
+        if x == row.registers[Register.WIDTH] - 1:
+            return 2
+    return field(row, entity, Field.DIR) & 3
+
+
+@inline
+def front_x(row: Row, entity: int) -> int:
+    """X of the cell in front of an entity."""
+    return field(row, entity, Field.X) + step_x(front_direction(row, entity))
+
+
+@inline
+def front_y(row: Row, entity: int) -> int:
+    """Y of the cell in front of an entity."""
+    return field(row, entity, Field.Y) + step_y(front_direction(row, entity))
+
+
+@inline
+def are_present(row: Row, a: int, b: int) -> bool:
+    """Whether both are in the room."""
+    return is_present(row, a) and is_present(row, b)
+
+
+@inline
+def share_line(row: Row, a: int, b: int) -> bool:
+    """Whether they are in one row or column (or cell)."""
+    return field(row, a, Field.X) == field(row, b, Field.X) or field(row, a, Field.Y) == field(
+        row, b, Field.Y
+    )
+
+
+@inline
+def faces(row: Row, a: int, b: int) -> bool:
+    """Whether b is in the cell ahead of a."""
+    direction = field(row, a, Field.DIR)
+    return is_at(
+        row, b, field(row, a, Field.X) + step_x(direction), field(row, a, Field.Y) + step_y(direction)
+    )
+
+
+@inline
+def make_eye_contact(row: Row, a: int, b: int) -> bool:
+    """Whether they look at each other along a row or column; distance and things between do not matter."""
+    return (
+        share_line(row, a, b)
+        and distance(row, a, b) > 0
+        and field(row, a, Field.DIR) == quadrant(row, a, b)
+        and field(row, b, Field.DIR) == quadrant(row, b, a)
+    )

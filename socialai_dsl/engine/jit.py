@@ -1,0 +1,57 @@
+"""How the engine's functions are compiled: integers as they are, nothing reordered, no interpreter lock.
+
+`inline` is for helpers, which are merged into their callers. `outline` is for what runs rarely or is large: it begins
+with `stay_outline()`, without which LLVM merges a function of thousands of lines into each of its callers. `part` is
+for the parts of a step, which call large functions: they are never compiled alone, as each would be with all it calls.
+Entry points called from Python are made by `cache.entry`. None of them allocates memory.
+"""
+
+from collections.abc import Callable
+from typing import Any, Final, TypeVar, cast
+
+from numba import config, njit, types
+from numba.core.typing.templates import signature
+from numba.extending import intrinsic
+
+_Function = TypeVar("_Function", bound=Callable[..., object])
+
+
+_OPTIONS: Final[dict[str, bool | str]] = {
+    "nogil": True,
+    "error_model": "numpy",
+    "_nrt": False,
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
+
+
+def inline(function: _Function) -> _Function:
+    """Compile a helper into each of its callers."""
+    return cast(_Function, njit(**_OPTIONS, forceinline=True)(function))
+
+
+def part(function: _Function) -> _Function:
+    """Compile a function as if it were written out in its callers."""
+    return cast(_Function, njit(inline="always")(function))
+
+
+def outline(function: _Function) -> _Function:
+    """Compile a function that is called."""
+    return cast(_Function, njit(**_OPTIONS, forceinline=False)(function))
+
+
+@intrinsic
+def _stay_outline(context: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        builder.function.attributes.add("noinline")
+        return context.get_dummy_value()
+
+    return signature(types.none), generate
+
+
+def _do_nothing() -> None:
+    """Plain Python has nothing to keep apart."""
+
+
+stay_outline = _do_nothing if config.DISABLE_JIT else _stay_outline
+"""Called first in a function, keeps it from being merged into its callers."""

@@ -1,0 +1,40 @@
+"""Operands of instructions: constants, temporaries and registers in one word, and the draws of a site."""
+
+import numpy as np
+
+from socialai_dsl.engine import rng
+from socialai_dsl.engine.jit import inline
+from socialai_dsl.engine.state import Key, Row
+from socialai_dsl.program import CONSTANT, TEMPORARY, Header, Register
+
+
+@inline
+def value(row: Row, operand: int) -> int:
+    """What an operand stands for."""
+    if operand >= CONSTANT // 2:
+        return operand - CONSTANT
+    if operand >= TEMPORARY:
+        return row.scratch[operand - TEMPORARY]
+    return row.registers[operand]
+
+
+@inline
+def assign(row: Row, operand: int, number: int) -> None:
+    """Write a register or temporary."""
+    if operand >= TEMPORARY:
+        row.scratch[operand - TEMPORARY] = number
+    else:
+        row.registers[operand] = number
+
+
+@inline
+def draw_at(row: Row, site: int) -> np.uint64:
+    """The random bits of a site in this step."""
+    place = row.program[Header.SITE_AT] + 2 * site
+    return rng.draw(row.key[Key.KEY], row.program[place], row.registers[Register.T], row.program[place + 1])
+
+
+@inline
+def draw_below(row: Row, site: int, n: int) -> int:
+    """A uniform number below n."""
+    return rng.below(draw_at(row, site), n)

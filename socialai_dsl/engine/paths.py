@@ -1,0 +1,124 @@
+"""Shortest paths by flooding boards from the goal, one layer at a time; bounded by the size of the room."""
+
+import numpy as np
+
+from socialai_dsl.engine.boards import is_deadly, npcs_are_hidden, solid_line
+from socialai_dsl.engine.entities import are_present, distance, field, is_present
+from socialai_dsl.engine.jit import inline, outline, stay_outline
+from socialai_dsl.engine.sets import add_cell, clear, drop_cell, fill_next_to, get_line, has_cell, set_line
+from socialai_dsl.engine.state import AGENT, FREE, FRONT, SEEN, STILL, Row
+from socialai_dsl.program import Body, Field, Header
+
+NO_PATH = -1
+
+
+@outline
+def find_free(row: Row, mover: int) -> None:
+    """Fill the board FREE with the cells that `mover` could stand on."""
+    stay_outline()
+    width = row.program[Header.CANVAS_WIDTH]
+    height = row.program[Header.CANVAS_HEIGHT]
+    full = (np.int64(1) << width) - 1
+    for y in range(height):
+        set_line(row, FREE, y, ~row.board[solid_line(row, y)] & full)
+    if mover > 0 or not npcs_are_hidden(row):
+        for npc in range(1, row.program[Header.NPCS] + 1):
+            if npc != mover and is_present(row, npc):
+                drop_cell(row, FREE, field(row, npc, Field.X), field(row, npc, Field.Y))
+    if mover == 0:
+        return
+    if is_present(row, AGENT):
+        drop_cell(row, FREE, field(row, AGENT, Field.X), field(row, AGENT, Field.Y))
+    if row.program[Header.DEADLY] != 0:
+        for y in range(height):
+            for x in range(width):
+                if is_deadly(row, x, y):
+                    drop_cell(row, FREE, x, y)
+
+
+@outline
+def first_direction(row: Row, mover: int) -> int:
+    """Direction of the next cell of a shortest path from `mover` to the set FRONT through FREE, or NO_PATH.
+
+    Among equally good cells the order is down, up, right, left. Destroys FRONT.
+    """
+    stay_outline()
+    x = field(row, mover, Field.X)
+    y = field(row, mover, Field.Y)
+    clear(row, SEEN)
+    while True:
+        if has_cell(row, FRONT, x, y + 1):
+            return 1
+        if has_cell(row, FRONT, x, y - 1):
+            return 3
+        if has_cell(row, FRONT, x + 1, y):
+            return 0
+        if has_cell(row, FRONT, x - 1, y):
+            return 2
+        if not _grow(row):
+            return NO_PATH
+
+
+@inline
+def _grow(row: Row) -> bool:
+    """Let FRONT be the free neighbours of its cells that were not in it before; whether there are any."""
+    height = row.program[Header.CANVAS_HEIGHT]
+    above = 0
+    any_grown = 0
+    for y in range(height):
+        here = get_line(row, FRONT, y)
+        under = get_line(row, FRONT, y + 1) if y + 1 < height else 0
+        known = get_line(row, SEEN, y) | here
+        grown = (here | here << 1 | here >> 1 | above | under) & get_line(row, FREE, y) & ~known
+        set_line(row, SEEN, y, known)
+        set_line(row, FRONT, y, grown)
+        above = here
+        any_grown |= grown
+    return any_grown != 0
+
+
+@outline
+def direction_to(row: Row, mover: int, target: int) -> int:
+    """Direction of the next cell on the way to the cell of `target`; NO_PATH if there is none or nowhere to go."""
+    stay_outline()
+    if not are_present(row, mover, target) or distance(row, mover, target) == 0:
+        return NO_PATH
+    find_free(row, mover)
+    clear(row, FRONT)
+    add_cell(row, FRONT, field(row, target, Field.X), field(row, target, Field.Y))
+    return first_direction(row, mover)
+
+
+@outline
+def direction_next_to(row: Row, mover: int, target: int) -> int:
+    """Direction of the next cell on the way to a free cell next to `target`; NO_PATH as above."""
+    stay_outline()
+    if not are_present(row, mover, target) or distance(row, mover, target) == 1:
+        return NO_PATH
+    find_free(row, mover)
+    fill_next_to(row, FRONT, target)
+    for y in range(row.program[Header.CANVAS_HEIGHT]):
+        set_line(row, FRONT, y, get_line(row, FRONT, y) & get_line(row, FREE, y))
+    return first_direction(row, mover)
+
+
+@outline
+def reaches(row: Row, mover: int, target: int) -> bool:
+    """Whether `mover` has a path to the cell of `target` or to one next to it."""
+    stay_outline()
+    if not are_present(row, mover, target):
+        return False
+    if distance(row, mover, target) <= 1:
+        return True
+    return direction_next_to(row, mover, target) != NO_PATH
+
+
+@inline
+def turn_towards(direction: int, wanted: int, coin: int) -> int:
+    """The quarter turn towards a direction; `coin` decides if it lies behind (0 left, 1 right)."""
+    turn = (wanted - direction) & 3
+    if turn == 0:
+        return STILL
+    if turn == 2:
+        return Body.LEFT + coin
+    return np.int64(Body.RIGHT) if turn == 1 else np.int64(Body.LEFT)

@@ -1,0 +1,154 @@
+"""Sets of cells in reset code: where something may be put, and putting it there."""
+
+import numpy as np
+
+from socialai_dsl.engine.bits import count_bits, nth_bit
+from socialai_dsl.engine.boards import copy_room, room_table
+from socialai_dsl.engine.entities import field, front_x, front_y, is_present, set_field
+from socialai_dsl.engine.jit import inline, outline, stay_outline
+from socialai_dsl.engine.operands import assign, draw_below, value
+from socialai_dsl.engine.sets import add_cell, clear, count_cells, fill_next_to, get_line, has_cell, set_line
+from socialai_dsl.engine.state import NOTHING, OCCUPIED, ONE, ZERO, Row
+from socialai_dsl.program import Field, Header, Op, Register, Side
+
+
+@outline
+def place(row: Row, op: int, a: int, b: int, c: int) -> None:
+    """Run one instruction on boards."""
+    stay_outline()
+    if op == Op.MAKE_ROOM:
+        make_room(row, value(row, a), value(row, b))
+    elif op == Op.PUT:
+        put(row, value(row, a), value(row, b), value(row, b + 1))
+    elif op == Op.PICK_CELL:
+        _pick_cell(row, a, b, c)
+    elif op == Op.B_FLOOR:
+        _fill_floor(row, a)
+    elif op == Op.B_WALL:
+        _fill_wall(row, a, b, c)
+    elif op == Op.B_RECT:
+        _fill_floor(row, a)
+        _cut(row, a, b)
+    elif op == Op.B_NEXT_TO:
+        fill_next_to(row, a, value(row, b))
+    elif op == Op.B_IN_FRONT_OF:
+        _fill_in_front_of(row, a, value(row, b))
+    else:
+        _combine(row, op, a, OCCUPIED if op == Op.B_FREE else b)
+
+
+@inline
+def _combine(row: Row, op: int, a: int, b: int) -> None:
+    for y in range(row.program[Header.CANVAS_HEIGHT]):
+        one = get_line(row, a, y)
+        other = get_line(row, b, y)
+        if op == Op.B_AND:
+            one &= other
+        elif op == Op.B_OR:
+            one |= other
+        elif op == Op.B_COPY:
+            one = other
+        else:
+            one &= ~other
+        set_line(row, a, y, one)
+
+
+@inline
+def _fill_floor(row: Row, a: int) -> None:
+    height = row.program[Header.CANVAS_HEIGHT]
+    table = room_table(row) + row.program[Header.CANVAS_WIDTH] * height + 1 + height
+    for y in range(height):
+        set_line(row, a, y, row.program[table + y])
+
+
+@inline
+def _fill_wall(row: Row, a: int, side: int, margin: int) -> None:
+    width = row.registers[Register.WIDTH]
+    height = row.registers[Register.HEIGHT]
+    clear(row, a)
+    if side <= Side.BOTTOM:
+        for x in range(margin, width - margin):
+            add_cell(row, a, x, ZERO if side == Side.TOP else height - 1)
+    else:
+        for y in range(margin, height - margin):
+            add_cell(row, a, ZERO if side == Side.LEFT else width - 1, y)
+
+
+@inline
+def _cut(row: Row, a: int, b: int) -> None:
+    """Keep the cells of board a that lie in the rectangle of operand b: left, right, top, bottom."""
+    left = max(value(row, b), 0)
+    right = min(value(row, b + 1), row.program[Header.CANVAS_WIDTH] - 1)
+    columns = 0
+    if left <= right:
+        columns = (np.int64(1) << (right + 1)) - (np.int64(1) << left)
+    top = value(row, b + 2)
+    bottom = value(row, b + 3)
+    for y in range(row.program[Header.CANVAS_HEIGHT]):
+        set_line(row, a, y, get_line(row, a, y) & columns if top <= y <= bottom else ZERO)
+
+
+@inline
+def _fill_in_front_of(row: Row, a: int, entity: int) -> None:
+    clear(row, a)
+    if is_present(row, entity):
+        add_cell(row, a, front_x(row, entity), front_y(row, entity))
+
+
+@inline
+def _pick_cell(row: Row, target: int, a: int, site: int) -> None:
+    """Draw one cell of board a; its x and y go to the temporaries `target` and the next."""
+    total = count_cells(row, a)
+    x = NOTHING
+    y = NOTHING
+    if total > 0:
+        left = draw_below(row, site, total)
+        y = ZERO
+        while left >= count_bits(get_line(row, a, y)):
+            left -= count_bits(get_line(row, a, y))
+            y += 1
+        x = nth_bit(get_line(row, a, y), left)
+    assign(row, target, x)
+    assign(row, target + 1, y)
+
+
+@inline
+def next_cell(row: Row, a: int, x: int, y: int) -> int:
+    """The first cell of board a after (x, y), row by row, as y * 32 + x; -1 if there is none."""
+    while y < row.program[Header.CANVAS_HEIGHT]:
+        x += 1
+        if x >= row.program[Header.CANVAS_WIDTH]:
+            x = -1
+            y += 1
+        elif has_cell(row, a, x, y):
+            return y * 32 + x
+    return -1
+
+
+@inline
+def put(row: Row, entity: int, x: int, y: int) -> None:
+    """Place an entity, or leave it out of the room if x is negative."""
+    set_field(row, entity, Field.X, x)
+    set_field(row, entity, Field.Y, y)
+    if x < 0:
+        set_field(row, entity, Field.GONE, ONE)
+    else:
+        set_field(row, entity, Field.GONE, ZERO)
+        occupy(row, entity)
+
+
+@inline
+def occupy(row: Row, entity: int) -> None:
+    """Mark the cell of an entity as taken."""
+    add_cell(row, OCCUPIED, field(row, entity, Field.X), field(row, entity, Field.Y))
+
+
+@inline
+def make_room(row: Row, width: int, height: int) -> None:
+    """Set the size of the room and copy it bare."""
+    row.registers[Register.WIDTH] = width
+    row.registers[Register.HEIGHT] = height
+    across = width - row.program[Header.MIN_WIDTH]
+    down = height - row.program[Header.MIN_HEIGHT]
+    row.registers[Register.ROOM] = across * row.program[Header.HEIGHTS] + down
+    copy_room(row)

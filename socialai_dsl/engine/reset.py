@@ -1,0 +1,98 @@
+"""The start of an episode: a room is drawn, or taken from a layout, and furnished."""
+
+import numpy as np
+
+from socialai_dsl import draws
+from socialai_dsl.engine import rng
+from socialai_dsl.engine.boards import draw_all
+from socialai_dsl.engine.entities import field, set_field
+from socialai_dsl.engine.jit import inline, part
+from socialai_dsl.engine.places import occupy
+from socialai_dsl.engine.sets import clear
+from socialai_dsl.engine.speech import clear_tokens, remember
+from socialai_dsl.engine.state import OCCUPIED, ONE, PIN_NONE, RESETTING, ZERO, Key, Row
+from socialai_dsl.engine.turns import settle
+from socialai_dsl.engine.vm import run
+from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Body, Field, Header, Register
+
+MEMBER_SITE = np.int64(draws.site("member"))
+"""Where a suite draws the program of an episode."""
+
+
+@inline
+def draw_member(key: np.uint64, count: int, pinned: int) -> int:
+    """Which program of its pool an environment plays in this episode."""
+    if pinned != PIN_NONE:
+        return pinned
+    return rng.below(rng.draw(key, MEMBER_SITE, ZERO, ZERO), count)
+
+
+@part
+def reset_row(row: Row, pinned: bool) -> None:
+    """Start an episode; the row's key and program are set already."""
+    _blank(row)
+    if pinned:
+        _pin_early(row)
+    run(row, row.program[Header.RESET_PC])
+    row.registers[Register.ENDED] = 0
+    if pinned:
+        _pin_late(row)
+    draw_all(row)
+    settle(row)
+
+
+@inline
+def _blank(row: Row) -> None:
+    registers = row.registers
+    clear_tokens(row)
+    row.key[Key.DIGEST] = np.uint64(0)
+    for i in range(row.program[Header.REGISTERS]):
+        registers[i] = 0
+    for entity in range(row.program[Header.ENTITIES]):
+        base = FIRST_ENTITY + ENTITY_FIELDS * entity
+        registers[base + Field.X] = -1
+        registers[base + Field.Y] = -1
+        registers[base + Field.LAST] = Body.NONE
+    registers[Register.OUTCOME] = -1
+    registers[Register.TEMPLATE] = -1
+    registers[Register.NOUN] = -1
+    registers[Register.POKED] = -1
+    registers[Register.ACTION] = Body.NONE
+    registers[Register.LAST_TURN] = Body.NONE
+    registers[Register.ENDED] = RESETTING
+    clear(row, OCCUPIED)
+
+
+@inline
+def _pin(row: Row, first: int) -> None:
+    """Write what a layout gives for the registers from `first` on, other than what was heard."""
+    log = row.program[Header.LOG]
+    end = log + row.program[Header.LOG_SIZE]
+    for i in range(first, row.program[Header.REGISTERS]):
+        told = log <= i < end or i == Register.LOGGED or i == Register.TOKENS
+        if row.pins[i] != PIN_NONE and not told:
+            row.registers[i] = row.pins[i]
+
+
+@inline
+def _pin_early(row: Row) -> None:
+    """Write what draws may depend on: the room, the entities and the program's own registers."""
+    for i in range(Register.WIDTH, Register.HEIGHT + 1):
+        if row.pins[i] != PIN_NONE:
+            row.registers[i] = row.pins[i]
+    _pin(row, np.int64(FIRST_ENTITY))
+    for entity in range(row.program[Header.ENTITIES]):
+        if row.pins[FIRST_ENTITY + ENTITY_FIELDS * entity + Field.X] != PIN_NONE:
+            if field(row, entity, Field.X) < 0:
+                set_field(row, entity, Field.GONE, ONE)
+            elif field(row, entity, Field.GONE) == 0:
+                occupy(row, entity)
+
+
+@inline
+def _pin_late(row: Row) -> None:
+    """Write everything a layout gives once more, over what the draws did, and what was heard."""
+    _pin(row, ZERO)
+    if row.pins[Register.LOGGED] != PIN_NONE:
+        for i in range(row.pins[Register.LOGGED]):
+            remember(row, row.pins[row.program[Header.LOG] + i])

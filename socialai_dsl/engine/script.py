@@ -1,0 +1,68 @@
+"""What the agent's own frame would do now: the actions of a scripted agent."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.engine.jit import outline, part, stay_outline
+from socialai_dsl.engine.speech import inbox_class
+from socialai_dsl.engine.state import STILL, Link, Row
+from socialai_dsl.engine.step import begin
+from socialai_dsl.engine.turns import act, conclude, move_agent, notice, settle
+from socialai_dsl.program import Flag, FrameColumn, Header, Register
+
+
+@part
+def script_row(row: Row, link: int) -> None:
+    """Write the action of the agent's frame, int64 (4,); the row is played on and must be a copy.
+
+    Without a frame the agent stands still and is silent.
+    """
+    program = row.program
+    body = STILL
+    line = 0
+    begin(row)
+    if program[Header.FLAGS] & Flag.AGENT_FRAME:
+        frame = program[Header.FRAME_AT]
+        heard = inbox_class(row, program[frame + FrameColumn.INBOX])
+        chosen = notice(row, frame, heard)
+        body = row.registers[Register.LAST_TURN] if chosen else act(row, frame)
+        row.registers[Register.ACTION] = body
+        move_agent(row, body)
+        settle(row)
+        conclude(row, frame, heard, chosen)
+        line = row.registers[Register.SAID_LINE]
+    action = row.action
+    action[1] = 0
+    action[2] = 0
+    action[3] = 0
+    action[0] = _index_of(program, link + Link.END, program[link + Link.ACTIONS], body)
+    _encode_line(row, link, line)
+
+
+@outline
+def _encode_line(row: Row, link: int, line: int) -> None:
+    stay_outline()
+    program = row.program
+    action = row.action
+    pair = line - program[Header.AGENT_SAYS]
+    nouns = program[Header.NOUNS]
+    if line == 0 or program[Header.AGENT_SAYS] == 0 or not 0 <= pair < program[Header.TEMPLATES] * nouns:
+        return
+    table = link + Link.END + program[link + Link.ACTIONS]
+    template = _index_of(program, table, program[link + Link.TEMPLATES], pair // nouns)
+    table += program[link + Link.TEMPLATES]
+    noun = _index_of(program, table, program[link + Link.NOUNS], pair % nouns)
+    if template >= 0 and noun >= 0:
+        action[1] = 1
+        action[2] = template
+        action[3] = noun
+
+
+@outline
+def _index_of(program: NDArray[np.int32], table: int, size: int, wanted: int) -> int:
+    """First index of a value in a table; the last index if it is not there and -1 means nothing."""
+    stay_outline()
+    for i in range(size):
+        if program[table + i] == wanted:
+            return i
+    return -1

@@ -1,0 +1,144 @@
+"""What is said reaches who is near: the agent's log and tokens, the inboxes of those who follow a frame."""
+
+from socialai_dsl.engine.boards import npcs_are_hidden
+from socialai_dsl.engine.entities import column, distance, is_present
+from socialai_dsl.engine.jit import inline, outline, stay_outline
+from socialai_dsl.engine.rng import fold
+from socialai_dsl.engine.state import AGENT, NOTHING, Key, Row
+from socialai_dsl.program import EntityColumn, FrameColumn, Header, LineColumn, Register
+
+
+@inline
+def _line(row: Row, line: int, name: int) -> int:
+    return row.program[row.program[Header.LINE_AT] + LineColumn.COLUMNS * line + name]
+
+
+@inline
+def _forget_oldest(row: Row) -> None:
+    """Drop the oldest line from log and tokens."""
+    registers = row.registers
+    log = row.program[Header.LOG]
+    lines = registers[Register.LOGGED] - 1
+    words = _line(row, registers[log], LineColumn.TOKENS)
+    left = max(0, registers[Register.TOKENS] - words)
+    for i in range(lines):
+        registers[log + i] = registers[log + i + 1]
+    for i in range(left):
+        row.tokens[i] = row.tokens[i + words]
+    for i in range(left, registers[Register.TOKENS]):
+        row.tokens[i] = 0
+    registers[log + lines] = 0
+    registers[Register.LOGGED] = lines
+    registers[Register.TOKENS] = left
+
+
+@outline
+def remember(row: Row, line: int) -> None:
+    """Add a line to the log, the tokens and the digest; the oldest whole lines make room."""
+    stay_outline()
+    registers = row.registers
+    words = _line(row, line, LineColumn.TOKENS)
+    room = row.program[Header.TOKENS]
+    while registers[Register.LOGGED] > 0 and (
+        registers[Register.TOKENS] + words > room
+        or registers[Register.LOGGED] >= row.program[Header.LOG_SIZE]
+    ):
+        _forget_oldest(row)
+    start = registers[Register.TOKENS]
+    first = row.program[Header.TOKEN_AT] + _line(row, line, LineColumn.FIRST_TOKEN)
+    words = min(words, room - start)
+    for i in range(words):
+        row.tokens[start + i] = row.program[first + i]
+    registers[row.program[Header.LOG] + registers[Register.LOGGED]] = line
+    registers[Register.LOGGED] += 1
+    registers[Register.TOKENS] = start + words
+    row.key[Key.DIGEST] = fold(row.key[Key.DIGEST], line)
+
+
+@inline
+def hear(row: Row, line: int) -> None:
+    """The agent hears a line."""
+    heard = row.registers[Register.HEARD]
+    if heard < row.program[Header.HEARD_SIZE]:
+        row.registers[row.program[Header.HEARD] + heard] = line
+        row.registers[Register.HEARD] = heard + 1
+    remember(row, line)
+
+
+@inline
+def clear_tokens(row: Row) -> None:
+    """Empty the token buffer."""
+    for i in range(row.registers[Register.TOKENS]):
+        row.tokens[i] = 0
+    row.registers[Register.TOKENS] = 0
+
+
+@inline
+def within_earshot(row: Row, speaker: int, hearer: int) -> bool:
+    """Whether the voice of one carries to the other."""
+    away = distance(row, speaker, hearer)
+    return column(row, speaker, EntityColumn.NEAR) <= away <= column(row, speaker, EntityColumn.FAR)
+
+
+@inline
+def put_into_inbox(row: Row, inbox: int, utterance: int) -> None:
+    """Add an utterance class to an inbox, unless it is full."""
+    count = row.registers[inbox]
+    if count < row.program[Header.INBOX_SIZE]:
+        row.registers[inbox + 1 + count] = utterance
+        row.registers[inbox] = count + 1
+
+
+@inline
+def empty_inbox(row: Row, inbox: int) -> None:
+    """Forget what was heard."""
+    for i in range(1, row.registers[inbox] + 1):
+        row.registers[inbox + i] = 0
+    row.registers[inbox] = 0
+
+
+@inline
+def inbox_class(row: Row, inbox: int) -> int:
+    """The class of what was heard: 0 nothing, the number of classes if several differ."""
+    count = row.registers[inbox]
+    if count == 0:
+        return 0
+    first = row.registers[inbox + 1]
+    for i in range(2, count + 1):
+        if row.registers[inbox + i] != first:
+            return row.program[Header.CLASSES]
+    return first
+
+
+@inline
+def is_in_inbox(row: Row, utterance: int, inbox: int) -> bool:
+    """Whether an utterance of this class was heard."""
+    found = False
+    for i in range(1, row.registers[inbox] + 1):
+        found |= row.registers[inbox + i] == utterance
+    return found
+
+
+@inline
+def deliver(row: Row, speaker: int, utterance: int) -> None:
+    """Put an utterance class into the inbox of everybody else with a frame who is within earshot."""
+    table = row.program[Header.FRAME_AT]
+    last = NOTHING
+    for _ in range(row.program[Header.FRAMES]):
+        entity = row.program[table + FrameColumn.ENTITY]
+        if entity not in (last, speaker) and is_present(row, entity) and within_earshot(row, speaker, entity):
+            put_into_inbox(row, row.program[table + FrameColumn.INBOX], utterance)
+        last = entity
+        table += FrameColumn.COLUMNS
+
+
+@outline
+def speak(row: Row, speaker: int, line: int) -> None:
+    """An NPC says a line: the agent hears it if it may and is near, and so do NPCs for whom it means something."""
+    stay_outline()
+    audible = not npcs_are_hidden(row) or column(row, speaker, EntityColumn.AUDIBLE) == 1
+    if audible and is_present(row, AGENT) and within_earshot(row, speaker, AGENT):
+        hear(row, line)
+    utterance = _line(row, line, LineColumn.CLASS)
+    if utterance > 1:
+        deliver(row, speaker, utterance)

@@ -1,0 +1,202 @@
+"""What a batch of environments is made of: few arrays, one row for each environment.
+
+`State` is all that persists and is all a snapshot needs, `Ports` is what goes in and out of a call, `Row` is what the
+functions of the engine see of one environment. Axis letters: E environments, R registers, L tokens, H x W canvas.
+"""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.program import BOARDS, MAX_SIDE, TEMPORARIES, Body
+
+PIN_NONE = -32768
+"""In a row of pins: this register is not given by a layout."""
+
+RESETTING = -1
+"""In `Register.ENDED` while reset code runs: nothing is drawn yet."""
+
+# Constants that are arguments have the type of all numbers here, or Numba compiles the callee for each of them.
+AGENT = np.int64(0)
+ZERO = np.int64(0)
+ONE = np.int64(1)
+STILL = np.int64(Body.NONE)
+NOTHING = np.int64(-1)
+
+SCRATCH_BOARDS = BOARDS + 4
+OCCUPIED = np.int64(BOARDS)
+FREE = np.int64(BOARDS + 1)
+FRONT = np.int64(BOARDS + 2)
+SEEN = np.int64(BOARDS + 3)
+
+
+class Key(IntEnum):
+    """Words of a row of `State.keys`."""
+
+    SEED = 0
+    INDEX = 1
+    EPISODE = 2
+    KEY = 3  # of the episode, made of the three
+    DIGEST = 4  # of the lines heard since the last reset
+    PROGRAM = 5  # offset of the program in `words`
+    POOL = 6  # programs to draw from: first entry of `choices`, number of entries << 32
+    WORDS = 7
+
+
+class Link(IntEnum):
+    """Words that follow a program in a batch. After them: the action, template and noun of each index of the batch."""
+
+    NUMBER = 0  # of the program in the batch
+    COUNTERS = 1  # first counter
+    RULES = 2  # counters of rules, then come those of outcomes
+    OUTCOMES = 3  # ways to end, deadly and time-out included
+    VIEWS = 4  # first row of the views
+    ACTIONS = 5  # choices of the batch's action space
+    TEMPLATES = 6
+    NOUNS = 7
+    END = 8
+
+
+class Book(IntEnum):
+    """The arrays of `Tables`, `State` and `Ports` in the order in which a call gets them, then some sizes."""
+
+    WORDS = 0
+    VIEWS = 1
+    CHOICES = 2
+    REGISTERS = 3
+    BOARDS = 4
+    KEYS = 5
+    TOKENS = 6
+    IMAGE = 7
+    ACTIONS = 8
+    PINS = 9
+    LAYOUT = 10
+    CHOSEN = 11
+    REWARD = 12
+    TERMINATED = 13
+    TRUNCATED = 14
+    OUTCOME = 15
+    FINAL_IMAGE = 16
+    FINAL_TOKENS = 17
+    COUNTERS = 18
+    SCRATCH = 19
+    SETS = 20
+    SPARE_REGISTERS = 21
+    SPARE_BOARDS = 22
+    SPARE_COUNTERS = 23
+    SIZES = 24
+
+
+class Size(IntEnum):
+    """Entries of `Ports.sizes`."""
+
+    REGISTERS = 0
+    BOARD = 1
+    TOKENS = 2
+    COUNTERS = 3
+    END = 4
+
+
+class State(NamedTuple):
+    """What persists from step to step. `tokens` and `image` are also the caller's observation."""
+
+    registers: NDArray[np.int16]  # (E, R)
+    boards: NDArray[
+        np.uint32
+    ]  # (E, H * W + 1 + H) cells as seen, the last is off the canvas; then solid rows
+    keys: NDArray[np.uint64]  # (E, Key.WORDS)
+    tokens: NDArray[np.int16]  # (E, L)
+    image: NDArray[
+        np.uint32
+    ]  # (E, 49) packed cells, from the agent's left to its right, each from far to near
+
+
+class Tables(NamedTuple):
+    """What never changes."""
+
+    words: NDArray[np.int32]  # the programs, each followed by its link
+    views: NDArray[
+        np.uint16
+    ]  # (poses, 49) cell of the board for each cell of the picture, by (y, x, direction)
+    choices: NDArray[np.int64]  # offsets of programs
+
+
+class Ports(NamedTuple):
+    """What a call reads and writes besides the state."""
+
+    actions: NDArray[np.int64]  # (E, 4)
+    pins: NDArray[np.int16]  # (layouts, R + 1) value of each register or PIN_NONE; last: member of the pool
+    layout: NDArray[np.int32]  # (E,) row of the pins that the next reset uses
+    chosen: NDArray[np.bool_]  # (E,) rows that a reset is for
+    reward: NDArray[np.float64]  # (E,)
+    terminated: NDArray[np.bool_]  # (E,)
+    truncated: NDArray[np.bool_]  # (E,)
+    outcome: NDArray[np.int16]  # (E,) of the episode that ended in this step, else -1
+    final_image: NDArray[np.uint32]  # (E, 49) last picture of an episode that was reset in the same step
+    final_tokens: NDArray[np.int16]  # (E, L)
+    counters: NDArray[np.int64]  # (threads * counters of all programs,)
+    scratch: NDArray[np.int64]  # (threads, TEMPORARIES)
+    sets: NDArray[np.uint32]  # (threads, SCRATCH_BOARDS * MAX_SIDE)
+    spare_registers: NDArray[np.int16]  # (threads, R) of a row that is played on for a look
+    spare_boards: NDArray[np.uint32]  # (threads, board)
+    spare_counters: NDArray[np.int64]  # (threads, counters of all programs)
+    sizes: NDArray[np.int64]  # (Size.END,)
+
+
+class Row(NamedTuple):
+    """One environment: pointers to its rows of the above (`pointers.pointer`), for code that is compiled."""
+
+    program: NDArray[np.int32]  # words from the program's first on
+    registers: NDArray[np.int16]
+    board: NDArray[np.uint32]
+    key: NDArray[np.uint64]
+    tokens: NDArray[np.int16]
+    image: NDArray[np.uint32]
+    action: NDArray[np.int64]
+    counters: NDArray[np.int64]  # from the program's first on
+    pins: NDArray[np.int16]
+    scratch: NDArray[np.int64]
+    sets: NDArray[np.uint32]  # line y of board b is number b * MAX_SIDE + y
+    views: NDArray[np.uint16]
+
+
+def empty_state(rows: int, registers: int, board: int, tokens: int, view: int) -> State:
+    """A state of zeros; every row must be reset before it is used."""
+    return State(
+        registers=np.zeros((rows, registers), np.int16),
+        boards=np.zeros((rows, board), np.uint32),
+        keys=np.zeros((rows, Key.WORDS), np.uint64),
+        tokens=np.zeros((rows, tokens), np.int16),
+        image=np.zeros((rows, view * view), np.uint32),
+    )
+
+
+def empty_ports(state: State, counters: int, threads: int) -> Ports:
+    """Ports that fit a state, with nothing pinned and no outcome."""
+    rows, registers = state.registers.shape
+    return Ports(
+        actions=np.zeros((rows, 4), np.int64),
+        pins=no_pins(registers),
+        layout=np.zeros(rows, np.int32),
+        chosen=np.ones(rows, np.bool_),
+        reward=np.zeros(rows, np.float64),
+        terminated=np.zeros(rows, np.bool_),
+        truncated=np.zeros(rows, np.bool_),
+        outcome=np.full(rows, -1, np.int16),
+        final_image=np.zeros_like(state.image),
+        final_tokens=np.zeros_like(state.tokens),
+        counters=np.zeros(threads * counters, np.int64),
+        scratch=np.zeros((threads, TEMPORARIES), np.int64),
+        sets=np.zeros((threads, SCRATCH_BOARDS * MAX_SIDE), np.uint32),
+        spare_registers=np.zeros((threads, registers), np.int16),
+        spare_boards=np.zeros((threads, state.boards.shape[1]), np.uint32),
+        spare_counters=np.zeros((threads, counters), np.int64),
+        sizes=np.array([registers, state.boards.shape[1], state.tokens.shape[1], counters], np.int64),
+    )
+
+
+def no_pins(registers: int) -> NDArray[np.int16]:
+    """One row of pins that pins nothing: row 0 of every table of pins."""
+    return np.full((1, registers + 1), PIN_NONE, np.int16)

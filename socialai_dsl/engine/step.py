@@ -1,0 +1,112 @@
+"""One step of one environment, in the order the language fixes."""
+
+import numpy as np
+
+from socialai_dsl.engine.boards import is_deadly
+from socialai_dsl.engine.entities import field
+from socialai_dsl.engine.jit import inline, part
+from socialai_dsl.engine.picture import take_picture
+from socialai_dsl.engine.speech import empty_inbox, inbox_class
+from socialai_dsl.engine.state import AGENT, Link, Row
+from socialai_dsl.engine.turns import conclude, move_agent, notice, say_as_agent, settle, take_turns
+from socialai_dsl.engine.vm import run
+from socialai_dsl.program import Field, Flag, FrameColumn, Header, Register
+
+TERMINATED = 1
+TRUNCATED = 2
+
+
+@inline
+def begin(row: Row) -> None:
+    """Time goes on; nothing is heard, used or said yet."""
+    registers = row.registers
+    registers[Register.T] += 1
+    registers[Register.HEARD] = 0
+    registers[Register.POKED] = -1
+    registers[Register.SAID_LINE] = 0
+
+
+@inline
+def decode(row: Row, link: int) -> None:
+    """Note the agent's body action and utterance. A pair that its grammar lacks is silence."""
+    registers = row.registers
+    program = row.program
+    table = link + Link.END
+    registers[Register.ACTION] = program[table + row.action[0]]
+    registers[Register.TEMPLATE] = -1
+    registers[Register.NOUN] = -1
+    registers[Register.CLASS] = 0
+    if row.action[1] == 1:
+        table += program[link + Link.ACTIONS]
+        template = program[table + row.action[2]]
+        noun = program[table + program[link + Link.TEMPLATES] + row.action[3]]
+        if template >= 0 and noun >= 0:
+            pair = template * program[Header.NOUNS] + noun
+            registers[Register.TEMPLATE] = template
+            registers[Register.NOUN] = noun
+            registers[Register.CLASS] = program[program[Header.CLASS_AT] + pair]
+
+
+@part
+def step_row(row: Row, link: int) -> float:
+    """One step; the reward. Whether and how the episode ended is in the registers."""
+    registers = row.registers
+    program = row.program
+    flags = program[Header.FLAGS]
+    begin(row)
+    decode(row, link)
+
+    frame = program[Header.FRAME_AT]
+    heard = 0
+    chosen = False
+    if flags & Flag.AGENT_FRAME:
+        heard = inbox_class(row, program[frame + FrameColumn.INBOX])
+        chosen = notice(row, frame, heard)
+    move_agent(row, registers[Register.ACTION])
+    settle(row)
+    say_as_agent(row)
+    if flags & Flag.AGENT_FRAME:
+        conclude(row, frame, heard, chosen)
+        empty_inbox(row, program[frame + FrameColumn.INBOX])
+        registers[Register.SAID_LINE] = 0
+    if flags & Flag.PICTURE_BEFORE_NPCS:
+        take_picture(row, link)
+
+    take_turns(row)
+    if program[Header.RULES_PC] != 0:
+        run(row, program[Header.RULES_PC])
+    settle(row)
+    reward = _judge(row, link)
+    if not flags & Flag.PICTURE_BEFORE_NPCS:
+        take_picture(row, link)
+    return reward
+
+
+@part
+def _judge(row: Row, link: int) -> float:
+    """Whether the episode ends, how, and for what reward."""
+    registers = row.registers
+    program = row.program
+    outcomes = program[link + Link.OUTCOMES]
+    if field(row, AGENT, Field.X) >= 0 and is_deadly(
+        row, field(row, AGENT, Field.X), field(row, AGENT, Field.Y)
+    ):
+        registers[Register.OUTCOME] = outcomes - 2
+        registers[Register.PERCENT] = 0
+    else:
+        table = program[Header.OUTCOME_AT] + 8 * registers[Register.CLASS]
+        pc = program[table + registers[Register.ACTION]]
+        if pc != 0:
+            run(row, pc)
+    if registers[Register.OUTCOME] >= 0:
+        registers[Register.ENDED] = TERMINATED
+    elif registers[Register.T] >= program[Header.HORIZON]:
+        registers[Register.ENDED] = TRUNCATED
+        registers[Register.OUTCOME] = outcomes - 1
+        registers[Register.PERCENT] = 0
+    else:
+        return 0.0
+    row.counters[program[link + Link.RULES] + registers[Register.OUTCOME]] += 1
+    row.counters[program[Header.COUNTERS] - 1] += 1
+    share = np.float64(registers[Register.PERCENT]) / 100.0
+    return share * (1.0 - 0.9 * np.float64(registers[Register.T]) / np.float64(program[Header.HORIZON]))

@@ -1,0 +1,191 @@
+"""Turns: the body actions of agent and NPCs, and how an NPC follows its frames."""
+
+from socialai_dsl.engine.boards import draw_cell, is_deadly, is_solid, npcs_are_hidden, type_row
+from socialai_dsl.engine.entities import (
+    field,
+    is_at,
+    is_present,
+    npc_at,
+    object_at,
+    set_field,
+    step_x,
+    step_y,
+)
+from socialai_dsl.engine.jit import inline, outline, part, stay_outline
+from socialai_dsl.engine.speech import deliver, empty_inbox, hear, inbox_class, speak
+from socialai_dsl.engine.state import AGENT, NOTHING, ONE, STILL, Row
+from socialai_dsl.engine.vm import run
+from socialai_dsl.program import Body, Field, Flag, FrameColumn, Header, Register, TypeColumn
+
+
+@part
+def settle(row: Row) -> None:
+    """Let statuses that follow from others follow."""
+    pc = row.program[Header.SETTLE_PC]
+    if pc != 0:
+        run(row, pc)
+
+
+@inline
+def _toggle_object(row: Row, x: int, y: int) -> int:
+    """Toggle the object in this cell; its number, or 0 if there is none."""
+    entity = object_at(row, x, y)
+    if entity > 0:
+        status = row.program[type_row(row, entity) + TypeColumn.TOGGLED]
+        if status != field(row, entity, Field.STATUS):
+            set_field(row, entity, Field.STATUS, status)
+            draw_cell(row, x, y)
+    return entity
+
+
+@outline
+def _toggle_ahead(row: Row) -> None:
+    """The agent toggles at what is ahead: it pokes an NPC, hidden or not, or uses an object."""
+    stay_outline()
+    direction = field(row, AGENT, Field.DIR)
+    x = field(row, AGENT, Field.X) + step_x(direction)
+    y = field(row, AGENT, Field.Y) + step_y(direction)
+    poked = npc_at(row, x, y)
+    if poked > 0:
+        set_field(row, poked, Field.POKED, ONE)
+    else:
+        poked = _toggle_object(row, x, y)
+    if poked > 0:
+        row.registers[Register.POKED] = poked
+
+
+@inline
+def move_agent(row: Row, action: int) -> None:
+    """The agent's body action."""
+    direction = field(row, AGENT, Field.DIR)
+    if action == Body.FORWARD:
+        x = field(row, AGENT, Field.X) + step_x(direction)
+        y = field(row, AGENT, Field.Y) + step_y(direction)
+        if not is_solid(row, x, y) and (npcs_are_hidden(row) or npc_at(row, x, y) == 0):
+            set_field(row, AGENT, Field.X, x)
+            set_field(row, AGENT, Field.Y, y)
+    elif action <= Body.RIGHT:
+        set_field(row, AGENT, Field.DIR, (direction + 2 * action - 1) & 3)
+    elif action == Body.TOGGLE:
+        _toggle_ahead(row)
+    set_field(row, AGENT, Field.LAST, action)
+
+
+@outline
+def move_npc(row: Row, npc: int, action: int) -> None:
+    """The body action of an NPC. It never enters what is solid or deadly, nor the cell of anybody else."""
+    stay_outline()
+    direction = field(row, npc, Field.DIR)
+    x = field(row, npc, Field.X)
+    y = field(row, npc, Field.Y)
+    ahead_x = x + step_x(direction)
+    ahead_y = y + step_y(direction)
+    if action <= Body.RIGHT:
+        set_field(row, npc, Field.DIR, (direction + 2 * action - 1) & 3)
+        draw_cell(row, x, y)
+    elif action == Body.FORWARD:
+        if (
+            not is_solid(row, ahead_x, ahead_y)
+            and not is_deadly(row, ahead_x, ahead_y)
+            and npc_at(row, ahead_x, ahead_y) == 0
+            and not is_at(row, AGENT, ahead_x, ahead_y)
+        ):
+            set_field(row, npc, Field.X, ahead_x)
+            set_field(row, npc, Field.Y, ahead_y)
+            draw_cell(row, x, y)
+            draw_cell(row, ahead_x, ahead_y)
+    elif action == Body.TOGGLE:
+        _toggle_object(row, ahead_x, ahead_y)
+
+
+@inline
+def _state_table(row: Row, frame: int) -> int:
+    """Offset of the row of the frame's current state in the state table."""
+    columns = 1 + 2 * (row.program[Header.CLASSES] + 1)
+    state = row.program[frame + FrameColumn.ROWS] + row.registers[row.program[frame + FrameColumn.STATE]]
+    return row.program[Header.STATE_AT] + columns * state
+
+
+@part
+def notice(row: Row, frame: int, heard: int) -> bool:
+    """What a frame does before the body action (`first`); whether it has chosen that action."""
+    row.registers[Register.LAST_TURN] = -1
+    pc = row.program[_state_table(row, frame) + 1 + heard]
+    if pc != 0:
+        run(row, pc)
+    return row.registers[Register.LAST_TURN] >= 0
+
+
+@part
+def act(row: Row, frame: int) -> int:
+    """The body action that the activity of the current state chooses."""
+    pc = row.program[_state_table(row, frame)]
+    if pc != 0:
+        run(row, pc)
+    chosen = row.registers[Register.LAST_TURN]
+    return chosen if chosen >= 0 else STILL
+
+
+@part
+def conclude(row: Row, frame: int, heard: int, chosen: bool) -> None:
+    """The clock ticks, then what is done after the body action (`then`), unless `first` took the whole turn."""
+    row.registers[row.program[frame + FrameColumn.CLOCK]] += 1
+    if not chosen:
+        pc = row.program[_state_table(row, frame) + 2 + row.program[Header.CLASSES] + heard]
+        if pc != 0:
+            run(row, pc)
+
+
+@part
+def _follow(row: Row, frame: int, npc: int) -> None:
+    """One turn of one frame of an NPC."""
+    heard = inbox_class(row, row.program[frame + FrameColumn.INBOX])
+    chosen = notice(row, frame, heard)
+    action = row.registers[Register.LAST_TURN]
+    if not chosen:
+        action = act(row, frame)
+    if action != Body.NONE:
+        move_npc(row, npc, action)
+        set_field(row, npc, Field.LAST, action)
+    settle(row)
+    conclude(row, frame, heard, chosen)
+
+
+@part
+def take_turns(row: Row) -> None:
+    """Every NPC takes its turn, in the order of the cast; what it says is heard when its turn ends."""
+    frames = row.program[Header.FRAMES]
+    frame = row.program[Header.FRAME_AT]
+    number = 0
+    if row.program[Header.FLAGS] & Flag.AGENT_FRAME:
+        number = 1
+        frame += FrameColumn.COLUMNS
+    last = NOTHING
+    while number < frames:
+        npc = row.program[frame + FrameColumn.ENTITY]
+        if npc != last:
+            set_field(row, npc, Field.LAST, STILL)
+            last = npc
+        if is_present(row, npc):
+            _follow(row, frame, npc)
+        number += 1
+        inbox = row.program[frame + FrameColumn.INBOX]
+        frame += FrameColumn.COLUMNS
+        if number == frames or row.program[frame + FrameColumn.ENTITY] != npc:
+            if row.registers[inbox] > 0:
+                empty_inbox(row, inbox)
+            if row.registers[Register.SAID_LINE] > 0:
+                speak(row, npc, row.registers[Register.SAID_LINE] - 1)
+                row.registers[Register.SAID_LINE] = 0
+
+
+@inline
+def say_as_agent(row: Row) -> None:
+    """The agent's utterance reaches the NPCs near it, and the agent itself where it hears its own voice."""
+    utterance = row.registers[Register.CLASS]
+    if utterance == 0:
+        return
+    deliver(row, AGENT, utterance)
+    if row.program[Header.FLAGS] & Flag.OWN_VOICE and row.program[Header.AGENT_SAYS] > 0:
+        pair = row.registers[Register.TEMPLATE] * row.program[Header.NOUNS]
+        hear(row, row.program[Header.AGENT_SAYS] - 1 + pair + row.registers[Register.NOUN])

@@ -1,0 +1,173 @@
+"""The interpreter: runs one piece of code on one environment. It raises nothing, since programs are proven first."""
+
+import numpy as np
+
+from socialai_dsl.engine import entities, paths
+from socialai_dsl.engine.bits import count_bits, lowest_bit, nth_bit
+from socialai_dsl.engine.boards import draw_entity
+from socialai_dsl.engine.conditions import holds
+from socialai_dsl.engine.entities import field, set_field
+from socialai_dsl.engine.jit import inline, outline, stay_outline
+from socialai_dsl.engine.operands import assign, draw_below, value
+from socialai_dsl.engine.places import next_cell, place
+from socialai_dsl.engine.sets import drop_cell
+from socialai_dsl.engine.state import NOTHING, ONE, RESETTING, STILL, ZERO, Row
+from socialai_dsl.program import Body, Field, FrameColumn, Header, Op, Register
+
+_NO_CELL = -1
+_SIDES = np.int64(2)
+
+
+@outline
+def run(row: Row, pc: int) -> None:
+    """Run the code at `pc` to its `HALT`. Skips go forward and `EACH_CELL` counts cells, so it ends."""
+    stay_outline()
+    start = row.program[Header.CODE_AT]
+    loop = 0  # pc of the first instruction in the loop
+    loop_board = 0
+    loop_target = 0
+    cell = _NO_CELL
+    while True:
+        word = start + 4 * pc
+        op = row.program[word]
+        a = row.program[word + 1]
+        b = row.program[word + 2]
+        c = row.program[word + 3]
+        pc += 1
+        if op <= Op.IF_REACHES:
+            if op == Op.HALT:
+                return
+            if op == Op.SKIP or not holds(row, op, a, b):
+                pc += c
+        elif op < Op.SET_FIELD:
+            _compute(row, op, a, b, c)
+        elif op < Op.BODY:
+            _effect(row, op, a, b, c)
+        elif op < Op.B_FLOOR:
+            row.registers[Register.LAST_TURN] = _choose(row, op, a, b, c)
+        elif op < Op.EACH_CELL or op > Op.END_EACH:
+            place(row, op, a, b, c)
+        elif op == Op.DROP_CELL:
+            if cell != _NO_CELL:
+                drop_cell(row, loop_board, cell & 31, cell >> 5)
+        else:
+            if op == Op.EACH_CELL:
+                loop = pc
+                loop_board = a
+                loop_target = b
+                cell = next_cell(row, a, NOTHING, ZERO)
+                if cell == _NO_CELL:
+                    pc += c
+                    if row.program[start + 4 * pc] == Op.END_EACH:
+                        pc += 1
+            elif cell != _NO_CELL:
+                cell = next_cell(row, loop_board, cell & 31, cell >> 5)
+                if cell != _NO_CELL:
+                    pc = loop
+            if cell != _NO_CELL:
+                assign(row, loop_target, cell & 31)
+                assign(row, loop_target + 1, cell >> 5)
+
+
+@inline
+def _compute(row: Row, op: int, a: int, b: int, c: int) -> None:
+    """Instructions that write a value."""
+    if op == Op.LOAD:
+        result = value(row, b)
+    elif op <= Op.MAX:
+        result = _arithmetic(op, value(row, b), value(row, c))
+    elif op == Op.FIELD:
+        result = field(row, value(row, b), c)
+    elif op == Op.DRAW:
+        result = draw_below(row, c, value(row, b))
+    elif op == Op.SET_BIT:
+        result = value(row, a) | (np.int64(1) << (value(row, b) & 63))
+    elif op == Op.DISTANCE:
+        result = entities.distance(row, value(row, b), value(row, c))
+    elif op == Op.QUADRANT:
+        result = entities.quadrant(row, value(row, b), value(row, c))
+    else:
+        result = _bits(row, op, value(row, b), c)
+    assign(row, a, result)
+
+
+@inline
+def _arithmetic(op: int, left: int, right: int) -> int:
+    if op == Op.ADD:
+        return left + right
+    if op == Op.SUB:
+        return left - right
+    if op == Op.MUL:
+        return left * right
+    if op == Op.MIN:
+        return min(left, right)
+    if op == Op.MAX:
+        return max(left, right)
+    if right == 0:
+        return 0
+    return left // right if op == Op.DIV else left % right
+
+
+@inline
+def _bits(row: Row, op: int, word: int, site: int) -> int:
+    """Numbers as sets of bits. A set has at most 32 members."""
+    if op == Op.ABS:
+        return abs(word)
+    word &= 0xFFFFFFFF
+    if op == Op.COUNT_BITS:
+        return count_bits(word)
+    if word == 0:
+        return 0
+    if op == Op.LOWEST_BIT:
+        return lowest_bit(word)
+    return nth_bit(word, draw_below(row, site, count_bits(word)))
+
+
+@inline
+def _effect(row: Row, op: int, a: int, b: int, c: int) -> None:
+    """Instructions that change the world."""
+    registers = row.registers
+    if op == Op.SAY:
+        if registers[Register.SAID_LINE] == 0:
+            registers[Register.SAID_LINE] = value(row, b) + 1
+    elif op == Op.GOTO:
+        frame = row.program[Header.FRAME_AT] + FrameColumn.COLUMNS * a
+        registers[row.program[frame + FrameColumn.STATE]] = b
+        registers[row.program[frame + FrameColumn.CLOCK]] = 0
+    elif op == Op.COUNT:
+        row.counters[a] += 1
+    elif op == Op.END:
+        registers[Register.OUTCOME] = a
+        registers[Register.PERCENT] = b
+    else:
+        entity = value(row, a)
+        if op == Op.SET_FIELD:
+            set_field(row, entity, b, value(row, c))
+        elif op == Op.BECOME:
+            set_field(row, entity, Field.STATUS, value(row, b))
+        else:
+            set_field(row, entity, Field.GONE, ONE)
+        if registers[Register.ENDED] != RESETTING:
+            draw_entity(row, entity)
+
+
+@inline
+def _choose(row: Row, op: int, a: int, b: int, c: int) -> int:
+    """Instructions that choose the body action of the entity on turn."""
+    if op == Op.BODY:
+        return value(row, a)
+    mover = value(row, a)
+    target = value(row, b)
+    direction = field(row, mover, Field.DIR)
+    if op == Op.TURN_TO:
+        return paths.turn_towards(direction, target, draw_below(row, c, _SIDES))
+    way = (
+        paths.direction_to(row, mover, target)
+        if op == Op.GO_TO
+        else paths.direction_next_to(row, mover, target)
+    )
+    if way == paths.NO_PATH:
+        return STILL
+    if way == direction:
+        return np.int64(Body.FORWARD)
+    return paths.turn_towards(direction, way, draw_below(row, c, _SIDES))
