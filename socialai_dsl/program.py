@@ -337,6 +337,7 @@ class RegisterName:
         register: its number.
         values: word of each value from `low` on; empty for plain numbers.
         low, high: range of its values.
+        kind: what its values are: int, bool, color, direction, action, entity (by number), text, noun, status.
     """
 
     path: str
@@ -344,6 +345,7 @@ class RegisterName:
     values: tuple[str, ...] = ()
     low: int = 0
     high: int = 0
+    kind: str = "int"
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.registers import Registers, state_names
 from socialai_dsl.program import Field, Op
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.terms import Checked, Effect, FramePlan, RulePlan, Sited, StepPlan
+from socialai_dsl.semantics.terms import BOOL, Checked, Effect, FramePlan, RulePlan, Sited, StepPlan
 
 FOR_EVER = -1
 
@@ -50,7 +50,7 @@ class _FrameCompiler:
         self.clock = shared.registers.by_path[f"{frame.member}.clock"]
         self.counters = {name: self._counter(name) for name in self._names()}
         self.once = {
-            rule.name: shared.registers.reserve(1)
+            rule.name: shared.registers.add(f"{frame.member}.fired.{rule.name}", BOOL)
             for state in frame.states
             for rule in (*state.first, *state.then)
             if rule.once

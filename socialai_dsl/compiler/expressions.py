@@ -274,7 +274,7 @@ class Expressions:
         return fold(substitute(term.condition or TRUE, term.variable, item), self.facts, self.classes)
 
     def _pick(self, term: terms.Quantified) -> int:
-        site = self.sites.row(self.site, term.ordinal)
+        site = self.sites.row(term.site or self.site, term.ordinal)
         if term.condition is not None:
             return self._chosen(term, Op.PICK_BIT, site)
         return self._item(term.items, self._into_temporary(Op.DRAW, constant(len(term.items)), site))

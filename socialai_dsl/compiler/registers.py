@@ -39,7 +39,7 @@ class Registers:
         """A named register."""
         register = self.reserve(1)
         self.by_path[path] = register
-        self.names.append(RegisterName(path, register, type_.words, type_.low, type_.high))
+        self.names.append(RegisterName(path, register, type_.words, type_.low, type_.high, type_.kind))
         return register
 
     def reserve(self, count: int) -> int:

@@ -1,0 +1,60 @@
+"""Environments by name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from gymnasium.vector import AutoresetMode
+
+from socialai_dsl.compiler import compile_loaded
+from socialai_dsl.envs.scenario_env import ScenarioEnv
+from socialai_dsl.envs.vector_env import ScenarioVectorEnv
+from socialai_dsl.frontend import load
+from socialai_dsl.program import Program
+
+Scenario = str | Program
+
+
+def program_of(scenario: Scenario) -> Program:
+    """The program of a scenario given by name or path, or itself."""
+    return scenario if isinstance(scenario, Program) else compile_loaded(load(str(scenario)))
+
+
+def make(scenario: Scenario, render_mode: str | None = None) -> ScenarioEnv:
+    """One environment of a scenario: `make("talkitout+unsocial")`, `make("my/scenario.yaml")`.
+
+    Raises:
+        ScenarioError: the scenario does not exist or has mistakes; `.diagnostics` lists them all.
+    """
+    return ScenarioEnv(program_of(scenario), render_mode)
+
+
+def make_vec(
+    scenario: Scenario | Sequence[Scenario],
+    num_envs: int = 1,
+    num_threads: int = 1,
+    autoreset_mode: str | AutoresetMode = "NextStep",
+    copy: bool = True,
+    render_mode: str | None = None,
+) -> ScenarioVectorEnv:
+    """Many environments of a scenario, or of several in turn; see ScenarioVectorEnv.
+
+    Raises:
+        ScenarioError: a scenario does not exist or has mistakes.
+        ValueError: an argument is not what was expected.
+    """
+    names = [scenario] if isinstance(scenario, str | Program) else list(scenario)
+    return ScenarioVectorEnv(
+        [program_of(name) for name in names], num_envs, num_threads, autoreset_mode, copy, render_mode
+    )
+
+
+def make_env(scenario: Scenario, render_mode: str | None = None, **_: Any) -> ScenarioEnv:
+    """Gymnasium's entry point for a single environment."""
+    return make(scenario, render_mode)
+
+
+def make_vector_env(scenario: Scenario, num_envs: int = 1, **options: Any) -> ScenarioVectorEnv:
+    """Gymnasium's entry point for a vector environment."""
+    return make_vec(scenario, num_envs, **options)

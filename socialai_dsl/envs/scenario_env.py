@@ -1,0 +1,147 @@
+"""One scenario as a Gymnasium environment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.engine.kernel import Task
+from socialai_dsl.envs.actions import encode_action
+from socialai_dsl.envs.picture import frame
+from socialai_dsl.envs.table import Table
+from socialai_dsl.program import Program, Register
+
+Observation = dict[str, NDArray[Any]]
+
+SILENCE = "NA"
+
+
+class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
+    """One environment.
+
+    Observation: `image` uint8 (7, 7, 4), `tokens` int16 (L,). Action: int64 (4,): body action (the last is no movement),
+    speak or not, template, noun; the last two are ignored in silence. Info: `utterance` (what is heard now, one line for
+    each speaker, "NA" in silence), `history` (all lines since the reset), and at the end `success` and `outcome`.
+
+    Args:
+        program: what `socialai_dsl.compile` returns.
+        render_mode: rgb_array, ansi or human (a picture in the terminal).
+    """
+
+    metadata = {"render_modes": ["rgb_array", "ansi", "human"], "render_fps": 4}  # noqa: RUF012 - Gymnasium's protocol
+
+    def __init__(self, program: Program, render_mode: str | None = None) -> None:
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ValueError(f"render_mode: got {render_mode!r}; expected None or one of {self.metadata['render_modes']}")
+        self.program = program
+        self.render_mode = render_mode
+        self._table = Table([program], 1, 1)
+        self.observation_space = self._table.merged.observation_space()
+        self.action_space = self._table.merged.action_space()
+        self._successes = [outcome.success for outcome in program.outcome_table]
+        # One row of each array, so that a step makes no views.
+        self._image, self._tokens = self._table.image[0], self._table.tokens[0]
+        self._registers = self._table.state.registers[0]
+        self._actions = self._table.batch.ports.actions
+        self._limits = [int(n) for n in self.action_space.nvec]
+        self._history = ""
+        self._ended = True
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start an episode: `seed` starts episode 0 of the seed, without it the next one.
+
+        Options: `layout` (a known room), `test_episode` (of the fixed test set), `index` (play as environment `index` of
+        a vector with this seed).
+        """
+        super().reset(seed=seed)
+        self._table.reset(seed, options)
+        self._ended = False
+        self._history = "\n".join(self._table.history(0))
+        if self.render_mode == "human":
+            self.render()
+        return self._observation(), {"utterance": SILENCE, "history": self._history}
+
+    def step(
+        self, action: NDArray[np.int64] | Sequence[int]
+    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """One step. Raises ValueError for an action outside the space, or after the end of the episode."""
+        if self._ended:
+            raise ValueError("step: got a call outside of an episode; expected reset() first")
+        table = self._table
+        self._actions[0] = self._checked(action)
+        table.batch.step(Task.STEP_ONLY)
+        ports, registers = table.batch.ports, self._registers
+        info: dict[str, Any] = {"utterance": SILENCE, "history": self._history}
+        if registers[Register.HEARD]:
+            self._history = "\n".join(table.history(0))
+            info = {"utterance": "\n".join(table.heard(0)), "history": self._history}
+        ended = bool(registers[Register.ENDED])
+        if ended:
+            self._ended = True
+            outcome = int(registers[Register.OUTCOME])
+            info |= {"success": self._successes[outcome], "outcome": self.program.outcomes[outcome]}
+        if self.render_mode == "human":
+            self.render()
+        return self._observation(), float(ports.reward[0]), bool(ports.terminated[0]), bool(ports.truncated[0]), info
+
+    def _checked(self, action: Any) -> Any:
+        try:
+            fits = len(action) == 4 and all(0 <= part < limit for part, limit in zip(action, self._limits, strict=True))
+        except TypeError:
+            fits = False
+        if not fits or any(isinstance(part, float | np.floating) for part in action):
+            raise ValueError(f"step: got the action {action!r}; expected one of {self.action_space}")
+        return action
+
+    def _observation(self) -> Observation:
+        return {"image": self._image.copy(), "tokens": self._tokens.copy()}
+
+    def encode_action(self, action: Sequence[Any]) -> NDArray[np.int64]:
+        """The action of the space for the paper's notation or words: see `actions.encode_action`."""
+        return encode_action(action, self.program.actions, self.program.templates, self.program.nouns)
+
+    def scripted_action(self) -> NDArray[np.int64]:
+        """What the agent's frame would do now, int64 (4,). Raises ValueError if the agent follows no frame."""
+        scripted: NDArray[np.int64] = self._table.scripted_actions()[0]
+        return scripted
+
+    def describe(self) -> dict[str, Any]:
+        """The state in the scenario's own names; can be put back as a layout."""
+        return self._table.describe(0)
+
+    def snapshot(self) -> bytes:
+        """The exact state, randomness included."""
+        return self._table.snapshot()
+
+    def restore(self, data: bytes) -> None:
+        """Put back a snapshot of this scenario. Raises ValueError for any other."""
+        self._table.restore(data)
+        self._ended = bool(self._registers[Register.ENDED])
+        self._history = "\n".join(self._table.history(0))
+
+    def counters(self) -> dict[str, Any]:
+        """Counts since the environment was made: {"outcomes": {name: n}, "rules": {name: n}, "episodes": n}."""
+        return self._table.counters()
+
+    def render(self) -> Any:
+        """The room as uint8 (H, W, 3), as text, or printed, by `render_mode`."""
+        if self.render_mode is None:
+            return None
+        if self.render_mode == "rgb_array":
+            return frame(self._table, 0, "rgb_array")
+        text = frame(self._table, 0, "ansi")
+        if self.render_mode == "ansi":
+            return text
+        heard = "\n".join(self._table.heard(0))
+        print(f"{text}\n{heard}\n")  # noqa: T201 - that is what this mode is for
+        return None
+
+    def close(self) -> None:
+        """Nothing is held open but memory."""
+        self._table.batch.close()

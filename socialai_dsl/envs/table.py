@@ -1,0 +1,221 @@
+"""A batch of environments with everything that single and vector environments share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.draws import GOLDEN, MASK, mix
+from socialai_dsl.engine.batch import Batch
+from socialai_dsl.engine.kernel import BAD_ACTION, Task
+from socialai_dsl.engine.state import PIN_NONE, Key
+from socialai_dsl.envs import snapshot
+from socialai_dsl.envs.describe import describe
+from socialai_dsl.envs.layout import pins_of
+from socialai_dsl.envs.merge import Merged
+from socialai_dsl.envs.seats import check_options, choose_episodes
+from socialai_dsl.program import (
+    ENTITY_FIELDS,
+    FIRST_ENTITY,
+    VIEW,
+    Field,
+    Flag,
+    Header,
+    Program,
+    Register,
+)
+
+# Odd multipliers, one for each cell of the picture: a sum of products tells pictures apart.
+_MULTIPLIERS = np.array([mix(k * GOLDEN) | 1 for k in range(1, VIEW * VIEW + 1)], np.uint64)
+
+
+class Table:
+    """Rows of environments; row i plays `programs[program_of[i]]`.
+
+    Attributes:
+        image: uint8 (E, 7, 7, 4), tokens: int16 (E, L): the engine's own buffers.
+    """
+
+    def __init__(self, programs: Sequence[Program], rows: int, threads: int) -> None:
+        self.programs = tuple(programs)
+        self.merged = Merged.of(self.programs)
+        self.program_of = np.arange(rows) % len(self.programs)
+        pools = [[number] for number in range(len(self.programs))]
+        self.batch = Batch(self.merged.parts, pools, self.program_of.tolist(), self.merged.length, threads)
+        self.state, self.rows = self.batch.state, rows
+        self.image = self.state.image.view(np.uint8).reshape(rows, VIEW, VIEW, 4)
+        self.tokens = self.state.tokens
+        self.fresh = True
+
+    # --- playing ---
+
+    def reset(self, seed: Any, options: Mapping[str, Any] | None) -> None:
+        """Start episodes; see `seats.choose_episodes` for the meaning of seeds, `layout.pins_of` for layouts."""
+        given = check_options(options)
+        chosen = self._mask(given.get("reset_mask"))
+        pins, rows = self._pins(given.get("layout"))
+        choose_episodes(self.state.keys, chosen, seed, given, self.fresh)
+        self.fresh = False
+        ports = self.batch.ports
+        ports.chosen[:] = chosen
+        ports.layout[:] = rows
+        self.batch.reset(pins)
+
+    def step(self, task: Task, actions: Any) -> int:
+        """Step all rows, int64 (E, 4); how many episodes ended. Raises ValueError for a bad action."""
+        if self.fresh:
+            raise ValueError("step: got a call before the first reset(); expected reset() first")
+        given = np.asarray(actions)
+        if given.shape != (self.rows, 4) or given.dtype.kind not in "iu":
+            raise ValueError(
+                f"step: got actions of shape {given.shape} and type {given.dtype}; expected integers ({self.rows}, 4)"
+            )
+        self.batch.ports.actions[:] = given
+        ended = self.batch.step(task)
+        if ended == BAD_ACTION:
+            space = self.merged.action_space()
+            row = next(i for i, action in enumerate(given) if not space.contains(action.astype(space.dtype)))
+            raise ValueError(f"step: got the action {given[row].tolist()} in row {row}; expected one of {space}")
+        return ended
+
+    def _mask(self, mask: Any) -> NDArray[np.bool_]:
+        if mask is None:
+            return np.ones(self.rows, np.bool_)
+        given = np.asarray(mask)
+        if given.shape != (self.rows,) or given.dtype != np.bool_:
+            raise ValueError(f"options['reset_mask']: got {mask!r}; expected {self.rows} booleans")
+        return given
+
+    def _pins(self, layout: Any) -> tuple[NDArray[np.int16] | None, NDArray[np.int32]]:
+        """The table of pins (row 0 pins nothing) and which of its rows each environment uses."""
+        rows = np.zeros(self.rows, np.int32)
+        if layout is None:
+            return None, rows
+        layouts = [layout] * self.rows if isinstance(layout, Mapping) else layout
+        if not isinstance(layouts, Sequence) or isinstance(layouts, str) or len(layouts) != self.rows:
+            raise ValueError(f"options['layout']: got {layout!r}; expected a mapping, or a list of {self.rows}")
+        width = self.state.registers.shape[1] + 1
+        pins = [np.full(width, PIN_NONE, np.int16)]
+        known: dict[tuple[int, int], int] = {}
+        for i, one in enumerate(layouts):
+            if one is None:
+                continue
+            key = id(one), int(self.program_of[i])
+            if key not in known:
+                known[key] = len(pins)
+                row = np.full(width, PIN_NONE, np.int16)
+                given = pins_of(self.programs[key[1]], one)
+                row[: len(given)] = given
+                pins.append(row)
+            rows[i] = known[key]
+        return np.stack(pins), rows
+
+    def scripted_actions(self) -> NDArray[np.int64]:
+        """What the agents' frames would do now, int64 (E, 4); nothing changes."""
+        if not all(program.header(Header.FLAGS) & Flag.AGENT_FRAME for program in self.programs):
+            raise ValueError("the agent of this scenario follows no frame; play its variant +oracle, if it has one")
+        self.batch.script()
+        return self.batch.ports.actions.copy()
+
+    # --- looking ---
+
+    def program(self, row: int) -> Program:
+        """The program that a row plays."""
+        return self.programs[self.program_of[row]]
+
+    def heard(self, row: int) -> list[str]:
+        """Lines heard in the last step."""
+        program, registers = self.program(row), self.state.registers[row]
+        first = program.header(Header.HEARD)
+        return [program.lines[line] for line in registers[first : first + int(registers[Register.HEARD])]]
+
+    def history(self, row: int) -> list[str]:
+        """Lines heard since the reset, as far as they are kept."""
+        program, registers = self.program(row), self.state.registers[row]
+        first = program.header(Header.LOG)
+        return [program.lines[line] for line in registers[first : first + int(registers[Register.LOGGED])]]
+
+    def describe(self, row: int) -> dict[str, Any]:
+        """The state of a row in the scenario's own names; a superset of a layout."""
+        return describe(self.program(row), self.state.registers[row])
+
+    def cells(self, row: int) -> tuple[NDArray[np.uint8], tuple[int, int, int]]:
+        """The canvas as it looks, uint8 (H, W, 4), and the agent's x, y, direction."""
+        program, registers = self.program(row), self.state.registers[row]
+        width, height = program.header(Header.CANVAS_WIDTH), program.header(Header.CANVAS_HEIGHT)
+        codes = self.state.boards[row, : width * height].copy().view(np.uint8).reshape(height, width, 4)
+        pose = (int(registers[FIRST_ENTITY + field]) for field in (Field.X, Field.Y, Field.DIR))
+        return codes, tuple(pose)  # type: ignore[return-value]
+
+    def room(self, row: int) -> tuple[int, int]:
+        """Width and height of the room."""
+        registers = self.state.registers[row]
+        return int(registers[Register.WIDTH]), int(registers[Register.HEIGHT])
+
+    # --- numbers for a learner ---
+
+    def utterance_ids(self) -> NDArray[np.int64]:
+        """A number for what was heard in the last step, int64 (E,); 0 for silence."""
+        registers = self.state.registers
+        ids = np.zeros(self.rows, np.uint64)
+        for number, program in enumerate(self.programs):
+            first = program.header(Header.HEARD)
+            heard = registers[:, Register.HEARD]
+            for k in range(program.header(Header.HEARD_SIZE)):
+                rows = np.flatnonzero((self.program_of == number) & (heard > k))
+                lines = registers[rows, first + k].astype(np.uint64) + np.uint64(1)
+                ids[rows] = (ids[rows] + lines + np.uint64(number << 32)) * np.uint64(_MULTIPLIERS[k])
+        return ids.view(np.int64)
+
+    def history_ids(self) -> NDArray[np.int64]:
+        """A number for all that was heard since the reset, int64 (E,); 0 for nothing."""
+        ids = self.state.keys[:, Key.DIGEST].copy()
+        if len(self.programs) > 1:
+            # Lines are numbered by program, so equal numbers of two programs may be different texts.
+            marks = np.array([mix(number * GOLDEN) & MASK for number in range(len(self.programs))], np.uint64)
+            ids[ids != 0] ^= marks[self.program_of][ids != 0]
+        return ids.view(np.int64)
+
+    def image_ids(self) -> NDArray[np.int64]:
+        """A number for the picture, int64 (E,)."""
+        words = self.state.image.astype(np.uint64)
+        words ^= words >> np.uint64(7)
+        return (words * _MULTIPLIERS).sum(axis=1, dtype=np.uint64).view(np.int64)
+
+    def counters(self) -> dict[str, Any]:
+        """How often each outcome and each rule happened since the environments were made, and episodes ended.
+
+        With several programs, names are preceded by the scenario's.
+        """
+        totals = self.batch.ports.counters.sum(axis=0)
+        counted: dict[str, Any] = {"outcomes": {}, "rules": {}, "episodes": 0}
+        for program, first in zip(self.programs, self.batch.first_counters, strict=True):
+            prefix = f"{program.name}: " if len(self.programs) > 1 else ""
+            numbers = totals[first : first + program.header(Header.COUNTERS)].tolist()
+            rules = len(program.rules)
+            for name, number in zip(program.rules, numbers, strict=False):
+                counted["rules"][prefix + name] = number
+            for name, number in zip(program.outcomes, numbers[rules:], strict=False):
+                counted["outcomes"][prefix + name] = number
+            counted["episodes"] += numbers[-1]
+        return counted
+
+    # --- saving ---
+
+    def snapshot(self) -> bytes:
+        """The exact state of all rows, randomness included."""
+        return snapshot.pack(self._arrays(), self._identity())
+
+    def restore(self, data: bytes) -> None:
+        """Put a snapshot of the same programs and number of rows back."""
+        snapshot.unpack(data, self._arrays(), self._identity())
+        self.fresh = False
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        return {**self.state._asdict(), "counters": self.batch.ports.counters}
+
+    def _identity(self) -> dict[str, Any]:
+        return {"programs": [program.sha256 for program in self.programs], "rows": self.rows}
