@@ -19,14 +19,17 @@ class Merged:
     Attributes:
         actions, templates, nouns: words of the action space; each string once, in order of appearance.
         vocabulary: word of each token id.
+        outcomes: every way an episode can end: its name and whether it is a success.
         length: tokens in a history, L.
         parts: the programs as the engine takes them.
+        highest: greatest value of each channel of the picture.
     """
 
     actions: tuple[str, ...]
     templates: tuple[str, ...]
     nouns: tuple[str, ...]
     vocabulary: tuple[str, ...]
+    outcomes: tuple[tuple[str, bool], ...]
     length: int
     parts: tuple[Part, ...]
     highest: tuple[int, int, int, int]
@@ -38,21 +41,23 @@ class Merged:
         templates = _union([p.templates for p in programs])
         nouns = _union([p.nouns for p in programs])
         vocabulary = _union([p.vocabulary for p in programs])
+        endings = [[(o.name, o.success) for o in p.outcome_table] for p in programs]
+        outcomes = tuple(dict.fromkeys(ending for own in endings for ending in own))
         parts = tuple(
             Part(
                 words=program.words,
                 rules=len(program.rules),
-                outcomes=len(program.outcomes),
+                outcomes=[outcomes.index(ending) for ending in own],
                 actions=[*(_body(program, word) for word in actions), int(Body.NONE)],
                 templates=_positions(templates, program.templates),
                 nouns=_positions(nouns, program.nouns),
                 tokens=_positions(program.vocabulary, vocabulary),
             )
-            for program in programs
+            for program, own in zip(programs, endings, strict=True)
         )
         length = max(program.header(Header.TOKENS) for program in programs)
         highest = tuple(max(column) for column in zip(*map(_highest_codes, programs), strict=True))
-        return cls(actions, templates, nouns, vocabulary, length, parts, highest)  # type: ignore[arg-type]
+        return cls(actions, templates, nouns, vocabulary, outcomes, length, parts, highest)  # type: ignore[arg-type]
 
     def action_space(self) -> spaces.MultiDiscrete:
         """[P + 1, 2, T, N]: body action (the last is no movement), speak or not, template, noun."""

@@ -28,8 +28,8 @@ from socialai_dsl.program import (
     Register,
 )
 
-# Odd multipliers, one for each cell of the picture: a sum of products tells pictures apart.
-_MULTIPLIERS = np.array([mix(k * GOLDEN) | 1 for k in range(1, VIEW * VIEW + 1)], np.uint64)
+# Odd multipliers, one for each line heard at once.
+_MULTIPLIERS = np.array([mix(k * GOLDEN) | 1 for k in range(1, 65)], np.uint64)
 
 
 class Table:
@@ -181,9 +181,7 @@ class Table:
 
     def image_ids(self) -> NDArray[np.int64]:
         """A number for the picture, int64 (E,)."""
-        words = self.state.image.astype(np.uint64)
-        words ^= words >> np.uint64(7)
-        return (words * _MULTIPLIERS).sum(axis=1, dtype=np.uint64).view(np.int64)
+        return self.batch.identify()
 
     def counters(self) -> dict[str, Any]:
         """How often each outcome and each rule happened since the environments were made, and episodes ended.

@@ -30,7 +30,7 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
 
     Observation: `image` uint8 (E, 7, 7, 4), `tokens` int16 (E, L). Action: int64 (E, 4): body action (the last is no
     movement), speak or not, template, noun. Infos, only in steps that end episodes: `success` bool (E,), `outcome` int
-    (E,) (an index into `program.outcomes`), with masks `_success` and `_outcome`; in same-step mode also `final_obs`
+    (E,) (an index into `outcomes`), with masks `_success` and `_outcome`; in same-step mode also `final_obs`
     (arrays as in an observation) and `final_info`.
 
     Args:
@@ -66,6 +66,8 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
         self._task = _TASKS[self.autoreset_mode]
         self._table = Table(programs, int(num_envs), int(num_threads))
         self._copy = copy
+        # The last entry answers for -1: nothing ended.
+        self._successes = np.array([success for _, success in self._table.merged.outcomes] + [False])
         self.num_envs = int(num_envs)
         self.render_mode = render_mode
         self.single_observation_space = self._table.merged.observation_space()
@@ -82,6 +84,11 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
     def program(self) -> Program:
         """The program, or the first of several."""
         return self._table.programs[0]
+
+    @property
+    def outcomes(self) -> list[str]:
+        """Name of each number in `infos["outcome"]`: `program.outcomes`, of several programs the union."""
+        return [name for name, _ in self._table.merged.outcomes]
 
     @property
     def vocabulary(self) -> tuple[str, ...]:
@@ -121,8 +128,7 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
         ports = self._table.batch.ports
         ended = ports.terminated | ports.truncated
         outcome = ports.outcome.copy()
-        successes = self._successes()
-        success = ended & successes[self._table.program_of, np.maximum(outcome, 0)]
+        success = ended & self._successes[outcome]
         infos: dict[str, Any] = {
             "success": success,
             "_success": ended,
@@ -136,15 +142,6 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
             infos["final_obs"] = {k: v.copy() for k, v in final.items()} if self._copy else final
             infos["_final_obs"] = ended
         return infos
-
-    def _successes(self) -> NDArray[np.bool_]:
-        """bool (programs, outcomes): which outcomes are a success."""
-        if not hasattr(self, "_success_table"):
-            most = max(len(program.outcome_table) for program in self.programs)
-            self._success_table = np.zeros((len(self.programs), most), np.bool_)
-            for row, program in zip(self._success_table, self.programs, strict=True):
-                row[: len(program.outcome_table)] = [outcome.success for outcome in program.outcome_table]
-        return self._success_table
 
     # --- strings, made only when asked for ---
 
