@@ -25,7 +25,7 @@ class Part:
     Attributes:
         words: the program, int32.
         rules: number of counted rules.
-        outcomes: number of ways to end, deadly and time-out included.
+        outcomes: the batch's number of each way to end, deadly and time-out included.
         actions: Body of each body action of the batch.
         templates, nouns: the program's own index of each of the batch's, -1 if it has no such.
         tokens: the batch's id of each token id of the program.
@@ -33,7 +33,7 @@ class Part:
 
     words: NDArray[np.int32]
     rules: int
-    outcomes: int
+    outcomes: Sequence[int]
     actions: Sequence[int]
     templates: Sequence[int]
     nouns: Sequence[int]
@@ -46,7 +46,7 @@ class Batch:
     Attributes:
         state, ports: arrays, one row for each environment.
         tables: programs, views and pools.
-        first_counters: the first counter of each program.
+        offsets, first_counters: where each program begins in the words, and where its counters.
     """
 
     def __init__(
@@ -73,19 +73,25 @@ class Batch:
             int(words[Header.CANVAS_WIDTH] * words[Header.CANVAS_HEIGHT] + 1 + words[Header.CANVAS_HEIGHT])
             for words in headers
         )
-        words, views, offsets, self.first_counters = _link(parts)
+        words, views, self.offsets, self.first_counters = _link(parts)
         starts = np.cumsum([0, *map(len, pools)])
-        self.tables = Tables(words, views, np.array([offsets[i] for pool in pools for i in pool], np.int64))
+        self.tables = Tables(
+            words, views, np.array([self.offsets[i] for pool in pools for i in pool], np.int64)
+        )
         self.state: State = empty_state(rows, registers, board, length, VIEW)
         counters = int(sum(int(header[Header.COUNTERS]) for header in headers))
         self.ports: Ports = empty_ports(self.state, counters, threads)
         for row, pool in enumerate(pool_of_row):
             self.state.keys[row, Key.POOL] = int(starts[pool]) | len(pools[pool]) << 32
-            self.state.keys[row, Key.PROGRAM] = offsets[pools[pool][0]]
+            self.state.keys[row, Key.PROGRAM] = self.offsets[pools[pool][0]]
         self._rows = rows
         self._book = self._make_book()
         self._cuts = _cut(rows, threads)
         self._executor = ThreadPoolExecutor(len(self._cuts) - 1) if len(self._cuts) > 1 else None
+
+    def program_numbers(self) -> NDArray[np.intp]:
+        """Which program each row plays, (E,)."""
+        return np.searchsorted(self.offsets, self.state.keys[:, Key.PROGRAM].astype(np.int64))
 
     def step(self, task: Task) -> int:
         """Step all rows with `ports.actions`; how many episodes ended, or BAD_ACTION and nothing happened."""
@@ -110,6 +116,11 @@ class Batch:
         """Let `ports.actions` be what the agents' frames would do now."""
         self._share(Task.SCRIPT)
 
+    def identify(self) -> NDArray[np.int64]:
+        """A digest of each picture, int64 (E,)."""
+        self._share(Task.IDENTIFY)
+        return self.ports.image_ids.view(np.int64).copy()
+
     def close(self) -> None:
         """Let the threads go."""
         if self._executor is not None:
@@ -117,7 +128,8 @@ class Batch:
             self._executor = None
 
     def _make_book(self) -> Any:
-        return make_book((*self.tables, *self.state, *self.ports))
+        flat = self.ports._replace(counters=self.ports.counters.reshape(-1))
+        return make_book((*self.tables, *self.state, *flat))
 
     def _share(self, task: Task) -> int:
         if self._executor is None:
@@ -154,11 +166,11 @@ def _link(
         link[Link.NUMBER] = number
         link[Link.COUNTERS] = counter
         link[Link.RULES] = part.rules
-        link[Link.OUTCOMES] = part.outcomes
+        link[Link.OUTCOMES] = len(part.outcomes)
         link[Link.VIEWS] = views[canvas]
         link[Link.ACTIONS], link[Link.TEMPLATES] = len(part.actions), len(part.templates)
         link[Link.NOUNS] = len(part.nouns)
-        tables = np.array([*part.actions, *part.templates, *part.nouns], np.int32)
+        tables = np.array([*part.actions, *part.templates, *part.nouns, *part.outcomes], np.int32)
         words += [_with_tokens(part), link, tables]
         offsets.append(offset)
         first_counters.append(counter)

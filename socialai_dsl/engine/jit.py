@@ -40,6 +40,11 @@ def outline(function: _Function) -> _Function:
     return cast(_Function, njit(**_OPTIONS, forceinline=False)(function))
 
 
+def compiled(function: _Function) -> _Function:
+    """Compile a function that Python calls and that may allocate."""
+    return cast(_Function, njit(nogil=True, error_model="numpy")(function))
+
+
 @intrinsic
 def _stay_outline(context: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

@@ -8,7 +8,7 @@ import numpy as np
 from socialai_dsl.engine import rng
 from socialai_dsl.engine.cache import entry
 from socialai_dsl.engine.jit import inline, outline, part, stay_outline
-from socialai_dsl.engine.picture import CELLS, take_picture
+from socialai_dsl.engine.picture import CELLS, image_digest, take_picture
 from socialai_dsl.engine.pointers import (
     bytes_of,
     float64_of,
@@ -38,6 +38,7 @@ class Task(IntEnum):
     RESET = 3  # reset the chosen rows to the episode named by their keys
     SCRIPT = 4  # write what the agent's frame would do into the actions
     CHECK = 5  # only look whether the actions are inside their space
+    IDENTIFY = 6  # write digests of the pictures
 
 
 @inline
@@ -100,6 +101,16 @@ def _keep_final(book: Any, row: int) -> None:
     _copy(int16_of(book, Book.FINAL_TOKENS, row), int16_of(book, Book.TOKENS, row), length)
 
 
+@inline
+def _outcome_of_batch(row: Row) -> int:
+    """The batch's number of how the episode ended."""
+    link = row.program[Header.SIZE]
+    spaces = (
+        row.program[link + Link.ACTIONS] + row.program[link + Link.TEMPLATES] + row.program[link + Link.NOUNS]
+    )
+    return row.program[link + Link.END + spaces + row.registers[Register.OUTCOME]]
+
+
 @part
 def _step(book: Any, thread: int, task: int, row: int) -> int:
     """Step one row, resetting as the task says; 1 if its episode ended."""
@@ -112,10 +123,12 @@ def _step(book: Any, thread: int, task: int, row: int) -> int:
             _start_next(book, thread, row)
     else:
         opened = _open_row(book, thread, ZERO, row)
-        reward = step_row(opened, opened.program[Header.SIZE])
+        link = opened.program[Header.SIZE]
+        int32_of(book, Book.PLAYED, ZERO)[row] = opened.program[link + Link.NUMBER]
+        reward = step_row(opened, link)
         ended = opened.registers[Register.ENDED]
         if ended != 0:
-            outcome = opened.registers[Register.OUTCOME]
+            outcome = _outcome_of_batch(opened)
             if ended == TERMINATED:
                 terminated = 1
             else:
@@ -174,7 +187,8 @@ def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
         book: the arrays of `Book` (`pointers.make_book`).
         task: a `Task`.
         thread: number of the thread.
-        first, last: the rows.
+        first: the first row.
+        last: the row after the last.
 
     Returns:
         How many episodes ended, or BAD_ACTION (then nothing was done).
@@ -191,7 +205,11 @@ def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
                 _reset(book, thread, int32_of(book, Book.LAYOUT, ZERO)[row], row)
     elif task == Task.CHECK:
         return 0 if _actions_fit(book, first, last) else BAD_ACTION
-    else:
+    elif task == Task.SCRIPT:
         for row in range(first, last):
             _script(book, thread, row)
+    else:
+        for row in range(first, last):
+            image = uint32_of(book, Book.IMAGE, row)
+            uint64_of(book, Book.IMAGE_IDS, ZERO)[row] = image_digest(image)
     return ended

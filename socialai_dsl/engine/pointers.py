@@ -78,19 +78,13 @@ def _guarded(book: Any, which: int, row: int) -> Guarded[Any]:
 
 
 _TYPES: Final = (
-    types.uint8,
-    types.int16,
-    types.uint16,
-    types.int32,
-    types.uint32,
-    types.int64,
-    types.uint64,
-    types.float64,
+    *(types.uint8, types.int16, types.uint16, types.int32),
+    *(types.uint32, types.int64, types.uint64, types.float64),
 )
 bytes_of, int16_of, uint16_of, int32_of, uint32_of, int64_of, uint64_of, float64_of = (
     _guarded if config.DISABLE_JIT else _pointers_to(kind) for kind in _TYPES
 )
-"""`int16_of(book, which, row)` and so on: a pointer to a row of an array of two dimensions, into one of one dimension."""
+"""`int16_of(book, which, row)` and so on: a pointer to a row of an array of two dimensions, or into one of one."""
 
 
 def make_book(arrays: Sequence[NDArray[Any]]) -> Any:

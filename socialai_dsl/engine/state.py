@@ -46,7 +46,11 @@ class Key(IntEnum):
 
 
 class Link(IntEnum):
-    """Words that follow a program in a batch. After them: the action, template and noun of each index of the batch."""
+    """Words that follow a program in a batch.
+
+    After them: for each action, template and noun of the batch the program's own (-1 if it has none), then for each
+    outcome of the program the batch's.
+    """
 
     NUMBER = 0  # of the program in the batch
     COUNTERS = 1  # first counter
@@ -86,7 +90,9 @@ class Book(IntEnum):
     SPARE_REGISTERS = 21
     SPARE_BOARDS = 22
     SPARE_COUNTERS = 23
-    SIZES = 24
+    PLAYED = 24
+    IMAGE_IDS = 25
+    SIZES = 26
 
 
 class Size(IntEnum):
@@ -136,12 +142,14 @@ class Ports(NamedTuple):
     outcome: NDArray[np.int16]  # (E,) of the episode that ended in this step, else -1
     final_image: NDArray[np.uint32]  # (E, 49) last picture of an episode that was reset in the same step
     final_tokens: NDArray[np.int16]  # (E, L)
-    counters: NDArray[np.int64]  # (threads * counters of all programs,)
+    counters: NDArray[np.int64]  # (threads, counters of all programs)
     scratch: NDArray[np.int64]  # (threads, TEMPORARIES)
     sets: NDArray[np.uint32]  # (threads, SCRATCH_BOARDS * MAX_SIDE)
     spare_registers: NDArray[np.int16]  # (threads, R) of a row that is played on for a look
     spare_boards: NDArray[np.uint32]  # (threads, board)
     spare_counters: NDArray[np.int64]  # (threads, counters of all programs)
+    played: NDArray[np.int32]  # (E,) number of the program that was stepped
+    image_ids: NDArray[np.uint64]  # (E,) digests of the pictures
     sizes: NDArray[np.int64]  # (Size.END,)
 
 
@@ -187,12 +195,14 @@ def empty_ports(state: State, counters: int, threads: int) -> Ports:
         outcome=np.full(rows, -1, np.int16),
         final_image=np.zeros_like(state.image),
         final_tokens=np.zeros_like(state.tokens),
-        counters=np.zeros(threads * counters, np.int64),
+        counters=np.zeros((threads, counters), np.int64),
         scratch=np.zeros((threads, TEMPORARIES), np.int64),
         sets=np.zeros((threads, SCRATCH_BOARDS * MAX_SIDE), np.uint32),
         spare_registers=np.zeros((threads, registers), np.int16),
         spare_boards=np.zeros((threads, state.boards.shape[1]), np.uint32),
         spare_counters=np.zeros((threads, counters), np.int64),
+        played=np.zeros(rows, np.int32),
+        image_ids=np.zeros(rows, np.uint64),
         sizes=np.array([registers, state.boards.shape[1], state.tokens.shape[1], counters], np.int64),
     )
 
