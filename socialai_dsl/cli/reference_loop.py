@@ -4,12 +4,12 @@ import time
 
 import numpy as np
 
-from socialai_dsl.engine.jit import outline
+from socialai_dsl.engine.jit import compiled
 
 ITERATIONS = 20_000_000
 
 
-@outline
+@compiled
 def reference_loop(iterations: int) -> np.int64:
     """Mix a 64-bit number, look up and change a table of 64 KiB, branch: what an interpreter's step is made of."""
     table = np.zeros(16384, np.uint32)
