@@ -157,6 +157,8 @@ def evaluate_agent(
     import socialai_dsl
     from trainer.evaluate import evaluate
 
+    if agent == "oracle":
+        scenario = _with_script(scenario, program)
     envs = socialai_dsl.make_vec(
         scenario, num_envs=_EVALUATED_TOGETHER, copy=False, autoreset_mode="SameStep"
     )
@@ -170,6 +172,30 @@ def evaluate_agent(
     number = int(result.success.argmax())
     actions = policy.actions_of(number, int(result.lengths[number]))
     return _figures(result), _record(scenario, program, number, actions, label)
+
+
+def _with_script(scenario: str, program: "Program") -> str:
+    """The scenario itself if it scripts the agent, else its variant `oracle`, in which everything else is the same.
+
+    Raises:
+        UsageError: there is no script.
+    """
+    import socialai_dsl
+    from socialai_dsl.program import Flag, Header
+
+    if program.header(Header.FLAGS) & Flag.AGENT_FRAME:
+        return scenario
+    name, mark, parameters = scenario.partition("?")
+    scripted = f"{name}+oracle{mark}{parameters}"
+    try:
+        socialai_dsl.load(scripted)
+    except socialai_dsl.ScenarioError as error:
+        if all(diagnostic.code == "S503" for diagnostic in error.diagnostics):
+            raise UsageError(
+                f"{scenario}: the agent has no frame, and there is no variant `oracle`"
+            ) from None
+        raise
+    return scripted
 
 
 def _make_policy(agent: str, envs: Any, device: str) -> "Policy":
