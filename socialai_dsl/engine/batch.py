@@ -107,9 +107,10 @@ class Batch:
 
     def reset(self, pins: NDArray[np.int16] | None = None) -> None:
         """Start the episodes that the keys of the rows `ports.chosen` name, from their layouts (`ports.layout`)."""
-        registers = self.state.registers.shape[1]
-        self.ports = self.ports._replace(pins=no_pins(registers) if pins is None else pins)
-        self._book = self._make_book()
+        if pins is not None or len(self.ports.pins) > 1:
+            registers = self.state.registers.shape[1]
+            self.ports = self.ports._replace(pins=no_pins(registers) if pins is None else pins)
+            self._book = self._make_book()
         self._share(Task.RESET)
 
     def script(self) -> None:

@@ -9,7 +9,8 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.kernel import BAD_ACTION, Task
+from socialai_dsl.engine.step import TRUNCATED
 from socialai_dsl.envs.actions import encode_action
 from socialai_dsl.envs.picture import frame
 from socialai_dsl.envs.table import Table
@@ -18,6 +19,7 @@ from socialai_dsl.program import Program, Register
 Observation = dict[str, NDArray[Any]]
 
 SILENCE = "NA"
+_HEARD = int(Register.HEARD)  # members of an enumeration are slow indices
 
 
 class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
@@ -46,8 +48,8 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         # One row of each array, so that a step makes no views.
         self._image, self._tokens = self._table.image[0], self._table.tokens[0]
         self._registers = self._table.state.registers[0]
-        self._actions = self._table.batch.ports.actions
-        self._limits = [int(n) for n in self.action_space.nvec]
+        self._action = self._table.batch.ports.actions[0]
+        self._reward = self._table.batch.ports.reward
         self._history = ""
         self._ended = True
 
@@ -73,31 +75,30 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         """One step. Raises ValueError for an action outside the space, or after the end of the episode."""
         if self._ended:
             raise ValueError("step: got a call outside of an episode; expected reset() first")
-        table = self._table
-        self._actions[0] = self._checked(action)
-        table.batch.step(Task.STEP_ONLY)
-        ports, registers = table.batch.ports, self._registers
+        given = action if isinstance(action, np.ndarray) else np.asarray(action)
+        if given.shape != (4,) or given.dtype.kind not in "iu":
+            raise self._refusal(action)
+        self._action[:] = given
+        ended = self._table.batch.step(Task.STEP_ONLY)
+        if ended == BAD_ACTION:
+            raise self._refusal(action)
         info: dict[str, Any] = {"utterance": SILENCE, "history": self._history}
-        if registers[Register.HEARD]:
-            self._history = "\n".join(table.history(0))
-            info = {"utterance": "\n".join(table.heard(0)), "history": self._history}
-        ended = bool(registers[Register.ENDED])
+        if self._registers.item(_HEARD):
+            self._history = "\n".join(self._table.history(0))
+            info = {"utterance": "\n".join(self._table.heard(0)), "history": self._history}
+        terminated = truncated = False
         if ended:
             self._ended = True
-            outcome = int(registers[Register.OUTCOME])
+            truncated = self._registers.item(Register.ENDED) == TRUNCATED
+            terminated = not truncated
+            outcome = self._registers.item(Register.OUTCOME)
             info |= {"success": self._successes[outcome], "outcome": self.program.outcomes[outcome]}
         if self.render_mode == "human":
             self.render()
-        return self._observation(), float(ports.reward[0]), bool(ports.terminated[0]), bool(ports.truncated[0]), info
+        return self._observation(), self._reward.item(), terminated, truncated, info
 
-    def _checked(self, action: Any) -> Any:
-        try:
-            fits = len(action) == 4 and all(0 <= part < limit for part, limit in zip(action, self._limits, strict=True))
-        except TypeError:
-            fits = False
-        if not fits or any(isinstance(part, float | np.floating) for part in action):
-            raise ValueError(f"step: got the action {action!r}; expected one of {self.action_space}")
-        return action
+    def _refusal(self, action: Any) -> ValueError:
+        return ValueError(f"step: got the action {action!r}; expected one of {self.action_space}")
 
     def _observation(self) -> Observation:
         return {"image": self._image.copy(), "tokens": self._tokens.copy()}
