@@ -53,15 +53,18 @@ class Activities:
         block.emit(Op.QUADRANT, direction, constant(self.entity), goal)
         block.emit(Op.TURN_TO, constant(self.entity), direction, self.turn)
 
-    def _turn(self, direction: Term) -> None:
-        """`turn(left)` and `turn(right)`: a direction that is not known yet counts as left unless it is right."""
+    def _turn(self, way: Term) -> None:
+        """`turn(left)` and `turn(right)`: -1 is left, 1 is right, 0 is no turn."""
         block = self.to.block
-        other, done = Label(), Label()
-        block.test(Op.IF_EQ, self.to.value(direction), constant(0), other)
-        block.emit(Op.BODY, constant(Body.RIGHT))
-        block.skip(done)
-        block.bind(other)
-        block.emit(Op.BODY, constant(Body.LEFT))
+        turn = self.to.value(way)
+        done = Label()
+        for value, body in ((-1, Body.LEFT), (1, Body.RIGHT)):
+            following = Label()
+            block.test(Op.IF_EQ, turn, constant(value), following)
+            block.emit(Op.BODY, constant(body))
+            block.skip(done)
+            block.bind(following)
+        block.emit(Op.BODY, constant(Body.NONE))
         block.bind(done)
 
     def _use(self, goal: int) -> None:

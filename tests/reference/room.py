@@ -125,22 +125,27 @@ class Setup:
     def order(self) -> list[str]:
         """`order:` first, then objects, NPCs, the agent; but what a placement needs comes before it."""
         cast = [*(name for name in self.members if name != "agent"), "agent"]
-        waiting = list(dict.fromkeys([*self.scenario.order, *self.scenario.objects, *cast]))
-        done: list[str] = []
-        while waiting:
-            ready = [name for name in waiting if not self.needs(name) & set(waiting) - {name}]
-            done.append((ready or waiting)[0])
-            waiting.remove(done[-1])
-        return done
+        done: dict[str, None] = {}
 
-    def needs(self, name: str) -> set[str]:
-        """The entities that somebody's place, position or colour speaks of, through lets and facings too."""
-        found: set[str] = set()
-        for value in self.values_of(name, ("place", "at", "color")):
+        def place(name: str, busy: frozenset[str]) -> None:
+            for need in self.needs(name):
+                if need not in busy and need not in done:
+                    place(need, busy | {need})
+            done[name] = None
+
+        for name in (*self.scenario.order, *self.scenario.objects, *cast):
+            if name not in done:
+                place(name, frozenset({name}))
+        return list(done)
+
+    def needs(self, name: str) -> list[str]:
+        """The entities that somebody's place or position speaks of, through lets and facings too, as mentioned."""
+        found: dict[str, None] = {}
+        for value in self.values_of(name, ("place", "at")):
             self.collect(value.tree, found, {name})
-        return found - {name}
+        return [need for need in found if need != name]
 
-    def collect(self, tree: ast.Node, found: set[str], seen: set[str]) -> None:
+    def collect(self, tree: ast.Node, found: dict[str, None], seen: set[str]) -> None:
         """Adds the names of all entities that an expression speaks of."""
         for node in tree.walk():
             if not isinstance(node, ast.Name) or node.id in seen:
@@ -150,7 +155,7 @@ class Setup:
                 self.collect(self.let_value(node.id).tree, found, seen)
             elif node.id in self.scenario.objects or node.id in self.members:
                 seen.add(node.id)
-                found.add(node.id)
+                found[node.id] = None
                 for value in self.values_of(node.id, ("facing",)):
                     self.collect(value.tree, found, seen)
 

@@ -1,0 +1,189 @@
+"""Plays the engine and the reference interpreter side by side and says where they first differ."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from socialai_dsl.compiler import compile_scenario
+from socialai_dsl.envs import ScenarioEnv
+from socialai_dsl.frontend import LoadedScenario, load
+from socialai_dsl.program import Program
+from tests.reference.interpreter import Action, Reference, Result, plain
+
+
+class Disagreement(AssertionError):  # noqa: N818 - reads better in a failing test
+    """The two differ; the message says in what, when and after which actions."""
+
+
+@dataclass
+class Pair:
+    """One environment and one reference interpreter in the same episode."""
+
+    env: ScenarioEnv
+    reference: Reference
+    scripted: bool
+
+    @classmethod
+    def of(cls, loaded: LoadedScenario, program: Program | None = None) -> Pair:
+        """A pair for a loaded scenario; `program` replaces what the compiler makes of it."""
+        program = program or compile_scenario(loaded.checked)
+        return cls(ScenarioEnv(program), Reference(loaded.scenario), "agent" in _frames(loaded))
+
+    def play(self, seed: int, episode: int, rng: np.random.Generator) -> int:
+        """One episode with actions drawn from `rng`; the number of steps. Raises Disagreement."""
+        env, reference = self.env, self.reference
+        observation, info = env.reset(seed=seed) if episode == 0 else env.reset()
+        expected = reference.reset(seed=seed, episode=episode)
+        trail: list[Action] = []
+        where = f"{env.program.name}, seed {seed}, episode {episode}"
+        self._compare(observation, info, 0.0, False, False, expected, where, trail)
+        while True:
+            action = self._action(rng, where, trail)
+            trail.append(action)
+            observation, reward, terminated, truncated, info = env.step(np.array(action))
+            expected = reference.step(action)
+            self._compare(observation, info, reward, terminated, truncated, expected, where, trail)
+            if terminated or truncated:
+                return len(trail)
+
+    def _action(self, rng: np.random.Generator, where: str, trail: list[Action]) -> Action:
+        """Usually what the agent's frame would do, where it has one; else anything, moving more often than not."""
+        scripted = self._scripted(where, trail) if self.scripted else None
+        if scripted is not None and rng.random() < 0.85:
+            return scripted
+        primitives, _, templates, nouns = (int(n) for n in self.env.action_space.nvec)
+        moves = [
+            i
+            for i, word in enumerate(self.reference.scenario.actions)
+            if word in ("left", "right", "forward")
+        ]
+        move = int(rng.choice(moves)) if moves and rng.random() < 0.85 else int(rng.integers(primitives))
+        return move, int(rng.integers(2)), int(rng.integers(templates)), int(rng.integers(nouns))
+
+    def _scripted(self, where: str, trail: list[Action]) -> Action:
+        expected = self.reference.scripted_action()
+        action = tuple(int(part) for part in self.env.scripted_action())
+        # Template and noun mean nothing in silence.
+        got = action if action[1] else (*action[:2], 0, 0)
+        if got != expected:
+            raise Disagreement(f"{where}: scripted action {got}, expected {expected}, after {trail}")
+        return expected
+
+    def _compare(
+        self,
+        observation: dict[str, Any],
+        info: dict[str, Any],
+        reward: float,
+        terminated: bool,
+        truncated: bool,
+        expected: Result,
+        where: str,
+        trail: list[Action],
+    ) -> None:
+        tokens = observation["tokens"]
+        differences = [
+            name
+            for name, got, wanted in (
+                ("image", observation["image"].tolist(), expected.image.tolist()),
+                ("tokens", tokens.tolist(), expected.tokens + [0] * (len(tokens) - len(expected.tokens))),
+                ("heard", info["utterance"], "\n".join(expected.heard) or "NA"),
+                ("reward", round(reward, 9), round(expected.reward, 9)),
+                ("terminated", terminated, expected.terminated),
+                ("truncated", truncated, expected.truncated),
+                ("outcome", self._outcome(info), expected.outcome),
+                ("state", _state_of_env(self.env), _state_of_reference(self.env, self.reference)),
+            )
+            if got != wanted
+        ]
+        if differences:
+            details = _difference(_state_of_env(self.env), _state_of_reference(self.env, self.reference))
+            raise Disagreement(
+                f"{where}, step {len(trail)}: {', '.join(differences)} differ.\n{details}\n"
+                f"heard {info['utterance']!r}, expected {expected.heard}; outcome {self._outcome(info)}, "
+                f"expected {expected.outcome}; reward {reward}, expected {expected.reward}\nactions {trail}"
+            )
+
+    def _outcome(self, info: dict[str, Any]) -> int | str | None:
+        """The outcome as the reference names it: an id, a place in the list, or deadly, timeout."""
+        if "outcome" not in info:
+            return None
+        name = info["outcome"]
+        return self.env.program.outcomes.index(name) if "@" in name else name
+
+
+def _frames(loaded: LoadedScenario) -> set[str]:
+    return {frame.member for frame in loaded.checked.frames}
+
+
+def _state_of_env(env: ScenarioEnv) -> dict[str, Any]:
+    """Everything that both sides can name, from the registers of the engine."""
+    program, state = env.program, env.describe()
+    common = {"t": state["t"], "room": state["room"], "cast": {}, "objects": {}, "let": {}}
+    for entity in program.entities:
+        if entity.role == "object":
+            group = state[entity.key] if entity.index is not None else [state[entity.key]]
+            common["objects"][entity.key] = [
+                {"at": o["at"], "color": o["color"], "state": o["state"], "gone": o.get("gone", False)} for o in group
+            ]
+        else:
+            common["cast"][entity.key] = _member(state[entity.key])
+    for name, value in state["let"].items():
+        owner, dot, register = name.partition(".")
+        if not dot:
+            common["let"][name] = value
+        elif not register.startswith("fired."):
+            common["cast"][owner].setdefault("registers", {})[register] = value
+    return dict(_flatten(common))
+
+
+def _member(described: dict[str, Any]) -> dict[str, Any]:
+    """A cast member; what does not vary (a fixed name) the engine does not hold."""
+    kept = ("at", "color", "facing", "clock", "name", "state")
+    return {key: described[key] for key in kept if key in described} | {"gone": described.get("gone", False)}
+
+
+def _flatten(node: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    if isinstance(node, dict):
+        for key, value in node.items():
+            yield from _flatten(value, f"{path}.{key}" if path else str(key))
+    else:
+        yield path, node
+
+
+def _state_of_reference(env: ScenarioEnv, reference: Reference) -> dict[str, Any]:
+    """The same from the reference, of what the engine holds."""
+    held = {name.path for name in env.program.registers}
+    state = reference.describe()
+    for name, member in state["cast"].items():
+        del member["kind_code"], member["was_poked"], member["once"]
+        for key, path in (("name", "name"), ("clock", "clock"), ("state", "frame")):
+            if f"{name}.{path}" not in held:
+                del member[key]
+        if isinstance(member.get("state"), int):
+            member["state"] = f"step{member['state']}"
+        slots = {k: plain(v) for k, v in reference.world.cast[name].slots.items()}
+        member["registers"] = {k: v for k, v in {**slots, **member["registers"]}.items() if f"{name}.{k}" in held}
+        if not member["registers"]:
+            del member["registers"]
+    state["let"] = {k: v for k, v in state["let"].items() if f"let.{k}" in held}
+    return dict(_flatten(state))
+
+
+def _difference(got: dict[str, Any], wanted: dict[str, Any]) -> str:
+    keys = sorted(got.keys() | wanted.keys())
+    return "\n".join(
+        f"  {key}: {got.get(key, '-')}, expected {wanted.get(key, '-')}"
+        for key in keys
+        if got.get(key) != wanted.get(key)
+    )
+
+
+def agree(name: str, episodes: int, seed: int = 0, program: Program | None = None) -> int:
+    """Play this many episodes of a scenario on both; the number of steps. Raises Disagreement."""
+    pair = Pair.of(load(name), program)
+    rng = np.random.default_rng(seed)
+    return sum(pair.play(seed, episode, rng) for episode in range(episodes))
