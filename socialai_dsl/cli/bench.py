@@ -77,9 +77,9 @@ def _table(report: "Report") -> str:
         batch = "Env" if row.batch == 0 else str(row.batch)
         lines.append(
             f"{row.what[:28]:<28} {row.mix:<7} {batch:>6} {row.cpu:>12,.0f} {row.wall:>13,.0f} "
-            f"{row.resets:>10,.0f} {row.cpu / report.reference:>8.4f}"
+            f"{row.resets:>10,.0f} {1000 * row.cpu / report.reference:>8.2f}"
         )
-    lines += ["", "ratio: steps for each iteration of the reference loop; compare machines by it"]
+    lines += ["", "ratio: steps for every 1,000 iterations of the reference loop; compare machines by it"]
     if report.training is not None:
         lines.append(f"training: {report.training:,.0f} frames/s wall, all cores")
     return "\n".join(lines)

@@ -96,11 +96,12 @@ def _measure_vector(
     what: str, mix: str, envs: Any, actions: Actions, repetitions: int, seconds: float
 ) -> Row:
     envs.reset(seed=1)
-    ended = 0
-    for batch in actions:
-        *_, terminations, truncations, _ = envs.step(batch)
-        ended += int(np.count_nonzero(terminations | truncations))
-    share = ended / (BATCHES * envs.num_envs)
+    ended, passes = 0, 8  # long enough for episodes that nothing ends but time
+    for _ in range(passes):
+        for batch in actions:
+            *_, terminations, truncations, _ = envs.step(batch)
+            ended += int(np.count_nonzero(terminations | truncations))
+    share = ended / (passes * BATCHES * envs.num_envs)
 
     def run(steps: int) -> None:
         step = envs.step
@@ -113,11 +114,15 @@ def _measure_vector(
 
 
 def _measure_single(name: str, mix: str, allowed: Allowed | None, repetitions: int, seconds: float) -> Row:
-    env = socialai_dsl.make(name)
     one = socialai_dsl.make_vec(name, num_envs=1)
     batches = walk_actions(one, allowed, 1) if allowed else random_actions(one, 1)
     one.close()
-    actions = list(batches[:, 0])
+    return _measure_env(name, mix, socialai_dsl.make(name), list(batches[:, 0]), repetitions, seconds)
+
+
+def _measure_env(
+    what: str, mix: str, env: Any, actions: Sequence[Any], repetitions: int, seconds: float
+) -> Row:
     env.reset(seed=1)
     episodes = 0
 
@@ -135,7 +140,7 @@ def _measure_single(name: str, mix: str, allowed: Allowed | None, repetitions: i
     share = episodes / probe
     cpu, wall = _time(run, 1, repetitions, seconds)
     env.close()
-    return Row(name, mix, 0, cpu, wall, cpu * share)
+    return Row(what, mix, 0, cpu, wall, cpu * share)
 
 
 def _measure_mixture(scenarios: Sequence[str], mix: str, batch: int, repetitions: int, seconds: float) -> Row:
@@ -161,17 +166,8 @@ def _measure_peer(repetitions: int, seconds: float) -> Iterator[Row]:
     env = gymnasium.make("MiniGrid-Empty-8x8-v0")
     env.action_space.seed(1)
     actions = [env.action_space.sample() for _ in range(BATCHES)]
-    env.reset(seed=1)
-
-    def run(steps: int) -> None:
-        for i in range(steps):
-            *_, terminated, truncated, _ = env.step(actions[i % BATCHES])
-            if terminated or truncated:
-                env.reset()
-
-    cpu, wall = _time(run, 1, repetitions, seconds)
-    env.close()
-    yield Row(f"MiniGrid {minigrid.__version__} Empty-8x8", "random", 0, cpu, wall, 0.0)
+    what = f"MiniGrid {minigrid.__version__} Empty-8x8"
+    yield _measure_env(what, "random", env, actions, repetitions, seconds)
 
 
 def _measure_training(scenario: str, frames: int) -> float:
