@@ -14,15 +14,15 @@ from socialai_dsl.program import Field, Op
 @inline
 def holds(row: Row, op: int, a: int, b: int) -> bool:
     """Whether a test holds."""
-    if op <= Op.IF_BIT:
-        return _compares(op, value(row, a), value(row, b))
     if op == Op.IF_HEARD:
         return is_in_inbox(row, b, a)
     if op == Op.IF_UNPINNED:
         return row.pins[a] == PIN_NONE
     if op == Op.IF_CHANCE:
         return rng.holds_with_chance(draw_at(row, b), a)
-    return _relates(row, op, value(row, a), value(row, b))
+    left = value(row, a)
+    right = value(row, b)
+    return _compares(op, left, right) if op <= Op.IF_BIT else _relates(row, op, left, right)
 
 
 @inline

@@ -62,35 +62,10 @@ def _open_row(book: Any, thread: int, layout: int, row: int) -> Row:
     )
 
 
-@outline
-def _reset(book: Any, thread: int, layout: int, row: int) -> None:
-    """Start the episode that the row's key names."""
-    stay_outline()
-    key = uint64_of(book, Book.KEYS, row)
-    key[Key.KEY] = rng.episode_key(key[Key.SEED], key[Key.INDEX], key[Key.EPISODE])
-    first = np.int64(key[Key.POOL] & np.uint64(0xFFFFFFFF))
-    count = np.int64(key[Key.POOL] >> np.uint64(32))
-    if count > 1:
-        pinned = int16_of(book, Book.PINS, layout)[int64_of(book, Book.SIZES, ZERO)[Size.REGISTERS]]
-        first += draw_member(key[Key.KEY], count, pinned)
-    key[Key.PROGRAM] = np.uint64(int64_of(book, Book.CHOICES, ZERO)[first])
-    opened = _open_row(book, thread, layout, row)
-    reset_row(opened, layout != 0)
-    take_picture(opened, opened.program[Header.SIZE])
-
-
 @inline
 def _copy(target: Any, source: Any, count: int) -> None:
     for i in range(count):
         target[i] = source[i]
-
-
-@outline
-def _start_next(book: Any, thread: int, row: int) -> None:
-    """Reset a row to its next episode."""
-    stay_outline()
-    uint64_of(book, Book.KEYS, row)[Key.EPISODE] += np.uint64(1)
-    _reset(book, thread, ZERO, row)
 
 
 @outline
@@ -112,35 +87,69 @@ def _outcome_of_batch(row: Row) -> int:
 
 
 @part
-def _step(book: Any, thread: int, task: int, row: int) -> int:
-    """Step one row, resetting as the task says; 1 if its episode ended."""
-    reward = 0.0
-    outcome = -1
-    terminated = 0
-    truncated = 0
-    if int16_of(book, Book.REGISTERS, row)[Register.ENDED] != 0:
-        if task == Task.STEP_NEXT:
-            _start_next(book, thread, row)
+def _reset(book: Any, thread: int, layout: int, row: int) -> None:
+    """Start the episode that the row's key names."""
+    key = uint64_of(book, Book.KEYS, row)
+    key[Key.KEY] = rng.episode_key(key[Key.SEED], key[Key.INDEX], key[Key.EPISODE])
+    first = np.int64(key[Key.POOL] & np.uint64(0xFFFFFFFF))
+    count = np.int64(key[Key.POOL] >> np.uint64(32))
+    if count > 1:
+        pinned = int16_of(book, Book.PINS, layout)[int64_of(book, Book.SIZES, ZERO)[Size.REGISTERS]]
+        first += draw_member(key[Key.KEY], count, pinned)
+    key[Key.PROGRAM] = np.uint64(int64_of(book, Book.CHOICES, ZERO)[first])
+    opened = _open_row(book, thread, layout, row)
+    reset_row(opened, layout != 0)
+    take_picture(opened, opened.program[Header.SIZE])
+
+
+@part
+def _step(book: Any, thread: int, row: int) -> int:
+    """Step one row and report on it; 1 if its episode ended."""
+    opened = _open_row(book, thread, ZERO, row)
+    link = opened.program[Header.SIZE]
+    int32_of(book, Book.PLAYED, ZERO)[row] = opened.program[link + Link.NUMBER]
+    float64_of(book, Book.REWARD, ZERO)[row] = step_row(opened, link)
+    ended = opened.registers[Register.ENDED]
+    if ended == 0:
+        return 0
+    int16_of(book, Book.OUTCOME, ZERO)[row] = _outcome_of_batch(opened)
+    if ended == TERMINATED:
+        bytes_of(book, Book.TERMINATED, ZERO)[row] = 1
     else:
-        opened = _open_row(book, thread, ZERO, row)
-        link = opened.program[Header.SIZE]
-        int32_of(book, Book.PLAYED, ZERO)[row] = opened.program[link + Link.NUMBER]
-        reward = step_row(opened, link)
-        ended = opened.registers[Register.ENDED]
-        if ended != 0:
-            outcome = _outcome_of_batch(opened)
-            if ended == TERMINATED:
-                terminated = 1
-            else:
-                truncated = 1
-            if task == Task.STEP_SAME:
-                _keep_final(book, row)
-                _start_next(book, thread, row)
-    float64_of(book, Book.REWARD, ZERO)[row] = reward
-    int16_of(book, Book.OUTCOME, ZERO)[row] = outcome
-    bytes_of(book, Book.TERMINATED, ZERO)[row] = terminated
-    bytes_of(book, Book.TRUNCATED, ZERO)[row] = truncated
-    return terminated + truncated
+        bytes_of(book, Book.TRUNCATED, ZERO)[row] = 1
+    return 1
+
+
+@inline
+def _report_nothing(book: Any, row: int) -> None:
+    float64_of(book, Book.REWARD, ZERO)[row] = 0.0
+    int16_of(book, Book.OUTCOME, ZERO)[row] = -1
+    bytes_of(book, Book.TERMINATED, ZERO)[row] = 0
+    bytes_of(book, Book.TRUNCATED, ZERO)[row] = 0
+
+
+@part
+def _advance(book: Any, thread: int, task: int, row: int) -> int:
+    """Step or reset one row, or both, as the task says; 1 if its episode ended."""
+    ended = 0
+    layout = ZERO
+    if task == Task.RESET:
+        if bytes_of(book, Book.CHOSEN, ZERO)[row] == 0:
+            return 0
+        layout = int32_of(book, Book.LAYOUT, ZERO)[row]
+    else:
+        _report_nothing(book, row)
+        over = int16_of(book, Book.REGISTERS, row)[Register.ENDED] != 0
+        if not over:
+            ended = _step(book, thread, row)
+            if ended == 0 or task != Task.STEP_SAME:
+                return ended
+            _keep_final(book, row)
+        elif task != Task.STEP_NEXT:
+            return 0
+        uint64_of(book, Book.KEYS, row)[Key.EPISODE] += np.uint64(1)
+    _reset(book, thread, layout, row)
+    return ended
 
 
 @inline
@@ -194,15 +203,11 @@ def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
         How many episodes ended, or BAD_ACTION (then nothing was done).
     """
     ended = 0
-    if task <= Task.STEP_ONLY:
-        if not _actions_fit(book, first, last):
+    if task <= Task.RESET:
+        if task != Task.RESET and not _actions_fit(book, first, last):
             return BAD_ACTION
         for row in range(first, last):
-            ended += _step(book, thread, task, row)
-    elif task == Task.RESET:
-        for row in range(first, last):
-            if bytes_of(book, Book.CHOSEN, ZERO)[row] != 0:
-                _reset(book, thread, int32_of(book, Book.LAYOUT, ZERO)[row], row)
+            ended += _advance(book, thread, task, row)
     elif task == Task.CHECK:
         return 0 if _actions_fit(book, first, last) else BAD_ACTION
     elif task == Task.SCRIPT:

@@ -6,10 +6,10 @@ from socialai_dsl.engine.bits import count_bits, nth_bit
 from socialai_dsl.engine.boards import copy_room, room_table
 from socialai_dsl.engine.entities import field, front_x, front_y, is_present, set_field
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.operands import assign, draw_below, value
+from socialai_dsl.engine.operands import draw_below, value
 from socialai_dsl.engine.sets import add_cell, clear, count_cells, fill_next_to, get_line, has_cell, set_line
 from socialai_dsl.engine.state import NOTHING, OCCUPIED, ONE, ZERO, Row
-from socialai_dsl.program import Field, Header, Op, Register, Side
+from socialai_dsl.program import TEMPORARY, Field, Header, Op, Register, Side
 
 
 @outline
@@ -19,16 +19,15 @@ def place(row: Row, op: int, a: int, b: int, c: int) -> None:
     if op == Op.MAKE_ROOM:
         make_room(row, value(row, a), value(row, b))
     elif op == Op.PUT:
-        put(row, value(row, a), value(row, b), value(row, b + 1))
+        put(row, value(row, a), row.scratch[b - TEMPORARY], row.scratch[b - TEMPORARY + 1])
     elif op == Op.PICK_CELL:
         _pick_cell(row, a, b, c)
-    elif op == Op.B_FLOOR:
+    elif op == Op.B_FLOOR or op == Op.B_RECT:
         _fill_floor(row, a)
+        if op == Op.B_RECT:
+            _cut(row, a, b - TEMPORARY)
     elif op == Op.B_WALL:
         _fill_wall(row, a, b, c)
-    elif op == Op.B_RECT:
-        _fill_floor(row, a)
-        _cut(row, a, b)
     elif op == Op.B_NEXT_TO:
         fill_next_to(row, a, value(row, b))
     elif op == Op.B_IN_FRONT_OF:
@@ -76,14 +75,14 @@ def _fill_wall(row: Row, a: int, side: int, margin: int) -> None:
 
 @inline
 def _cut(row: Row, a: int, b: int) -> None:
-    """Keep the cells of board a that lie in the rectangle of operand b: left, right, top, bottom."""
-    left = max(value(row, b), 0)
-    right = min(value(row, b + 1), row.program[Header.CANVAS_WIDTH] - 1)
+    """Keep the cells of board a that lie in the rectangle of temporaries from b on: left, right, top, bottom."""
+    left = max(row.scratch[b], 0)
+    right = min(row.scratch[b + 1], row.program[Header.CANVAS_WIDTH] - 1)
     columns = 0
     if left <= right:
         columns = (np.int64(1) << (right + 1)) - (np.int64(1) << left)
-    top = value(row, b + 2)
-    bottom = value(row, b + 3)
+    top = row.scratch[b + 2]
+    bottom = row.scratch[b + 3]
     for y in range(row.program[Header.CANVAS_HEIGHT]):
         set_line(row, a, y, get_line(row, a, y) & columns if top <= y <= bottom else ZERO)
 
@@ -108,8 +107,8 @@ def _pick_cell(row: Row, target: int, a: int, site: int) -> None:
             left -= count_bits(get_line(row, a, y))
             y += 1
         x = nth_bit(get_line(row, a, y), left)
-    assign(row, target, x)
-    assign(row, target + 1, y)
+    row.scratch[target - TEMPORARY] = x
+    row.scratch[target - TEMPORARY + 1] = y
 
 
 @inline

@@ -72,27 +72,28 @@ def run(row: Row, pc: int) -> None:
 @inline
 def _compute(row: Row, op: int, a: int, b: int, c: int) -> None:
     """Instructions that write a value."""
+    result = value(row, b)
     if op == Op.LOAD:
-        result = value(row, b)
-    elif op <= Op.MAX:
-        result = _arithmetic(op, value(row, b), value(row, c))
+        pass
+    elif op <= Op.MAX or op == Op.DISTANCE or op == Op.QUADRANT:
+        result = _combine(row, op, result, value(row, c))
     elif op == Op.FIELD:
-        result = field(row, value(row, b), c)
+        result = field(row, result, c)
     elif op == Op.DRAW:
-        result = draw_below(row, c, value(row, b))
+        result = draw_below(row, c, result)
     elif op == Op.SET_BIT:
-        result = value(row, a) | (np.int64(1) << (value(row, b) & 63))
-    elif op == Op.DISTANCE:
-        result = entities.distance(row, value(row, b), value(row, c))
-    elif op == Op.QUADRANT:
-        result = entities.quadrant(row, value(row, b), value(row, c))
+        result = value(row, a) | (np.int64(1) << (result & 63))
     else:
-        result = _bits(row, op, value(row, b), c)
+        result = _bits(row, op, result, c)
     assign(row, a, result)
 
 
 @inline
-def _arithmetic(op: int, left: int, right: int) -> int:
+def _combine(row: Row, op: int, left: int, right: int) -> int:
+    if op == Op.DISTANCE:
+        return entities.distance(row, left, right)
+    if op == Op.QUADRANT:
+        return entities.quadrant(row, left, right)
     if op == Op.ADD:
         return left + right
     if op == Op.SUB:
