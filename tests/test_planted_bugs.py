@@ -187,9 +187,11 @@ def play_all(pair: Pair) -> None:
         pair.play(5, episode, rng)
 
 
-@pytest.mark.parametrize("wrong", [SpeaksBeforeMoving, PaysForTheStepBefore])
-def test_a_wrong_order_of_events_is_found_out(wrong: type[Reference]) -> None:
-    loaded = load("talkitout+oracle")
+@pytest.mark.parametrize(
+    ("wrong", "name"), [(SpeaksBeforeMoving, COUNTING), (PaysForTheStepBefore, "talkitout+oracle")]
+)
+def test_a_wrong_order_of_events_is_found_out(wrong: type[Reference], name: str) -> None:
+    loaded = load(name)
     pair = Pair.of(loaded)
     pair.reference = wrong(loaded.scenario)
     with pytest.raises(Disagreement):
