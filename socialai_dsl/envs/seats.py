@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from socialai_dsl.draws import MAX_SEED, TEST_DOMAIN
 from socialai_dsl.engine.state import Key
 
-TEST_EPISODES = 500
+LAST_EPISODE = (1 << 32) - 1
 OPTIONS = ("index", "layout", "reset_mask", "test_episode")
 
 
@@ -30,12 +30,13 @@ def choose_episodes(
 ) -> None:
     """Set seed, index and episode in the rows, uint64 (E, Key.WORDS), that are chosen, bool (E,).
 
+    `test_episode` names episodes of a domain of keys that no seed reaches; 0 to 499 are the fixed test set.
     One seed gives environment i (seed, i); a list gives it (seeds[i], 0); both start at episode 0. Without a seed the
     next episode follows, or, in a fresh batch, a seed is drawn from the operating system.
     """
     rows = np.flatnonzero(chosen)
     if options.get("test_episode") is not None:
-        episodes = _each("options['test_episode']", options["test_episode"], len(keys), TEST_EPISODES - 1)
+        episodes = _each("options['test_episode']", options["test_episode"], len(keys), LAST_EPISODE)
         keys[rows, Key.SEED], keys[rows, Key.INDEX] = TEST_DOMAIN, 0
         keys[rows, Key.EPISODE] = episodes[rows]
         return
