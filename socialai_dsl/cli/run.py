@@ -14,6 +14,7 @@ from socialai_dsl.cli.run_folder import (
     SETTINGS,
     create_run_folder,
     read_json,
+    scenario_folder_name,
     versions,
     write_json,
     write_text,
@@ -206,7 +207,7 @@ def _draw_curve(settings: Settings, program: "Program", folder: Path, result: di
     test = (result["frames"], result["eval"]["success_rate"], result["eval"]["success_rate_se"])
     successes = frozenset(outcome.name for outcome in program.outcome_table if outcome.success)
     curve = read_curve(folder / "metrics.jsonl", successes, test)
-    title = f"{settings.scenario}, {settings.agent}, seed {settings.seed}"
+    title = f"{scenario_folder_name(settings.scenario)}, {settings.agent}, seed {settings.seed}"
     draw_learning_curve(curve, title, folder / "learning_curve.png")
 
 
