@@ -48,7 +48,7 @@ class Allowed:
     """
 
     def __init__(self, name: str, seed: int = 0) -> None:
-        envs = socialai_dsl.make_vec(name, num_envs=_PROBE_ENVS)
+        envs: Any = socialai_dsl.make_vec(name, num_envs=_PROBE_ENVS)
         sizes = [int(n) for n in envs.single_action_space.nvec]
         words = [*socialai_dsl.compile(socialai_dsl.load(name)).actions, "none"]
         walking = np.array([i for i, word in enumerate(words[: sizes[0]]) if word in _WALKING], np.int64)
