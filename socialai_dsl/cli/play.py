@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.errors import Exit, UsageError
-from socialai_dsl.diagnostics import did_you_mean, printable
+from socialai_dsl.diagnostics import printable
 
 if TYPE_CHECKING:
     import numpy as np
@@ -118,7 +118,7 @@ def _ask_action(env: Any, program: "Program", ask: Callable[[str], str]) -> "NDA
         try:
             action: NDArray[np.int64] = env.unwrapped.encode_action((primitive, utterance))
         except ValueError as error:
-            print(f"  {printable(str(error))}{_suggestion(line, program)}")
+            print(f"  {printable(str(error))}")
             continue
         return action
 
@@ -141,9 +141,3 @@ def _choices(program: "Program") -> str:
         f"  utterances: {', '.join(program.templates)}\n"
         f"  <noun>:     {', '.join(program.nouns)}"
     )
-
-
-def _suggestion(line: str, program: "Program") -> str:
-    sayable = {template.replace("<noun>", noun) for template in program.templates for noun in program.nouns}
-    meant = did_you_mean(line, sayable | set(program.actions))
-    return f"; did you mean {meant!r}?" if meant else ""

@@ -11,6 +11,8 @@ from socialai_dsl.envs.tiles import draw_tile
 _ARROWS: Final = ">v<^"
 _ANSI_COLOURS: Final = (31, 32, 34, 35, 33, 37)
 _RESET: Final = "\x1b[0m"
+_COLOUR_LETTERS: Final = "rgbpye"
+_COLOURLESS: Final = frozenset({tiles.UNSEEN, tiles.LAVA})
 
 # Letters of the text picture; where a status matters it picks from the letters, the last one serves the rest.
 _LETTERS: Final[dict[int, str]] = {
@@ -72,8 +74,9 @@ def draw_ansi(codes: NDArray[np.uint8], agent: tuple[int, int, int], colour: boo
     """The room as text, two characters a cell.
 
     The agent and the NPCs show an arrow in their direction of gaze: the agent's stands alone, an NPC's
-    follows the letter of its kind (`A` for kind 0). Capital letters of objects mean closed, lit or full;
-    with `colour`, escape codes give the objects' colours.
+    follows the letter of its kind (`A` for kind 0). Objects have the first letter of their colour (`e` for
+    grey) before their own: `gD` is a green closed door, `gL` a locked one, `g/` an open one. With `colour`,
+    escape codes show the colours as well, those of NPCs too.
     """
     _check(codes, None)
     x, y, direction = agent
@@ -93,12 +96,14 @@ def draw_ansi(codes: NDArray[np.uint8], agent: tuple[int, int, int], colour: boo
 
 
 def _letters(code: tuple[int, int, int, int]) -> str:
-    kind, _, status, orientation = code
+    kind, colour, status, orientation = code
     if kind == tiles.NPC:
         return chr(ord("A") + status % 26) + _ARROWS[orientation % 4]
     choices = _LETTERS.get(kind, "?")
     letter = choices[min(status, len(choices) - 1)]
-    return "##" if kind == tiles.WALL else " " + letter
+    if kind == tiles.WALL:
+        return "##"
+    return (" " if kind in _COLOURLESS else _COLOUR_LETTERS[colour % 6]) + letter
 
 
 def _paint(text: str, style: str, colour: bool) -> str:

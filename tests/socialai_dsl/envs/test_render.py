@@ -97,11 +97,12 @@ def test_wrong_shapes_are_refused() -> None:
 
 def test_text_picture() -> None:
     codes = room(5, 4)
-    codes[0, 2] = (tiles.DOOR, 0, 2, 0)
+    codes[0, 2] = (tiles.DOOR, 1, 2, 0)
+    codes[1, 2] = (tiles.LAVA, 0, 0, 0)
     codes[2, 3] = (tiles.NPC, 2, 1, 2)
     assert draw_ansi(codes, (1, 1, 3)).splitlines() == [
-        "#### L####",
-        "## ^ . .##",
+        "####gL####",
+        "## ^ ~ .##",
         "## . .B<##",
         "##########",
     ]
