@@ -1,0 +1,338 @@
+"""Builds tiny programs word by word, so that the engine is tested without the compiler."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from socialai_dsl import draws
+from socialai_dsl.engine.batch import Batch, Part
+from socialai_dsl.engine.state import Key
+from socialai_dsl.program import (
+    CONSTANT,
+    ENTITY_FIELDS,
+    FIRST_ENTITY,
+    TEMPORARY,
+    Body,
+    EntityColumn,
+    EntityName,
+    Field,
+    Flag,
+    FrameColumn,
+    Header,
+    Op,
+    Outcome,
+    Program,
+    TypeColumn,
+    pack_cell,
+)
+
+EMPTY, WALL, DOOR, LAVA, NPC = 1, 2, 4, 9, 11
+OPEN, CLOSED, LOCKED = 0, 1, 2
+
+Instruction = tuple[int, ...]
+
+
+def constant(number: int) -> int:
+    """The operand that stands for a number."""
+    return CONSTANT + number
+
+
+def temporary(number: int) -> int:
+    """The operand that stands for a temporary."""
+    return TEMPORARY + number
+
+
+def entity_register(entity: int, which: Field) -> int:
+    """The register of a field of an entity."""
+    return FIRST_ENTITY + ENTITY_FIELDS * entity + which
+
+
+@dataclass
+class FrameSpec:
+    """A frame of an entity: for each state its activity, and its `first` and `then` by what was heard.
+
+    Keys of `first` and `then` are utterance classes; -1 stands for all of them.
+    """
+
+    entity: int
+    activities: Sequence[Sequence[Instruction]]
+    first: Sequence[dict[int, Sequence[Instruction]]] = ()
+    then: Sequence[dict[int, Sequence[Instruction]]] = ()
+
+
+@dataclass
+class Assembly:
+    """A room of `size` on a canvas of `canvas`, entities put where `at` says, and code.
+
+    Entities are numbered agent, NPCs, objects. Object types: door (open, closed, locked) and lava.
+    Templates x nouns are 2 x 3; `classes` gives the utterance class of each pair.
+    """
+
+    at: Sequence[tuple[int, int] | None] = ((2, 2),)
+    facing: Sequence[int] = ()
+    npcs: int = 0
+    objects: Sequence[str] = ()
+    size: tuple[int, int] = (5, 5)
+    canvas: tuple[int, int] = (6, 7)
+    in_wall: bool = True
+    registers: int = 8
+    reset: Sequence[Instruction] = ()
+    settle: Sequence[Instruction] = ()
+    rules: Sequence[Instruction] = ()
+    outcomes: dict[tuple[int, int], Sequence[Instruction]] = field(default_factory=dict)
+    frames: Sequence[FrameSpec] = ()
+    classes: Sequence[int] = (1, 2, 3, 1, 1, 4)
+    horizon: int = 10
+    flags: int = 0
+    earshot: tuple[int, int] = (0, 1)
+    audible: Sequence[int] = ()
+    lines: Sequence[tuple[str, Sequence[int], int]] = ()  # text, token ids, class
+    tokens: int = 8
+    log: int = 4
+    deadly: bool = False
+    counted: int = 1
+    sites: Sequence[tuple[int, int]] = ((draws.site("a"), 0), (draws.site("b"), 3))
+    agent_says: int = 0
+
+    def __post_init__(self) -> None:
+        self.code: list[Instruction] = [(Op.HALT, 0, 0, 0)]
+        self.own = FIRST_ENTITY + ENTITY_FIELDS * len(self.at)
+
+    def add(self, block: Sequence[Instruction]) -> int:
+        """Append code; its pc, 0 for no code."""
+        if not block:
+            return 0
+        pc = len(self.code)
+        for op, *operands in block:
+            self.code.append((op, *operands, *[0] * (3 - len(operands))))
+        self.code.append((Op.HALT, 0, 0, 0))
+        return pc
+
+    def program(self) -> Program:
+        """The program, with all tables."""
+        classes = max(self.classes) + 1
+        width, height = self.canvas
+        entities = len(self.at)
+        frame_registers = self.own + self.registers
+        heard = frame_registers + 2 * len(self.frames)
+        inbox = self.inbox_register(0, len(self.frames))
+        log = inbox + 5 * entities
+        header = np.zeros(Header.END, np.int64)
+        tables: list[tuple[Header, list[int]]] = [
+            (Header.ACTION_AT, [*range(7), Body.NONE]),
+            (Header.CLASS_AT, list(self.classes)),
+            (Header.ENTITY_AT, self._entities()),
+            (Header.TYPE_AT, self._types()),
+            (Header.ROOM_AT, self._room()),
+            (Header.FRAME_AT, self._frames(frame_registers, inbox)),
+            (Header.STATE_AT, self._states(classes)),
+            (Header.OUTCOME_AT, self._outcomes(classes)),
+            (Header.LINE_AT, self._lines()),
+            (Header.TOKEN_AT, [token for _, tokens, _ in self.lines for token in tokens]),
+            (Header.SITE_AT, [number for site in self.sites for number in site]),
+        ]
+        header[Header.RESET_PC] = self.add(self._reset())
+        header[Header.SETTLE_PC] = self.add(self.settle)
+        header[Header.RULES_PC] = self.add(self.rules)
+        tables.append((Header.CODE_AT, [word for instruction in self.code for word in instruction]))
+        words = [0] * Header.END
+        for at, table in tables:
+            header[at] = len(words)
+            words += table
+        outcomes = 4
+        for name, number in {
+            Header.SIZE: len(words),
+            Header.REGISTERS: log + self.log,
+            Header.CANVAS_WIDTH: width,
+            Header.CANVAS_HEIGHT: height,
+            Header.ENTITIES: entities,
+            Header.NPCS: self.npcs,
+            Header.PRIMITIVES: 7,
+            Header.TEMPLATES: 2,
+            Header.NOUNS: 3,
+            Header.CLASSES: classes,
+            Header.HORIZON: self.horizon,
+            Header.FLAGS: self.flags,
+            Header.TOKENS: self.tokens,
+            Header.LOG: log,
+            Header.LOG_SIZE: self.log,
+            Header.HEARD: heard,
+            Header.HEARD_SIZE: 4,
+            Header.INBOX: inbox,
+            Header.INBOX_SIZE: 4,
+            Header.FRAMES: len(self.frames),
+            Header.DEADLY: 1 << LAVA if self.deadly else 0,
+            Header.MIN_WIDTH: self.size[0],
+            Header.MIN_HEIGHT: self.size[1],
+            Header.HEIGHTS: 1,
+            Header.OUTSIDE: pack_cell(WALL, 5),
+            Header.INSTRUCTIONS: len(self.code),
+            Header.LINES: len(self.lines),
+            Header.STATES: sum(len(frame.activities) for frame in self.frames),
+            Header.SITES: len(self.sites),
+            Header.TYPE_ROWS: 6,
+            Header.COUNTERS: self.counted + outcomes + 1,
+            Header.AGENT_SAYS: self.agent_says,
+        }.items():
+            header[name] = number
+        words[: Header.END] = header.tolist()
+        return Program(
+            words=np.array(words, np.int32),
+            name="assembled",
+            actions=("left", "right", "forward", "pickup", "drop", "toggle", "done"),
+            templates=("Where is <noun>", "Open <noun>"),
+            nouns=("you", "sesame", "the exit"),
+            entities=self._names(),
+            registers=(),
+            lines=tuple(text for text, _, _ in self.lines),
+            outcome_table=tuple(
+                Outcome(name, name == "won") for name in ("won", "lost", "deadly", "timeout")
+            ),
+            rules=tuple(f"rule{i}" for i in range(self.counted)),
+            vocabulary=("<pad>", "<unk>", *(f"word{i}" for i in range(20))),
+            source_map=[None] * len(self.code),
+            labels={},
+        )
+
+    def _names(self) -> tuple[EntityName, ...]:
+        npcs = [EntityName(f"npc{i}", None, "npc", "peer") for i in range(self.npcs)]
+        statuses = {"door": ("open", "closed", "locked"), "lava": ("",)}
+        objects = [
+            EntityName(f"{kind}{i}", None, "object", kind, statuses[kind])
+            for i, kind in enumerate(self.objects)
+        ]
+        return (EntityName("agent", None, "agent", "agent"), *npcs, *objects)
+
+    def _reset(self) -> list[Instruction]:
+        block: list[Instruction] = [(Op.MAKE_ROOM, constant(self.size[0]), constant(self.size[1]))]
+        for entity, cell in enumerate(self.at):
+            x, y = cell if cell is not None else (-1, -1)
+            block += [
+                (Op.IF_UNPINNED, entity_register(entity, Field.X), 0, 3),
+                (Op.LOAD, temporary(0), constant(x)),
+                (Op.LOAD, temporary(1), constant(y)),
+                (Op.PUT, constant(entity), temporary(0)),
+            ]
+        for entity, direction in enumerate(self.facing):
+            block.append((Op.LOAD, entity_register(entity, Field.DIR), constant(direction)))
+        for entity in range(1 + self.npcs, len(self.at)):
+            status = CLOSED if self.objects[entity - 1 - self.npcs] == "door" else 0
+            block.append((Op.LOAD, entity_register(entity, Field.STATUS), constant(status)))
+        return [*block, *self.reset]
+
+    def _entities(self) -> list[int]:
+        rows: list[int] = []
+        for entity in range(len(self.at)):
+            kind = "agent" if entity == 0 else "npc"
+            if entity > self.npcs:
+                kind = self.objects[entity - 1 - self.npcs]
+            row = [0] * EntityColumn.COLUMNS
+            row[EntityColumn.TYPE] = {"agent": 0, "npc": 1, "door": 2, "lava": 5}[kind]
+            row[EntityColumn.KIND] = entity if kind == "npc" else 0
+            row[EntityColumn.NEAR], row[EntityColumn.FAR] = self.earshot
+            row[EntityColumn.AUDIBLE] = int(entity in self.audible)
+            row[EntityColumn.IN_WALL] = int(kind == "door" and self.in_wall)
+            rows += row
+        return rows
+
+    @staticmethod
+    def _types() -> list[int]:
+        def row(code: int, status: int, walkable: int, toggled: int) -> list[int]:
+            columns = [0] * TypeColumn.COLUMNS
+            columns[TypeColumn.CODE], columns[TypeColumn.STATUS] = code, status
+            columns[TypeColumn.WALKABLE], columns[TypeColumn.TOGGLED] = walkable, toggled
+            return columns
+
+        door = [row(DOOR, OPEN, 1, CLOSED), row(DOOR, CLOSED, 0, OPEN), row(DOOR, LOCKED, 0, LOCKED)]
+        rows = [row(10, 0, 1, 0), row(NPC, 0, 0, 0), *door, row(LAVA, 0, 1, 0)]
+        return [word for one in rows for word in one]
+
+    def _room(self) -> list[int]:
+        (width, height), (across, down) = self.canvas, self.size
+        cells, solid, floor = [], [0] * height, [0] * height
+        for y in range(height):
+            for x in range(width):
+                inside = x < across and y < down
+                wall = inside and (x in (0, across - 1) or y in (0, down - 1))
+                cells.append(pack_cell(WALL, 5) if wall else pack_cell(EMPTY))
+                if wall or not inside:
+                    solid[y] |= 1 << x
+                else:
+                    floor[y] |= 1 << x
+        return [*cells, pack_cell(WALL, 5), *solid, *floor]
+
+    def _frames(self, registers: int, inbox: int) -> list[int]:
+        rows: list[int] = []
+        first = 0
+        for number, frame in enumerate(self.frames):
+            row = [0] * FrameColumn.COLUMNS
+            row[FrameColumn.ENTITY] = frame.entity
+            row[FrameColumn.STATE] = registers + 2 * number
+            row[FrameColumn.CLOCK] = registers + 2 * number + 1
+            row[FrameColumn.ROWS], row[FrameColumn.STATES] = first, len(frame.activities)
+            row[FrameColumn.INBOX] = inbox + 5 * frame.entity
+            rows += row
+            first += len(frame.activities)
+        return rows
+
+    def inbox_register(self, entity: int, frames: int) -> int:
+        """The inbox of an entity in a program with so many frames."""
+        return self.own + self.registers + 2 * frames + 4 + 5 * entity
+
+    def state_register(self, frame: int) -> int:
+        """The register of a frame's state; its clock is the next."""
+        return self.own + self.registers + 2 * frame
+
+    def _states(self, classes: int) -> list[int]:
+        rows: list[int] = []
+        for frame in self.frames:
+            for state, activity in enumerate(frame.activities):
+                rows.append(self.add(activity))
+                for table in (frame.first, frame.then):
+                    known = table[state] if state < len(table) else {}
+                    default = self.add(known.get(-1, ()))
+                    rows += [
+                        self.add(known[heard]) if heard in known else default for heard in range(classes + 1)
+                    ]
+        return rows
+
+    def _outcomes(self, classes: int) -> list[int]:
+        table = [0] * (8 * classes)
+        for (heard, body), block in self.outcomes.items():
+            pc = self.add(block)
+            for c in range(classes) if heard < 0 else [heard]:
+                for b in range(8) if body < 0 else [body]:
+                    table[8 * c + b] = pc
+        return table
+
+    def _lines(self) -> list[int]:
+        rows: list[int] = []
+        first = 0
+        for _, tokens, heard in self.lines:
+            rows += [first, len(tokens), heard]
+            first += len(tokens)
+        return rows
+
+
+HIDDEN = int(Flag.NPCS_HIDDEN)
+
+
+def batch_of(program: Program, rows: int = 1, threads: int = 1, seed: int = 7) -> Batch:
+    """A batch of one program, row i at (seed, i), reset."""
+    part = Part(
+        words=program.words,
+        rules=len(program.rules),
+        outcomes=range(len(program.outcome_table)),
+        actions=[*range(7), Body.NONE],
+        templates=range(2),
+        nouns=range(3),
+        tokens=range(len(program.vocabulary)),
+    )
+    batch = Batch([part], [[0]], [0] * rows, program.header(Header.TOKENS), threads)
+    batch.state.keys[:, Key.SEED] = seed
+    batch.state.keys[:, Key.INDEX] = np.arange(rows)
+    batch.reset()
+    return batch

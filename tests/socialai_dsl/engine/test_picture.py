@@ -1,0 +1,72 @@
+"""The picture shows the world cell `pos + (6 - j) * forward + (i - 3) * right`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from socialai_dsl.engine.picture import view_table
+from socialai_dsl.program import Field, Op, pack_cell
+from tests.assembly import HIDDEN, Assembly, batch_of, constant, entity_register
+
+
+@pytest.mark.parametrize(("width", "height"), [(8, 8), (5, 9), (30, 4)])
+def test_every_cell_of_every_pose(width: int, height: int) -> None:
+    table = view_table(width, height).reshape(height, width, 4, 7, 7)
+    rng = np.random.default_rng(0)
+    for _ in range(2000):
+        x, y, direction = rng.integers(width), rng.integers(height), rng.integers(4)
+        i, j = rng.integers(7, size=2)
+        forward = ((1, 0), (0, 1), (-1, 0), (0, -1))[direction]
+        right = ((0, 1), (-1, 0), (0, -1), (1, 0))[direction]
+        seen = [
+            at + (6 - j) * ahead + (i - 3) * aside
+            for at, ahead, aside in zip((x, y), forward, right, strict=True)
+        ]
+        inside = 0 <= seen[0] < width and 0 <= seen[1] < height
+        assert table[y, x, direction, i, j] == (seen[1] * width + seen[0] if inside else width * height)
+
+
+def test_what_is_seen() -> None:
+    # The agent looks right from (1, 2); a door of colour 2 ahead in the right wall, an NPC to its left.
+    colour = [
+        (Op.LOAD, entity_register(2, Field.COLOR), constant(2)),
+        (Op.LOAD, entity_register(1, Field.COLOR), constant(4)),
+    ]
+    room = Assembly(at=((1, 2), (2, 1), (4, 2)), npcs=1, objects=("door",), facing=(0, 3), reset=colour)
+    image = batch_of(room.program()).state.image.view(np.uint8).reshape(7, 7, 4)
+    assert image[3, 6].tolist() == [1, 0, 0, 0], "its own cell"
+    assert image[3, 3].tolist() == [4, 2, 1, 0], "the door, three cells ahead"
+    assert image[2, 5].tolist() == [11, 4, 1, 3], "the NPC, ahead to the left, facing up"
+    assert image[1, 5].tolist() == [2, 5, 0, 0], "the wall"
+    assert image[3, 2].tolist() == [1, 0, 0, 0], "beyond the room, on the canvas"
+    assert image[3, 0].tolist() == [2, 5, 0, 0], "off the canvas"
+
+
+def test_hidden_npcs_leave_no_trace() -> None:
+    shown, hidden = (
+        batch_of(Assembly(at=((1, 2), (2, 2)), npcs=1, flags=flags).program()).state.image[0]
+        for flags in (0, HIDDEN)
+    )
+    assert hidden[3 * 7 + 5] == pack_cell(1)
+    assert (shown != hidden).sum() == 1
+
+
+def test_an_agent_without_a_place_sees_nothing() -> None:
+    image = batch_of(Assembly(at=(None,)).program()).state.image[0]
+    assert set(np.delete(image, 3 * 7 + 6).tolist()) == {pack_cell(2, 5)}
+
+
+def test_digests_tell_pictures_apart() -> None:
+    batch = batch_of(Assembly(at=((1, 2),)).program(), 20000)
+    batch.state.image[:] = np.random.default_rng(0).integers(0, 3, batch.state.image.shape)
+    batch.state.image[7] = batch.state.image[3]
+    ids = batch.identify()
+    assert ids[7] == ids[3]
+    assert len(set(ids.tolist())) == len(np.unique(batch.state.image, axis=0))
+    # One changed cell anywhere changes it.
+    before = ids[0]
+    for k in range(49):
+        batch.state.image[0, k] ^= 1 << 24
+        assert batch.identify()[0] != before
+        batch.state.image[0, k] ^= 1 << 24
