@@ -127,7 +127,8 @@ def _state_of_env(env: ScenarioEnv) -> dict[str, Any]:
         if entity.role == "object":
             group = state[entity.key] if entity.index is not None else [state[entity.key]]
             common["objects"][entity.key] = [
-                {"at": o["at"], "color": o["color"], "state": o["state"], "gone": o.get("gone", False)} for o in group
+                {"at": o["at"], "color": o["color"], "state": o["state"], "gone": o.get("gone", False)}
+                for o in group
             ]
         else:
             common["cast"][entity.key] = _member(state[entity.key])
@@ -166,7 +167,9 @@ def _state_of_reference(env: ScenarioEnv, reference: Reference) -> dict[str, Any
         if isinstance(member.get("state"), int):
             member["state"] = f"step{member['state']}"
         slots = {k: plain(v) for k, v in reference.world.cast[name].slots.items()}
-        member["registers"] = {k: v for k, v in {**slots, **member["registers"]}.items() if f"{name}.{k}" in held}
+        member["registers"] = {
+            k: v for k, v in {**slots, **member["registers"]}.items() if f"{name}.{k}" in held
+        }
         if not member["registers"]:
             del member["registers"]
     state["let"] = {k: v for k, v in state["let"].items() if f"let.{k}" in held}

@@ -176,9 +176,9 @@ def _lines(program: Program) -> None:
     for number in range(h(Header.LINES)):
         at = h(Header.LINE_AT) + LineColumn.COLUMNS * number
         first, count, heard_as = (int(word) for word in program.words[at : at + LineColumn.COLUMNS])
-        _require(
-            first >= 0 and 1 <= count <= h(Header.TOKENS), f"line {number} does not fit into the history"
-        )
+        _require(1 <= count <= h(Header.TOKENS), f"line {number} does not fit into the history")
+        inside = first >= 0 and h(Header.TOKEN_AT) + first + count <= tokens_end
+        _require(inside, f"words of line {number} are out of range")
         _require(
             count * (h(Header.LOG_SIZE) + 1) > h(Header.TOKENS),
             f"the log cannot hold line {number} often enough",

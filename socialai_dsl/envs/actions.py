@@ -48,7 +48,9 @@ def _index(given: Any, words: Sequence[str], what: str) -> int:
         raise ValueError(f"got the {what} {given!r}; expected one of {', '.join(map(repr, words))}{hint}")
     if isinstance(given, int | np.integer) and not isinstance(given, bool) and 0 <= given < len(words):
         return int(given)
-    raise ValueError(f"got the {what} {given!r}; expected a number from 0 to {len(words) - 1}, a word, or None")
+    raise ValueError(
+        f"got the {what} {given!r}; expected a number from 0 to {len(words) - 1}, a word, or None"
+    )
 
 
 def _sentence(given: Any, templates: Sequence[str], nouns: Sequence[str]) -> tuple[int, int]:
@@ -60,5 +62,6 @@ def _sentence(given: Any, templates: Sequence[str], nouns: Sequence[str]) -> tup
         if given in sentences:
             return sentences[given]
         near = did_you_mean(given, sentences)
-        raise ValueError(f"got the sentence {given!r}, which the grammar cannot say" + (f"; did you mean {near!r}?" if near else ""))
+        hint = f"; did you mean {near!r}?" if near else ""
+        raise ValueError(f"got the sentence {given!r}, which the grammar cannot say{hint}")
     raise ValueError(f"got the sentence {given!r}; expected a text such as {next(iter(sentences))!r}")

@@ -142,7 +142,11 @@ class _Layout:
         self._set(number, Field.Y, y)
 
     def _hint(self) -> str:
-        return "" if self.row[Register.WIDTH] != PIN_NONE else " (the smallest room; give `room` for a larger one)"
+        return (
+            ""
+            if self.row[Register.WIDTH] != PIN_NONE
+            else " (the smallest room; give `room` for a larger one)"
+        )
 
     def _taken(self, number: int, x: int, y: int) -> int | None:
         """Who of the same sort is pinned to this cell: bodies may stand on objects, and objects lie under bodies."""
@@ -207,9 +211,12 @@ class _Layout:
             return
         self._mapping("pending", given)
         start, rows = self.program.header(Header.FRAME_AT), self.program.header(Header.FRAMES)
-        table = self.program.words[start : start + rows * FrameColumn.COLUMNS].reshape(rows, FrameColumn.COLUMNS)
+        table = self.program.words[start : start + rows * FrameColumn.COLUMNS].reshape(
+            rows, FrameColumn.COLUMNS
+        )
         inboxes = {
-            str(self.program.entities[row[FrameColumn.ENTITY]]): row[FrameColumn.INBOX] for row in table.tolist()
+            str(self.program.entities[row[FrameColumn.ENTITY]]): row[FrameColumn.INBOX]
+            for row in table.tolist()
         }
         for key, classes in given.items():
             if key not in inboxes:

@@ -56,15 +56,18 @@ class Merged:
             for program, own in zip(programs, endings, strict=True)
         )
         length = max(program.header(Header.TOKENS) for program in programs)
-        highest = tuple(max(column) for column in zip(*map(_highest_codes, programs), strict=True))
-        return cls(actions, templates, nouns, vocabulary, outcomes, length, parts, highest)  # type: ignore[arg-type]
+        kinds, colors, statuses, orientations = np.max(
+            [_highest_codes(program) for program in programs], axis=0
+        ).tolist()
+        highest = (kinds, colors, statuses, orientations)
+        return cls(actions, templates, nouns, vocabulary, outcomes, length, parts, highest)
 
     def action_space(self) -> spaces.MultiDiscrete:
         """[P + 1, 2, T, N]: body action (the last is no movement), speak or not, template, noun."""
         return spaces.MultiDiscrete([len(self.actions) + 1, 2, len(self.templates), len(self.nouns)])
 
     def observation_space(self) -> spaces.Dict:
-        """image uint8 (7, 7, 4) and tokens int16 (L,), both with true bounds."""
+        """Image uint8 (7, 7, 4) and tokens int16 (L,), both with true bounds."""
         high = np.broadcast_to(np.array(self.highest, np.uint8), (VIEW, VIEW, 4)).copy()
         return spaces.Dict(
             {
@@ -92,7 +95,9 @@ def _body(program: Program, word: str) -> int:
 def _highest_codes(program: Program) -> tuple[int, int, int, int]:
     """The greatest value of each channel of the picture."""
     h, words = program.header, program.words
-    types = words[h(Header.TYPE_AT) :][: h(Header.TYPE_ROWS) * TypeColumn.COLUMNS].reshape(-1, TypeColumn.COLUMNS)
+    types = words[h(Header.TYPE_AT) :][: h(Header.TYPE_ROWS) * TypeColumn.COLUMNS].reshape(
+        -1, TypeColumn.COLUMNS
+    )
     rooms = words[h(Header.ROOM_AT) : h(Header.FRAME_AT)].view(np.uint32) if h(Header.FRAME_AT) else words[:0]
     width, height = h(Header.CANVAS_WIDTH), h(Header.CANVAS_HEIGHT)
     cells = rooms.reshape(-1, width * height + 1 + 2 * height)[:, : width * height + 1]

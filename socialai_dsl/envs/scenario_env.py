@@ -25,9 +25,10 @@ _HEARD = int(Register.HEARD)  # members of an enumeration are slow indices
 class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
     """One environment.
 
-    Observation: `image` uint8 (7, 7, 4), `tokens` int16 (L,). Action: int64 (4,): body action (the last is no movement),
-    speak or not, template, noun; the last two are ignored in silence. Info: `utterance` (what is heard now, one line for
-    each speaker, "NA" in silence), `history` (all lines since the reset), and at the end `success` and `outcome`.
+    Observation: `image` uint8 (7, 7, 4), `tokens` int16 (L,). Action: int64 (4,): body action (the last is no
+    movement), speak or not, template, noun; the last two are ignored in silence. Info: `utterance` (what is heard
+    now, one line for each speaker, "NA" in silence), `history` (all lines since the reset), and at the end `success`
+    and `outcome`.
 
     Args:
         program: what `socialai_dsl.compile` returns.
@@ -38,11 +39,12 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
 
     def __init__(self, program: Program, render_mode: str | None = None) -> None:
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(f"render_mode: got {render_mode!r}; expected None or one of {self.metadata['render_modes']}")
+            modes = ", ".join(self.metadata["render_modes"])
+            raise ValueError(f"render_mode: got {render_mode!r}; expected None or one of {modes}")
         self.program = program
         self.render_mode = render_mode
         self._table = Table([program], 1, 1)
-        self.observation_space = self._table.merged.observation_space()
+        self.observation_space = self._table.merged.observation_space()  # type: ignore[assignment]
         self.action_space = self._table.merged.action_space()
         self._successes = [outcome.success for outcome in program.outcome_table]
         # One row of each array, so that a step makes no views.
@@ -58,8 +60,8 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Start an episode: `seed` starts episode 0 of the seed, without it the next one.
 
-        Options: `layout` (a known room), `test_episode` (of the fixed test set), `index` (play as environment `index` of
-        a vector with this seed).
+        Options: `layout` (a known room), `test_episode` (of the fixed test set), `index` (play as environment
+        `index` of a vector with this seed).
         """
         super().reset(seed=seed)
         self._table.reset(seed, options)
@@ -140,7 +142,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         if self.render_mode == "ansi":
             return text
         heard = "\n".join(self._table.heard(0))
-        print(f"{text}\n{heard}\n")  # noqa: T201 - that is what this mode is for
+        print(f"{text}\n{heard}\n")
         return None
 
     def close(self) -> None:

@@ -18,7 +18,6 @@ from socialai_dsl.envs.layout import pins_of
 from socialai_dsl.envs.merge import Merged
 from socialai_dsl.envs.seats import check_options, choose_episodes
 from socialai_dsl.program import (
-    ENTITY_FIELDS,
     FIRST_ENTITY,
     VIEW,
     Field,
@@ -78,7 +77,9 @@ class Table:
         if ended == BAD_ACTION:
             space = self.merged.action_space()
             row = next(i for i, action in enumerate(given) if not space.contains(action.astype(space.dtype)))
-            raise ValueError(f"step: got the action {given[row].tolist()} in row {row}; expected one of {space}")
+            raise ValueError(
+                f"step: got the action {given[row].tolist()} in row {row}; expected one of {space}"
+            )
         return ended
 
     def _mask(self, mask: Any) -> NDArray[np.bool_]:
@@ -96,7 +97,9 @@ class Table:
             return None, rows
         layouts = [layout] * self.rows if isinstance(layout, Mapping) else layout
         if not isinstance(layouts, Sequence) or isinstance(layouts, str) or len(layouts) != self.rows:
-            raise ValueError(f"options['layout']: got {layout!r}; expected a mapping, or a list of {self.rows}")
+            raise ValueError(
+                f"options['layout']: got {layout!r}; expected a mapping, or a list of {self.rows}"
+            )
         width = self.state.registers.shape[1] + 1
         pins = [np.full(width, PIN_NONE, np.int16)]
         known: dict[tuple[int, int], int] = {}
@@ -116,7 +119,9 @@ class Table:
     def scripted_actions(self) -> NDArray[np.int64]:
         """What the agents' frames would do now, int64 (E, 4); nothing changes."""
         if not all(program.header(Header.FLAGS) & Flag.AGENT_FRAME for program in self.programs):
-            raise ValueError("the agent of this scenario follows no frame; play its variant +oracle, if it has one")
+            raise ValueError(
+                "the agent of this scenario follows no frame; play its variant +oracle, if it has one"
+            )
         self.batch.script()
         return self.batch.ports.actions.copy()
 
@@ -124,7 +129,7 @@ class Table:
 
     def program(self, row: int) -> Program:
         """The program that a row plays."""
-        return self.programs[self.program_of[row]]
+        return self.programs[int(self.program_of[row])]
 
     def heard(self, row: int) -> list[str]:
         """Lines heard in the last step."""

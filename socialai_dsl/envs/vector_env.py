@@ -58,11 +58,17 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
                 raise ValueError(f"{what}: got {number!r}; expected a whole number, at least 1")
         mode = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else str(autoreset_mode)
         if mode.lower() not in _MODES:
-            raise ValueError(f"autoreset_mode: got {autoreset_mode!r}; expected NextStep, SameStep or Disabled")
+            raise ValueError(
+                f"autoreset_mode: got {autoreset_mode!r}; expected NextStep, SameStep or Disabled"
+            )
         if render_mode not in (None, "rgb_array", "ansi"):
             raise ValueError(f"render_mode: got {render_mode!r}; expected None, 'rgb_array' or 'ansi'")
         self.autoreset_mode = _MODES[mode.lower()]
-        self.metadata = {"render_modes": ["rgb_array", "ansi"], "autoreset_mode": self.autoreset_mode, "render_fps": 4}
+        self.metadata = {
+            "render_modes": ["rgb_array", "ansi"],
+            "autoreset_mode": self.autoreset_mode,
+            "render_fps": 4,
+        }
         self._task = _TASKS[self.autoreset_mode]
         self._table = Table(programs, int(num_envs), int(num_threads))
         self._copy = copy
@@ -122,7 +128,11 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
 
     def _observation(self) -> Observation:
         image, tokens = self._table.image, self._table.tokens
-        return {"image": image.copy(), "tokens": tokens.copy()} if self._copy else {"image": image, "tokens": tokens}
+        return (
+            {"image": image.copy(), "tokens": tokens.copy()}
+            if self._copy
+            else {"image": image, "tokens": tokens}
+        )
 
     def _infos(self) -> dict[str, Any]:
         ports = self._table.batch.ports
@@ -137,7 +147,7 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
         }
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             image = ports.final_image.view(np.uint8).reshape(self.num_envs, VIEW, VIEW, 4)
-            final = {"image": image, "tokens": ports.final_tokens}
+            final: Observation = {"image": image, "tokens": ports.final_tokens}
             infos["final_info"], infos["_final_info"] = dict(infos), ended
             infos["final_obs"] = {k: v.copy() for k, v in final.items()} if self._copy else final
             infos["_final_obs"] = ended
