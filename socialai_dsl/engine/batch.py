@@ -129,8 +129,9 @@ class Batch:
             self._executor = None
 
     def _make_book(self) -> Any:
-        flat = self.ports._replace(counters=self.ports.counters.reshape(-1))
-        return make_book((*self.tables, *self.state, *flat))
+        tables = self.tables._replace(views=self.tables.views.reshape(-1))
+        ports = self.ports._replace(counters=self.ports.counters.reshape(-1))
+        return make_book((*tables, *self.state, *ports))
 
     def _share(self, task: Task) -> int:
         if self._executor is None:

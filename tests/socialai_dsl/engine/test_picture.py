@@ -58,15 +58,16 @@ def test_an_agent_without_a_place_sees_nothing() -> None:
 
 
 def test_digests_tell_pictures_apart() -> None:
-    batch = batch_of(Assembly(at=((1, 2),)).program(), 20000)
+    batch = batch_of(Assembly(at=((1, 2),)).program(), 2000)
     batch.state.image[:] = np.random.default_rng(0).integers(0, 3, batch.state.image.shape)
     batch.state.image[7] = batch.state.image[3]
     ids = batch.identify()
     assert ids[7] == ids[3]
-    assert len(set(ids.tolist())) == len(np.unique(batch.state.image, axis=0))
-    # One changed cell anywhere changes it.
-    before = ids[0]
+    assert len(set(ids.tolist())) == 1999
+
+
+def test_a_digest_depends_on_every_cell() -> None:
+    batch = batch_of(Assembly(at=((1, 2),)).program(), 50)
     for k in range(49):
-        batch.state.image[0, k] ^= 1 << 24
-        assert batch.identify()[0] != before
-        batch.state.image[0, k] ^= 1 << 24
+        batch.state.image[k, k] ^= 1 << 24
+    assert len(set(batch.identify().tolist())) == 50

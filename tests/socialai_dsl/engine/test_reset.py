@@ -132,7 +132,7 @@ def test_pinned_cells_are_taken() -> None:
         (Op.PICK_CELL, temporary(0), 0, 0),
         (Op.PUT, constant(0), temporary(0)),
     ]
-    # Everything but (3, 3) is pinned to be taken: nine NPCs would not fit, so the room is three cells long.
+    # A room of three cells of which two are pinned to be taken.
     room = Assembly(at=(None, None, None), npcs=2, size=(5, 3), canvas=(5, 3), reset=reset)
     for seed in range(20):
         batch = batch_of(room.program(), seed=seed)
