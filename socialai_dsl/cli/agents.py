@@ -171,7 +171,11 @@ def evaluate_agent(
         envs.close()
     number = int(result.success.argmax())
     actions = policy.actions_of(number, int(result.lengths[number]))
-    return _figures(result), _record(scenario, program, number, actions, label)
+    figures = _figures(result)
+    if agent == "oracle":
+        # A room that the script does not solve is worth looking at: it can be played again by its number.
+        figures["unsolved"] = (~result.success).nonzero()[0].tolist()
+    return figures, _record(scenario, program, number, actions, label)
 
 
 def _with_script(scenario: str, program: "Program") -> str:

@@ -28,6 +28,7 @@ SUMMARY: Final = "train an agent on a scenario, evaluate it and write pictures a
 
 # About two minutes of training with the fast network on two cores of a server.
 DEFAULT_FRAMES: Final = 1_000_000
+_NUMBERS_SHOWN: Final = 8
 BUILT_IN_AGENTS: Final = ("ppo", "random", "oracle", "human")
 
 
@@ -228,6 +229,8 @@ def _table(result: dict[str, Any], folder: Path) -> str:
         ("mean length", f"{evaluation['mean_length']:.1f} steps"),
         ("mean return", f"{evaluation['mean_return']:.3f}"),
     ]
+    if evaluation.get("unsolved"):
+        rows.append(("unsolved", _numbers(evaluation["unsolved"])))
     if result["frames"]:
         speed = result["frames_per_second"]
         rows.append(
@@ -239,6 +242,13 @@ def _table(result: dict[str, Any], folder: Path) -> str:
     rows.append(("written to", str(folder)))
     width = max(len(name) for name, _ in rows)
     return "\n" + "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
+
+
+def _numbers(episodes: list[int]) -> str:
+    """The first of a list of test episodes; `result.json` has them all."""
+    shown = ", ".join(map(str, episodes[:_NUMBERS_SHOWN]))
+    more = len(episodes) - _NUMBERS_SHOWN
+    return f"test episodes {shown}" + (f" and {more} more (all in {RESULT})" if more > 0 else "")
 
 
 def _positive(text: str) -> int:
