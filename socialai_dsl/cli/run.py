@@ -55,8 +55,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--explo",
         choices=("none", "auto", "lang", "cell"),
-        default="auto",
-        help="exploration bonus; auto (default): the paper's choice for this scenario",
+        default="none",
+        help="exploration bonus (default: none); auto: the paper's choice for this scenario",
     )
     parser.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help="default: auto")
     parser.add_argument(

@@ -31,7 +31,7 @@ def entry(function: _Function) -> _Function:
     dispatcher = njit(nogil=True, error_model="numpy", _nrt=False, forceinline=False)(function)
     folder = cache_folder()
     if folder is not None and not config.DISABLE_JIT:
-        dispatcher._cache = _Cache(function)
+        dispatcher._cache = CodeCache(function)
     return cast(_Function, dispatcher)
 
 
@@ -143,7 +143,7 @@ class _Files(IndexDataCacheFile):  # type: ignore[misc]
             file.write(body + hashlib.sha256(body).digest())
 
 
-class _Cache(FunctionCache):  # type: ignore[misc]
+class CodeCache(FunctionCache):  # type: ignore[misc]
     """A cache that answers "not there" instead of failing."""
 
     _impl_class = _Implementation

@@ -1,9 +1,8 @@
 """How the engine's functions are compiled: integers as they are, nothing reordered, no interpreter lock.
 
 `inline` is for helpers, which are merged into their callers. `outline` is for what runs rarely or is large: it begins
-with `stay_outline()`, without which LLVM merges a function of thousands of lines into each of its callers. `part` is
-for the parts of a step, which call large functions: they are never compiled alone, as each would be with all it calls.
-Entry points called from Python are made by `cache.entry`. None of them allocates memory.
+with `stay_outline()`, without which LLVM merges it into each of its callers all the same. The interpreter itself is
+compiled apart (`separate`). Entry points called from Python are made by `cache.entry`. None of them allocates memory.
 """
 
 from collections.abc import Callable
@@ -28,11 +27,6 @@ _OPTIONS: Final[dict[str, bool | str]] = {
 def inline(function: _Function) -> _Function:
     """Compile a helper into each of its callers."""
     return cast(_Function, njit(**_OPTIONS, forceinline=True)(function))
-
-
-def part(function: _Function) -> _Function:
-    """Compile a function as if it were written out in its callers."""
-    return cast(_Function, njit(inline="always")(function))
 
 
 def outline(function: _Function) -> _Function:

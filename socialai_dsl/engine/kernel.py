@@ -7,7 +7,7 @@ import numpy as np
 
 from socialai_dsl.engine import rng
 from socialai_dsl.engine.cache import entry
-from socialai_dsl.engine.jit import inline, outline, part, stay_outline
+from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.picture import CELLS, image_digest, take_picture
 from socialai_dsl.engine.pointers import (
     bytes_of,
@@ -86,7 +86,7 @@ def _outcome_of_batch(row: Row) -> int:
     return row.program[link + Link.END + spaces + row.registers[Register.OUTCOME]]
 
 
-@part
+@inline
 def _reset(book: Any, thread: int, layout: int, row: int) -> None:
     """Start the episode that the row's key names."""
     key = uint64_of(book, Book.KEYS, row)
@@ -102,7 +102,7 @@ def _reset(book: Any, thread: int, layout: int, row: int) -> None:
     take_picture(opened, opened.program[Header.SIZE])
 
 
-@part
+@inline
 def _step(book: Any, thread: int, row: int) -> int:
     """Step one row and report on it; 1 if its episode ended."""
     opened = _open_row(book, thread, ZERO, row)
@@ -128,7 +128,7 @@ def _report_nothing(book: Any, row: int) -> None:
     bytes_of(book, Book.TRUNCATED, ZERO)[row] = 0
 
 
-@part
+@inline
 def _advance(book: Any, thread: int, task: int, row: int) -> int:
     """Step or reset one row, or both, as the task says; 1 if its episode ended."""
     ended = 0

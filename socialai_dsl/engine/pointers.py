@@ -131,3 +131,13 @@ def _store(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     number = context.cast(builder, arguments[2], kind.read, kind.dtype)
     builder.store(number, builder.gep(arguments[0], [arguments[1]]))
     return context.get_dummy_value()
+
+
+ROW_TYPES: Final = tuple(
+    Pointer(kind)
+    for kind in (
+        *(types.int32, types.int16, types.uint32, types.uint64, types.int16, types.uint32),
+        *(types.int64, types.int64, types.int16, types.int64, types.uint32, types.uint16),
+    )
+)
+"""Numba's types of the fields of a `state.Row`."""

@@ -6,7 +6,7 @@ from socialai_dsl import draws
 from socialai_dsl.engine import rng
 from socialai_dsl.engine.boards import draw_all
 from socialai_dsl.engine.entities import field, set_field
-from socialai_dsl.engine.jit import inline, part
+from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.places import occupy
 from socialai_dsl.engine.sets import clear
 from socialai_dsl.engine.speech import clear_tokens, remember
@@ -27,7 +27,7 @@ def draw_member(key: np.uint64, count: int, pinned: int) -> int:
     return rng.below(rng.draw(key, MEMBER_SITE, ZERO, ZERO), count)
 
 
-@part
+@inline
 def reset_row(row: Row, pinned: bool) -> None:
     """Start an episode; the row's key and program are set already."""
     _blank(row)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.engine.jit import outline, part, stay_outline
+from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.speech import inbox_class
 from socialai_dsl.engine.state import STILL, Link, Row
 from socialai_dsl.engine.step import begin
@@ -11,7 +11,7 @@ from socialai_dsl.engine.turns import act, conclude, move_agent, notice, settle
 from socialai_dsl.program import Flag, FrameColumn, Header, Register
 
 
-@part
+@inline
 def script_row(row: Row, link: int) -> None:
     """Write the action of the agent's frame, int64 (4,); the row is played on and must be a copy.
 

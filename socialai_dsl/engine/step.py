@@ -4,7 +4,7 @@ import numpy as np
 
 from socialai_dsl.engine.boards import is_deadly
 from socialai_dsl.engine.entities import field
-from socialai_dsl.engine.jit import inline, part
+from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.picture import take_picture
 from socialai_dsl.engine.speech import empty_inbox, inbox_class
 from socialai_dsl.engine.state import AGENT, Link, Row
@@ -47,7 +47,7 @@ def decode(row: Row, link: int) -> None:
             registers[Register.CLASS] = program[program[Header.CLASS_AT] + pair]
 
 
-@part
+@inline
 def step_row(row: Row, link: int) -> float:
     """One step; the reward. Whether and how the episode ended is in the registers."""
     registers = row.registers
@@ -82,7 +82,7 @@ def step_row(row: Row, link: int) -> float:
     return reward
 
 
-@part
+@inline
 def _judge(row: Row, link: int) -> float:
     """Whether the episode ends, how, and for what reward."""
     registers = row.registers

@@ -11,14 +11,14 @@ from socialai_dsl.engine.entities import (
     step_x,
     step_y,
 )
-from socialai_dsl.engine.jit import inline, outline, part, stay_outline
+from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.speech import deliver, empty_inbox, hear, inbox_class, speak
 from socialai_dsl.engine.state import AGENT, NOTHING, ONE, STILL, Row
 from socialai_dsl.engine.vm import run
 from socialai_dsl.program import Body, Field, Flag, FrameColumn, Header, Register, TypeColumn
 
 
-@part
+@inline
 def settle(row: Row) -> None:
     """Let statuses that follow from others follow."""
     pc = row.program[Header.SETTLE_PC]
@@ -106,7 +106,7 @@ def _state_table(row: Row, frame: int) -> int:
     return row.program[Header.STATE_AT] + columns * state
 
 
-@part
+@inline
 def notice(row: Row, frame: int, heard: int) -> bool:
     """What a frame does before the body action (`first`); whether it has chosen that action."""
     row.registers[Register.LAST_TURN] = -1
@@ -116,7 +116,7 @@ def notice(row: Row, frame: int, heard: int) -> bool:
     return row.registers[Register.LAST_TURN] >= 0
 
 
-@part
+@inline
 def act(row: Row, frame: int) -> int:
     """The body action that the activity of the current state chooses."""
     pc = row.program[_state_table(row, frame)]
@@ -126,7 +126,7 @@ def act(row: Row, frame: int) -> int:
     return chosen if chosen >= 0 else STILL
 
 
-@part
+@inline
 def conclude(row: Row, frame: int, heard: int, chosen: bool) -> None:
     """The clock ticks, then what is done after the body action (`then`), unless `first` took the whole turn."""
     row.registers[row.program[frame + FrameColumn.CLOCK]] += 1
@@ -136,7 +136,7 @@ def conclude(row: Row, frame: int, heard: int, chosen: bool) -> None:
             run(row, pc)
 
 
-@part
+@inline
 def _follow(row: Row, frame: int, npc: int) -> None:
     """One turn of one frame of an NPC."""
     heard = inbox_class(row, row.program[frame + FrameColumn.INBOX])
@@ -151,7 +151,7 @@ def _follow(row: Row, frame: int, npc: int) -> None:
     conclude(row, frame, heard, chosen)
 
 
-@part
+@inline
 def take_turns(row: Row) -> None:
     """Every NPC takes its turn, in the order of the cast; what it says is heard when its turn ends."""
     frames = row.program[Header.FRAMES]

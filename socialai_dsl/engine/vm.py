@@ -1,5 +1,7 @@
 """The interpreter: runs one piece of code on one environment. It raises nothing, since programs are proven first."""
 
+from typing import Any
+
 import numpy as np
 
 from socialai_dsl.engine import entities, paths
@@ -7,9 +9,11 @@ from socialai_dsl.engine.bits import count_bits, lowest_bit, nth_bit
 from socialai_dsl.engine.boards import draw_entity
 from socialai_dsl.engine.conditions import holds
 from socialai_dsl.engine.entities import field, set_field
-from socialai_dsl.engine.jit import inline, outline, stay_outline
+from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.operands import assign, draw_below, value
 from socialai_dsl.engine.places import next_cell, place
+from socialai_dsl.engine.pointers import ROW_TYPES
+from socialai_dsl.engine.separate import Separate
 from socialai_dsl.engine.sets import drop_cell
 from socialai_dsl.engine.state import NOTHING, ONE, RESETTING, STILL, ZERO, Row
 from socialai_dsl.program import Body, Field, FrameColumn, Header, Op, Register
@@ -18,10 +22,8 @@ _NO_CELL = -1
 _SIDES = np.int64(2)
 
 
-@outline
-def run(row: Row, pc: int) -> None:
-    """Run the code at `pc` to its `HALT`. Skips go forward and `EACH_CELL` counts cells, so it ends."""
-    stay_outline()
+@inline
+def _run(row: Row, pc: int) -> None:
     start = row.program[Header.CODE_AT]
     loop = 0  # pc of the first instruction in the loop
     loop_board = 0
@@ -172,3 +174,45 @@ def _choose(row: Row, op: int, a: int, b: int, c: int) -> int:
     if way == direction:
         return np.int64(Body.FORWARD)
     return paths.turn_towards(direction, way, draw_below(row, c, _SIDES))
+
+
+def _run_apart(
+    program: Any,
+    registers: Any,
+    board: Any,
+    key: Any,
+    tokens: Any,
+    image: Any,
+    action: Any,
+    counters: Any,
+    pins: Any,
+    scratch: Any,
+    sets: Any,
+    views: Any,
+    pc: int,
+) -> None:
+    _run(
+        Row(
+            program,
+            registers,
+            board,
+            key,
+            tokens,
+            image,
+            action,
+            counters,
+            pins,
+            scratch,
+            sets,
+            views,
+        ),
+        pc,
+    )
+
+
+def _like_run(row: Row, pc: int) -> None:
+    """Run the code at `pc` to its `HALT`. Skips go forward and `EACH_CELL` counts cells, so it ends."""
+
+
+interpreter = Separate("socialai_dsl_run", _run_apart, ROW_TYPES)
+run = interpreter.caller(_like_run)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 from socialai_dsl.diagnostics import did_you_mean
@@ -83,7 +84,7 @@ def _argument(resolver: Resolver, name: str, node: ast.Expr, expected: Any, scop
 
 def _choice(resolver: Resolver, path: DataPath, node: ast.Expr, scope: Scope) -> Activity:
     ordinal = scope.draws.number()
-    members = resolve_groups.group(resolver, node, ACTION, scope)
+    members = resolve_groups.group(resolver, _with_stay(node), ACTION, scope)
     if members.type != ACTION:
         raise resolver.fail(
             "S204", f"`{quoted(node)}` are not actions; write choose(forward | left)", node, scope
@@ -91,6 +92,13 @@ def _choice(resolver: Resolver, path: DataPath, node: ast.Expr, scope: Scope) ->
     weights = {item: members.items.count(item) for item in members.items}
     span = resolver.findings.at(path)
     return Activity("choose", tuple(weights), scope.draws.site, span, tuple(weights.values()), ordinal)
+
+
+def _with_stay(node: ast.Expr) -> ast.Expr:
+    """`stay` among the options is the action `none`: the word that stands alone in a `do:` may stand here too."""
+    if isinstance(node, ast.Alternatives):
+        return replace(node, options=tuple(map(_with_stay, node.options)))
+    return replace(node, id="none") if isinstance(node, ast.Name) and node.id == "stay" else node
 
 
 def effect(resolver: Resolver, path: DataPath, raw: object, scope: Scope) -> Effect:
