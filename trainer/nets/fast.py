@@ -1,26 +1,20 @@
-"""This module is the default network: a bag of cells instead of convolutions, for training on ordinary CPUs."""
+"""This module is the default network: cells read in the light of the dialogue, no convolutions, for ordinary CPUs."""
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import Any
-
 import torch
 from torch import Tensor, nn
-from torch.nn import functional
 
 from trainer.nets.base import ActorCritic, NetSpec
 from trainer.nets.dialogue import DialogueEncoder
 
 
-class CellRows:
-    """Which row of the cell table each cell of each image selects.
-
-    A row stands for one kind of cell (a distinct tuple of channels) at one place of the view.
+class Cells:
+    """Images as the kinds of their cells: there are far fewer kinds than cells.
 
     Attributes:
-        kinds: int64 (C, channels), the distinct tuples.
-        rows: int64 (I, cells), place * C + kind.
+        kinds: int64 (C, channels), the distinct cells.
+        kind_of: int64 (I, cells), which of them each cell of each image is.
     """
 
     def __init__(self, images: Tensor, sizes: tuple[int, ...]) -> None:
@@ -30,19 +24,8 @@ class CellRows:
             code = code * size + cells[..., channel]
         present = torch.zeros(_product(sizes), dtype=torch.bool, device=images.device)
         present[code.flatten()] = True
-        kinds = present.nonzero().squeeze(1)
-        rank = present.cumsum(0) - 1
-        self.kinds = _unravel(kinds, sizes)
-        places = torch.arange(cells.shape[1], device=images.device) * len(kinds)
-        self.rows = rank[code] + places
-
-    @cached_property
-    def transposed(self) -> tuple[Tensor, Tensor]:
-        """For each table row the images that select it: their numbers, row after row, and where each row begins."""
-        flat = self.rows.flatten()
-        images = torch.argsort(flat, stable=True) // self.rows.shape[1]
-        counts = torch.bincount(flat, minlength=self.rows.shape[1] * len(self.kinds))
-        return images, counts.cumsum(0) - counts
+        self.kinds = _unravel(present.nonzero().squeeze(1), sizes)
+        self.kind_of = (present.cumsum(0) - 1)[code]
 
 
 def _product(sizes: tuple[int, ...]) -> int:
@@ -60,26 +43,12 @@ def _unravel(codes: Tensor, sizes: tuple[int, ...]) -> Tensor:
     return torch.stack(channels[::-1], 1)
 
 
-class _SumRows(torch.autograd.Function):
-    """Sum of an image's table rows; its gradient is the same kind of sum over the transposed selection."""
-
-    @staticmethod
-    def forward(ctx: Any, table: Tensor, view: CellRows) -> Tensor:
-        ctx.view = view
-        return functional.embedding_bag(view.rows, table, mode="sum")
-
-    @staticmethod
-    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor, None]:
-        images, offsets = ctx.view.transposed
-        return functional.embedding_bag(images, grad.contiguous(), offsets, mode="sum"), None
-
-
 class FastNet(ActorCritic):
-    """Bag of cells, FiLM by the dialogue, LSTM, heads.
+    """FiLM on every cell by the dialogue, a linear layer over all cells, LSTM, heads.
 
-    Each kind of cell is embedded from its channels; place and kind together select a row of a table; an image is the
-    sum of its rows. That is a linear layer over embedded cells, computed by looking up what few kinds there are.
-    The dialogue scales and shifts the sum (FiLM, Perez et al. 2018).
+    Each kind of cell is embedded from its channels. The dialogue scales and shifts the embedding (FiLM, Perez et al.
+    2018) before a rectifier, so that a word such as a colour can pick out the cells it speaks of wherever they are.
+    This is computed once for each pair of a history and a kind of cell, then looked up for the cells of an image.
 
     Attributes:
         kind_size: width of a cell's embedding.
@@ -91,24 +60,25 @@ class FastNet(ActorCritic):
         super().__init__(spec, width, DialogueEncoder(spec.vocabulary_size))
         height, ahead, channels = spec.image_shape
         # 256 values per channel, so that scenarios with other bounds share the weights' shape.
-        self.channels = nn.Parameter(torch.randn(channels, 256, self.kind_size))
-        self.kind = nn.Linear(self.kind_size, self.kind_size)
-        self.places = nn.Parameter(torch.empty(height * ahead, self.kind_size, width))
-        nn.init.normal_(self.places, std=(height * ahead * self.kind_size) ** -0.5)
-        self.bias = nn.Parameter(torch.zeros(width))
-        self.film = nn.Linear(self.dialogue.size, 2 * width)
+        self.channels = nn.Parameter(torch.randn(channels, 256, self.kind_size) * channels**-0.5)
+        self.film = nn.Linear(self.dialogue.size, 2 * self.kind_size)
+        self.cells = nn.Linear(height * ahead * self.kind_size, width)
+        self.words = nn.Linear(self.dialogue.size, width, bias=False)
         self._sizes = tuple(high + 1 for high in spec.image_high)
 
-    def prepare(self, images: Tensor) -> CellRows:
-        """Kinds and table rows of the images."""
-        return CellRows(images, self._sizes)
+    def prepare(self, images: Tensor) -> Cells:
+        """The kinds of the images' cells."""
+        return Cells(images, self._sizes)
 
-    def perceive(self, prepared: CellRows, text: Tensor, image_index: Tensor, text_index: Tensor) -> Tensor:
+    def perceive(self, prepared: Cells, text: Tensor, image_index: Tensor, text_index: Tensor) -> Tensor:
         """Features (P, width) of the pairs; see `ActorCritic.perceive`."""
+        used, history = torch.unique(text_index, return_inverse=True)
+        text = text.index_select(0, used)  # (S, size)
         channel = torch.arange(self.channels.shape[0], device=text.device)
-        kinds = self.kind(torch.relu(self.channels[channel, prepared.kinds].sum(1)))
-        table = torch.matmul(kinds, self.places).flatten(0, 1)
-        images: Tensor = _SumRows.apply(table, prepared)  # type: ignore[no-untyped-call]
-        scale, shift = self.film(text).index_select(0, text_index).chunk(2, 1)
-        seen = (images + self.bias).index_select(0, image_index)
-        return torch.relu(torch.addcmul(seen + shift, seen, scale))
+        kinds = self.channels[channel, prepared.kinds].sum(1)  # (C, kind_size)
+        scale, shift = self.film(text)[:, None].chunk(2, 2)
+        read = torch.relu(torch.addcmul(kinds + shift, kinds, scale))  # (S, C, kind_size)
+        rows = history[:, None] * len(kinds) + prepared.kind_of.index_select(0, image_index)  # (P, cells)
+        cells = read.flatten(0, 1).index_select(0, rows.flatten()).view(len(rows), -1)
+        said = self.words(text).index_select(0, history)
+        return torch.relu(self.cells(cells) + said)

@@ -9,7 +9,7 @@ import torch
 from torch.nn import functional
 
 from trainer.nets import ActorCritic, NetSpec, build_net, net_class
-from trainer.nets.fast import CellRows, FastNet
+from trainer.nets.fast import Cells, FastNet
 from trainer.nets.paper import PaperNet
 
 SPEC = NetSpec((8, 2, 4, 16), (7, 7, 4), (12, 5, 3, 3), 40)
@@ -60,21 +60,19 @@ def test_linear_layers_of_the_paper_network_start_with_unit_rows() -> None:
         assert (layer.bias == 0).all()
 
 
-def test_the_bag_is_a_linear_layer_over_embedded_cells() -> None:
+def test_looking_up_kinds_is_film_on_every_cell() -> None:
     torch.manual_seed(0)
     net = FastNet(SPEC).double()
-    images = random_images(5)
-    prepared, nothing = net.prepare(images), torch.zeros(5, dtype=torch.int64)
-    with torch.no_grad():
-        net.film.weight.zero_()
-        net.film.bias.zero_()
-    got = net.perceive(prepared, torch.zeros(1, 128).double(), torch.arange(5), nothing)
-    cells = images.flatten(1, 2).long()
-    channel = torch.arange(4)
-    kinds = net.kind(torch.relu(net.channels[channel, cells].sum(2)))
-    expected = torch.relu(functional.linear(kinds.flatten(1), net.places.flatten(0, 1).t(), net.bias))
+    images, text = random_images(5), torch.randn(3, 128).double()
+    image_index, text_index = torch.arange(5), torch.tensor([2, 0, 0, 2, 2])
+    got = net.perceive(net.prepare(images), text, image_index, text_index)
+    embedded = net.channels[torch.arange(4), images.flatten(1, 2).long()].sum(2)  # (5, 49, kind_size)
+    scale, shift = net.film(text[text_index])[:, None].chunk(2, 2)
+    read = torch.relu(embedded * (1 + scale) + shift)
+    said = functional.linear(text[text_index], net.words.weight)
+    expected = torch.relu(functional.linear(read.flatten(1), net.cells.weight, net.cells.bias) + said)
     assert torch.allclose(got, expected, rtol=0, atol=1e-12)
-    parameters = [net.places, net.channels, net.kind.weight]
+    parameters = [net.channels, net.film.weight, net.cells.weight, net.words.weight]
     for one, other in zip(
         torch.autograd.grad(got.square().sum(), parameters, retain_graph=True),
         torch.autograd.grad(expected.square().sum(), parameters),
@@ -87,9 +85,9 @@ def test_kinds_of_cells_are_told_apart_by_every_channel() -> None:
     images = torch.zeros(5, 7, 7, 4, dtype=torch.uint8)
     for channel, value in enumerate(SPEC.image_high):
         images[channel + 1, 2, 3, channel] = value
-    view = CellRows(images, tuple(high + 1 for high in SPEC.image_high))
+    view = Cells(images, tuple(high + 1 for high in SPEC.image_high))
     assert len(view.kinds) == 5
-    assert len(set(view.rows[:, 2 * 7 + 3].tolist())) == 5
+    assert len(set(view.kind_of[:, 2 * 7 + 3].tolist())) == 5
 
 
 @pytest.mark.parametrize("name", ["fast", "paper"])
