@@ -1,6 +1,6 @@
 """A batch of environments in memory: programs one behind the other, state, ports, and the threads that serve them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from socialai_dsl.engine.kernel import BAD_ACTION, Task, serve
 from socialai_dsl.engine.picture import view_table
 from socialai_dsl.engine.pointers import make_book
+from socialai_dsl.engine.queries import identify, script
 from socialai_dsl.engine.state import Key, Link, Ports, State, Tables, empty_ports, empty_state, no_pins
 from socialai_dsl.engine.vm import interpreter
 from socialai_dsl.program import VIEW, Header
@@ -117,11 +118,11 @@ class Batch:
 
     def script(self) -> None:
         """Let `ports.actions` be what the agents' frames would do now."""
-        self._share(Task.SCRIPT)
+        self._ask(script)
 
     def identify(self) -> NDArray[np.int64]:
         """A digest of each picture, int64 (E,)."""
-        self._share(Task.IDENTIFY)
+        self._ask(identify)
         return self.ports.image_ids.view(np.int64).copy()
 
     def close(self) -> None:
@@ -138,12 +139,18 @@ class Batch:
     def _share(self, task: Task) -> int:
         if self._executor is None:
             return serve(self._book, int(task), 0, 0, self._rows)
+        return self._ask(lambda *part: serve(part[0], int(task), *part[1:]))
+
+    def _ask(self, kernel: Callable[[Any, int, int, int], int]) -> int:
+        """Let every thread do its rows; the sum of what they return."""
+        if self._executor is None:
+            return kernel(self._book, 0, 0, self._rows)
         others = [
-            self._executor.submit(serve, self._book, int(task), thread, first, last)
+            self._executor.submit(kernel, self._book, thread, first, last)
             for thread, (first, last) in enumerate(self._cuts[1:], 1)
         ]
-        ended = serve(self._book, int(task), 0, *self._cuts[0])
-        return ended + sum(other.result() for other in others)
+        done = kernel(self._book, 0, *self._cuts[0])
+        return done + sum(other.result() for other in others)
 
 
 def _cut(rows: int, threads: int) -> list[tuple[int, int]]:

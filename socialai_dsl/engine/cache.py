@@ -157,6 +157,7 @@ class CodeCache(FunctionCache):  # type: ignore[misc]
         )
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The code compiled for a signature, None if there is none or it cannot be read."""
         try:
             return super().load_overload(sig, target_context)
         except Exception:  # whatever a damaged file makes of unpickling: the code is simply compiled anew
@@ -164,6 +165,7 @@ class CodeCache(FunctionCache):  # type: ignore[misc]
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep the code compiled for a signature, if the disk lets us."""
         try:
             super().save_overload(sig, data)
         except OSError:  # a full or vanished disk must not stop a run

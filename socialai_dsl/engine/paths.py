@@ -6,16 +6,15 @@ from socialai_dsl.engine.boards import is_deadly, npcs_are_hidden, solid_line
 from socialai_dsl.engine.entities import are_present, distance, field, is_present
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.sets import add_cell, clear, drop_cell, fill_next_to, get_line, has_cell, set_line
-from socialai_dsl.engine.state import AGENT, FREE, FRONT, SEEN, STILL, Row
+from socialai_dsl.engine.state import AGENT, FREE, FRONT, SEEN, STILL, ZERO, Row
 from socialai_dsl.program import Body, Field, Header
 
 NO_PATH = -1
 
 
-@outline
+@inline
 def find_free(row: Row, mover: int) -> None:
     """Fill the board FREE with the cells that `mover` could stand on."""
-    stay_outline()
     width = row.program[Header.CANVAS_WIDTH]
     height = row.program[Header.CANVAS_HEIGHT]
     full = (np.int64(1) << width) - 1
@@ -36,13 +35,12 @@ def find_free(row: Row, mover: int) -> None:
                     drop_cell(row, FREE, x, y)
 
 
-@outline
+@inline
 def first_direction(row: Row, mover: int) -> int:
     """Direction of the next cell of a shortest path from `mover` to the set FRONT through FREE, or NO_PATH.
 
     Among equally good cells the order is down, up, right, left. Destroys FRONT.
     """
-    stay_outline()
     x = field(row, mover, Field.X)
     y = field(row, mover, Field.Y)
     clear(row, SEEN)
@@ -78,39 +76,27 @@ def _grow(row: Row) -> bool:
 
 
 @outline
-def direction_to(row: Row, mover: int, target: int) -> int:
-    """Direction of the next cell on the way to the cell of `target`; NO_PATH if there is none or nowhere to go."""
-    stay_outline()
-    if not are_present(row, mover, target) or distance(row, mover, target) == 0:
-        return NO_PATH
-    find_free(row, mover)
-    clear(row, FRONT)
-    add_cell(row, FRONT, field(row, target, Field.X), field(row, target, Field.Y))
-    return first_direction(row, mover)
+def find_way(row: Row, mover: int, target: int, beside: bool) -> int:
+    """Direction of the next cell on the way to the cell of `target`, or to a free cell `beside` it.
 
-
-@outline
-def direction_next_to(row: Row, mover: int, target: int) -> int:
-    """Direction of the next cell on the way to a free cell next to `target`; NO_PATH as above."""
+    NO_PATH if there is none, and also for who is there already.
+    """
     stay_outline()
-    if not are_present(row, mover, target) or distance(row, mover, target) == 1:
+    if not are_present(row, mover, target) or distance(row, mover, target) == (1 if beside else 0):
         return NO_PATH
     find_free(row, mover)
     fill_next_to(row, FRONT, target)
     for y in range(row.program[Header.CANVAS_HEIGHT]):
-        set_line(row, FRONT, y, get_line(row, FRONT, y) & get_line(row, FREE, y))
+        set_line(row, FRONT, y, get_line(row, FRONT, y) & get_line(row, FREE, y) if beside else ZERO)
+    if not beside:
+        add_cell(row, FRONT, field(row, target, Field.X), field(row, target, Field.Y))
     return first_direction(row, mover)
 
 
-@outline
+@inline
 def reaches(row: Row, mover: int, target: int) -> bool:
-    """Whether `mover` has a path to the cell of `target` or to one next to it."""
-    stay_outline()
-    if not are_present(row, mover, target):
-        return False
-    if distance(row, mover, target) <= 1:
-        return True
-    return direction_next_to(row, mover, target) != NO_PATH
+    """Whether `mover`, in the room like `target`, has a path to its cell or to one next to it."""
+    return distance(row, mover, target) <= 1 or find_way(row, mover, target, np.bool_(True)) != NO_PATH
 
 
 @inline

@@ -90,9 +90,8 @@ class Book(IntEnum):
     SPARE_REGISTERS = 21
     SPARE_BOARDS = 22
     SPARE_COUNTERS = 23
-    PLAYED = 24
-    IMAGE_IDS = 25
-    SIZES = 26
+    IMAGE_IDS = 24
+    SIZES = 25
 
 
 class Size(IntEnum):
@@ -148,7 +147,6 @@ class Ports(NamedTuple):
     spare_registers: NDArray[np.int16]  # (threads, R) of a row that is played on for a look
     spare_boards: NDArray[np.uint32]  # (threads, board)
     spare_counters: NDArray[np.int64]  # (threads, counters of all programs)
-    played: NDArray[np.int32]  # (E,) number of the program that was stepped
     image_ids: NDArray[np.uint64]  # (E,) digests of the pictures
     sizes: NDArray[np.int64]  # (Size.END,)
 
@@ -201,7 +199,6 @@ def empty_ports(state: State, counters: int, threads: int) -> Ports:
         spare_registers=np.zeros((threads, registers), np.int16),
         spare_boards=np.zeros((threads, state.boards.shape[1]), np.uint32),
         spare_counters=np.zeros((threads, counters), np.int64),
-        played=np.zeros(rows, np.int32),
         image_ids=np.zeros(rows, np.uint64),
         sizes=np.array([registers, state.boards.shape[1], state.tokens.shape[1], counters], np.int64),
     )

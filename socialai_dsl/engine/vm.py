@@ -23,55 +23,6 @@ _SIDES = np.int64(2)
 
 
 @inline
-def _run(row: Row, pc: int) -> None:
-    start = row.program[Header.CODE_AT]
-    loop = 0  # pc of the first instruction in the loop
-    loop_board = 0
-    loop_target = 0
-    cell = _NO_CELL
-    while True:
-        word = start + 4 * pc
-        op = row.program[word]
-        a = row.program[word + 1]
-        b = row.program[word + 2]
-        c = row.program[word + 3]
-        pc += 1
-        if op <= Op.IF_REACHES:
-            if op == Op.HALT:
-                return
-            if op == Op.SKIP or not holds(row, op, a, b):
-                pc += c
-        elif op < Op.SET_FIELD:
-            _compute(row, op, a, b, c)
-        elif op < Op.BODY:
-            _effect(row, op, a, b, c)
-        elif op < Op.B_FLOOR:
-            row.registers[Register.LAST_TURN] = _choose(row, op, a, b, c)
-        elif op < Op.EACH_CELL or op > Op.END_EACH:
-            place(row, op, a, b, c)
-        elif op == Op.DROP_CELL:
-            if cell != _NO_CELL:
-                drop_cell(row, loop_board, cell & 31, cell >> 5)
-        else:
-            if op == Op.EACH_CELL:
-                loop = pc
-                loop_board = a
-                loop_target = b
-                cell = next_cell(row, a, NOTHING, ZERO)
-                if cell == _NO_CELL:
-                    pc += c
-                    if row.program[start + 4 * pc] == Op.END_EACH:
-                        pc += 1
-            elif cell != _NO_CELL:
-                cell = next_cell(row, loop_board, cell & 31, cell >> 5)
-                if cell != _NO_CELL:
-                    pc = loop
-            if cell != _NO_CELL:
-                assign(row, loop_target, cell & 31)
-                assign(row, loop_target + 1, cell >> 5)
-
-
-@inline
 def _compute(row: Row, op: int, a: int, b: int, c: int) -> None:
     """Instructions that write a value."""
     result = value(row, b)
@@ -103,9 +54,9 @@ def _combine(row: Row, op: int, left: int, right: int) -> int:
     if op == Op.MUL:
         return left * right
     if op == Op.MIN:
-        return min(left, right)
+        return left if left < right else right
     if op == Op.MAX:
-        return max(left, right)
+        return left if left > right else right
     if right == 0:
         return 0
     return left // right if op == Op.DIV else left % right
@@ -164,11 +115,7 @@ def _choose(row: Row, op: int, a: int, b: int, c: int) -> int:
     direction = field(row, mover, Field.DIR)
     if op == Op.TURN_TO:
         return paths.turn_towards(direction, target, draw_below(row, c, _SIDES))
-    way = (
-        paths.direction_to(row, mover, target)
-        if op == Op.GO_TO
-        else paths.direction_next_to(row, mover, target)
-    )
+    way = paths.find_way(row, mover, target, op == Op.GO_NEXT_TO)
     if way == paths.NO_PATH:
         return STILL
     if way == direction:
@@ -176,7 +123,7 @@ def _choose(row: Row, op: int, a: int, b: int, c: int) -> int:
     return paths.turn_towards(direction, way, draw_below(row, c, _SIDES))
 
 
-def _run_apart(
+def _run(
     program: Any,
     registers: Any,
     board: Any,
@@ -191,28 +138,57 @@ def _run_apart(
     views: Any,
     pc: int,
 ) -> None:
-    _run(
-        Row(
-            program,
-            registers,
-            board,
-            key,
-            tokens,
-            image,
-            action,
-            counters,
-            pins,
-            scratch,
-            sets,
-            views,
-        ),
-        pc,
-    )
+    row = Row(program, registers, board, key, tokens, image, action, counters, pins, scratch, sets, views)
+    start = row.program[Header.CODE_AT]
+    loop = 0  # pc of the first instruction in the loop
+    loop_board = 0
+    loop_target = 0
+    cell = _NO_CELL
+    while True:
+        word = start + 4 * pc
+        op = row.program[word]
+        a = row.program[word + 1]
+        b = row.program[word + 2]
+        c = row.program[word + 3]
+        pc += 1
+        if op <= Op.IF_REACHES:
+            if op == Op.HALT:
+                return
+            if op == Op.SKIP or not holds(row, op, a, b):
+                pc += c
+        elif op < Op.SET_FIELD:
+            _compute(row, op, a, b, c)
+        elif op < Op.BODY:
+            _effect(row, op, a, b, c)
+        elif op < Op.B_FLOOR:
+            row.registers[Register.LAST_TURN] = _choose(row, op, a, b, c)
+        elif op < Op.EACH_CELL or op > Op.END_EACH:
+            place(row, op, a, b, c)
+        elif op == Op.DROP_CELL:
+            if cell != _NO_CELL:
+                drop_cell(row, loop_board, cell & 31, cell >> 5)
+        else:
+            if op == Op.EACH_CELL:
+                loop = pc
+                loop_board = a
+                loop_target = b
+                cell = next_cell(row, a, NOTHING, ZERO)
+                if cell == _NO_CELL:
+                    pc += c
+                    if row.program[start + 4 * pc] == Op.END_EACH:
+                        pc += 1
+            elif cell != _NO_CELL:
+                cell = next_cell(row, loop_board, cell & 31, cell >> 5)
+                if cell != _NO_CELL:
+                    pc = loop
+            if cell != _NO_CELL:
+                assign(row, loop_target, cell & 31)
+                assign(row, loop_target + 1, cell >> 5)
 
 
 def _like_run(row: Row, pc: int) -> None:
     """Run the code at `pc` to its `HALT`. Skips go forward and `EACH_CELL` counts cells, so it ends."""
 
 
-interpreter = Separate("socialai_dsl_run", _run_apart, ROW_TYPES)
+interpreter = Separate("socialai_dsl_run", _run, ROW_TYPES)
 run = interpreter.caller(_like_run)

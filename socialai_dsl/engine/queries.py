@@ -1,18 +1,27 @@
-"""What the agent's own frame would do now: the actions of a scripted agent."""
+"""What can be asked of rows without stepping them: what the agent's own frame would do now, digests of pictures.
+
+These are compiled when they are first asked for.
+"""
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.engine.cache import entry
 from socialai_dsl.engine.jit import inline, outline, stay_outline
+from socialai_dsl.engine.picture import image_digest
+from socialai_dsl.engine.pointers import int16_of, int64_of, uint32_of, uint64_of
+from socialai_dsl.engine.rows import copy, open_row
 from socialai_dsl.engine.speech import inbox_class
-from socialai_dsl.engine.state import STILL, Link, Row
+from socialai_dsl.engine.state import STILL, ZERO, Book, Link, Row, Size
 from socialai_dsl.engine.step import begin
 from socialai_dsl.engine.turns import act, conclude, move_agent, notice, settle
 from socialai_dsl.program import Flag, FrameColumn, Header, Register
 
 
 @inline
-def script_row(row: Row, link: int) -> None:
+def _play(row: Row, link: int) -> None:
     """Write the action of the agent's frame, int64 (4,); the row is played on and must be a copy.
 
     Without a frame the agent stands still and is silent.
@@ -66,3 +75,37 @@ def _index_of(program: NDArray[np.int32], table: int, size: int, wanted: int) ->
         if program[table + i] == wanted:
             return i
     return -1
+
+
+@inline
+def _script_row(book: Any, thread: int, row: int) -> None:
+    """Write the scripted action of one row. It is played, and then everything is as it was."""
+    opened = open_row(book, thread, ZERO, row)
+    sizes = int64_of(book, Book.SIZES, ZERO)
+    registers = int16_of(book, Book.SPARE_REGISTERS, thread)
+    board = uint32_of(book, Book.SPARE_BOARDS, thread)
+    counters = int64_of(book, Book.SPARE_COUNTERS, thread)
+    count = opened.program[Header.COUNTERS]
+    copy(registers, opened.registers, sizes[Size.REGISTERS])
+    copy(board, opened.board, sizes[Size.BOARD])
+    copy(counters, opened.counters, count)
+    _play(opened, opened.program[Header.SIZE])
+    copy(opened.registers, registers, sizes[Size.REGISTERS])
+    copy(opened.board, board, sizes[Size.BOARD])
+    copy(opened.counters, counters, count)
+
+
+@entry
+def script(book: Any, thread: int, first: int, last: int) -> int:
+    """Write what the agents' frames would do now into the actions of the rows first to last - 1."""
+    for row in range(first, last):
+        _script_row(book, thread, row)
+    return 0
+
+
+@entry
+def identify(book: Any, thread: int, first: int, last: int) -> int:
+    """Write digests of the pictures of the rows first to last - 1."""
+    for row in range(first, last):
+        uint64_of(book, Book.IMAGE_IDS, ZERO)[row] = image_digest(uint32_of(book, Book.IMAGE, row))
+    return 0

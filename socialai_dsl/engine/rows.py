@@ -1,0 +1,39 @@
+"""Opens one row of a batch: the pointers that the engine's functions work with."""
+
+from typing import Any
+
+import numpy as np
+
+from socialai_dsl.engine.jit import inline
+from socialai_dsl.engine.pointers import int16_of, int32_of, int64_of, uint16_of, uint32_of, uint64_of
+from socialai_dsl.engine.state import ZERO, Book, Key, Link, Row, Size
+from socialai_dsl.program import Header
+
+
+@inline
+def open_row(book: Any, thread: int, layout: int, row: int) -> Row:
+    """One environment, with the scratch space of a thread and the pins of a layout."""
+    key = uint64_of(book, Book.KEYS, row)
+    program = int32_of(book, Book.WORDS, np.int64(key[Key.PROGRAM]))
+    counters = thread * int64_of(book, Book.SIZES, ZERO)[Size.COUNTERS]
+    return Row(
+        program,
+        int16_of(book, Book.REGISTERS, row),
+        uint32_of(book, Book.BOARDS, row),
+        key,
+        int16_of(book, Book.TOKENS, row),
+        uint32_of(book, Book.IMAGE, row),
+        int64_of(book, Book.ACTIONS, row),
+        int64_of(book, Book.COUNTERS, counters + program[program[Header.SIZE] + Link.COUNTERS]),
+        int16_of(book, Book.PINS, layout),
+        int64_of(book, Book.SCRATCH, thread),
+        uint32_of(book, Book.SETS, thread),
+        uint16_of(book, Book.VIEWS, ZERO),
+    )
+
+
+@inline
+def copy(target: Any, source: Any, count: int) -> None:
+    """Copy some numbers from where one pointer points to where another does."""
+    for i in range(count):
+        target[i] = source[i]
