@@ -13,6 +13,7 @@ from socialai_dsl.engine.batch import Batch
 from socialai_dsl.engine.kernel import BAD_ACTION, Task
 from socialai_dsl.engine.state import PIN_NONE, Key
 from socialai_dsl.envs import snapshot
+from socialai_dsl.envs.audit import first_unsound
 from socialai_dsl.envs.describe import describe
 from socialai_dsl.envs.layout import pins_of
 from socialai_dsl.envs.merge import Merged
@@ -213,12 +214,32 @@ class Table:
         return snapshot.pack(self._arrays(), self._identity())
 
     def restore(self, data: bytes) -> None:
-        """Put a snapshot of the same programs and number of rows back."""
-        snapshot.unpack(data, self._arrays(), self._identity())
+        """Put a snapshot of the same programs and number of rows back. Raises ValueError, and changes nothing, else."""
+        arrays = self._arrays()
+        read = {name: np.empty_like(array) for name, array in arrays.items()}
+        snapshot.unpack(data, read, self._identity())
+        self._check(read)
+        counters = read.pop("counters")
+        for name, array in read.items():
+            arrays[name][...] = array
+        self.batch.ports.counters[:] = 0
+        self.batch.ports.counters[0] = counters
         self.fresh = False
 
+    def _check(self, read: Mapping[str, NDArray[Any]]) -> None:
+        """The engine trusts its state, so what comes from outside must be a state that it can be in."""
+        fixed = [Key.POOL, Key.PROGRAM]
+        if not np.array_equal(read["keys"][:, fixed], self.state.keys[:, fixed]):
+            raise ValueError("the snapshot is damaged: rows play other programs")
+        if read["tokens"].min(initial=0) < 0 or read["tokens"].max(initial=0) >= len(self.merged.vocabulary):
+            raise ValueError("the snapshot is damaged: a token is outside the vocabulary")
+        for number, program in enumerate(self.programs):
+            wrong = first_unsound(program, read["registers"][self.program_of == number])
+            if wrong:
+                raise ValueError(f"the snapshot is damaged: {wrong}")
+
     def _arrays(self) -> dict[str, NDArray[Any]]:
-        return {**self.state._asdict(), "counters": self.batch.ports.counters}
+        return {**self.state._asdict(), "counters": self.batch.ports.counters.sum(axis=0)}
 
     def _identity(self) -> dict[str, Any]:
         return {"programs": [program.sha256 for program in self.programs], "rows": self.rows}

@@ -1,0 +1,130 @@
+"""Whether registers from outside are ones a program can produce: the engine checks no index, so nobody else may lie."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.program import (
+    ENTITY_FIELDS,
+    FIRST_ENTITY,
+    Body,
+    Field,
+    FrameColumn,
+    Header,
+    Program,
+    Register,
+)
+
+Bounds = NDArray[np.int16]
+
+
+def first_unsound(program: Program, registers: NDArray[np.int16]) -> str | None:
+    """What is wrong with the registers, int16 (E, R), of environments that play a program; None if nothing is."""
+    low, high = _bounds(program)
+    own = registers[:, : len(low)]
+    wrong = np.argwhere((own < low) | (own > high))
+    if len(wrong):
+        row, register = wrong[0]
+        return (
+            f"register {register} of row {row}: got {own[row, register]}, "
+            f"expected a number from {low[register]} to {high[register]}"
+        )
+    heights = program.header(Header.HEIGHTS)
+    across = own[:, Register.WIDTH].astype(int) - program.header(Header.MIN_WIDTH)
+    down = own[:, Register.HEIGHT].astype(int) - program.header(Header.MIN_HEIGHT)
+    other_room = np.flatnonzero(own[:, Register.ROOM] != across * heights + down)
+    return f"row {other_room[0]}: the size of the room does not fit it" if len(other_room) else None
+
+
+def _bounds(program: Program) -> tuple[Bounds, Bounds]:
+    """Least and greatest value of each register."""
+    count = program.header(Header.REGISTERS)
+    low = np.full(count, np.iinfo(np.int16).min, np.int16)
+    high = np.full(count, np.iinfo(np.int16).max, np.int16)
+    for first, size, least, most in (*_common(program), *_entities(program), *_speech(program)):
+        low[first : first + size], high[first : first + size] = least, most
+    for name in program.registers:
+        low[name.register], high[name.register] = name.low, name.high
+    for first, size, least, most in _frames(program):
+        low[first : first + size], high[first : first + size] = least, most
+    return low, high
+
+
+Range = tuple[int, int, int, int]
+"""First register, how many, least, greatest value."""
+
+
+def _common(program: Program) -> list[Range]:
+    h = program.header
+    lines = h(Header.LINES)
+    greatest = {
+        Register.T: (0, h(Header.HORIZON)),
+        Register.WIDTH: (h(Header.MIN_WIDTH), h(Header.CANVAS_WIDTH)),
+        Register.HEIGHT: (h(Header.MIN_HEIGHT), h(Header.MIN_HEIGHT) + h(Header.HEIGHTS) - 1),
+        Register.ROOM: (0, _rooms_that_fit(program) - 1),
+        Register.ACTION: (0, int(Body.NONE)),
+        Register.CLASS: (0, h(Header.CLASSES) - 1),
+        Register.TEMPLATE: (-1, h(Header.TEMPLATES) - 1),
+        Register.NOUN: (-1, h(Header.NOUNS) - 1),
+        Register.OUTCOME: (-1, len(program.outcome_table) - 1),
+        Register.PERCENT: (0, 100),
+        Register.HEARD: (0, h(Header.HEARD_SIZE)),
+        Register.LOGGED: (0, h(Header.LOG_SIZE)),
+        Register.TOKENS: (0, h(Header.TOKENS)),
+        Register.ENDED: (0, 2),
+        Register.POKED: (-1, h(Header.ENTITIES) - 1),
+        Register.SAID_LINE: (0, lines),
+        Register.LAST_TURN: (-1, int(Body.NONE)),
+    }
+    return [(register, 1, *bounds) for register, bounds in greatest.items()]
+
+
+def _rooms_that_fit(program: Program) -> int:
+    """How many room templates the program has space for behind the first."""
+    h = program.header
+    size = h(Header.CANVAS_WIDTH) * h(Header.CANVAS_HEIGHT) + 1 + 2 * h(Header.CANVAS_HEIGHT)
+    return min((h(Header.SIZE) - h(Header.ROOM_AT)) // size, np.iinfo(np.int16).max)
+
+
+def _entities(program: Program) -> list[Range]:
+    ranges: list[Range] = []
+    for number, entity in enumerate(program.entities):
+        statuses = max(len(entity.states), 1) if entity.role == "object" else 128
+        greatest = {
+            Field.X: (-1, program.header(Header.CANVAS_WIDTH) - 1),
+            Field.Y: (-1, program.header(Header.CANVAS_HEIGHT) - 1),
+            Field.DIR: (0, 3),
+            Field.COLOR: (0, 5),
+            Field.STATUS: (0, statuses - 1),
+            Field.GONE: (0, 1),
+            Field.POKED: (0, 1),
+            Field.LAST: (0, int(Body.NONE)),
+        }
+        base = FIRST_ENTITY + ENTITY_FIELDS * number
+        ranges += [(base + name, 1, *bounds) for name, bounds in greatest.items()]
+    return ranges
+
+
+def _speech(program: Program) -> list[Range]:
+    h = program.header
+    last_line = max(h(Header.LINES) - 1, 0)
+    return [
+        (h(Header.LOG), h(Header.LOG_SIZE), 0, last_line),
+        (h(Header.HEARD), h(Header.HEARD_SIZE), 0, last_line),
+    ]
+
+
+def _frames(program: Program) -> list[Range]:
+    h = program.header
+    start, rows = h(Header.FRAME_AT), h(Header.FRAMES)
+    table = program.words[start : start + rows * FrameColumn.COLUMNS].reshape(rows, FrameColumn.COLUMNS)
+    ranges: list[Range] = []
+    for row in table.tolist():
+        ranges += [
+            (row[FrameColumn.STATE], 1, 0, row[FrameColumn.STATES] - 1),
+            (row[FrameColumn.CLOCK], 1, 0, h(Header.HORIZON)),
+            (row[FrameColumn.INBOX], 1, 0, h(Header.INBOX_SIZE)),
+            (row[FrameColumn.INBOX] + 1, h(Header.INBOX_SIZE), 0, h(Header.CLASSES) - 1),
+        ]
+    return ranges
