@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +14,11 @@ from socialai_dsl.envs.audit import first_unsound
 from socialai_dsl.program import FIRST_ENTITY, Field, Header, Register
 
 
-def played(steps: int, seed: int = 0) -> ScenarioVectorEnv:
-    envs = socialai_dsl.make_vec("talkitout", num_envs=32)
+SAMPLES = sorted(str(path) for path in (Path(__file__).parents[2] / "data" / "agreement").glob("*.yaml"))
+
+
+def played(steps: int, seed: int = 0, name: str = "talkitout") -> ScenarioVectorEnv:
+    envs = socialai_dsl.make_vec(name, num_envs=32)
     envs.reset(seed=seed)
     generator = np.random.default_rng(seed)
     for _ in range(steps):
@@ -22,9 +26,10 @@ def played(steps: int, seed: int = 0) -> ScenarioVectorEnv:
     return envs
 
 
+@pytest.mark.parametrize("name", ["talkitout", *SAMPLES], ids=lambda name: Path(name).stem)
 @pytest.mark.parametrize("steps", [0, 1, 7, 60])
-def test_every_state_of_an_episode_is_sound(steps: int) -> None:
-    envs = played(steps)
+def test_every_state_of_an_episode_is_sound(name: str, steps: int) -> None:
+    envs = played(steps, name=name)
     assert first_unsound(envs.program, envs._table.state.registers) is None
 
 
