@@ -13,7 +13,6 @@ from socialai_dsl.envs import ScenarioVectorEnv
 from socialai_dsl.envs.audit import first_unsound
 from socialai_dsl.program import FIRST_ENTITY, Field, Header, Register
 
-
 SAMPLES = sorted(str(path) for path in (Path(__file__).parents[2] / "data" / "agreement").glob("*.yaml"))
 
 
