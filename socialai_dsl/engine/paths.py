@@ -1,19 +1,39 @@
-"""Shortest paths by flooding boards from the goal, one layer at a time; bounded by the size of the room."""
+"""Shortest paths by flooding sets of cells from the goal, one layer at a time; bounded by the size of the room."""
 
 import numpy as np
 
+from socialai_dsl.engine import small_paths
 from socialai_dsl.engine.boards import is_deadly, npcs_are_hidden, solid_line
 from socialai_dsl.engine.entities import are_present, distance, field, is_present
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.sets import add_cell, clear, drop_cell, fill_next_to, get_line, has_cell, set_line
-from socialai_dsl.engine.state import AGENT, FREE, FRONT, SEEN, STILL, ZERO, Row
+from socialai_dsl.engine.state import AGENT, FREE, FRONT, NO_PATH, SEEN, STILL, ZERO, Row
 from socialai_dsl.program import Body, Field, Header
 
-NO_PATH = -1
+
+@outline
+def find_way(row: Row, mover: int, target: int, beside: bool) -> int:
+    """Direction of the next cell of a shortest path to the cell of `target`, or to a free cell `beside` it.
+
+    NO_PATH if there is none, and also for who is there already. Among equally good cells the order is down, up, right,
+    left.
+    """
+    stay_outline()
+    if not are_present(row, mover, target) or distance(row, mover, target) == (1 if beside else 0):
+        return NO_PATH
+    if row.program[Header.CANVAS_WIDTH] * row.program[Header.CANVAS_HEIGHT] <= small_paths.MOST_CELLS:
+        return small_paths.find_way(row, mover, target, beside)
+    _find_free(row, mover)
+    fill_next_to(row, FRONT, target)
+    for y in range(row.program[Header.CANVAS_HEIGHT]):
+        set_line(row, FRONT, y, get_line(row, FRONT, y) & get_line(row, FREE, y) if beside else ZERO)
+    if not beside:
+        add_cell(row, FRONT, field(row, target, Field.X), field(row, target, Field.Y))
+    return _first_direction(row, mover)
 
 
 @inline
-def find_free(row: Row, mover: int) -> None:
+def _find_free(row: Row, mover: int) -> None:
     """Fill the board FREE with the cells that `mover` could stand on."""
     width = row.program[Header.CANVAS_WIDTH]
     height = row.program[Header.CANVAS_HEIGHT]
@@ -36,11 +56,8 @@ def find_free(row: Row, mover: int) -> None:
 
 
 @inline
-def first_direction(row: Row, mover: int) -> int:
-    """Direction of the next cell of a shortest path from `mover` to the set FRONT through FREE, or NO_PATH.
-
-    Among equally good cells the order is down, up, right, left. Destroys FRONT.
-    """
+def _first_direction(row: Row, mover: int) -> int:
+    """Direction of the next cell from `mover` to the set FRONT through FREE, or NO_PATH. Destroys FRONT."""
     x = field(row, mover, Field.X)
     y = field(row, mover, Field.Y)
     clear(row, SEEN)
@@ -73,24 +90,6 @@ def _grow(row: Row) -> bool:
         above = here
         any_grown |= grown
     return any_grown != 0
-
-
-@outline
-def find_way(row: Row, mover: int, target: int, beside: bool) -> int:
-    """Direction of the next cell on the way to the cell of `target`, or to a free cell `beside` it.
-
-    NO_PATH if there is none, and also for who is there already.
-    """
-    stay_outline()
-    if not are_present(row, mover, target) or distance(row, mover, target) == (1 if beside else 0):
-        return NO_PATH
-    find_free(row, mover)
-    fill_next_to(row, FRONT, target)
-    for y in range(row.program[Header.CANVAS_HEIGHT]):
-        set_line(row, FRONT, y, get_line(row, FRONT, y) & get_line(row, FREE, y) if beside else ZERO)
-    if not beside:
-        add_cell(row, FRONT, field(row, target, Field.X), field(row, target, Field.Y))
-    return first_direction(row, mover)
 
 
 @inline

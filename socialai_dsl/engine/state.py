@@ -24,6 +24,7 @@ ZERO = np.int64(0)
 ONE = np.int64(1)
 STILL = np.int64(Body.NONE)
 NOTHING = np.int64(-1)
+NO_PATH = np.int64(-1)
 
 SCRATCH_BOARDS = BOARDS + 4
 OCCUPIED = np.int64(BOARDS)

@@ -15,7 +15,7 @@ from socialai_dsl.engine.places import next_cell, place
 from socialai_dsl.engine.pointers import ROW_TYPES
 from socialai_dsl.engine.separate import Separate
 from socialai_dsl.engine.sets import drop_cell
-from socialai_dsl.engine.state import NOTHING, ONE, RESETTING, STILL, ZERO, Row
+from socialai_dsl.engine.state import NO_PATH, NOTHING, ONE, RESETTING, STILL, ZERO, Row
 from socialai_dsl.program import Body, Field, FrameColumn, Header, Op, Register
 
 _NO_CELL = -1
@@ -116,7 +116,7 @@ def _choose(row: Row, op: int, a: int, b: int, c: int) -> int:
     if op == Op.TURN_TO:
         return paths.turn_towards(direction, target, draw_below(row, c, _SIDES))
     way = paths.find_way(row, mover, target, op == Op.GO_NEXT_TO)
-    if way == paths.NO_PATH:
+    if way == NO_PATH:
         return STILL
     if way == direction:
         return np.int64(Body.FORWARD)

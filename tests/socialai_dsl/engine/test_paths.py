@@ -97,10 +97,10 @@ def test_doors_are_ways_when_open(status: int, expected: Body) -> None:
     assert choice(Op.GO_TO, 1, 0, **room) == expected
 
 
-def test_shortest_paths_in_random_rooms() -> None:
+@pytest.mark.parametrize("size", [8, 9, 7])
+def test_shortest_paths_in_random_rooms(size: int) -> None:
     """In rooms with random obstacles every next cell is one nearer to the goal, and NONE means there is no way."""
-    rng = np.random.default_rng(3)
-    size = 8
+    rng = np.random.default_rng(size)
     checked = blocked = 0
     for _ in range(120):
         cells = [(x, y) for x in range(1, size - 1) for y in range(1, size - 1)]
@@ -132,7 +132,7 @@ def test_shortest_paths_in_random_rooms() -> None:
         assert action in {0: (FORWARD,), 1: (RIGHT,), 3: (LEFT,), 2: (LEFT, RIGHT)}[turn]
         checked += 1
     assert checked > 50
-    assert blocked > 3
+    assert blocked > 1
 
 
 def _distances(goal: tuple[int, int], walls: set[tuple[int, int]], size: int) -> dict[tuple[int, int], int]:
