@@ -14,21 +14,30 @@ def _line(row: Row, line: int, name: int) -> int:
 
 
 @inline
-def _forget_oldest(row: Row) -> None:
-    """Drop the oldest line from log and tokens."""
+def _forget_oldest(row: Row, words: int) -> None:
+    """Drop whole lines, the oldest first, until the log has room for one more line and the tokens for `words` more."""
     registers = row.registers
     log = row.program[Header.LOG]
-    lines = registers[Register.LOGGED] - 1
-    words = _line(row, registers[log], LineColumn.TOKENS)
-    left = max(0, registers[Register.TOKENS] - words)
-    for i in range(lines):
-        registers[log + i] = registers[log + i + 1]
+    lines = registers[Register.LOGGED]
+    most = row.program[Header.TOKENS] - words
+    left = registers[Register.TOKENS]
+    gone = 0
+    while gone < lines and (left > most or lines - gone >= row.program[Header.LOG_SIZE]):
+        left -= _line(row, registers[log + gone], LineColumn.TOKENS)
+        gone += 1
+    if gone == 0:
+        return
+    left = max(left, 0)
+    shift = registers[Register.TOKENS] - left
+    for i in range(lines - gone):
+        registers[log + i] = registers[log + gone + i]
     for i in range(left):
-        row.tokens[i] = row.tokens[i + words]
+        row.tokens[i] = row.tokens[shift + i]
     for i in range(left, registers[Register.TOKENS]):
         row.tokens[i] = 0
-    registers[log + lines] = 0
-    registers[Register.LOGGED] = lines
+    for i in range(lines - gone, lines):
+        registers[log + i] = 0
+    registers[Register.LOGGED] = lines - gone
     registers[Register.TOKENS] = left
 
 
@@ -38,15 +47,10 @@ def remember(row: Row, line: int) -> None:
     stay_outline()
     registers = row.registers
     words = _line(row, line, LineColumn.TOKENS)
-    room = row.program[Header.TOKENS]
-    while registers[Register.LOGGED] > 0 and (
-        registers[Register.TOKENS] + words > room
-        or registers[Register.LOGGED] >= row.program[Header.LOG_SIZE]
-    ):
-        _forget_oldest(row)
+    _forget_oldest(row, words)
     start = registers[Register.TOKENS]
     first = row.program[Header.TOKEN_AT] + _line(row, line, LineColumn.FIRST_TOKEN)
-    words = min(words, room - start)
+    words = min(words, row.program[Header.TOKENS] - start)
     for i in range(words):
         row.tokens[start + i] = row.program[first + i]
     registers[row.program[Header.LOG] + registers[Register.LOGGED]] = line
