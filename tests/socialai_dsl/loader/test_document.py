@@ -103,6 +103,8 @@ def test_every_visible_character_is_found_where_it_stands(
         ),
     )
     text = yaml.dump({"k": value}, Dumper=dumper, allow_unicode=True, width=width)
+    # PyYAML folds some lines of marks and spaces so that nobody reads them back as they were.
+    assume(yaml.safe_load(text) == {"k": value})
     try:
         document = read(text)
     except ScenarioError:

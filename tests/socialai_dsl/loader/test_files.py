@@ -18,7 +18,8 @@ def finding(path: Path) -> str:
     start = time.perf_counter()
     with pytest.raises(ScenarioError) as raised:
         read_document(path, "f")
-    assert time.perf_counter() - start < 1.0
+    # Against hanging; how fast it is a benchmark's business.
+    assert time.perf_counter() - start < 20.0
     assert str(raised.value)
     return str(raised.value.diagnostics[0])
 
