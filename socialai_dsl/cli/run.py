@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 SUMMARY: Final = "train an agent on a scenario, evaluate it and write pictures and figures"
 
 # About two minutes of training with the fast network on two cores of a server.
-DEFAULT_FRAMES: Final = 1_000_000
+DEFAULT_FRAMES: Final = 600_000
 _NUMBERS_SHOWN: Final = 8
 BUILT_IN_AGENTS: Final = ("ppo", "random", "oracle", "human")
 
