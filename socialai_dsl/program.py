@@ -17,7 +17,8 @@ instructions from the code table's start, and ends at `HALT`; pc 0 is a `HALT`, 
 
 **Operands.** `value(x)` of an operand word x: a constant x - CONSTANT if x >= CONSTANT // 2; a temporary if
 x >= TEMPORARY; else the register x. Temporaries are int64 scratch of one run and carry nothing from run to run. Where
-an op writes, `dst` is a register or temporary. An "entity" operand is a value that is an entity's number.
+an op writes, `dst` is a register or temporary. An "entity" operand is a value that is an entity's number, or a cell:
+`CELL + 32 * y + x`, which is always present, never moves and faces nowhere.
 
 **Utterance classes.** The compiler groups all pairs (template, noun) that no rule of the program tells apart into one
 class; class 0 is silence, 1 is "said, but nothing any rule waits for". Tables are indexed by class, so a step visits
@@ -37,7 +38,7 @@ import numpy.typing as npt
 
 from socialai_dsl.source import Span
 
-VERSION = 1
+VERSION = 2
 TEMPORARY = 8192
 TEMPORARIES = 64
 CONSTANT = 1 << 20
@@ -46,6 +47,8 @@ BOARDS = 8
 
 ENTITY_FIELDS = 8
 FIRST_ENTITY = 32
+CELL = 2048
+"""Entity operands from here on are cells: `CELL + 32 * y + x`."""
 NO_ACTION = 7
 VIEW = 7
 MAX_SIDE = 30
@@ -94,15 +97,20 @@ class Header(IntEnum):
     TOKEN_AT = 36  # (sum of line lengths,) token ids
     SITE_AT = 37  # (sites, 2): site, number (draws.py)
     RESET_PC = 38
-    SETTLE_PC = 39
-    RULES_PC = 40
+    SETTLE_PC = 39  # computed statuses; run when Register.CHANGED is set, always with Flag.SETTLE_ALWAYS
+    RULES_PC = 40  # once a step after all turns: memories, then the rules of the world
     LINES = 41
     STATES = 42
     SITES = 43
     TYPE_ROWS = 44
     COUNTERS = 45  # rules, then outcomes, then deadly, time-out, episodes
     AGENT_SAYS = 46  # 1 + line spoken by the agent for pair (0, 0), if it hears itself; pairs follow row by row; else 0
-    END = 47
+    BEFORE_PC = 47  # run at the start of a step, before time goes on: what `prev` and memories ask
+    LINKS_PC = 48  # what statuses change directly in others (`unlocks`); run when Register.CHANGED is set
+    REQUIRE_PC = (
+        49  # run after a reset; it sets Register.ACCEPTED to 1 if the room is as required. 0: it always is
+    )
+    END = 50
 
 
 class Flag(IntEnum):
@@ -112,6 +120,8 @@ class Flag(IntEnum):
     PICTURE_BEFORE_NPCS = 2
     AGENT_FRAME = 4
     OWN_VOICE = 8
+    SETTLE_ALWAYS = 16  # computed statuses depend on more than the statuses of objects
+    EGOCENTRIC = 32  # the picture shows an NPC's direction as (direction - the agent's + 2) mod 4
 
 
 class Register(IntEnum):
@@ -134,6 +144,12 @@ class Register(IntEnum):
     POKED = 14  # entity toggled at by the agent this step, -1 none (an NPC: it was poked)
     SAID_LINE = 15  # 1 + line that the entity on turn says this step, 0 none
     LAST_TURN = 16  # Body of the entity on turn
+    UTTERANCE = 17  # of the agent this step: 1 + template * nouns + noun, 0 silent
+    CHANGED = 18  # 1: an object's status or presence has changed since statuses were last settled
+    ACCEPTED = 19  # written by the code at REQUIRE_PC
+    ATTEMPT = (
+        20  # how many rooms of this episode were not as required; part of the key of every draw at reset
+    )
 
 
 class Field(IntEnum):
@@ -143,7 +159,7 @@ class Field(IntEnum):
     Y = 1
     DIR = 2  # 0 right (east), 1 down (south), 2 left (west), 3 up (north)
     COLOR = 3  # 0 red, 1 green, 2 blue, 3 purple, 4 yellow, 5 grey
-    STATUS = 4  # of an object: index into its type's states; 0 for others
+    STATUS = 4  # of an object: index into its type's states; of an NPC: its status code in the picture
     GONE = 5  # 1: not in the room
     POKED = 6  # NPC: 1 once it was poked in this episode
     LAST = 7  # Body of its last turn
@@ -166,12 +182,13 @@ class EntityColumn(IntEnum):
     """Columns of the entity table."""
 
     TYPE = 0  # first row in the type table; the status is added
-    KIND = 1  # NPC: status code in the picture; object: 0
+    KIND = 1  # NPC: greatest status code it can have in the picture (see Field.STATUS); object: 0
     NEAR = 2  # least and greatest Manhattan distance at which its voice is heard
     FAR = 3
     AUDIBLE = 4  # 1: heard even while NPCs are hidden
     IN_WALL = 5  # object: 1 if it lies in a wall (then "in front" is the cell one step into the room)
-    COLUMNS = 6
+    VIEW = 6  # side of its view square
+    COLUMNS = 7
 
 
 class TypeColumn(IntEnum):
@@ -235,6 +252,8 @@ class Op(IntEnum):
     IF_FACES_TOWARD = 15  # direction of e(a) is the quadrant of the way to e(b)
     IF_IN_LINE = 16  # same row or column, both present
     IF_REACHES = 17  # e(a) has a path to the cell of e(b), or next to it
+    IF_LOOKS_AT = 18  # e(b) lies straight ahead of e(a), within its view, nothing opaque between
+    IF_UNOBSTRUCTED = 19  # e(a) and e(b) are in one row or column with nothing opaque between
     # Values.
     LOAD = 20  # dst a = v(b)
     ADD = 21  # dst a = v(b) + v(c)
@@ -253,6 +272,8 @@ class Op(IntEnum):
     COUNT_BITS = 34  # dst a = number of set bits of v(b)
     LOWEST_BIT = 35  # dst a = position of the lowest set bit of v(b); 0 if none
     PICK_BIT = 36  # dst a = position of a uniformly drawn set bit of v(b), site c (literal); 0 if none
+    SEES = 37  # dst a = 1 if e(c) would be in the view square of e(b) if that faced direction v(a), else 0
+    CELL_OF = 38  # dst a = the cell of e(b); CELL - 1 if it is not in the room
     # Effects.
     SET_FIELD = 40  # field b (literal) of e(a) = v(c); X, Y, STATUS, GONE have ops of their own
     BECOME = 41  # status of e(a) = v(b); the cell is drawn anew
@@ -268,7 +289,8 @@ class Op(IntEnum):
     )
     GO_TO = 52  # e(a) takes one step of a shortest path to the cell of e(b); site c for turning round
     GO_NEXT_TO = 53  # e(a) takes one step of a shortest path to a free cell next to e(b); site c
-    # Boards: sets of cells, numbered 0 to BOARDS - 1 (literals). Only in reset code.
+    # Boards: sets of cells, numbered 0 to BOARDS - 1 (literals). They carry nothing from run to run; B_FREE and PUT
+    # belong to reset code.
     B_FLOOR = 60  # board a = cells of plain floor
     B_WALL = 61  # board a = cells of wall side b (literal Side), at least c (literal) cells from its corners
     B_RECT = (
@@ -281,7 +303,8 @@ class Op(IntEnum):
     B_WITHOUT = 67  # board a = a without b
     B_FREE = 68  # board a = a without cells that hold an entity
     EACH_CELL = (
-        69  # run the c instructions up to END_EACH for each cell of board a, row by row; v(b), v(b+1) = x, y
+        69  # run the c instructions up to END_EACH for each cell of board a, row by row; v(b), v(b + 1) = x, y and
+        # v(b + 2) = the cell as an operand (temporaries)
     )
     DROP_CELL = 70  # take the current cell out of the board of the loop
     END_EACH = 71
@@ -291,6 +314,12 @@ class Op(IntEnum):
     PUT = 73  # e(a) is placed at x = v(b), y = v(b + 1) (b is a temporary); not in the room if x is -1
     MAKE_ROOM = 74  # the room has width v(a), height v(b)
     B_COPY = 75  # board a = board b
+    B_COUNT = 76  # dst a (a temporary) = number of cells of board b
+    FIRST_CELL = (
+        77  # dst a, a + 1 (temporaries) = x, y of the first cell of board b, row by row; -1, -1 if none
+    )
+    # dst a, a + 1 (temporaries) = x, y of the cell of board b nearest to e(c), ties: the first; -1, -1 if none
+    NEAREST_CELL = 78
 
 
 class Side(IntEnum):
@@ -302,7 +331,7 @@ class Side(IntEnum):
     RIGHT = 3
 
 
-TESTS = range(Op.IF_EQ, Op.IF_REACHES + 1)
+TESTS = range(Op.IF_EQ, Op.IF_UNOBSTRUCTED + 1)
 CODES_OF_TYPES: Mapping[str, int] = {"empty": 1, "wall": 2, "npc": 11}
 COLORS = ("red", "green", "blue", "purple", "yellow", "grey")
 DIRECTIONS = ("right", "down", "left", "up")
@@ -333,11 +362,14 @@ class RegisterName:
     """How the scenario calls a register of its own, and what its numbers mean.
 
     Attributes:
-        path: address in a layout: `let.exit`, `wizard.frame`, `wizard.clock`, `wizard.name`, `jill.goal`.
+        path: address in a layout: `let.exit`, `wizard.frame`, `wizard.clock`, `wizard.name`, `jill.goal`,
+            `teacher.one_of`, `switches[0].initial`; an element of a sequence or memory is `let.dance[0].move` and
+            `let.dance[0].utterance`; how many a memory holds is `memory.attempt.filled`.
         register: its number.
         values: word of each value from `low` on; empty for plain numbers.
         low, high: range of its values.
-        kind: what its values are: int, bool, color, direction, action, entity (by number), text, noun, status.
+        kind: what its values are: int, bool, color, direction, action, entity (by number), text, noun, status,
+            utterance (0 silence, else 1 + template * nouns + noun), cell (CELL + 32 * y + x).
     """
 
     path: str

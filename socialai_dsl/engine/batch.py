@@ -9,12 +9,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.engine.kernel import BAD_ACTION, Task, serve
+from socialai_dsl.engine.kernel import BAD_ACTION, Task, prepare, serve
 from socialai_dsl.engine.picture import view_table
 from socialai_dsl.engine.pointers import make_book
 from socialai_dsl.engine.queries import identify, script
 from socialai_dsl.engine.state import Key, Link, Ports, State, Tables, empty_ports, empty_state, no_pins
-from socialai_dsl.engine.vm import interpreter
 from socialai_dsl.program import VIEW, Header
 
 _ROWS_WORTH_A_THREAD: Final = 64
@@ -86,7 +85,7 @@ class Batch:
         for row, pool in enumerate(pool_of_row):
             self.state.keys[row, Key.POOL] = int(starts[pool]) | len(pools[pool]) << 32
             self.state.keys[row, Key.PROGRAM] = self.offsets[pools[pool][0]]
-        interpreter.prepare()
+        prepare()
         self._rows = rows
         self._book = self._make_book()
         self._cuts = _cut(rows, threads)

@@ -1,9 +1,11 @@
 """The one compiled entry point: steps, resets or scripts the rows of a part of a batch."""
 
+import gc
 from enum import IntEnum
 from typing import Any
 
 import numpy as np
+from numba import config, types
 
 from socialai_dsl.engine import rng
 from socialai_dsl.engine.cache import entry
@@ -22,6 +24,7 @@ from socialai_dsl.engine.reset import draw_member, reset_row
 from socialai_dsl.engine.rows import copy, open_row
 from socialai_dsl.engine.state import ZERO, Book, Key, Link, Row, Size
 from socialai_dsl.engine.step import TERMINATED, step_row
+from socialai_dsl.engine.vm import interpreter
 from socialai_dsl.program import Header, Register
 
 BAD_ACTION = -1
@@ -148,3 +151,18 @@ def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
         reset_row(fresh, layout != 0)
         take_picture(fresh, fresh.program[Header.SIZE])
     return ended
+
+
+def prepare() -> None:
+    """Compile the engine, or load it from the cache, unless that is done."""
+    if config.DISABLE_JIT or serve.overloads:  # type: ignore[attr-defined]
+        return
+    # The compiler makes millions of objects that live to its end: looking for garbage is a tenth of its time.
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        interpreter.prepare()
+        serve.compile((types.int64[::1], *[types.int64] * 4))  # type: ignore[attr-defined]
+    finally:
+        if collecting:
+            gc.enable()

@@ -12,6 +12,8 @@ entity     number of the entity: 0 the agent, NPCs in cast order, then objects i
 text       index into `words`: the finite set of texts that the expression can be (names, kinds)
 noun       index into `words`, the nouns of the scenario's grammar
 status     index into `words`, the states of an object type
+utterance  0 silence, else 1 + template * nouns + noun; `words` are the texts
+cell       CELL + 32 * y + x (program.py); where an entity is asked for its place, a cell will do
 =========  =====================================================================================
 """
 
@@ -22,7 +24,9 @@ from typing import Literal
 
 from socialai_dsl.source import Span
 
-Kind = Literal["bool", "int", "direction", "color", "action", "entity", "text", "noun", "status"]
+Kind = Literal[
+    "bool", "int", "direction", "color", "action", "entity", "text", "noun", "status", "utterance", "cell"
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +60,9 @@ class Const:
 
 @dataclass(frozen=True, slots=True)
 class Read:
-    """A register of the scenario, by its path: `let.exit`, `wizard.name`, `jill.goal` (a frame's `let` or slot)."""
+    """A register of the scenario, by its path: `let.exit`, `wizard.name`, `jill.goal` (a frame's `let` or slot),
+    `teacher.one_of`, `let.dance[0].move`, `memory.attempt.filled`, `prev.0`.
+    """
 
     type: Type
     path: str
@@ -143,15 +149,63 @@ class Not:
 @dataclass(frozen=True, slots=True)
 class Test:
     """A relation of two entities: at (same cell), next_to, faces, faces_toward, in_front_of, eye_contact, in_line,
-    can_reach; or of the candidate cell (`subject` is None: here.next_to(x), here.at(x), here.in_front_of(x)).
+    can_reach, looks_at, unobstructed; or of the candidate cell (`subject` is None: here.next_to(x), here.at(x),
+    here.in_front_of(x)).
     """
 
     name: Literal[
-        "at", "next_to", "faces", "faces_toward", "in_front_of", "eye_contact", "in_line", "can_reach"
+        "at",
+        "next_to",
+        "faces",
+        "faces_toward",
+        "in_front_of",
+        "eye_contact",
+        "in_line",
+        "can_reach",
+        "looks_at",
+        "unobstructed",
     ]
     subject: Term | None
     object: Term
     type: Type = BOOL
+
+
+@dataclass(frozen=True, slots=True)
+class Sees:
+    """The viewer, a cast member, has the target in its view square, as it faces now or as if it faced `facing`."""
+
+    viewer: Term
+    target: Term
+    facing: Term | None = None
+    type: Type = BOOL
+
+
+@dataclass(frozen=True, slots=True)
+class Chance:
+    """True with a probability, drawn anew at every use; `ordinal` and `site` as those of a pick."""
+
+    probability: float
+    ordinal: int = 0
+    site: str = ""
+    type: Type = BOOL
+
+
+@dataclass(frozen=True, slots=True)
+class Select:
+    """The value beside the first condition that holds, else `default`."""
+
+    type: Type
+    conditions: tuple[Term, ...]
+    values: tuple[Term, ...]
+    default: Term
+
+
+@dataclass(frozen=True, slots=True)
+class CellOf:
+    """The cell of an entity."""
+
+    type: Type
+    entity: Term
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,6 +266,7 @@ class Quantified:
     pick and first give an item (`type` is the items'); count an int; any and all a bool; nearest the item with
     the least distance to `to`. `ordinal` numbers the picks of one value in source order (draws.py); `site` is empty
     unless the pick comes from a slot that is substituted into a larger value: then it is the site of the slot.
+    With `cells` the items are all floor cells, row by row, and the variable is a cell.
     """
 
     type: Type
@@ -222,6 +277,7 @@ class Quantified:
     to: Term | None = None
     ordinal: int = 0
     site: str = ""
+    cells: bool = False
 
 
 Term = (
@@ -237,6 +293,10 @@ Term = (
     | Logic
     | Not
     | Test
+    | Sees
+    | Chance
+    | Select
+    | CellOf
     | PokedNow
     | Said
     | Spoke
@@ -306,6 +366,8 @@ class Placing:
     where: Term | None = None
     where_site: str = ""
     nowhere: bool = False
+    when: Term | None = None
+    """Done only if this holds: of several for one entity (`one_of`), one does."""
 
 
 # --- what happens -----------------------------------------------------------------------------------------------
@@ -314,7 +376,8 @@ class Placing:
 @dataclass(frozen=True, slots=True)
 class Activity:
     """One body action a turn: stay, left, right, forward, toggle, face(x), turn_to(dir), turn(left|right), go_to(x),
-    go_next_to(x), use(x), enter(x), choose(...); `weights` go with the args of choose.
+    go_next_to(x), use(x), enter(x), perform(seq), choose(...); `weights` go with the args of choose. The args of
+    perform are the elements of the sequence in turn, each as its move and its utterance.
     """
 
     name: Literal[
@@ -330,6 +393,7 @@ class Activity:
         "go_next_to",
         "use",
         "enter",
+        "perform",
         "choose",
     ]
     args: tuple[Term, ...]
@@ -430,6 +494,7 @@ class Coloring:
     span: Span
     value: Sited | None = None
     distinct_from: tuple[int, ...] = ()
+    when: Term | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -441,6 +506,7 @@ class Facing:
     span: Span
     value: Sited | None = None
     toward: Term | None = None
+    when: Term | None = None
 
 
 Setup = Drawn | Coloring | Placing | Facing
@@ -458,6 +524,8 @@ class ObjectType:
     transparent: frozenset[int]
     toggled: dict[int, int] = field(hash=False)
     deadly: bool = False
+    active: frozenset[int] = frozenset()
+    """Statuses in which it works on what it is linked to (`unlocks`)."""
     shown: dict[int, tuple[int, int]] = field(default_factory=dict, hash=False)
 
 
@@ -469,6 +537,10 @@ class Entity:
         number: its place in the order agent, NPCs, objects. key, index: `doors`, 2 for doors[2]; index None if single.
         type: of an object. status: initial. kind, kind_code: of an NPC. name: type and term of its name (cast members).
         near, far: Manhattan distances at which its voice is heard. in_wall: it lies in a wall.
+        view: side of its view square. kind_drawn: the status code of an NPC whose kind is drawn; `kind_code` is then
+            the greatest it can be.
+        initial: initial status of an object where it is drawn or computed (then `status` is the type's).
+        unlocks: objects that are unlocked whenever this one is in an active status (links; a level, not an edge).
     """
 
     number: int
@@ -485,6 +557,10 @@ class Entity:
     far: int = 1
     audible: bool = False
     in_wall: bool = False
+    view: int = 7
+    kind_drawn: Term | None = None
+    initial: Read | None = None
+    unlocks: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -507,6 +583,33 @@ class RoomPlan:
     build: tuple[tuple[ObjectType, Region, Span], ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class Computed:
+    """A status that follows from a condition: `on` while it holds; `off` once it stops holding.
+
+    An object that is in `on` while the condition is false becomes `off`; in any other status it is left alone.
+    """
+
+    entity: int
+    on: int
+    off: int
+    condition: Sited
+
+
+@dataclass(frozen=True, slots=True)
+class MemoryPlan:
+    """The last `length` acts of the agent, oldest first, in steps that began with `open` true (None: all steps).
+
+    Registers: `memory.NAME[k].move` and `memory.NAME[k].utterance` for k < length, and `memory.NAME.filled`, how many
+    it holds, at most `length`. A new act goes to the last place and pushes the others towards 0.
+    """
+
+    path: str
+    length: int
+    utterances: Type
+    open: Sited | None
+
+
 @dataclass(frozen=True)
 class Checked:
     """A scenario in which everything is resolved and nothing is wrong: the compiler's input.
@@ -514,6 +617,11 @@ class Checked:
     Attributes:
         setup: what is drawn at reset after the room, in the order it is done (needs first).
         words_in_order: every word that may be heard, in order of first appearance, lower case.
+        computed: statuses that follow from conditions, each after those it reads.
+        remembered: registers that take their value at the start of every step, on the state that the last one left.
+        memories: what the agent did last. rules: rules of the world, all that hold fire, top to bottom.
+        require: a room is drawn again while one of these is false.
+        egocentric: the picture shows the directions of NPCs relative to the agent's.
     """
 
     name: str
@@ -531,6 +639,12 @@ class Checked:
     picture_before_npcs: bool
     names_shown: bool
     own_voice: bool
+    computed: tuple[Computed, ...] = ()
+    remembered: tuple[Drawn, ...] = ()
+    memories: tuple[MemoryPlan, ...] = ()
+    rules: tuple[RulePlan, ...] = ()
+    require: tuple[Sited, ...] = ()
+    egocentric: bool = False
 
 
 TURN = Type("int", -1, 1, ("left", "none", "right"))
