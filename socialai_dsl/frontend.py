@@ -10,7 +10,7 @@ from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, S
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
 from socialai_dsl.loader import Resolved, resolve
 from socialai_dsl.parameters import Substituted, substitute
-from socialai_dsl.schema import Scenario
+from socialai_dsl.schema import Npc, Scenario
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.semantics.check import check_meaning
 from socialai_dsl.semantics.terms import Checked
@@ -126,6 +126,9 @@ def _checked(resolved: Resolved, bag: DiagnosticBag) -> tuple[Checked | None, Sc
             return _checked_scenario(resolved, bag)
         case "variant":
             return None, None  # of any scenario: its shape was checked when it was read
+        case "npc":
+            _check_npc(resolved, bag)
+            return None, None
         case "library":
             _check_library(resolved, bag)
             return None, None
@@ -133,6 +136,12 @@ def _checked(resolved: Resolved, bag: DiagnosticBag) -> tuple[Checked | None, Sc
     hint = "known are `scenario`, `variant` and `library`"
     bag.error("S108", message, resolved.key_span((resolved.kind,)), hint=hint)
     return None, None
+
+
+def _check_npc(resolved: Resolved, bag: DiagnosticBag) -> None:
+    """Its shape; what it means is checked in the scenarios that draw it."""
+    assert isinstance(resolved.data, dict), "internal: a file is a mapping"
+    model_of(Npc, resolved.data, resolved, bag, partial=resolved.data.get("abstract") is True)
 
 
 def _check_library(resolved: Resolved, bag: DiagnosticBag) -> None:
@@ -148,6 +157,11 @@ def _check_library(resolved: Resolved, bag: DiagnosticBag) -> None:
 
 
 def _checked_scenario(resolved: Resolved, bag: DiagnosticBag) -> tuple[Checked | None, Scenario | None]:
+    try:
+        resolved = resolved.with_drawn_files()
+    except ScenarioError as error:
+        bag.extend(error.diagnostics)
+        return None, None
     assert isinstance(resolved.data, dict), "internal: a file is a mapping"
     filled = substitute(resolved, bag)
     data = _with_grammar(filled, resolved, bag)

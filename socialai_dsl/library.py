@@ -29,6 +29,7 @@ class ObjectTypeModel(Model):
         walkable, transparent: statuses in which it can be entered, seen through.
         toggled: status -> the status that a toggle makes of it.
         deadly: entering it ends the episode.
+        active: statuses in which it works on what it is linked to (`unlocks`).
         shown: status -> what the status and orientation channels show.
         color: where a scenario gives none; default random.
     """
@@ -40,6 +41,7 @@ class ObjectTypeModel(Model):
     transparent: Statuses = ()
     toggled: dict[Word, Word] = Field(default_factory=dict)
     deadly: bool = False
+    active: Statuses = ()
     shown: dict[Word, Channels] = Field(default_factory=dict)
     color: Word = "random"
 
@@ -55,6 +57,7 @@ class ObjectTypeModel(Model):
             transparent=frozenset(map(number, self.transparent)),
             toggled={number(before): number(after) for before, after in self.toggled.items()},
             deadly=self.deadly,
+            active=frozenset(map(number, self.active)),
             shown={number(status): channels for status, channels in self.shown.items()},
         )
 

@@ -127,7 +127,7 @@ class Builder:
         found = DiagnosticBag()
         build.edits += apply_patch(build.tree, patch, found)
         found.raise_errors(self.library.sources)
-        self._check_depth(build.tree)
+        self.check_depth(build.tree)
 
     def check_chain(self, path: Path, chain: tuple[Path, ...], asked: Span) -> None:
         """Whether `path` may be built on by the files of `chain`.
@@ -166,7 +166,7 @@ class Builder:
         base.tree.children.pop("abstract", None)
         del root.children["extends"]
         merged = merge(base.tree, root)
-        self._check_depth(merged)
+        self.check_depth(merged)
         return merged
 
     def _kind(self, root: Node) -> str:
@@ -188,7 +188,12 @@ class Builder:
         hint = "give one of " + ", ".join(f"`{kind}: name`" for kind in KINDS)
         raise self.library.error("S108", "no key says what this file is", root.value_span(), hint=hint)
 
-    def _check_depth(self, tree: Node) -> None:
+    def check_depth(self, tree: Node) -> None:
+        """Whether a tree that was put together is shallow enough.
+
+        Raises:
+            ScenarioError: S004.
+        """
         for path, node in tree.walk():
             if len(path) > MAX_DEPTH:
                 message = f"put together, the scenario is nested more than {MAX_DEPTH} levels deep"

@@ -121,6 +121,49 @@ class Resolved(Positions):
         names = [ScenarioName(Part(file.name, span), (), {}) for file in files]
         return tuple(_resolved(self._builder, f, n, span) for f, n in zip(files, names, strict=True))
 
+    def with_drawn_files(self) -> Resolved:
+        """This scenario with the npc files that each `one_of` of its cast names put in the place of their names.
+
+        Raises:
+            ScenarioError: whatever is wrong with a name or a file; S108 for a file of another kind.
+        """
+        cast = self.data.get("cast") if isinstance(self.data, dict) else None
+        drawing = [
+            name
+            for name, member in (cast.items() if isinstance(cast, dict) else ())
+            if isinstance(member, dict) and isinstance(member.get("one_of"), str | list)
+        ]
+        if not drawing:
+            return self
+        build = self._build.copy()
+        for name in drawing:
+            place: DataPath = ("cast", name, "one_of")
+            node = build.tree.at(place)
+            node.value, node.children = None, [file._build.tree for file in self._npc_files(place)]
+        self._builder.check_depth(build.tree)
+        return Resolved(self._builder, build, self._given)
+
+    def _npc_files(self, place: DataPath) -> list[Resolved]:
+        """The npc files that are named at `place`; those that others build on are left out of a pattern."""
+        found: list[Resolved] = []
+        part = self.part(place)
+        places = [(*place, i) for i in range(len(part))] if isinstance(part, list) else [place]
+        for one in places:
+            files = self.include_all(one)
+            for file in files:
+                document, there = self.find(one)
+                span = document.value_span(there)
+                if file.kind != "npc":
+                    message = f"`{file.path.name}` is a file of the kind `{file.kind}`; only npc files can be drawn"
+                    raise self._builder.library.error("S108", message, span)
+                abstract = isinstance(file.data, dict) and file.data.get("abstract") is True
+                if abstract and len(files) == 1:
+                    message = f"`{file.path.name}` is abstract: others build on it, nobody can be it"
+                    raise self._builder.library.error("S108", message, span)
+                if not abstract:
+                    found.append(file)
+        return found
+
     def members(self) -> tuple[Resolved, ...]:
         """The members of a suite, in order, with what `?split=` replaces and the variants it passes on.
 

@@ -72,6 +72,14 @@ class Node:
         """The entry of a mapping; None if there is none or this is no mapping."""
         return self.children.get(key) if isinstance(self.children, dict) else None
 
+    def at(self, path: DataPath) -> Node:
+        """The part at a path below this one, which must exist."""
+        part = self
+        for step in path:
+            assert part.children is not None, "internal: the path leads into a scalar"
+            part = part.children[step]  # type: ignore[call-overload]
+        return part
+
     def text(self, key: str) -> str | None:
         """The text at a key of a mapping; None for anything else."""
         entry = self.entry(key)

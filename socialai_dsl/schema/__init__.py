@@ -1,7 +1,18 @@
 """What an author may write, as pydantic models: shape only, meaning is checked by `semantics`."""
 
-from socialai_dsl.schema.behaviour import CastMember, FirstRule, Frame, Rule, State, Step, ThenRule
-from socialai_dsl.schema.scenario import PRIMITIVES, Outcome, Parameter, Scenario
+from socialai_dsl.schema.behaviour import (
+    CastMember,
+    FirstRule,
+    Frame,
+    Npc,
+    Role,
+    Rule,
+    State,
+    Step,
+    ThenRule,
+    WorldRule,
+)
+from socialai_dsl.schema.scenario import PRIMITIVES, Memory, Outcome, Parameter, Scenario, Sequence
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
 
 __all__ = [
@@ -9,15 +20,20 @@ __all__ = [
     "CastMember",
     "FirstRule",
     "Frame",
+    "Memory",
+    "Npc",
     "ObjectGroup",
     "Observe",
     "Outcome",
     "Parameter",
+    "Role",
     "Room",
     "Rule",
     "Scenario",
+    "Sequence",
     "State",
     "Step",
     "ThenRule",
     "UtteranceGrammar",
+    "WorldRule",
 ]

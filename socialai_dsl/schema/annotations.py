@@ -8,9 +8,19 @@ from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 
-from socialai_dsl.schema.behaviour import CastMember, FirstRule, Frame, State, Step, ThenRule
+from socialai_dsl.schema.behaviour import (
+    CastMember,
+    FirstRule,
+    Frame,
+    Npc,
+    Role,
+    State,
+    Step,
+    ThenRule,
+    WorldRule,
+)
 from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.schema.scenario import Outcome, Parameter, Scenario
+from socialai_dsl.schema.scenario import Memory, Outcome, Parameter, Scenario, Sequence, SungWith
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
 
 CALLED: Final[dict[type, str]] = {
@@ -21,6 +31,12 @@ CALLED: Final[dict[type, str]] = {
     ThenRule: "a rule of `then`",
     Step: "a step",
     CastMember: "a member of the cast",
+    Npc: "an npc file",
+    Role: "a role",
+    WorldRule: "a rule of the world",
+    Sequence: "a sequence",
+    SungWith: "the utterance of a sequence",
+    Memory: "a memory",
     ObjectGroup: "an object",
     Room: "the room",
     Observe: "`observe`",

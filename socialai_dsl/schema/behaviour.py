@@ -8,7 +8,13 @@ from pydantic import BeforeValidator, Field
 
 from socialai_dsl.schema.base import Expression, Expressions, Model, TextLine, Texts, Word, _as_tuple
 
-SlotType = Literal["text", "utterance", "object", "npc", "direction", "color", "int", "bool", "noun"]
+SlotType = Literal[
+    "text", "utterance", "object", "npc", "direction", "color", "int", "bool", "noun", "cell", "sequence"
+]
+
+Probability = Annotated[
+    float, BeforeValidator(lambda v: float(v) if type(v) is int else v), Field(ge=0, le=1)
+]
 
 
 class Effects(Model):
@@ -26,10 +32,18 @@ class Rule(Effects):
     hears: Texts = Field((), description="an utterance, or a list of alternatives")
     when: Expression | None = None
     after: int | None = Field(None, ge=0, description="holds from this turn in the state on")
-    chance: Annotated[float, BeforeValidator(lambda v: float(v) if type(v) is int else v)] | None = Field(
-        None, ge=0, le=1, description="drawn anew each turn if everything else holds"
-    )
+    chance: Probability | None = Field(None, description="drawn anew each turn if everything else holds")
     once: bool = Field(False, description="once per episode and NPC")
+
+
+class WorldRule(Model):
+    """A rule about the world, read once a step after everybody has moved; each that holds takes effect."""
+
+    id: Word | None = Field(None, description="names the rule in coverage, traces and patches")
+    when: Expression | None = None
+    chance: Probability | None = Field(None, description="drawn anew each step if everything else holds")
+    once: bool = Field(False, description="once per episode")
+    cause: Expressions = Field((), description="effects on objects and NPCs, in order")
 
 
 class ThenRule(Rule):
@@ -73,9 +87,24 @@ class Frame(Model):
     steps: Annotated[tuple[Step, ...], BeforeValidator(_as_tuple)] | None = None
 
 
-class CastMember(Model):
-    """The agent or an NPC. Keys left out come from `npc_defaults`, then from the defaults of the language."""
+class Role(Model):
+    """A part that a member of the cast plays: where it is put, and what drives it if it is an NPC."""
 
+    place: str | None = Field(None, description="default anywhere")
+    at: Annotated[tuple[Expression, ...], BeforeValidator(_as_tuple)] | None = None
+    facing: Expression | None = Field(None, description="a direction, random, or toward(x); default random")
+    frame: Word | None = Field(None, description="the frame an NPC in this role follows")
+
+
+class CastMember(Model):
+    """The agent or an NPC. Keys left out come from its role, from the file that `one_of` draws, from `npc_defaults`,
+    then from the defaults of the language.
+    """
+
+    role: Word | None = Field(None, description="the part it plays")
+    one_of: Annotated[tuple[Npc, ...], BeforeValidator(_as_tuple)] | None = Field(
+        None, description="files of NPCs, one of which is drawn for each episode: a list, or a pattern with *"
+    )
     kind: Word | None = Field(None, description="what it looks like; default peer")
     name: Expression | None = Field(None, description="what precedes its lines; default its key, capitalised")
     color: Expression | None = Field(None, description="default random")
@@ -89,11 +118,25 @@ class CastMember(Model):
     audible: Literal["always"] | None = Field(None, description="heard even while NPCs are hidden")
     kind_code: int | None = Field(None, ge=0, le=255, description="status code in the image")
 
-    def over(self, defaults: CastMember) -> CastMember:
+    def over(self, defaults: CastMember | Role) -> CastMember:
         """This member with what it leaves out taken from `defaults`; `with` is merged key by key."""
         given: dict[str, Any] = {name: getattr(self, name) for name in self.model_fields_set}
-        base: dict[str, Any] = {name: getattr(defaults, name) for name in defaults.model_fields_set}
+        known = defaults.model_fields_set & CastMember.model_fields.keys()
+        base: dict[str, Any] = {name: getattr(defaults, name) for name in known}
         if "place" in given or "at" in given:
             base.pop("place", None), base.pop("at", None)
-        given["with_"] = {**defaults.with_, **self.with_}
+        given["with_"] = {**(defaults.with_ if isinstance(defaults, CastMember) else {}), **self.with_}
         return CastMember.model_construct(**{**base, **given})
+
+
+class Npc(CastMember):
+    """A file of its own for one NPC: a member of the cast with its frames, which `one_of` draws."""
+
+    npc: Word
+    abstract: bool = False
+    about: str | None = None
+    notes: str | None = None
+    frames: dict[Word, Frame] = Field(default_factory=dict)
+
+
+CastMember.model_rebuild(_types_namespace={"Npc": Npc})

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field
 
 from socialai_dsl.schema.base import Expression, Model, Word, _as_tuple
-from socialai_dsl.schema.behaviour import CastMember, Frame
+from socialai_dsl.schema.behaviour import CastMember, Frame, Probability, Role, WorldRule
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
 
 Primitive = Literal["left", "right", "forward", "pickup", "drop", "toggle", "done"]
@@ -22,6 +22,34 @@ class Outcome(Model):
     failure: Expression | None = None
     reward: int = Field(100, ge=0, le=100, description="per cent of the success reward")
     id: Word | None = None
+
+
+class SungWith(Model):
+    """When the elements of a sequence are accompanied by an utterance."""
+
+    chance: Probability = Field(
+        description="of an utterance, drawn uniformly from the grammar, for each element"
+    )
+
+
+class Sequence(Model):
+    """A sequence of acts, drawn at reset: each element has a move and perhaps an utterance."""
+
+    sequence: int = Field(ge=1, le=16, description="how many elements")
+    moves: Annotated[tuple[Primitive, ...], BeforeValidator(_as_tuple)] = Field(
+        min_length=1, description="what each move is drawn from"
+    )
+    utterance: SungWith | None = Field(None, description="default: silent")
+
+
+class Memory(Model):
+    """What the agent did last, to be compared with a sequence."""
+
+    last: int = Field(ge=1, le=16, description="how many acts it holds")
+    of: Literal["agent.acts"] = Field("agent.acts", description="moves and utterances of the agent")
+    while_: Expression | None = Field(
+        None, alias="while", description="only steps at whose start this held; default all"
+    )
 
 
 class Parameter(Model):
@@ -49,22 +77,44 @@ class Scenario(Model):
         (), description="order of placement"
     )
     objects: dict[Word, ObjectGroup] = Field(default_factory=dict)
-    let: dict[Word, Expression] = Field(
+    let: dict[Word, Expression | Sequence] = Field(
         default_factory=dict, description="drawn or computed once per episode"
     )
     define: dict[str, Expression] = Field(default_factory=dict, description="recomputed at every use")
+    memory: dict[Word, Memory] = Field(default_factory=dict, description="what the agent did last")
     frames: dict[Word, Frame] = Field(default_factory=dict)
+    roles: dict[Word, Role] = Field(default_factory=dict, description="parts that members of the cast play")
     npc_defaults: CastMember = CastMember()
     cast: dict[Word, CastMember]
+    rules: Annotated[tuple[WorldRule, ...], BeforeValidator(_as_tuple)] = Field(
+        (), description="rules about the world, read once a step; each that holds takes effect"
+    )
     outcome: Annotated[tuple[Outcome, ...], BeforeValidator(_as_tuple)] = Field(min_length=1)
     observe: Observe = Observe()
+    require: Annotated[tuple[Expression, ...], BeforeValidator(_as_tuple)] = Field(
+        (), description="conditions on the drawn room, which is drawn again while one is false"
+    )
 
     def members(self) -> dict[str, CastMember]:
-        """The cast with `npc_defaults` filled in (they do not apply to the agent), in the order written."""
-        return {
-            name: member if name == "agent" else member.over(self.npc_defaults)
-            for name, member in self.cast.items()
-        }
+        """The cast in the order written, each as its first alternative (`alternatives`)."""
+        return {name: self.alternatives(name)[0] for name in self.cast}
+
+    def alternatives(self, name: str) -> tuple[CastMember, ...]:
+        """What a member can be, one for each file of its `one_of`, else one.
+
+        What it leaves out comes from the file, then from its role (not the frame, for the agent: a role drives NPCs
+        only), then, for NPCs, from `npc_defaults`.
+        """
+        member = self.cast[name]
+        drawn = [member.over(file) for file in member.one_of or ()] or [member]
+        role = self.roles.get(member.role) if member.role is not None else None
+        if role is not None:
+            drawn = [one.over(role) for one in drawn]
+        if name != "agent":
+            return tuple(one.over(self.npc_defaults) for one in drawn)
+        if role is not None and member.frame is None:
+            drawn = [one.model_copy(update={"frame": None}) for one in drawn]
+        return tuple(drawn)
 
     def npcs(self) -> dict[str, CastMember]:
         """The members other than the agent, in the order they act."""

@@ -42,6 +42,15 @@ class ObjectGroup(Model):
     ) = Field(None, description="[x, y], or a list of them: a group")
     color: Expressions | None = Field(None, description="a colour, `random`, `distinct`, or one each")
     state: Word | None = Field(None, description="initial status; default the type's")
+    pressed: Expression | None = Field(None, description="whether it is pressed at first")
+    opened: Expression | None = Field(None, description="whether it is opened at first")
+    locked: Expression | None = Field(None, description="computed: it is locked while this holds")
+    tagged: Expression | None = Field(None, description="computed: it is tagged while this holds")
+    one_way: bool = Field(False, description="a toggle only leads away from the initial status, never back")
+    dark: bool = Field(False, description="the agent sees no difference between its statuses")
+    unlocks: str | None = Field(
+        None, description="what is unlocked while this is pressed: one object, or a group in the same order"
+    )
 
 
 class Observe(Model):
@@ -51,6 +60,10 @@ class Observe(Model):
     image: Literal["end", "before_npcs"] = Field("end", description="when in the step the picture is taken")
     names: Literal["shown", "hidden"] = Field("shown", description="speaker names in what is heard")
     own_voice: bool = Field(False, description="whether the agent hears itself")
+    directions: Literal["absolute", "egocentric"] = Field(
+        "absolute",
+        description="how the image shows the directions of NPCs; egocentric: as seen from the agent",
+    )
 
 
 class UtteranceGrammar(Model):
