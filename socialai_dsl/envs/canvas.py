@@ -61,8 +61,25 @@ class Canvas:
         width: float = 0.05,
     ) -> None:
         """Draw a disc, a ring, or both."""
-        box = self._box(x - radius, y - radius, x + radius, y + radius)
+        self.ellipse(x - radius, y - radius, x + radius, y + radius, fill, outline, width)
+
+    def ellipse(
+        self,
+        x0: float,
+        y0: float,
+        x1: float,
+        y1: float,
+        fill: Rgb | None = None,
+        outline: Rgb | None = None,
+        width: float = 0.05,
+    ) -> None:
+        """Draw the ellipse that fills the rectangle between two corners."""
+        box = self._box(x0, y0, x1, y1)
         self._draw.ellipse(box, fill=fill, outline=outline, width=self._width(width) if outline else 0)
+
+    def pie(self, x: float, y: float, radius: float, start: float, end: float, fill: Rgb) -> None:
+        """Draw a slice of a disc between two angles in degrees, clockwise from the right."""
+        self._draw.pieslice(self._box(x - radius, y - radius, x + radius, y + radius), start, end, fill=fill)
 
     def polygon(self, points: list[tuple[float, float]], fill: Rgb) -> None:
         """Draw a filled polygon."""

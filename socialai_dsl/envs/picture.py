@@ -5,10 +5,22 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from socialai_dsl.envs.render import draw_ansi, draw_grid
 from socialai_dsl.envs.table import Table
-from socialai_dsl.program import VIEW, Header
+from socialai_dsl.envs.tiles import Code
+from socialai_dsl.program import (
+    ENTITY_FIELDS,
+    FIRST_ENTITY,
+    VIEW,
+    EntityColumn,
+    Field,
+    Flag,
+    Header,
+    Program,
+    TypeColumn,
+)
 
 
 def frame(table: Table, row: int, mode: str, tile: int = 32) -> Any:
@@ -17,10 +29,45 @@ def frame(table: Table, row: int, mode: str, tile: int = 32) -> Any:
     width, height = table.room(row)
     if mode == "ansi":
         return draw_ansi(codes[:height, :width], agent)
-    return draw_grid(codes[:height, :width], agent, _seen(table, row, agent)[:height, :width], tile)
+    seen = _seen(table, row, agent)[:height, :width]
+    return draw_grid(codes[:height, :width], agent, seen, tile, _under_npcs(table, row))
 
 
-def _seen(table: Table, row: int, agent: tuple[int, int, int]) -> np.ndarray[Any, np.dtype[np.bool_]]:
+def _under_npcs(table: Table, row: int) -> dict[tuple[int, int], Code]:
+    """(x, y) -> the object in whose cell an NPC stands and is drawn; a cell of the canvas shows one of them."""
+    program, registers = table.program(row), table.state.registers[row]
+    if program.header(Header.FLAGS) & Flag.NPCS_HIDDEN:
+        return {}
+    fields = registers[FIRST_ENTITY:][: ENTITY_FIELDS * len(program.entities)].reshape(-1, ENTITY_FIELDS)
+    present = {
+        number: (int(entity[Field.X]), int(entity[Field.Y]))
+        for number, entity in enumerate(fields)
+        if entity[Field.X] >= 0 and not entity[Field.GONE]
+    }
+    roles = [entity.role for entity in program.entities]
+    npcs = {place for number, place in present.items() if roles[number] == "npc"}
+    return {
+        place: _look(program, number, fields[number])
+        for number, place in present.items()
+        if roles[number] == "object" and place in npcs
+    }
+
+
+def _look(program: Program, number: int, entity: NDArray[np.int16]) -> Code:
+    """How an object looks in its status."""
+    entities, types = program.header(Header.ENTITY_AT), program.header(Header.TYPE_AT)
+    kind = int(program.words[entities + EntityColumn.COLUMNS * number + EntityColumn.TYPE])
+    first = types + TypeColumn.COLUMNS * (kind + int(entity[Field.STATUS]))
+    look = program.words[first : first + TypeColumn.COLUMNS]
+    return (
+        int(look[TypeColumn.CODE]),
+        int(entity[Field.COLOR]),
+        int(look[TypeColumn.STATUS]),
+        int(look[TypeColumn.ORIENTATION]),
+    )
+
+
+def _seen(table: Table, row: int, agent: tuple[int, int, int]) -> NDArray[np.bool_]:
     """Which cells of the canvas lie in the agent's field of view, bool (H, W)."""
     program = table.program(row)
     width, height = program.header(Header.CANVAS_WIDTH), program.header(Header.CANVAS_HEIGHT)
@@ -29,5 +76,5 @@ def _seen(table: Table, row: int, agent: tuple[int, int, int]) -> np.ndarray[Any
     dx, dy = xs - x, ys - y
     ahead_x, ahead_y = ((1, 0), (0, 1), (-1, 0), (0, -1))[direction]
     ahead, aside = dx * ahead_x + dy * ahead_y, -dx * ahead_y + dy * ahead_x
-    seen: np.ndarray[Any, np.dtype[np.bool_]] = (ahead >= 0) & (ahead < VIEW) & (abs(aside) <= VIEW // 2)
+    seen: NDArray[np.bool_] = (ahead >= 0) & (ahead < VIEW) & (abs(aside) <= VIEW // 2)
     return seen

@@ -1,12 +1,13 @@
 """This module turns what a room looks like now into pictures and text, without a display."""
 
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.envs import tiles
-from socialai_dsl.envs.tiles import draw_tile
+from socialai_dsl.envs.tiles import SEEN_LINE, Code, draw_tile
 
 _ARROWS: Final = ">v<^"
 _ANSI_COLOURS: Final = (31, 32, 34, 35, 33, 37)
@@ -22,7 +23,7 @@ _LETTERS: Final[dict[int, str]] = {
     tiles.FLOOR: ",",
     tiles.DOOR: "/DL",
     tiles.BALL: "o*",
-    tiles.BOX: "Bb",
+    tiles.BOX: "BbX",
     tiles.LAVA: "~",
     tiles.SWITCH: "sS",
     tiles.APPLE: "a:",
@@ -31,7 +32,7 @@ _LETTERS: Final[dict[int, str]] = {
     tiles.MARBLE: "m",
     tiles.PLATFORM: "pP",
     tiles.FENCE: "+",
-    tiles.REMOTE_DOOR: "_RK",
+    tiles.REMOTE_DOOR: "_R",
 }
 
 
@@ -40,14 +41,16 @@ def draw_grid(
     agent: tuple[int, int, int],
     seen: NDArray[np.bool_] | None = None,
     tile: int = 32,
+    below: Mapping[tuple[int, int], Code] | None = None,
 ) -> NDArray[np.uint8]:
     """Draw the room from above.
 
     Args:
         codes: uint8 (H, W, 4), each cell's (type, colour, status, orientation) as in the observation.
         agent: (x, y, direction); x to the right, y down, direction 0 right, 1 down, 2 left, 3 up.
-        seen: bool (H, W), the cells in the agent's field of view, lightly tinted; None tints nothing.
+        seen: bool (H, W), the cells in the agent's field of view, tinted and outlined; None marks nothing.
         tile: side of a cell in pixels.
+        below: (x, y) -> what lies under the one who stands there, such as a doorway.
 
     Returns:
         uint8 (H * tile, W * tile, 3).
@@ -65,9 +68,31 @@ def draw_grid(
             code = _code(codes, row, column)
             here = direction % 4 if (column, row) == (x, y) else None
             lit = bool(seen[row, column]) if seen is not None else False
-            cells.append(draw_tile(code, here, lit, tile))
+            under = below.get((column, row)) if below else None
+            cells.append(draw_tile(code, here, lit, tile, under))
         rows.append(np.concatenate(cells, axis=1))
-    return np.concatenate(rows, axis=0)
+    picture = np.concatenate(rows, axis=0)
+    if seen is not None:
+        _outline(picture, seen, tile)
+    return picture
+
+
+def _outline(picture: NDArray[np.uint8], seen: NDArray[np.bool_], tile: int) -> None:
+    """Draw a line inside the edge of what is seen, over walls as well, where a tint would not show."""
+    width = max(1, tile // 16)
+    padded = np.pad(seen, 1)
+    height, columns = seen.shape
+    cells = picture.reshape(height, tile, columns, tile, 3)
+    left, right = slice(0, width), slice(tile - width, tile)
+    # For each side where the neighbour is not seen: the pixels of a cell along that side.
+    for open_side, down, across in (
+        (~padded[1:-1, :-2], slice(None), left),
+        (~padded[1:-1, 2:], slice(None), right),
+        (~padded[:-2, 1:-1], left, slice(None)),
+        (~padded[2:, 1:-1], right, slice(None)),
+    ):
+        for row, column in np.argwhere(seen & open_side):
+            cells[row, down, column, across] = SEEN_LINE
 
 
 def draw_ansi(codes: NDArray[np.uint8], agent: tuple[int, int, int], colour: bool = False) -> str:
@@ -95,7 +120,7 @@ def draw_ansi(codes: NDArray[np.uint8], agent: tuple[int, int, int], colour: boo
     return "\n".join(lines)
 
 
-def _letters(code: tuple[int, int, int, int]) -> str:
+def _letters(code: Code) -> str:
     kind, colour, status, orientation = code
     if kind == tiles.NPC:
         return chr(ord("A") + status % 26) + _ARROWS[orientation % 4]
@@ -110,7 +135,7 @@ def _paint(text: str, style: str, colour: bool) -> str:
     return f"\x1b[{style}m{text}{_RESET}" if colour else text
 
 
-def _code(codes: NDArray[np.uint8], row: int, column: int) -> tuple[int, int, int, int]:
+def _code(codes: NDArray[np.uint8], row: int, column: int) -> Code:
     kind, colour, status, orientation = (int(value) for value in codes[row, column])
     return kind, colour, status, orientation
 

@@ -1,15 +1,19 @@
-"""This module draws one cell of the room: what lies on it, who stands on it and where they look."""
+"""This module draws one cell of the room: what lies on it, and with the figures, who stands on it."""
 
 import math
 from collections.abc import Callable
 from functools import lru_cache
 from itertools import pairwise
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.envs.canvas import INK, PAPER, WHITE, Canvas, Rgb, mix
+from socialai_dsl.envs.figures import draw_agent, draw_npc, turn
+
+Code: TypeAlias = tuple[int, int, int, int]
+"""A cell as in the observation: type, colour, status, orientation."""
 
 # Codes of the observation, channel 0.
 UNSEEN, EMPTY, WALL, FLOOR, DOOR, BALL, BOX, LAVA = 0, 1, 2, 3, 4, 6, 7, 9
@@ -27,11 +31,12 @@ PALETTE: Final[tuple[Rgb, ...]] = (
 LINE: Final[Rgb] = (221, 218, 209)
 STONE: Final[Rgb] = (92, 97, 107)
 SEEN_TINT: Final[Rgb] = (255, 226, 138)
+SEEN_LINE: Final[Rgb] = (214, 150, 20)
 
 
 @lru_cache(maxsize=4096)
 def draw_tile(
-    code: tuple[int, int, int, int], agent_direction: int | None, seen: bool, size: int
+    code: Code, agent_direction: int | None, seen: bool, size: int, below: Code | None = None
 ) -> NDArray[np.uint8]:
     """Draw one cell.
 
@@ -40,18 +45,19 @@ def draw_tile(
         agent_direction: 0 right, 1 down, 2 left, 3 up if the agent stands here, else None.
         seen: whether the cell lies in the agent's field of view; such cells are tinted.
         size: side of the tile in pixels.
+        below: what lies under it, such as the doorway in which an NPC stands; None for plain floor.
 
     Returns:
         A read-only array, uint8 (size, size, 3).
     """
     canvas = Canvas(size)
-    kind, colour, status, orientation = code
     canvas.fill(mix(PAPER, SEEN_TINT, 0.55) if seen else PAPER)
     canvas.rectangle(0, 0, 1, 1, outline=mix(LINE, SEEN_TINT, 0.5) if seen else LINE, width=0.03)
-    draw = _DRAWERS.get(kind, _draw_unknown)
-    draw(canvas, PALETTE[colour % len(PALETTE)], status, orientation)
+    for kind, colour, status, orientation in [below, code] if below is not None else [code]:
+        draw = _DRAWERS.get(kind, _draw_unknown)
+        draw(canvas, PALETTE[colour % len(PALETTE)], status, orientation)
     if agent_direction is not None:
-        _draw_agent(canvas, agent_direction)
+        draw_agent(canvas, agent_direction)
     pixels = canvas.pixels()
     pixels.setflags(write=False)
     return pixels
@@ -63,96 +69,6 @@ def _dark(colour: Rgb) -> Rgb:
 
 def _light(colour: Rgb) -> Rgb:
     return mix(colour, WHITE, 0.55)
-
-
-def _turn(points: list[tuple[float, float]], direction: int) -> list[tuple[float, float]]:
-    """Turn points that were drawn facing right about the centre; exact, so that directions match."""
-    cos, sin = ((1, 0), (0, 1), (-1, 0), (0, -1))[direction % 4]
-    return [
-        (0.5 + (x - 0.5) * cos - (y - 0.5) * sin, 0.5 + (x - 0.5) * sin + (y - 0.5) * cos) for x, y in points
-    ]
-
-
-# --- the agent and the NPCs
-
-
-def _draw_agent(canvas: Canvas, direction: int) -> None:
-    body = [(0.90, 0.50), (0.16, 0.86), (0.30, 0.50), (0.16, 0.14)]
-    inner = [(0.80, 0.50), (0.26, 0.76), (0.37, 0.50), (0.26, 0.24)]
-    canvas.polygon(_turn(body, direction), fill=(120, 18, 24))
-    canvas.polygon(_turn(inner, direction), fill=(232, 48, 52))
-
-
-def _draw_npc(canvas: Canvas, colour: Rgb, status: int, orientation: int) -> None:
-    beak = _turn([(0.97, 0.5), (0.80, 0.36), (0.80, 0.64)], orientation)
-    canvas.polygon(beak, fill=_dark(colour))
-    canvas.circle(0.5, 0.5, 0.37, fill=_dark(colour))
-    canvas.circle(0.5, 0.5, 0.325, fill=colour)
-    _draw_eyes(canvas, orientation)
-    _draw_hat(canvas, status)
-
-
-def _draw_eyes(canvas: Canvas, orientation: int) -> None:
-    dx, dy = ((1, 0), (0, 1), (-1, 0), (0, -1))[orientation % 4]
-    for side in (-1, 1):
-        x, y = 0.5 + side * 0.13 + dx * 0.07, 0.53 + dy * 0.07
-        canvas.circle(x, y, 0.105, fill=WHITE)
-        canvas.circle(x + dx * 0.045, y + dy * 0.045, 0.058, fill=INK)
-
-
-def _draw_hat(canvas: Canvas, kind: int) -> None:
-    """Six hats tell the first kinds apart; later kinds repeat them with dots for the round."""
-    _HATS[kind % len(_HATS)](canvas)
-    for dot in range(min(kind // len(_HATS), 5)):
-        canvas.circle(0.22 + dot * 0.14, 0.90, 0.055, fill=WHITE, outline=INK, width=0.02)
-
-
-def _pointed_hat(canvas: Canvas) -> None:
-    canvas.polygon([(0.5, 0.0), (0.73, 0.30), (0.27, 0.30)], fill=(58, 48, 120))
-    canvas.rectangle(0.16, 0.27, 0.84, 0.345, fill=(58, 48, 120), radius=0.03)
-    canvas.circle(0.51, 0.19, 0.045, fill=(250, 214, 90))
-
-
-def _flat_cap(canvas: Canvas) -> None:
-    canvas.rectangle(0.24, 0.12, 0.76, 0.31, fill=(52, 92, 86), radius=0.09)
-    canvas.rectangle(0.24, 0.26, 0.92, 0.335, fill=(34, 62, 58), radius=0.03)
-
-
-def _crown(canvas: Canvas) -> None:
-    points = [(0.24, 0.33), (0.22, 0.08), (0.37, 0.20), (0.5, 0.03), (0.63, 0.20), (0.78, 0.08), (0.76, 0.33)]
-    canvas.polygon(points, fill=(160, 112, 10))
-    inner = [(0.28, 0.29), (0.27, 0.16), (0.38, 0.25), (0.5, 0.11), (0.62, 0.25), (0.73, 0.16), (0.72, 0.29)]
-    canvas.polygon(inner, fill=(250, 206, 62))
-
-
-def _top_hat(canvas: Canvas) -> None:
-    canvas.rectangle(0.31, 0.02, 0.69, 0.30, fill=INK, radius=0.02)
-    canvas.rectangle(0.31, 0.20, 0.69, 0.26, fill=(200, 56, 56))
-    canvas.rectangle(0.17, 0.27, 0.83, 0.335, fill=INK, radius=0.03)
-
-
-def _bow(canvas: Canvas) -> None:
-    canvas.polygon([(0.5, 0.18), (0.24, 0.05), (0.24, 0.32)], fill=(224, 70, 140))
-    canvas.polygon([(0.5, 0.18), (0.76, 0.05), (0.76, 0.32)], fill=(224, 70, 140))
-    canvas.circle(0.5, 0.185, 0.065, fill=(160, 34, 92))
-
-
-def _headband(canvas: Canvas) -> None:
-    canvas.rectangle(0.19, 0.25, 0.81, 0.345, fill=WHITE, outline=INK, width=0.02, radius=0.02)
-    canvas.polygon([(0.5, 0.0), (0.57, 0.27), (0.43, 0.27)], fill=(226, 120, 40))
-
-
-_HATS: Final[tuple[Callable[[Canvas], None], ...]] = (
-    _pointed_hat,
-    _flat_cap,
-    _crown,
-    _top_hat,
-    _bow,
-    _headband,
-)
-
-
-# --- objects
 
 
 def _draw_nothing(canvas: Canvas, colour: Rgb, status: int, orientation: int) -> None:
@@ -220,14 +136,12 @@ def _draw_padlock(canvas: Canvas) -> None:
 def _draw_remote_door(canvas: Canvas, colour: Rgb, status: int, orientation: int) -> None:
     del orientation
     canvas.rectangle(0, 0, 1, 1, outline=_dark(colour), width=0.11)
-    bottom = 0.24 if status == 0 else 0.9
+    bottom = 0.24 if status == 0 else 0.9  # a grating, drawn up when open
     for x in (0.28, 0.5, 0.72):
         canvas.line([(x, 0.1), (x, bottom)], fill=colour, width=0.07)
     for y in (0.34, 0.66):
         if y < bottom:
             canvas.line([(0.14, y), (0.86, y)], fill=colour, width=0.06)
-    if status == 2:
-        _draw_padlock(canvas)
 
 
 def _draw_ball(canvas: Canvas, colour: Rgb, status: int, orientation: int) -> None:
@@ -253,12 +167,13 @@ def _star(x: float, y: float, radius: float) -> list[tuple[float, float]]:
 def _draw_box(canvas: Canvas, colour: Rgb, status: int, orientation: int) -> None:
     del orientation
     canvas.rectangle(0.18, 0.36, 0.82, 0.84, fill=colour, outline=_dark(colour), width=0.05)
-    if status == 0:
-        canvas.rectangle(0.14, 0.24, 0.86, 0.42, fill=_light(colour), outline=_dark(colour), width=0.05)
-    else:
+    if status == 1:
         canvas.polygon([(0.18, 0.36), (0.05, 0.16), (0.60, 0.10), (0.82, 0.36)], fill=_dark(colour))
         canvas.polygon([(0.23, 0.34), (0.13, 0.20), (0.57, 0.15), (0.74, 0.34)], fill=_light(colour))
-    _draw_ticks(canvas, max(0, status - 1))
+    else:
+        canvas.rectangle(0.14, 0.24, 0.86, 0.42, fill=_light(colour), outline=_dark(colour), width=0.05)
+    if status == 2:
+        _draw_padlock(canvas)
 
 
 def _draw_lava(canvas: Canvas, colour: Rgb, status: int, orientation: int) -> None:
@@ -318,7 +233,7 @@ def _draw_marble(canvas: Canvas, colour: Rgb, status: int, orientation: int) -> 
     canvas.circle(0.42, 0.42, 0.045, fill=_light(colour))
     if status:  # rolling: two dashes trail it
         for y in (0.40, 0.60):
-            canvas.line(_turn([(0.06, y), (0.2, y)], orientation), fill=_dark(colour), width=0.05)
+            canvas.line(turn([(0.06, y), (0.2, y)], orientation), fill=_dark(colour), width=0.05)
 
 
 def _draw_platform(canvas: Canvas, colour: Rgb, status: int, orientation: int) -> None:
@@ -348,7 +263,7 @@ _DRAWERS: Final[dict[int, Callable[[Canvas, Rgb, int, int], None]]] = {
     BALL: _draw_ball,
     BOX: _draw_box,
     LAVA: _draw_lava,
-    NPC: _draw_npc,
+    NPC: draw_npc,
     SWITCH: _draw_switch,
     APPLE: _draw_apple,
     LEVER: _draw_lever,

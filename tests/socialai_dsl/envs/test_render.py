@@ -12,9 +12,10 @@ from socialai_dsl.envs.tiles import draw_tile
 OBJECTS = [
     *[(kind, 0, 0, 0) for kind in (1, 2, 3, 4, 6, 7, 9, 11, 12, 13, 14, 15, 16, 17, 18, 19)],
     *[(tiles.DOOR, 0, status, 0) for status in (1, 2)],
-    *[(tiles.REMOTE_DOOR, 0, status, 0) for status in (1, 2)],
+    (tiles.REMOTE_DOOR, 0, 1, 0),
+    (tiles.BOX, 0, 2, 0),
     *[(kind, 0, 1, 0) for kind in (tiles.BOX, tiles.SWITCH, tiles.APPLE, tiles.LEVER, tiles.GENERATOR)],
-    *[(tiles.NPC, 0, kind, 0) for kind in range(1, 13)],
+    *[(tiles.NPC, 0, kind, 0) for kind in range(1, 24)],
     (tiles.BALL, 0, 1, 1),
     (tiles.UNSEEN, 0, 0, 0),
     (5, 0, 0, 0),
@@ -40,6 +41,26 @@ def test_the_six_colours_can_be_told_apart(kind: int) -> None:
     pictures = [draw_tile((kind, colour, 0, 0), None, False, 32).astype(int) for colour in range(6)]
     for one, other in combinations(range(6), 2):
         assert np.abs(pictures[one] - pictures[other]).sum(axis=2).max() > 60, (one, other)
+
+
+@pytest.mark.parametrize("kind", range(12))
+def test_the_gaze_is_seen_under_every_hat(kind: int) -> None:
+    """An arrow at the edge of the cell, on the side that the NPC faces and on no other."""
+    edges = [np.s_[10:22, 25:31], np.s_[25:31, 10:22], np.s_[10:22, 1:7], np.s_[1:7, 10:22]]
+    for direction, edge in enumerate(edges):
+        face = draw_tile((tiles.NPC, 4, kind, direction), None, False, 32).astype(int)
+        other = draw_tile((tiles.NPC, 4, kind, (direction + 1) % 4), None, False, 32).astype(int)
+        changed = np.abs(face[edge] - other[edge]).max(axis=2) > 60
+        assert changed.sum() >= 15, (kind, direction)
+
+
+def test_whoever_stands_in_a_doorway_is_drawn_within_its_frame() -> None:
+    npc, door = (tiles.NPC, 4, 2, 1), (tiles.DOOR, 1, 0, 0)
+    alone = draw_tile(npc, None, False, 32)
+    inside = draw_tile(npc, None, False, 32, below=door)
+    frame = draw_tile(door, None, False, 32)
+    assert (inside[:, 31] == frame[:, 31])[3:-3].mean() > 0.8, "the frame of the door is seen at the edge"
+    assert (inside[16:24, 8:24] == alone[16:24, 8:24]).all(), "and the face in the middle"
 
 
 @pytest.mark.parametrize("direction", [0, 1, 2, 3])
@@ -77,6 +98,29 @@ def test_only_the_seen_cells_are_tinted() -> None:
     changed = (plain != tinted).any(axis=2)
     assert changed[16:32, 16:32].all()
     changed[16:32, 16:32] = False
+    assert not changed.any()
+
+
+def test_the_view_is_outlined_over_walls() -> None:
+    seen = np.zeros((5, 6), bool)
+    seen[0, 0:2] = True
+    picture = draw_grid(room(), (3, 3, 0), seen, tile=16)
+    line = (picture == tiles.SEEN_LINE).all(axis=2)
+    assert line[0, :32].all(), "along the top of both cells"
+    assert line[:16, 0].all(), "down the left side"
+    assert not line[1:15, 15:17].any(), "not between two cells that are seen"
+    assert not line[16:].any()
+    assert not line[:, 32:].any()
+
+
+def test_what_lies_below_is_drawn_where_it_is() -> None:
+    codes = room()
+    codes[0, 2] = (tiles.NPC, 4, 0, 1)
+    plain = draw_grid(codes, (3, 3, 0), tile=16)
+    framed = draw_grid(codes, (3, 3, 0), tile=16, below={(2, 0): (tiles.DOOR, 1, 0, 0)})
+    changed = (plain != framed).any(axis=2)
+    assert changed[:16, 32:48].any()
+    changed[:16, 32:48] = False
     assert not changed.any()
 
 
