@@ -96,6 +96,10 @@ class Assembly:
     counted: int = 1
     sites: Sequence[tuple[int, int]] = ((draws.site("a"), 0), (draws.site("b"), 3))
     agent_says: int = 0
+    view: int = 7
+    before: Sequence[Instruction] = ()
+    links: Sequence[Instruction] = ()
+    require: Sequence[Instruction] = ()
 
     def __post_init__(self) -> None:
         self.code: list[Instruction] = [(Op.HALT, 0, 0, 0)]
@@ -137,6 +141,9 @@ class Assembly:
         header[Header.RESET_PC] = self.add(self._reset())
         header[Header.SETTLE_PC] = self.add(self.settle)
         header[Header.RULES_PC] = self.add(self.rules)
+        header[Header.BEFORE_PC] = self.add(self.before)
+        header[Header.LINKS_PC] = self.add(self.links)
+        header[Header.REQUIRE_PC] = self.add(self.require)
         tables.append((Header.CODE_AT, [word for instruction in self.code for word in instruction]))
         words = [0] * Header.END
         for at, table in tables:
@@ -235,6 +242,7 @@ class Assembly:
             row[EntityColumn.NEAR], row[EntityColumn.FAR] = self.earshot
             row[EntityColumn.AUDIBLE] = int(entity in self.audible)
             row[EntityColumn.IN_WALL] = int(kind == "door" and self.in_wall)
+            row[EntityColumn.VIEW] = self.view
             rows += row
         return rows
 
@@ -242,6 +250,7 @@ class Assembly:
     def _types() -> list[int]:
         def row(code: int, status: int, walkable: int, toggled: int) -> list[int]:
             columns = [0] * TypeColumn.COLUMNS
+            columns[TypeColumn.TRANSPARENT] = walkable
             columns[TypeColumn.CODE], columns[TypeColumn.STATUS] = code, status
             columns[TypeColumn.WALKABLE], columns[TypeColumn.TOGGLED] = walkable, toggled
             return columns

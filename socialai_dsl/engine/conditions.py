@@ -2,13 +2,16 @@
 
 import numpy as np
 
-from socialai_dsl.engine import entities, rng
+from socialai_dsl.engine import rng
+from socialai_dsl.engine.entities import column, front_x, front_y, quadrant
 from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.operands import draw_at, value
-from socialai_dsl.engine.paths import reaches
+from socialai_dsl.engine.paths import find_way
+from socialai_dsl.engine.sight import is_unobstructed
 from socialai_dsl.engine.speech import is_in_inbox
-from socialai_dsl.engine.state import PIN_NONE, Row
-from socialai_dsl.program import Field, Op
+from socialai_dsl.engine.state import NO_CELL, NO_PATH, PIN_NONE, Row
+from socialai_dsl.engine.whereabouts import facing, is_somewhere, x_of, y_of
+from socialai_dsl.program import EntityColumn, Op
 
 
 @inline
@@ -40,23 +43,35 @@ def _compares(op: int, left: int, right: int) -> bool:
 
 @inline
 def _relates(row: Row, op: int, a: int, b: int) -> bool:
-    """Tests of two entities: false unless both are in the room."""
-    if not entities.are_present(row, a, b):
-        return False
-    if op == Op.IF_NEXT_TO:
-        return entities.distance(row, a, b) == 1
-    if op == Op.IF_SAME_CELL:
-        return entities.distance(row, a, b) == 0
-    if op == Op.IF_FACES:
-        return entities.faces(row, a, b)
+    """Tests of two entities or cells: false unless both are in the room."""
+    if not (is_somewhere(row, a) and is_somewhere(row, b)):
+        return np.bool_(False)
+    x = x_of(row, a)
+    y = y_of(row, a)
     if op == Op.IF_IN_FRONT_OF:
-        return entities.is_at(row, a, entities.front_x(row, b), entities.front_y(row, b))
-    if op == Op.IF_EYE_CONTACT:
-        return entities.make_eye_contact(row, a, b)
-    if op == Op.IF_FACES_TOWARD:
-        return entities.field(row, a, Field.DIR) == entities.quadrant(row, a, b)
-    if op == Op.IF_IN_LINE:
-        return entities.share_line(row, a, b)
+        return b < NO_CELL and x == front_x(row, b) and y == front_y(row, b)
+    dx = x_of(row, b) - x
+    dy = y_of(row, b) - y
+    away = abs(dx) + abs(dy)
+    if op == Op.IF_SAME_CELL:
+        return away == 0
+    if op == Op.IF_NEXT_TO:
+        return away == 1
     if op == Op.IF_REACHES:
-        return reaches(row, a, b)
-    return np.bool_(False)
+        return away <= 1 or find_way(row, a, b, np.bool_(True)) != NO_PATH
+    in_line = dx == 0 or dy == 0
+    if op == Op.IF_IN_LINE:
+        return in_line
+    if op == Op.IF_UNOBSTRUCTED:
+        return in_line and is_unobstructed(row, x, y, dx, dy)
+    if facing(row, a) != quadrant(dx, dy):
+        return np.bool_(False)
+    if op == Op.IF_FACES_TOWARD:
+        return np.bool_(True)
+    if op == Op.IF_FACES:
+        return away == 1
+    if not in_line or away == 0:
+        return np.bool_(False)
+    if op == Op.IF_EYE_CONTACT:
+        return facing(row, b) == quadrant(-dx, -dy)
+    return away < column(row, a, EntityColumn.VIEW) and is_unobstructed(row, x, y, dx, dy)

@@ -84,10 +84,8 @@ def distance(row: Row, a: int, b: int) -> int:
 
 
 @inline
-def quadrant(row: Row, a: int, b: int) -> int:
-    """Direction in which b lies from a; on the diagonals SE is right, NE up, NW left, SW down."""
-    dx = field(row, b, Field.X) - field(row, a, Field.X)
-    dy = field(row, b, Field.Y) - field(row, a, Field.Y)
+def quadrant(dx: int, dy: int) -> int:
+    """Direction of what lies dx to the right and dy down; on the diagonals SE is right, NE up, NW left, SW down."""
     if abs(dx) > abs(dy):
         return 0 if dx > 0 else 2
     if abs(dy) > abs(dx):
@@ -126,37 +124,3 @@ def front_x(row: Row, entity: int) -> int:
 def front_y(row: Row, entity: int) -> int:
     """Y of the cell in front of an entity."""
     return field(row, entity, Field.Y) + step_y(front_direction(row, entity))
-
-
-@inline
-def are_present(row: Row, a: int, b: int) -> bool:
-    """Whether both are in the room."""
-    return is_present(row, a) and is_present(row, b)
-
-
-@inline
-def share_line(row: Row, a: int, b: int) -> bool:
-    """Whether they are in one row or column (or cell)."""
-    return field(row, a, Field.X) == field(row, b, Field.X) or field(row, a, Field.Y) == field(
-        row, b, Field.Y
-    )
-
-
-@inline
-def faces(row: Row, a: int, b: int) -> bool:
-    """Whether b is in the cell ahead of a."""
-    direction = field(row, a, Field.DIR)
-    return is_at(
-        row, b, field(row, a, Field.X) + step_x(direction), field(row, a, Field.Y) + step_y(direction)
-    )
-
-
-@inline
-def make_eye_contact(row: Row, a: int, b: int) -> bool:
-    """Whether they look at each other along a row or column; distance and things between do not matter."""
-    return (
-        share_line(row, a, b)
-        and distance(row, a, b) > 0
-        and field(row, a, Field.DIR) == quadrant(row, a, b)
-        and field(row, b, Field.DIR) == quadrant(row, b, a)
-    )

@@ -4,10 +4,11 @@ import numpy as np
 
 from socialai_dsl.engine import small_paths
 from socialai_dsl.engine.boards import is_deadly, npcs_are_hidden, solid_line
-from socialai_dsl.engine.entities import are_present, distance, field, is_present
+from socialai_dsl.engine.entities import field, is_present
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.sets import add_cell, clear, drop_cell, fill_next_to, get_line, has_cell, set_line
-from socialai_dsl.engine.state import AGENT, FREE, FRONT, NO_PATH, SEEN, STILL, ZERO, Row
+from socialai_dsl.engine.state import AGENT, FREE, FRONT, NO_CELL, NO_PATH, SEEN, STILL, Row
+from socialai_dsl.engine.whereabouts import distance, is_somewhere, x_of, y_of
 from socialai_dsl.program import Body, Field, Header
 
 
@@ -16,19 +17,27 @@ def find_way(row: Row, mover: int, target: int, beside: bool) -> int:
     """Direction of the next cell of a shortest path to the cell of `target`, or to a free cell `beside` it.
 
     NO_PATH if there is none, and also for who is there already. Among equally good cells the order is down, up, right,
-    left.
+    left. The target may be a cell itself.
     """
     stay_outline()
-    if not are_present(row, mover, target) or distance(row, mover, target) == (1 if beside else 0):
+    if mover >= NO_CELL or not (is_present(row, mover) and is_somewhere(row, target)):
         return NO_PATH
-    if row.program[Header.CANVAS_WIDTH] * row.program[Header.CANVAS_HEIGHT] <= small_paths.MOST_CELLS:
-        return small_paths.find_way(row, mover, target, beside)
+    width = row.program[Header.CANVAS_WIDTH]
+    height = row.program[Header.CANVAS_HEIGHT]
+    x = x_of(row, target)
+    y = y_of(row, target)
+    if x >= width or y >= height or distance(row, mover, target) == (1 if beside else 0):
+        return NO_PATH
+    if width * height <= small_paths.MOST_CELLS:
+        return small_paths.find_way(row, mover, y * width + x, beside)
     _find_free(row, mover)
-    fill_next_to(row, FRONT, target)
-    for y in range(row.program[Header.CANVAS_HEIGHT]):
-        set_line(row, FRONT, y, get_line(row, FRONT, y) & get_line(row, FREE, y) if beside else ZERO)
-    if not beside:
-        add_cell(row, FRONT, field(row, target, Field.X), field(row, target, Field.Y))
+    if beside:
+        fill_next_to(row, FRONT, x, y)
+        for line in range(height):
+            set_line(row, FRONT, line, get_line(row, FRONT, line) & get_line(row, FREE, line))
+    else:
+        clear(row, FRONT)
+        add_cell(row, FRONT, x, y)
     return _first_direction(row, mover)
 
 
@@ -90,12 +99,6 @@ def _grow(row: Row) -> bool:
         above = here
         any_grown |= grown
     return any_grown != 0
-
-
-@inline
-def reaches(row: Row, mover: int, target: int) -> bool:
-    """Whether `mover`, in the room like `target`, has a path to its cell or to one next to it."""
-    return distance(row, mover, target) <= 1 or find_way(row, mover, target, np.bool_(True)) != NO_PATH
 
 
 @inline

@@ -1,14 +1,15 @@
-"""Sets of cells in reset code: where something may be put, and putting it there."""
+"""Sets of cells: where something may be put and putting it there, and which of them is meant."""
 
 import numpy as np
 
-from socialai_dsl.engine.bits import count_bits, nth_bit
+from socialai_dsl.engine.bits import count_bits, lowest_bit, nth_bit
 from socialai_dsl.engine.boards import copy_room, room_table
 from socialai_dsl.engine.entities import field, front_x, front_y, is_present, set_field
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.operands import draw_below, value
-from socialai_dsl.engine.sets import add_cell, clear, count_cells, fill_next_to, get_line, has_cell, set_line
-from socialai_dsl.engine.state import NOTHING, OCCUPIED, ONE, ZERO, Row
+from socialai_dsl.engine.sets import add_cell, clear, count_cells, fill_next_to, get_line, set_line
+from socialai_dsl.engine.state import NO_CELL, NOTHING, OCCUPIED, ONE, ZERO, Row
+from socialai_dsl.engine.whereabouts import is_somewhere, x_of, y_of
 from socialai_dsl.program import TEMPORARY, Field, Header, Op, Register, Side
 
 
@@ -22,6 +23,12 @@ def place(row: Row, op: int, a: int, b: int, c: int) -> None:
         put(row, value(row, a), row.scratch[b - TEMPORARY], row.scratch[b - TEMPORARY + 1])
     elif op == Op.PICK_CELL:
         _pick_cell(row, a, b, c)
+    elif op == Op.B_COUNT:
+        row.scratch[a - TEMPORARY] = count_cells(row, b)
+    elif op == Op.FIRST_CELL:
+        _write_cell(row, a, next_cell(row, b, NOTHING, ZERO))
+    elif op == Op.NEAREST_CELL:
+        _write_cell(row, a, _nearest_cell(row, b, value(row, c)))
     elif op == Op.B_FLOOR or op == Op.B_RECT:
         _fill_floor(row, a)
         if op == Op.B_RECT:
@@ -29,7 +36,7 @@ def place(row: Row, op: int, a: int, b: int, c: int) -> None:
     elif op == Op.B_WALL:
         _fill_wall(row, a, b, c)
     elif op == Op.B_NEXT_TO:
-        fill_next_to(row, a, value(row, b))
+        _fill_next_to(row, a, value(row, b))
     elif op == Op.B_IN_FRONT_OF:
         _fill_in_front_of(row, a, value(row, b))
     else:
@@ -88,9 +95,17 @@ def _cut(row: Row, a: int, b: int) -> None:
 
 
 @inline
+def _fill_next_to(row: Row, a: int, thing: int) -> None:
+    if is_somewhere(row, thing):
+        fill_next_to(row, a, x_of(row, thing), y_of(row, thing))
+    else:
+        clear(row, a)
+
+
+@inline
 def _fill_in_front_of(row: Row, a: int, entity: int) -> None:
     clear(row, a)
-    if is_present(row, entity):
+    if entity < NO_CELL and is_present(row, entity):
         add_cell(row, a, front_x(row, entity), front_y(row, entity))
 
 
@@ -114,14 +129,38 @@ def _pick_cell(row: Row, target: int, a: int, site: int) -> None:
 @inline
 def next_cell(row: Row, a: int, x: int, y: int) -> int:
     """The first cell of board a after (x, y), row by row, as y * 32 + x; -1 if there is none."""
+    x += 1
     while y < row.program[Header.CANVAS_HEIGHT]:
-        x += 1
-        if x >= row.program[Header.CANVAS_WIDTH]:
-            x = -1
-            y += 1
-        elif has_cell(row, a, x, y):
-            return y * 32 + x
-    return -1
+        line = get_line(row, a, y) >> x << x
+        if line != 0:
+            return y * 32 + lowest_bit(line)
+        x = ZERO
+        y += 1
+    return NOTHING
+
+
+@inline
+def _nearest_cell(row: Row, a: int, thing: int) -> int:
+    """The cell of board a nearest to a thing, the first of equally near ones; as `next_cell`."""
+    x = x_of(row, thing)
+    y = y_of(row, thing)
+    nearest = NOTHING
+    least = NOTHING
+    cell = next_cell(row, a, NOTHING, ZERO)
+    while cell >= 0:
+        away = abs((cell & 31) - x) + abs((cell >> 5) - y)
+        if least < 0 or away < least:
+            nearest = cell
+            least = away
+        cell = next_cell(row, a, cell & 31, cell >> 5)
+    return nearest
+
+
+@inline
+def _write_cell(row: Row, target: int, cell: int) -> None:
+    """Write x and y of a cell to the temporaries `target` and the next; -1 and -1 if it is none."""
+    row.scratch[target - TEMPORARY] = cell & 31 if cell >= 0 else NOTHING
+    row.scratch[target - TEMPORARY + 1] = cell >> 5
 
 
 @inline

@@ -3,10 +3,10 @@
 import numpy as np
 
 from socialai_dsl.engine.bits import count_bits
-from socialai_dsl.engine.entities import field, is_present, step_x, step_y
+from socialai_dsl.engine.entities import step_x, step_y
 from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.state import ZERO, Row
-from socialai_dsl.program import MAX_SIDE, Field, Header
+from socialai_dsl.program import MAX_SIDE, Header
 
 
 @inline
@@ -59,11 +59,8 @@ def count_cells(row: Row, board: int) -> int:
 
 
 @inline
-def fill_next_to(row: Row, board: int, entity: int) -> None:
-    """Let the set be the cells at distance 1 from an entity, nothing if it is not in the room."""
+def fill_next_to(row: Row, board: int, x: int, y: int) -> None:
+    """Let the set be the cells at distance 1 from (x, y)."""
     clear(row, board)
-    if is_present(row, entity):
-        for direction in range(4):
-            x = field(row, entity, Field.X) + step_x(direction)
-            y = field(row, entity, Field.Y) + step_y(direction)
-            add_cell(row, board, x, y)
+    for direction in range(4):
+        add_cell(row, board, x + step_x(direction), y + step_y(direction))

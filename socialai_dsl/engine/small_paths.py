@@ -17,13 +17,13 @@ _ONE = np.uint64(1)
 
 @inline
 def find_way(row: Row, mover: int, target: int, beside: bool) -> int:
-    """What `paths.find_way` says, for two who are in the room and not there already."""
+    """What `paths.find_way` says for the cell of this number, if the mover is in the room and not there already."""
     width = np.uint64(row.program[Header.CANVAS_WIDTH])
     first_column = _first_column(row)
     free = _find_free(row, mover)
     start = _cell_of(row, mover)
     near = _neighbours(start, width, first_column)
-    front = _cell_of(row, target)
+    front = _ONE << np.uint64(target)
     if beside:
         front = _neighbours(front, width, first_column) & free
     seen = _NONE

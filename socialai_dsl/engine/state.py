@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.program import BOARDS, MAX_SIDE, TEMPORARIES, Body
+from socialai_dsl.program import BOARDS, CELL, MAX_SIDE, TEMPORARIES, Body
 
 PIN_NONE = -32768
 """In a row of pins: this register is not given by a layout."""
@@ -25,6 +25,8 @@ ONE = np.int64(1)
 STILL = np.int64(Body.NONE)
 NOTHING = np.int64(-1)
 NO_PATH = np.int64(-1)
+NO_CELL = np.int64(CELL - 1)
+"""The cell of what is not in the room; operands from here on are cells."""
 
 SCRATCH_BOARDS = BOARDS + 4
 OCCUPIED = np.int64(BOARDS)

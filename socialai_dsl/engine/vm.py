@@ -4,19 +4,21 @@ from typing import Any
 
 import numpy as np
 
-from socialai_dsl.engine import entities, paths
+from socialai_dsl.engine import paths
 from socialai_dsl.engine.bits import count_bits, lowest_bit, nth_bit
 from socialai_dsl.engine.boards import draw_entity
 from socialai_dsl.engine.conditions import holds
-from socialai_dsl.engine.entities import field, set_field
+from socialai_dsl.engine.entities import field, quadrant, set_field
 from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.operands import assign, draw_below, value
 from socialai_dsl.engine.places import next_cell, place
 from socialai_dsl.engine.pointers import ROW_TYPES
 from socialai_dsl.engine.separate import Separate
 from socialai_dsl.engine.sets import drop_cell
+from socialai_dsl.engine.sight import is_in_view
 from socialai_dsl.engine.state import NO_PATH, NOTHING, ONE, RESETTING, STILL, ZERO, Row
-from socialai_dsl.program import Body, Field, FrameColumn, Header, Op, Register
+from socialai_dsl.engine.whereabouts import attribute, cell_of, x_of, y_of
+from socialai_dsl.program import CELL, Body, Field, FrameColumn, Header, Op, Register
 
 _NO_CELL = -1
 _SIDES = np.int64(2)
@@ -28,12 +30,18 @@ def _compute(row: Row, op: int, a: int, b: int, c: int) -> None:
     result = value(row, b)
     if op == Op.LOAD:
         pass
-    elif op <= Op.MAX or op == Op.DISTANCE or op == Op.QUADRANT:
-        result = _combine(row, op, result, value(row, c))
+    elif op <= Op.MAX:
+        result = _combine(op, result, value(row, c))
+    elif op == Op.DISTANCE or op == Op.QUADRANT:
+        result = _measure(row, op, result, value(row, c))
     elif op == Op.FIELD:
-        result = field(row, result, c)
+        result = attribute(row, result, c)
     elif op == Op.DRAW:
         result = draw_below(row, c, result)
+    elif op == Op.SEES:
+        result = np.int64(is_in_view(row, result, value(row, c), value(row, a)))
+    elif op == Op.CELL_OF:
+        result = cell_of(row, result)
     elif op == Op.SET_BIT:
         result = value(row, a) | (np.int64(1) << (result & 63))
     else:
@@ -42,11 +50,15 @@ def _compute(row: Row, op: int, a: int, b: int, c: int) -> None:
 
 
 @inline
-def _combine(row: Row, op: int, left: int, right: int) -> int:
-    if op == Op.DISTANCE:
-        return entities.distance(row, left, right)
-    if op == Op.QUADRANT:
-        return entities.quadrant(row, left, right)
+def _measure(row: Row, op: int, a: int, b: int) -> int:
+    """Numbers between two entities or cells."""
+    dx = x_of(row, b) - x_of(row, a)
+    dy = y_of(row, b) - y_of(row, a)
+    return abs(dx) + abs(dy) if op == Op.DISTANCE else quadrant(dx, dy)
+
+
+@inline
+def _combine(op: int, left: int, right: int) -> int:
     if op == Op.ADD:
         return left + right
     if op == Op.SUB:
@@ -151,7 +163,7 @@ def _run(
         b = row.program[word + 2]
         c = row.program[word + 3]
         pc += 1
-        if op <= Op.IF_REACHES:
+        if op < Op.LOAD:
             if op == Op.HALT:
                 return
             if op == Op.SKIP or not holds(row, op, a, b):
@@ -184,6 +196,7 @@ def _run(
             if cell != _NO_CELL:
                 assign(row, loop_target, cell & 31)
                 assign(row, loop_target + 1, cell >> 5)
+                assign(row, loop_target + 2, CELL + cell)
 
 
 def _like_run(row: Row, pc: int) -> None:

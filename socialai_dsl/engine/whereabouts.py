@@ -1,0 +1,60 @@
+"""Where an operand is that names an entity or a cell: a cell is always in the room and faces nowhere."""
+
+import numpy as np
+
+from socialai_dsl.engine.entities import field, is_present
+from socialai_dsl.engine.jit import inline
+from socialai_dsl.engine.state import NO_CELL, NOTHING, Row
+from socialai_dsl.program import CELL, Field
+
+_FIRST_CELL = np.int64(CELL)
+
+
+@inline
+def is_somewhere(row: Row, thing: int) -> bool:
+    """Whether it is in the room; what is in no cell (`NO_CELL`) is not."""
+    if thing >= NO_CELL:
+        return thing > NO_CELL
+    return is_present(row, thing)
+
+
+@inline
+def x_of(row: Row, thing: int) -> int:
+    """Its column; that of an entity which is not in the room is the last it had, -1 if none."""
+    return thing & 31 if thing >= NO_CELL else field(row, thing, Field.X)
+
+
+@inline
+def y_of(row: Row, thing: int) -> int:
+    """Its line, as `x_of`; what is in no cell is above the room."""
+    return (thing - _FIRST_CELL) >> 5 if thing >= NO_CELL else field(row, thing, Field.Y)
+
+
+@inline
+def facing(row: Row, thing: int) -> int:
+    """The direction that it faces; -1 of a cell."""
+    return NOTHING if thing >= NO_CELL else field(row, thing, Field.DIR)
+
+
+@inline
+def attribute(row: Row, thing: int, name: int) -> int:
+    """One field; of a cell X and Y, the rest is 0."""
+    if thing < NO_CELL:
+        return field(row, thing, name)
+    if name == Field.X:
+        return x_of(row, thing)
+    return y_of(row, thing) if name == Field.Y else np.int64(0)
+
+
+@inline
+def cell_of(row: Row, thing: int) -> int:
+    """The cell that it is in, as an operand."""
+    if not is_somewhere(row, thing):
+        return NO_CELL
+    return _FIRST_CELL + 32 * y_of(row, thing) + x_of(row, thing)
+
+
+@inline
+def distance(row: Row, a: int, b: int) -> int:
+    """Manhattan distance."""
+    return abs(x_of(row, a) - x_of(row, b)) + abs(y_of(row, a) - y_of(row, b))
