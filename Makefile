@@ -10,7 +10,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 ARGS ?=
 
-.PHONY: help run test test-long lint format bench update-goldens clean
+.PHONY: help run test test-long lint format bench fidelity update-goldens clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -35,6 +35,9 @@ format: $(STAMP) ## rewrite the code in the house style
 
 bench: $(STAMP) ## measure the engine's speed on this machine
 	$(BIN)/socialai bench $(ARGS)
+
+fidelity: $(STAMP) ## compare the scenarios with the paper's code, under a random policy; writes docs/fidelity.md
+	$(BIN)/socialai fidelity --write docs/fidelity.md $(ARGS)
 
 update-goldens: $(STAMP) ## rewrite the golden files; review the diff before committing it
 	$(BIN)/python -m pytest --update-goldens $(ARGS)

@@ -7,7 +7,17 @@ import traceback
 from collections.abc import Sequence
 from typing import Final
 
-from socialai_dsl.cli import bench, evaluate, new, play, run, schema, show, validate
+from socialai_dsl.cli import (
+    bench,
+    evaluate,
+    fidelity,
+    new,
+    play,
+    run,
+    schema,
+    show,
+    validate,
+)
 from socialai_dsl.cli.errors import Exit, RunFailed, UsageError, is_usage
 from socialai_dsl.diagnostics import ScenarioError, render_text
 
@@ -20,6 +30,7 @@ _COMMANDS: Final = {
     "evaluate": evaluate,
     "play": play,
     "bench": bench,
+    "fidelity": fidelity,
 }
 
 
