@@ -31,7 +31,7 @@ class Pair:
     def of(cls, loaded: LoadedScenario, program: Program | None = None) -> Pair:
         """A pair for a loaded scenario; `program` replaces what the compiler makes of it."""
         program = program or compile_scenario(loaded.checked)
-        return cls(ScenarioEnv(program), Reference(loaded.scenario), "agent" in _frames(loaded))
+        return cls(ScenarioEnv(program), Reference(loaded.resolved), "agent" in _frames(loaded))
 
     def play(self, seed: int, episode: int, rng: np.random.Generator) -> int:
         """One episode with actions drawn from `rng`; the number of steps. Raises Disagreement."""

@@ -9,7 +9,18 @@ from socialai_dsl.grammar import ast
 from tests.reference import chance, geometry
 from tests.reference.evaluate import Context, drawn, of, weighed
 from tests.reference.source import Value
-from tests.reference.world import TYPES, Cell, Entity, World, as_list, quadrant, step_from, turned, where
+from tests.reference.world import (
+    TYPES,
+    Cell,
+    Entity,
+    Performance,
+    World,
+    as_list,
+    quadrant,
+    step_from,
+    turned,
+    where,
+)
 
 SEARCH_ORDER = ("down", "up", "right", "left")
 
@@ -44,7 +55,11 @@ def toggle(world: World, user: Entity, cell: Cell) -> None:
     thing = world.object_at(cell)
     if thing is not None:
         thing.toggled_by.append(user)
-        thing.status = TYPES[thing.type].toggled.get(thing.status, thing.status)
+        changes = TYPES[thing.type].toggled
+        if thing.one_way:
+            # "`one_way: true` drops the second entry": there is no way back.
+            changes = dict(list(changes.items())[:1])
+        thing.status = changes.get(thing.status, thing.status)
 
 
 @dataclass
@@ -66,6 +81,8 @@ class Activity:
             return turn_towards(world, me, self.goal)
         if self.verb == "stay":
             return "none"
+        if self.verb == "perform":
+            return self.element(me)[0]
         if all(where(goal) is None for goal in as_list(self.goal)):
             return "none"
         return {
@@ -75,6 +92,16 @@ class Activity:
             "use": use,
             "enter": enter,
         }[self.verb](world, me, self.goal)
+
+    def element(self, me: Entity) -> tuple[str, int]:
+        """The body action and utterance of a sequence in this turn of the state; after the last, nothing."""
+        assert isinstance(self.goal, Performance)
+        elements = self.goal.elements
+        return elements[me.clock] if me.clock < len(elements) else ("none", 0)
+
+    def utterance(self, me: Entity) -> int:
+        """The number of the utterance that is performed in this turn, 0 if none."""
+        return self.element(me)[1] if self.verb == "perform" else 0
 
     def fulfilled(self, world: World, me: Entity) -> bool:
         """Whether what it goes for is reached already."""
@@ -88,6 +115,8 @@ class Activity:
             return me.action == "toggle" and geometry.faces(world, me, self.goal)
         if self.verb in ("go_to", "enter", "go_next_to"):
             return self.fulfilled(world, me)
+        if self.verb == "perform":
+            return me.clock >= len(self.goal.elements)
         return me.facing == self.goal if self.verb == "turn_to" else True
 
 

@@ -25,6 +25,11 @@ def episode(seed: int, index: int, number: int) -> int:
     return key
 
 
+def attempt(key: int, number: int) -> int:
+    """The key of the draws of a room: that of the episode, until a room was refused."""
+    return key if number == 0 else scramble(key + number * STRIDE)
+
+
 def bits(key: int, path: str, step: int, number: int) -> int:
     """64 random bits of the `number`-th draw at a place of the scenario in a step."""
     place = int.from_bytes(blake2b(path.encode(), digest_size=4).digest(), "big") >> 1

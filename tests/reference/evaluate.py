@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING, Any
 from socialai_dsl.grammar import ast
 from tests.reference import chance, geometry, speech
 from tests.reference.source import Value
-from tests.reference.world import COLORS, DIRECTIONS, TYPES, Entity, World, as_list, turned, where
+from tests.reference.world import (
+    COLORS,
+    DIRECTIONS,
+    TYPES,
+    Entity,
+    Performance,
+    Recall,
+    World,
+    as_list,
+    turned,
+    where,
+)
 
 if TYPE_CHECKING:
     from tests.reference.room import Setup
@@ -101,6 +112,11 @@ def _name(node: ast.Name, context: Context) -> Any:
             return slot
     if word in context_lets(context):
         return _let(word, context)
+    if word in world.registers:
+        return world.registers[word]
+    if word in world.memories:
+        return world.memories[word]
+    word = world.roles.get(word, word)
     if word in world.objects:
         return world.objects[word]
     if word in world.cast:
@@ -110,6 +126,7 @@ def _name(node: ast.Name, context: Context) -> Any:
         "W": lambda: world.width,
         "H": lambda: world.height,
         "self": lambda: me,
+        "objects": world.things,
         "cells": world.interior,
         "colors": lambda: list(COLORS),
         "directions": lambda: list(DIRECTIONS),
@@ -179,7 +196,12 @@ def attribute(subject: Any, name: str, context: Context) -> Any:
         return bool(subject.toggled_by)
     if name in ("kind", "cell", "index", "gone", "poked", "was_poked", "action", "noun", "type"):
         return getattr(subject, name)
+    if name == "unlocked_by":
+        found = [thing for thing in context.world.things() if subject in thing.unlocks]
+        return found[0] if len(found) == 1 else found
     if subject.sort == "object":
+        if context.setup:
+            context.setup.compute_status(subject)
         assert name in TYPES[subject.type].states, f"{subject.type} has no {name}"
         return not subject.gone and subject.status == name
     if name in subject.registers:
@@ -198,6 +220,10 @@ def same(a: Any, b: Any) -> bool:
     """Equality. A value fits a noun if their texts are equal, so 3 is "3"; an entity in a cell is not the cell."""
     if isinstance(a, Entity) or isinstance(b, Entity):
         return a is b
+    if isinstance(a, Recall) and isinstance(b, Performance):
+        return a.equals(b)
+    if isinstance(b, Recall) and isinstance(a, Performance):
+        return b.equals(a)
     if isinstance(a, bool) or isinstance(b, bool):
         return a is b
     if isinstance(a, str) != isinstance(b, str):
@@ -346,8 +372,32 @@ def _first(node: ast.Call, context: Context) -> Any:
     return group[0]
 
 
+def _prev(node: ast.Call, context: Context) -> Any:
+    """An expression as it was at the start of the step, before the agent acted."""
+    before = context.world.before
+    if before is None:
+        return of(node.args[0], context)
+    earlier = replace(
+        context,
+        world=before,
+        me=moved(context.me, before),
+        variables={name: moved(value, before) for name, value in context.variables.items()},
+    )
+    return moved(of(node.args[0], earlier), context.world)
+
+
+def moved(value: Any, world: World) -> Any:
+    """The same value with every entity replaced by what it is in another moment of its world."""
+    if isinstance(value, list):
+        return [moved(item, world) for item in value]
+    if not isinstance(value, Entity):
+        return value
+    return as_list(world.objects[value.key])[value.index] if value.sort == "object" else world.cast[value.key]
+
+
 FUNCTIONS: dict[str, Callable[[ast.Call, Context], Any]] = {
     "pick": _pick,
+    "prev": _prev,
     "first": _first,
     "count": lambda node, context: len(as_list(of(node.args[0], context))),
     "min": lambda node, context: min(of(argument, context) for argument in node.args),

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
-from socialai_dsl.grammar import ast
-from socialai_dsl.schema import FirstRule, Frame, Rule, Step, ThenRule
 from tests.reference import bodies, chance, speech
-from tests.reference.evaluate import Context, NothingFoundError, evaluate, holds, of, pattern
+from tests.reference.effects import Cause, affect, assign, assignments, causes
+from tests.reference.evaluate import Context, NothingFoundError, evaluate, holds, pattern
+from tests.reference.script import Frame, Rule, Step
 from tests.reference.source import Sources
-from tests.reference.world import TYPES, Entity, World, as_list
+from tests.reference.world import Entity, World
 
 
 @dataclass
@@ -20,7 +20,7 @@ class Consequence:
     rule: Any
     activity: bodies.Activity | None = None
     registers: dict[str, Any] = field(default_factory=dict)
-    causes: list[tuple[str, list[Entity], str | None]] = field(default_factory=list)
+    causes: list[Cause] = field(default_factory=list)
     say: str | None = None
 
 
@@ -32,6 +32,7 @@ class Turn:
     read_then: bool = True
     afterwards: Consequence | None = None
     say: str | None = None  # one utterance per turn: the first is kept
+    noun: str | int | None = None  # of a performed utterance
 
 
 class FrameRunner:
@@ -58,6 +59,10 @@ class FrameRunner:
     def end(self, turn: Turn) -> str | None:
         """Step 4b, second part, after the body action: `then`, or the end of an entry; returns what is said."""
         frame = self.frame
+        spoken = turn.activity.utterance(self.me)
+        if spoken and turn.say is None:
+            # What is performed is said with the body action; a `say` of the same turn comes too late.
+            turn.say, turn.noun = speech.pair(self.sources.scenario.grammar, spoken)
         if frame is not None:
             self.me.clock += 1
             if frame.states is None:
@@ -181,7 +186,7 @@ class FrameRunner:
 
     # -- rules ---------------------------------------------------------------------------------------------
 
-    def first_that_holds(self, rules: tuple[ThenRule, ...], path: str) -> Consequence | None:
+    def first_that_holds(self, rules: tuple[Rule, ...], path: str) -> Consequence | None:
         """Lists are read top to bottom, the first rule that holds fires."""
         for number, rule in enumerate(rules):
             found = self.fires(rule, f"{path}[{rule.id or number}]")
@@ -235,39 +240,23 @@ class FrameRunner:
     def consequence(self, rule: Any, path: str, context: Context) -> Consequence:
         """ "A rule computes first, then acts": all values from the state in which its condition held."""
         found = Consequence(rule)
-        if isinstance(rule, FirstRule) and rule.do is not None:
+        if isinstance(rule, Rule) and rule.do is not None:
             found.activity = bodies.plan(self.expression(f"{path}.do", rule.do), context)
-        for name, source in rule.set.items():
-            found.registers[name] = evaluate(self.expression(f"{path}.set.{name}", source), context)
-        for number, source in enumerate(rule.cause):
-            site = f"{path}.cause[{number}]" if len(rule.cause) > 1 else f"{path}.cause"
-            found.causes.append(self.cause(site, source, context))
+        found.registers = assignments(self.sources, rule, path, context, self.me.frame)
+        found.causes = causes(self.sources, rule, path, context, self.me.frame)
         if rule.say is not None:
             found.say = evaluate(self.sources.text(f"{path}.say", rule.say, self.me.frame), context)
         return found
 
-    def cause(self, site: str, source: Any, context: Context) -> tuple[str, list[Entity], str | None]:
-        """An effect: its verb, what it is done to, and the status that `become` names."""
-        value = self.expression(site, source)
-        node: Any = value.tree
-        context = replace(context, value=value)
-        if isinstance(node, ast.Name):
-            return node.id, [self.me], None
-        subject = [self.me] if node.subject is None else as_list(of(node.subject, context))
-        status = None
-        if isinstance(node, ast.Call) and node.args:
-            status = node.args[0].id if isinstance(node.args[0], ast.Name) else str(of(node.args[0], context))
-        return node.name, subject, status
-
     def perform(self, found: Consequence, turn: Turn) -> None:
         """Effects in the order set, cause, say, goto."""
-        self.me.registers.update(found.registers)
+        assign(self.world, self.me, found.registers)
         for verb, targets, status in found.causes:
             for target in targets:
                 affect(target, verb, status)
         if found.say is not None and turn.say is None:
             turn.say = found.say
-        if isinstance(found.rule, ThenRule):
+        if isinstance(found.rule, Rule):
             goal = found.rule.goto or found.rule.goto_now
             if goal is not None:
                 self.me.state, self.me.clock = goal, 0
@@ -288,21 +277,3 @@ class FrameRunner:
             return bodies.plan(self.expression(site, source), self.context())
         except NothingFoundError:
             return bodies.Activity("stay")
-
-
-def affect(target: Entity, verb: str, status: str | None) -> None:
-    """One effect on one entity; what does not apply to its status changes nothing."""
-    if verb == "vanish":
-        target.cell = None
-    elif verb == "reset":
-        target.status = target.initial
-    elif verb == "become":
-        target.status = str(status)
-    elif verb == "unlock":
-        if target.status == "locked":
-            target.status = "shut" if target.type == "box" else "closed"
-    elif target.type == "box":
-        target.status = {"open": "opened", "close": "shut", "lock": "locked"}[verb]
-    else:
-        target.status = {"open": "open", "close": "closed", "lock": "locked"}[verb]
-    assert target.sort != "object" or target.status in TYPES[target.type].states

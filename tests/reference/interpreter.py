@@ -8,17 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from socialai_dsl.schema import Scenario
-from tests.reference import bodies, chance, geometry, speech
+from tests.reference import bodies, chance, geometry, rules, speech
 from tests.reference.evaluate import Context, NothingFoundError, holds
 from tests.reference.frames import FrameRunner, Turn
 from tests.reference.picture import picture
 from tests.reference.room import Setup
+from tests.reference.script import script_of
+from tests.reference.settling import Settling
 from tests.reference.source import Sources
 from tests.reference.vocabulary import Vocabulary
-from tests.reference.world import Entity, World, as_list
+from tests.reference.world import Entity, Performance, World, as_list
 
 Action = tuple[int, int, int, int]
+ATTEMPTS = 64
 
 
 @dataclass
@@ -35,14 +37,16 @@ class Result:
 
 
 class Reference:
-    """Plays one scenario, slowly."""
+    """Plays one scenario, slowly. It takes a name, a resolved scenario, its models or its plain data."""
 
-    def __init__(self, scenario: Scenario) -> None:
-        self.scenario = scenario
-        self.sources = Sources(scenario)
-        self.vocabulary = Vocabulary(scenario, self.sources)
+    def __init__(self, source: Any) -> None:
+        self.scenario = script_of(source)
+        self.sources = Sources(self.scenario)
+        self.vocabulary = Vocabulary(self.scenario, self.sources)
+        self.looks_back = "prev(" in repr(self.scenario)
         self.history: list[list[int]] = []
         self.world = World(0)
+        self.rooms_refused = 0
 
     # -- reset ---------------------------------------------------------------------------------------------
 
@@ -54,56 +58,92 @@ class Reference:
         test: bool = False,
         layout: dict[str, Any] | None = None,
     ) -> Result:
-        """Draws the room; at reset the history is empty."""
-        scenario = self.scenario
+        """Draws the room until all that is required of it holds; at reset the history is empty."""
         key = chance.episode(chance.TEST_SET if test else seed, index, episode)
-        self.world = World(
+        for attempt in range(ATTEMPTS):
+            self.world = self.new_world(chance.attempt(key, attempt))
+            self.prepare(layout or {})
+            self.world.key = key
+            if self.accepted():
+                break
+            self.rooms_refused += 1
+        else:
+            raise RuntimeError(f"{self.scenario.scenario}: no room has all that is required of it")
+        self.history = []
+        return Result(picture(self.world, self.canvas), [])
+
+    def new_world(self, key: int) -> World:
+        """A world with nothing in it."""
+        scenario = self.scenario
+        return World(
             key,
             nouns=scenario.grammar.nouns,
-            always_audible=frozenset(n for n, m in scenario.members().items() if m.audible == "always"),
             npcs_hidden=scenario.observe.npcs == "hidden",
             own_voice=scenario.observe.own_voice,
+            egocentric=scenario.observe.directions == "egocentric",
             step_names={
                 name: [entry.state for entry in frame.steps]
                 for name, frame in scenario.frames.items()
                 if frame.steps is not None
             },
         )
-        setup = Setup(scenario, self.sources, self.world, layout or {})
+
+    def prepare(self, layout: dict[str, Any]) -> None:
+        """Draws one room and settles it."""
+        scenario = self.scenario
+        setup = Setup(scenario, self.sources, self.world, layout)
         setup.run()
+        self.world.always_audible = frozenset(n for n, m in setup.members.items() if m.audible == "always")
+        self.settling = Settling(scenario, self.sources, self.world)
+        self.settling.all()
         self.canvas = scenario.room.canvas or (max(setup.sizes("width")), max(setup.sizes("height")))
         for member in self.world.cast.values():
             frame = self.sources.frame_of(member.frame)
             if frame is not None and frame.steps is not None:
                 FrameRunner(self.sources, self.world, member).skip_empty(frame)
-        self.history = []
-        return Result(picture(self.world, self.canvas), [])
+
+    def accepted(self) -> bool:
+        """Whether the room is as `require` wants it."""
+        for number, source in enumerate(self.scenario.require):
+            path = f"require[{number}]" if len(self.scenario.require) > 1 else "require"
+            try:
+                if not holds(self.sources.expression(path, source), Context(self.world)):
+                    return False
+            except NothingFoundError:
+                return False
+        return True
 
     # -- step ----------------------------------------------------------------------------------------------
 
     def step(self, action: Action) -> Result:
         """One step. An action is (primitive, speak, template, noun); the primitive after the last is none."""
         world = self.world
-        # Step 0: the clock. What is true of one step only is forgotten.
-        world.t += 1
-        world.lines = []
-        for member in world.cast.values():
-            member.utterance, member.action, member.poked = None, "none", False
-        for thing in world.things():
-            thing.toggled_by = []
+        # Step 0: what is asked of the state that the last step left, then the clock.
+        self.look_back()
+        self.begin_step()
         # Step 1: the agent's body action. A scripted agent reads its `first` before.
         runner = FrameRunner(self.sources, world, world.agent)
         turn = runner.begin()
         bodies.act(world, world.agent, self.primitive(action))
-        # Step 2: nothing in the language moves or counts by itself yet.
+        # Links are direct consequences and part of an early picture; computed statuses are not.
+        self.settling.links()
         early = picture(world, self.canvas)
+        self.settling.statuses()
+        # Step 2: nothing in the language moves or counts by itself yet.
         # Step 3: the agent's utterance is delivered; then a scripted agent's `then` is read.
         self.utter(action)
         runner.end(turn)
+        self.settling.all()
         # Step 4: NPCs in cast order.
         for npc in world.npcs:
             self.npc_turn(npc)
-        # Steps 5 to 7: no memories, world rules or computed statuses yet.
+        # Step 5: memories.
+        for memory in world.memories.values():
+            if memory.open:
+                memory.entries = [*memory.entries, (world.agent.action, world.agent.pair)][-memory.size :]
+        # Steps 6 and 7: the world's rules, then it settles.
+        rules.run(self.scenario, self.sources, world)
+        self.settling.all()
         self.remember()
         # Step 8: outcome, then time.
         result = self.judge()
@@ -112,6 +152,29 @@ class Reference:
         result.tokens = [token for line in self.history for token in line]
         result.heard = tuple(self.line(speaker, text) for speaker, text in world.lines)
         return result
+
+    def look_back(self) -> None:
+        """Keeps the state for `prev`, and which memories are open in this step."""
+        world = self.world
+        world.before = None
+        if self.looks_back:
+            world.before = copy.deepcopy(world)
+        for name, memory in world.memories.items():
+            source = self.scenario.memory[name].while_
+            value = None if source is None else self.sources.expression(f"memory.{name}.while", source)
+            try:
+                memory.open = holds(value, Context(world))
+            except NothingFoundError:
+                memory.open = False
+
+    def begin_step(self) -> None:
+        """The clock; what is true of one step only is forgotten."""
+        self.world.t += 1
+        self.world.lines = []
+        for member in self.world.cast.values():
+            member.utterance, member.action, member.poked, member.pair = None, "none", False, 0
+        for thing in self.world.things():
+            thing.toggled_by = []
 
     def primitive(self, action: Action) -> str:
         """The word for the first number of an action."""
@@ -123,6 +186,7 @@ class Reference:
         if speaks:
             text = self.scenario.grammar.utterance(template, noun)
             value = speech.noun_value(self.scenario.grammar.nouns[noun])
+            self.world.agent.pair = 1 + self.scenario.grammar.pairs().index((template, noun))
             speech.speak(self.world, self.world.agent, text, value)
 
     def npc_turn(self, npc: Entity) -> None:
@@ -134,9 +198,11 @@ class Reference:
         # What `first` caused may have made it vanish; what has vanished does nothing.
         if not npc.gone:
             bodies.act(self.world, npc, turn.activity.primitive(self.world, npc))
+            self.settling.all()
             runner.end(turn)
+        self.settling.all()
         if turn.say is not None:
-            speech.speak(self.world, npc, turn.say)
+            speech.speak(self.world, npc, turn.say, turn.noun)
 
     def remember(self) -> None:
         """Adds what was heard to the history; beyond its length the oldest whole utterances are dropped."""
@@ -179,15 +245,20 @@ class Reference:
 
     def scripted_action(self) -> Action:
         """What the agent's frame would do in the next step; the state stays as it is."""
-        world = copy.deepcopy(self.world)
-        world.t += 1
-        for member in world.cast.values():
-            member.utterance, member.action, member.poked = None, "none", False
-        runner = FrameRunner(self.sources, world, world.agent)
-        turn: Turn = runner.begin()
-        primitive = turn.activity.primitive(world, world.agent)
-        bodies.act(world, world.agent, primitive)
-        text = runner.end(turn)
+        kept = self.world, self.settling
+        try:
+            self.world = world = copy.deepcopy(self.world)
+            self.settling = Settling(self.scenario, self.sources, world)
+            self.look_back()
+            self.begin_step()
+            runner = FrameRunner(self.sources, world, world.agent)
+            turn: Turn = runner.begin()
+            primitive = turn.activity.primitive(world, world.agent)
+            bodies.act(world, world.agent, primitive)
+            self.settling.all()
+            text = runner.end(turn)
+        finally:
+            self.world, self.settling = kept
         actions = list(self.scenario.actions)
         number = actions.index(primitive) if primitive in actions else len(actions)
         return (number, 0, 0, 0) if text is None else (number, 1, *self.pair(text))
@@ -207,6 +278,7 @@ class Reference:
 
     def entity(self, name: str) -> Entity:
         """An entity by its name in the scenario; a let that holds one counts too."""
+        name = self.world.roles.get(name, name)
         found = self.world.lets.get(name) or self.world.cast.get(name) or self.world.objects.get(name)
         if found is None:
             group, _, number = name.rstrip("]").partition("[")
@@ -224,7 +296,8 @@ class Reference:
                 name: [self.describe_object(thing) for thing in as_list(group)]
                 for name, group in world.objects.items()
             },
-            "let": {name: plain(value) for name, value in world.lets.items()},
+            "let": described_lets(world),
+            "state": dict(world.registers),
         }
 
     def describe_member(self, member: Entity) -> dict[str, Any]:
@@ -235,6 +308,7 @@ class Reference:
             "color": member.color,
             "name": member.name,
             "kind_code": member.kind_code,
+            "one_of": member.drawn_from,
             "state": self.state_name(member),
             "clock": member.clock,
             "registers": {name: plain(value) for name, value in member.registers.items()},
@@ -256,6 +330,18 @@ class Reference:
     def describe_object(thing: Entity) -> dict[str, Any]:
         """An object."""
         return {"at": plain(thing.cell), "color": thing.color, "state": thing.status, "gone": thing.gone}
+
+
+def described_lets(world: World) -> dict[str, Any]:
+    """All that was drawn or computed once; a sequence element by element."""
+    found: dict[str, Any] = {}
+    for name, value in world.lets.items():
+        if isinstance(value, Performance):
+            for k, (move, said) in enumerate(value.elements):
+                found |= {f"{name}[{k}].move": move, f"{name}[{k}].utterance": said}
+        else:
+            found[name] = plain(value)
+    return found
 
 
 def plain(value: Any) -> Any:

@@ -32,13 +32,20 @@ def shown(world: World, cell: Cell, canvas: tuple[int, int]) -> tuple[int, int, 
         return EMPTY if on_canvas else WALL
     for npc in world.npcs:
         if npc.cell == cell and not world.npcs_hidden:
-            return NPC, COLORS.index(str(npc.color)), npc.kind_code, DIRECTIONS.index(npc.facing)
+            return NPC, COLORS.index(str(npc.color)), npc.kind_code, direction_shown(world, npc.facing)
     thing = world.object_at(cell)
     if thing is not None:
         type_ = TYPES[thing.type]
         tag = 1 if thing.status == "tagged" else 0
-        return type_.code, COLORS.index(str(thing.color)), type_.states.index(thing.status), tag
+        status = 0 if thing.dark else type_.states.index(thing.status)
+        return type_.code, COLORS.index(str(thing.color)), status, tag
     ground = world.terrain.get(cell)
     if ground is not None:
         return TYPES[ground].code, COLORS.index(TYPES[ground].color), 0, 0
     return WALL if world.on_border(cell) else EMPTY
+
+
+def direction_shown(world: World, facing: str) -> int:
+    """The number of a direction; egocentric: 2 towards where the agent looks, 0 back at it."""
+    number = DIRECTIONS.index(facing)
+    return (number - DIRECTIONS.index(world.agent.facing) + 2) % 4 if world.egocentric else number

@@ -6,10 +6,10 @@ import re
 from typing import Any
 
 from socialai_dsl.grammar import ast
-from socialai_dsl.schema import CastMember, ObjectGroup, Scenario
 from tests.reference import chance
 from tests.reference.evaluate import Context, evaluate, of
 from tests.reference.places import region
+from tests.reference.script import Group, Member, Script, Sequence
 from tests.reference.source import Sources, Value
 from tests.reference.world import (
     COLORS,
@@ -17,6 +17,8 @@ from tests.reference.world import (
     TYPES,
     Cell,
     Entity,
+    Performance,
+    Recall,
     World,
     as_list,
     quadrant,
@@ -27,17 +29,20 @@ from tests.reference.world import (
 class Setup:
     """The drawing of one room. Attributes that others ask for are computed when first asked for."""
 
-    def __init__(self, scenario: Scenario, sources: Sources, world: World, layout: dict[str, Any]) -> None:
+    def __init__(self, scenario: Script, sources: Sources, world: World, layout: dict[str, Any]) -> None:
         self.scenario, self.sources, self.world, self.layout = scenario, sources, world, layout
-        self.members = scenario.members()
+        self.pinned_lets: dict[str, Any] = layout.get("let") or {}
+        self.members: dict[str, Member] = {}
         self.drawn_cells: set[str] = set()
         self.facing_known: set[str] = set()
+        self.status_known: set[str] = set()
 
     # -- the whole of it -----------------------------------------------------------------------------------
 
     def run(self) -> None:
         """Sizes, entities, fixed things, placements in their order, then all that is drawn or computed once."""
         self.draw_size()
+        self.draw_members()
         self.make_entities()
         self.build()
         self.pin()
@@ -50,6 +55,11 @@ class Setup:
             self.compute_name(member)
         for name in self.scenario.let:
             self.compute_let(name)
+        for thing in self.world.things():
+            self.compute_status(thing)
+            self.compute_links(thing)
+        for name, source in self.scenario.state.items():
+            self.compute_register(self.world, name, source, f"state.{name}", None)
         for member in self.world.cast.values():
             self.compute_slots(member)
             self.compute_earshot(member)
@@ -90,17 +100,42 @@ class Setup:
 
     # -- entities ------------------------------------------------------------------------------------------
 
+    def draw_members(self) -> None:
+        """Who plays: of a member that is one of several files, one is drawn."""
+        for name in self.scenario.cast:
+            versions = self.scenario.versions(name)
+            number = 0
+            if name in self.scenario.files:
+                number = self.draw(f"cast.{name}.one_of", 0, len(versions))
+                given = self.pinned_lets.get(f"{name}.one_of")
+                if given is not None:
+                    number = list(self.scenario.files[name]).index(given) if isinstance(given, str) else given
+            self.members[name] = versions[number]
+
+    def kinds(self) -> list[str]:
+        """The kinds of NPCs by first appearance in the cast, those of `one_of` in the order of its files."""
+        return list(
+            dict.fromkeys(
+                version.kind or "peer"
+                for name in self.scenario.cast
+                if name != "agent"
+                for version in self.scenario.versions(name)
+            )
+        )
+
     def make_entities(self) -> None:
         """Everything that will be put down, not placed yet."""
         for name, group in self.scenario.objects.items():
             size = group_size(group)
-            initial = group.state or TYPES[group.type].initial
+            initial = TYPES[group.type].initial
             things = [
                 Entity(name, "object", index, type=group.type, status=initial, initial=initial)
                 for index in range(size or 1)
             ]
+            for thing in things:
+                thing.one_way, thing.dark = group.one_way, group.dark
             self.world.objects[name] = things[0] if size is None else things
-        kinds: list[str] = []
+        kinds = self.kinds()
         for name, member in self.members.items():
             person = Entity(name, "agent" if name == "agent" else "npc", kind=member.kind or "peer")
             person.view = member.view or 7
@@ -108,10 +143,14 @@ class Setup:
             person.state = self.start_of(member.frame)
             if name != "agent":
                 # "NPC status = index of its kind in order of first appearance in the cast."
-                if person.kind not in kinds:
-                    kinds.append(person.kind)
                 person.kind_code = kinds.index(person.kind) if member.kind_code is None else member.kind_code
+            if name in self.scenario.files:
+                drawn = self.scenario.versions(name).index(member)
+                person.drawn_from = list(self.scenario.files[name])[drawn]
             self.world.cast[name] = person
+        self.world.roles = {role: self.scenario.player_of(role) for role in self.scenario.roles}
+        for name, memory in self.scenario.memory.items():
+            self.world.memories[name] = Recall(memory.last, memory.of)
 
     def start_of(self, name: str | None) -> str | int | None:
         """The first state of a frame, or the first entry of its steps."""
@@ -148,26 +187,32 @@ class Setup:
     def collect(self, tree: ast.Node, found: dict[str, None], seen: set[str]) -> None:
         """Adds the names of all entities that an expression speaks of."""
         for node in tree.walk():
-            if not isinstance(node, ast.Name) or node.id in seen:
+            if not isinstance(node, ast.Name):
                 continue
-            if node.id in self.scenario.let:
-                seen.add(node.id)
-                self.collect(self.let_value(node.id).tree, found, seen)
-            elif node.id in self.scenario.objects or node.id in self.members:
-                seen.add(node.id)
-                found[node.id] = None
-                for value in self.values_of(node.id, ("facing",)):
+            name = self.world.roles.get(node.id, node.id)
+            if name in seen:
+                continue
+            if name in self.scenario.let:
+                seen.add(name)
+                if not isinstance(self.scenario.let[name], Sequence):
+                    self.collect(self.let_value(name).tree, found, seen)
+            elif name in self.scenario.objects or name in self.members:
+                seen.add(name)
+                found[name] = None
+                for value in self.values_of(name, ("facing",)):
                     self.collect(value.tree, found, seen)
 
     def values_of(self, name: str, keys: tuple[str, ...]) -> list[Value]:
         """What is written under some keys of an object or a member."""
-        holder: Any = self.scenario.objects.get(name) or self.members[name]
-        prefix = "objects" if name in self.scenario.objects else "cast"
-        values = []
-        for key in keys:
-            for path, source in leaves(f"{prefix}.{name}.{key}", getattr(holder, key, None)):
-                values.append(self.sources.expression(path, source))
-        return values
+        is_object = name in self.scenario.objects
+        holders: list[Any] = [self.scenario.objects[name]] if is_object else self.scenario.versions(name)
+        prefix = "objects" if is_object else "cast"
+        return [
+            self.sources.expression(path, source)
+            for holder in holders
+            for key in keys
+            for path, source in leaves(f"{prefix}.{name}.{key}", getattr(holder, key, None))
+        ]
 
     def pin(self) -> None:
         """What a layout pins is put down first."""
@@ -178,13 +223,15 @@ class Setup:
                 self.drawn_cells.add(repr((entity.key, entity.index)))
             entity.color = pinned.get("color", entity.color)
             entity.name = pinned.get("name", entity.name)
-            entity.status = pinned.get("state") or entity.status
+            if pinned.get("state"):
+                entity.status = pinned["state"]
+                self.status_known.add(repr((entity.key, entity.index)))
             if pinned.get("facing"):
                 entity.facing = pinned["facing"]
                 self.facing_known.add(entity.key)
-        for name, given in (self.layout.get("let") or {}).items():
-            if given is None:
-                continue
+        for name, given in self.pinned_lets.items():
+            if given is None or "[" in name or name.endswith(".one_of"):
+                continue  # elements of sequences and who is drawn are looked up where they are drawn
             owner, _, register = name.partition(".")
             if register:
                 self.world.cast[owner].registers[register] = self.decode(given)
@@ -218,7 +265,7 @@ class Setup:
         else:
             self.put_down(self.world.cast[name], f"cast.{name}", self.members[name])
 
-    def put_down(self, entity: Entity, path: str, holder: ObjectGroup | CastMember) -> None:
+    def put_down(self, entity: Entity, path: str, holder: Group | Member) -> None:
         """One uniform draw from the free cells that satisfy the place; if there is none it is not in the room."""
         if repr((entity.key, entity.index)) in self.drawn_cells:
             return
@@ -313,13 +360,63 @@ class Setup:
         else:
             member.facing = evaluate(value, self.context(member))
 
+    def compute_status(self, thing: Entity) -> None:
+        """The initial status: `state:`, or what `pressed:` and `opened:` say."""
+        if repr((thing.key, thing.index)) in self.status_known:
+            return
+        self.status_known.add(repr((thing.key, thing.index)))
+        group = self.scenario.objects[thing.key]
+        if group.state is not None:
+            thing.status = thing.initial = str(group.state)
+        for word, source in (("pressed", group.pressed), ("opened", group.opened)):
+            if source is not None and evaluate(
+                self.sources.expression(f"objects.{thing.key}.{word}", source), self.context(thing, it=thing)
+            ):
+                thing.status = thing.initial = "open" if word not in TYPES[thing.type].states else word
+
+    def compute_links(self, thing: Entity) -> None:
+        """What it unlocks: groups of one size pairwise, else each of them all."""
+        source = self.scenario.objects[thing.key].unlocks
+        if source is None:
+            return
+        value = self.sources.expression(f"objects.{thing.key}.unlocks", source)
+        others, group = evaluate(value, self.context(thing)), self.world.objects[thing.key]
+        if isinstance(others, list) and isinstance(group, list):
+            assert len(others) == len(group), "groups of different sizes cannot be linked one by one"
+            others = others[thing.index]
+        thing.unlocks = as_list(others)
+
+    def draw_sequence(self, name: str, sequence: Sequence) -> Performance:
+        """Each element: one of the moves, and at a chance one of all utterances."""
+        elements = []
+        for k in range(sequence.length):
+            move = sequence.moves[self.draw(f"let.{name}[{k}].move", 0, len(sequence.moves))]
+            site, spoken, pairs = f"let.{name}[{k}].utterance", 0, self.scenario.grammar.pairs()
+            if sequence.chance is not None and chance.happens(self.world.key, site, 0, sequence.chance):
+                spoken = 1 + self.draw(site, 1, len(pairs))
+            pinned = self.pinned_lets
+            elements.append(
+                (
+                    pinned.get(f"{name}[{k}].move") or move,
+                    spoken
+                    if pinned.get(f"{name}[{k}].utterance") is None
+                    else pinned[f"{name}[{k}].utterance"],
+                )
+            )
+        return Performance(tuple(elements))
+
     def let_value(self, name: str) -> Value:
         """The tree of a `let`."""
         return self.sources.expression(f"let.{name}", self.scenario.let[name])
 
     def compute_let(self, name: str) -> None:
         """Once per episode."""
-        if name not in self.world.lets:
+        if name in self.world.lets:
+            return
+        written = self.scenario.let[name]
+        if isinstance(written, Sequence):
+            self.world.lets[name] = self.draw_sequence(name, written)
+        else:
             self.world.lets[name] = evaluate(self.let_value(name), self.context())
 
     def compute_slots(self, member: Entity) -> None:
@@ -353,16 +450,25 @@ class Setup:
         """The start values of a frame's `let`, one copy per member that follows it."""
         frame = self.sources.frame_of(member.frame)
         for name, source in (frame.let if frame else {}).items():
-            if name not in member.registers:
-                path = f"{member.key}/frames.{member.frame}.let.{name}"
-                context = self.context(member)
-                context.in_frame = True
-                member.registers[name] = evaluate(
-                    self.sources.expression(path, source, member.frame), context
-                )
+            path = f"{member.key}/frames.{member.frame}.let.{name}"
+            self.compute_register(member, name, source, path, member.frame)
+
+    def compute_register(
+        self, holder: Entity | World, name: str, source: Any, path: str, frame: str | None
+    ) -> None:
+        """The start value of a register, and its range where one is given."""
+        context = self.context(holder if isinstance(holder, Entity) else None)
+        context.in_frame = isinstance(holder, Entity)
+        if isinstance(source, dict):
+            if "range" in source:
+                numbers = evaluate(self.sources.expression(f"{path}.range", source["range"], frame), context)
+                holder.ranges[name] = (numbers[0], numbers[-1])
+            path, source = f"{path}.start", source["start"]
+        if name not in holder.registers:
+            holder.registers[name] = evaluate(self.sources.expression(path, source, frame), context)
 
 
-def group_size(group: ObjectGroup) -> int | None:
+def group_size(group: Group) -> int | None:
     """How many; None for a single object."""
     if group.count is not None:
         return group.count

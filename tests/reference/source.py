@@ -7,7 +7,7 @@ from itertools import count
 from typing import Any
 
 from socialai_dsl.grammar import ParseProblem, ast, parse_expression, parse_text
-from socialai_dsl.schema import Frame, Parameter, Scenario
+from tests.reference.script import Frame, Script
 
 
 class Value:
@@ -44,7 +44,7 @@ def draws(node: ast.Node) -> bool:
 class Sources:
     """Gives the tree of any value of one scenario; each is made once."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Script) -> None:
         self.scenario = scenario
         self.fresh = count()
         self.known: dict[tuple[str, str], Value] = {}
@@ -130,13 +130,7 @@ class Sources:
         return replace(node, **changes)
 
     def _parameter(self, name: str) -> Any:
-        parameter = self.scenario.params[name]
-        if not isinstance(parameter, Parameter):
-            return parameter
-        labels = parameter.values
-        if isinstance(labels, dict) and str(parameter.default) in labels:
-            return labels[str(parameter.default)]
-        return parameter.default
+        return self.scenario.params[name]
 
 
 def read(source: Any) -> ast.Node:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from tests.reference.script import Grammar
 from tests.reference.world import Entity, Heard, World, distance
 
 ANY_NOUN = None
@@ -70,6 +71,12 @@ def in_speaking_order(world: World, inbox: list[Heard]) -> list[Heard]:
     """What was heard in a turn, the agent's first, then in cast order."""
     order = [world.agent, *world.npcs]
     return sorted(inbox, key=lambda heard: order.index(heard.speaker))
+
+
+def pair(grammar: Grammar, number: int) -> tuple[str, str | int]:
+    """The text and noun of an utterance by its number, counted from 1."""
+    template, noun = grammar.pairs()[number - 1]
+    return grammar.utterance(template, noun), noun_value(grammar.nouns[noun])
 
 
 def words(text: str) -> list[str]:

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from socialai_dsl.grammar import ast
-from socialai_dsl.schema import Scenario
 from tests.reference.evaluate import weighed
+from tests.reference.script import Frame, Member, Script, Sequence
 from tests.reference.source import Sources, Value
 from tests.reference.speech import words
 from tests.reference.world import COLORS, DIRECTIONS
@@ -16,14 +16,18 @@ PADDING, UNKNOWN = 0, 1
 LONGEST = 256
 PICKING = ("pick", "first", "nearest")
 
+Who = tuple[str, int]
+"""A member of the cast in one of its versions: `one_of` gives several."""
+
 
 class Vocabulary:
     """Words to ids: 0 pads, 1 is unknown. Made before `observe:` is applied."""
 
-    def __init__(self, scenario: Scenario, sources: Sources) -> None:
-        self.scenario, self.sources, self.members = scenario, sources, scenario.members()
+    def __init__(self, scenario: Script, sources: Sources) -> None:
+        self.scenario, self.sources = scenario, sources
+        self.members = {name: scenario.versions(name) for name in scenario.cast}
         self.ids: dict[str, int] = {}
-        self.ranges: dict[tuple[str, str], tuple[int, int]] = {}  # of registers that are being worked out
+        self.ranges: dict[tuple[Who, str], tuple[int, int]] = {}  # of registers that are being worked out
         for text in self.in_order_of_appearance():
             for word in words(text):
                 self.ids.setdefault(word, len(self.ids) + 2)
@@ -42,26 +46,42 @@ class Vocabulary:
         for name in self.members:
             yield from self.names_of(name)
         for name in self.members:
-            for value in self.sayings(name):
-                for piece in self.pieces(value.tree, name):
-                    yield from piece
+            for who in self.who(name):
+                for value in self.sayings(who):
+                    for piece in self.pieces(value.tree, who):
+                        yield from piece
 
     # -- what can be said ----------------------------------------------------------------------------------
 
-    def names_of(self, member: str) -> list[str]:
+    def who(self, name: str) -> list[Who]:
+        """A member in all its versions."""
+        return [(name, number) for number in range(len(self.members[name]))]
+
+    def version(self, member: Who) -> Member:
+        """What is written about it."""
+        return self.members[member[0]][member[1]]
+
+    def frame(self, member: Who) -> Frame | None:
+        """The frame it follows."""
+        return self.sources.frame_of(self.version(member).frame)
+
+    def names_of(self, name: str) -> list[str]:
         """All names that a member can bear."""
-        written = self.members[member].name
+        return list(dict.fromkeys(bears for who in self.who(name) for bears in self.names_of_version(who)))
+
+    def names_of_version(self, member: Who) -> list[str]:
+        """All names that it can bear in one of its versions."""
+        written = self.version(member).name
         if written is None:
-            return [member.capitalize()]
-        tree = self.sources.name(f"cast.{member}.name", written).tree
+            return [member[0].capitalize()]
+        tree = self.sources.name(f"cast.{member[0]}.name", written).tree
         if isinstance(tree, ast.Name) and tree.id not in self.scenario.let:
             return [tree.id]
         return self.values(tree, member)
 
-    def sayings(self, member: str) -> list[Value]:
+    def sayings(self, member: Who) -> list[Value]:
         """The texts of a member's frame, in order of its states or steps."""
-        frame_name = self.members[member].frame
-        frame = self.sources.frame_of(frame_name)
+        frame_name, frame = self.version(member).frame, self.frame(member)
         if frame is None:
             return []
         rules: list[Any] = list(frame.steps or ())
@@ -73,7 +93,7 @@ class Vocabulary:
             if rule.say is not None
         ]
 
-    def pieces(self, tree: Any, member: str) -> list[list[str]]:
+    def pieces(self, tree: Any, member: Who) -> list[list[str]]:
         """A text as a row of pieces, each a list of what it can read."""
         if not isinstance(tree, ast.Text):
             return [self.values(tree, member)]
@@ -88,18 +108,19 @@ class Vocabulary:
                 row.append(self.values(part, member))
         return row
 
-    def text_slot(self, part: Any, member: str) -> ast.Node | None:
+    def text_slot(self, part: Any, member: Who) -> ast.Node | None:
         """The text that fills a slot of type text or utterance, if the part names one."""
-        frame = self.sources.frame_of(self.members[member].frame)
+        frame = self.frame(member)
         if frame is None or not isinstance(part, ast.Name):
             return None
         if frame.slots.get(part.id) not in ("text", "utterance"):
             return None
-        return self.sources.text(f"cast.{member}.with.{part.id}", self.members[member].with_[part.id]).tree
+        path = f"cast.{member[0]}.with.{part.id}"
+        return self.sources.text(path, self.version(member).with_[part.id]).tree
 
     # -- the values an expression can have -----------------------------------------------------------------
 
-    def values(self, tree: Any, member: str) -> list[str]:
+    def values(self, tree: Any, member: Who) -> list[str]:
         """All texts that a `<...>` part can read, in the order of its type."""
         if isinstance(tree, ast.Attribute):
             if tree.name == "color":
@@ -124,19 +145,19 @@ class Vocabulary:
             return [str(number) for number in range(min(map(int, options)), max(map(int, options)) + 1)]
         return options
 
-    def names_of_subject(self, subject: Any, member: str) -> list[str]:
+    def names_of_subject(self, subject: Any, member: Who) -> list[str]:
         """The names that `subject.name` can read."""
-        if isinstance(subject, ast.Name) and subject.id in self.members:
-            return self.names_of(subject.id)
+        if isinstance(subject, ast.Name) and self.scenario.player_of(subject.id) in self.members:
+            return self.names_of(self.scenario.player_of(subject.id))
         if isinstance(subject, ast.Name) and subject.id == "self":
-            return self.names_of(member)
+            return self.names_of(member[0])
         mentioned = [
             node.id for node in subject.walk() if isinstance(node, ast.Name) and node.id in self.members
         ]
         everyone = mentioned or list(self.members)
         return list(dict.fromkeys(name for one in everyone for name in self.names_of(one)))
 
-    def options(self, tree: Any, member: str) -> list[str] | None:
+    def options(self, tree: Any, member: Who) -> list[str] | None:
         """The words that an expression can be, or None if it is a number that is computed."""
         if isinstance(tree, ast.Name):
             source = self.declared(tree.id, member)
@@ -170,26 +191,27 @@ class Vocabulary:
             return self.values(tree, member) if tree.name in ("color", "facing", "name") else None
         return None
 
-    def declared(self, name: str, member: str) -> ast.Node | None:
+    def declared(self, name: str, member: Who) -> ast.Node | None:
         """The tree of a let or slot."""
-        frame = self.sources.frame_of(self.members[member].frame)
+        frame = self.frame(member)
         if frame is not None and name in frame.slots:
-            source = self.members[member].with_[name]
-            return self.sources.expression(f"cast.{member}.with.{name}", source).tree
-        if name in self.scenario.let:
+            source = self.version(member).with_[name]
+            return self.sources.expression(f"cast.{member[0]}.with.{name}", source).tree
+        if name in self.scenario.let and not isinstance(self.scenario.let[name], Sequence):
             return self.sources.expression(f"let.{name}", self.scenario.let[name]).tree
         return None
 
-    def assigned(self, name: str, member: str) -> list[ast.Node]:
+    def assigned(self, name: str, member: Who) -> list[ast.Node]:
         """All that a register of the member's frame can be given: its start and every `set`."""
-        frame_name = self.members[member].frame
-        frame = self.sources.frame_of(frame_name)
+        frame_name, frame = self.version(member).frame, self.frame(member)
         if frame is None or name not in frame.let:
             return []
         entries: list[Any] = list(frame.steps or ())
         for state in (frame.states or {}).values():
             entries += [*state.first, *state.then]
-        sources = [frame.let[name], *(entry.set[name] for entry in entries if name in entry.set)]
+        start = frame.let[name]
+        start = start["start"] if isinstance(start, dict) else start
+        sources = [start, *(entry.set[name] for entry in entries if name in entry.set)]
         return [
             self.sources.expression(f"vocabulary.{frame_name}", source, frame_name).tree for source in sources
         ]
@@ -199,7 +221,7 @@ class Vocabulary:
         """Whether a value is the result of arithmetic."""
         return any(isinstance(node, ast.Arithmetic | ast.Negative) for node in tree.walk())
 
-    def register_bounds(self, name: str, member: str) -> tuple[int, int]:
+    def register_bounds(self, name: str, member: Who) -> tuple[int, int]:
         """The range of a register: what its `set`s can make of it in as many steps as there are."""
         assigned = self.assigned(name, member)
         self.ranges[member, name] = self.bounds(assigned[0], member)
@@ -212,7 +234,7 @@ class Vocabulary:
             self.ranges[member, name] = wider
         return self.ranges.pop((member, name))
 
-    def bounds(self, tree: Any, member: str) -> tuple[int, int]:
+    def bounds(self, tree: Any, member: Who) -> tuple[int, int]:
         """The least and greatest value of a computed number."""
         if isinstance(tree, ast.Number):
             return tree.value, tree.value
@@ -268,22 +290,34 @@ class Vocabulary:
 
     def longest_history(self) -> int:
         """The number of tokens kept: every speaker's longest line at every step, in eights, 8 to 256."""
-        per_step = sum(self.longest_line(name) for name in self.members if name != "agent")
+        per_step = sum(
+            max(self.longest_line(who) for who in self.who(name)) for name in self.members if name != "agent"
+        )
         if self.scenario.observe.own_voice:
-            grammar = self.scenario.grammar
-            template = max(len(words(text.replace("<noun>", " "))) for text in grammar.templates)
-            noun = max(len(words(str(text))) for text in grammar.nouns)
-            per_step += template + noun + max(len(words(name)) for name in self.names_of("agent"))
+            per_step += self.longest_utterance() + max(len(words(name)) for name in self.names_of("agent"))
         bound = self.scenario.horizon * per_step
         return min(LONGEST, max(8, (bound + 7) // 8 * 8))
 
-    def longest_line(self, member: str) -> int:
+    def longest_line(self, member: Who) -> int:
         """The words of a member's longest line, its name included; 0 if it says nothing."""
-        texts = self.sayings(member)
-        if not texts:
-            return 0
-        name = max(len(words(name)) for name in self.names_of(member))
-        return name + max(
+        lengths = [
             sum(max(len(words(text)) for text in piece) for piece in self.pieces(value.tree, member))
-            for value in texts
-        )
+            for value in self.sayings(member)
+        ]
+        if self.performs(member):
+            lengths.append(self.longest_utterance())
+        name = max(len(words(name)) for name in self.names_of(member[0]))
+        return name + max(lengths) if lengths else 0
+
+    def longest_utterance(self) -> int:
+        """The words of the longest utterance of the grammar."""
+        grammar = self.scenario.grammar
+        template = max(len(words(text.replace("<noun>", " "))) for text in grammar.templates)
+        return template + max(len(words(str(text))) for text in grammar.nouns)
+
+    def performs(self, member: Who) -> bool:
+        """Whether it may say what the grammar has: whoever performs a sequence."""
+        frame = self.frame(member)
+        holders: list[Any] = [] if frame is None else [*(frame.steps or ()), *(frame.states or {}).values()]
+        holders += [rule for holder in holders for rule in getattr(holder, "first", ())]
+        return any("perform(" in str(holder.do) for holder in holders)

@@ -25,6 +25,7 @@ class ObjectType:
     transparent: tuple[str, ...] = ()
     toggled: dict[str, str] = field(default_factory=dict)
     deadly: bool = False
+    active: tuple[str, ...] = ()  # statuses in which it works on what it is linked to
 
 
 TYPES = {
@@ -49,8 +50,11 @@ TYPES = {
         "idle",
         transparent=("idle", "pressed"),
         toggled={"idle": "pressed", "pressed": "idle"},
+        active=("pressed",),
     ),
-    "lever": ObjectType(14, ("down", "up"), "down", "red", (), ("down", "up"), {"down": "up"}),
+    "lever": ObjectType(
+        14, ("down", "up"), "down", "red", (), ("down", "up"), {"down": "up"}, active=("up",)
+    ),
     "box": ObjectType(
         7,
         ("shut", "opened", "locked"),
@@ -85,9 +89,13 @@ class Entity:
     status: str = ""
     initial: str = ""
     toggled_by: list[Entity] = field(default_factory=list)  # in this step
+    one_way: bool = False
+    dark: bool = False
+    unlocks: list[Entity] = field(default_factory=list)
     # the cast
     facing: str = "right"
     name: str | None = None
+    drawn_from: str | None = None  # which of several npc files it is
     kind: str = "peer"
     kind_code: int = 0
     view: int = 7
@@ -96,10 +104,12 @@ class Entity:
     clock: int = 0
     slots: dict[str, Any] = field(default_factory=dict)
     registers: dict[str, Any] = field(default_factory=dict)
+    ranges: dict[str, tuple[int, int]] = field(default_factory=dict)  # of registers that saturate
     fired_once: set[str] = field(default_factory=set)
     inbox: list[Heard] = field(default_factory=list)
     utterance: str | None = None  # in this step
     noun: str | int | None = None  # of the last utterance
+    pair: int = 0  # the number of the agent's utterance in this step, 0 for silence
     action: str = "none"  # in this step
     poked: bool = False
     was_poked: bool = False
@@ -113,6 +123,33 @@ class Entity:
         return f"<{self.key}{[self.index]} at {self.cell}>"
 
 
+@dataclass(frozen=True)
+class Performance:
+    """A sequence that was drawn: body actions, each with the number of an utterance (0: none)."""
+
+    elements: tuple[tuple[str, int], ...]
+
+
+@dataclass
+class Recall:
+    """A memory: what the agent did in the last steps in which it was open."""
+
+    size: int
+    of: str
+    entries: list[tuple[str, int]] = field(default_factory=list)
+    open: bool = False  # at the start of this step
+
+    def equals(self, lesson: Performance) -> bool:
+        """Element by element; false until it is full, or where the lengths differ."""
+        if len(self.entries) < self.size or self.size != len(lesson.elements):
+            return False
+        return all(self.seen(a) == self.seen(b) for a, b in zip(self.entries, lesson.elements, strict=True))
+
+    def seen(self, element: tuple[str, int]) -> Any:
+        """What it keeps of an element."""
+        return {"agent.acts": element, "agent.actions": element[0], "agent.utterances": element[1]}[self.of]
+
+
 @dataclass
 class World:
     """The whole state of an episode."""
@@ -124,13 +161,20 @@ class World:
     terrain: dict[Cell, str] = field(default_factory=dict)
     objects: dict[str, Entity | list[Entity]] = field(default_factory=dict)
     cast: dict[str, Entity] = field(default_factory=dict)
+    roles: dict[str, str] = field(default_factory=dict)  # role -> who plays it
     lets: dict[str, Any] = field(default_factory=dict)
+    registers: dict[str, Any] = field(default_factory=dict)  # the world's `state`
+    ranges: dict[str, tuple[int, int]] = field(default_factory=dict)  # of registers that saturate
+    memories: dict[str, Recall] = field(default_factory=dict)
+    fired_once: set[str] = field(default_factory=set)  # of the world's rules
+    before: World | None = None  # as the last step left it, for `prev`
     nouns: tuple[str | int, ...] = ()
     step_names: dict[str, list[str | None]] = field(default_factory=dict)  # per frame with `steps`
     earshot: dict[str, str | int] = field(default_factory=dict)  # how far each voice carries
     always_audible: frozenset[str] = frozenset()
     npcs_hidden: bool = False
     own_voice: bool = False
+    egocentric: bool = False
     lines: list[tuple[Entity, str]] = field(default_factory=list)  # what the agent heard in this step
 
     @property

@@ -1,0 +1,75 @@
+"""Effects on things and members: which are asked for, and what each does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from socialai_dsl.grammar import ast
+from tests.reference.evaluate import Context, evaluate, of
+from tests.reference.source import Sources
+from tests.reference.world import TYPES, Entity, World, as_list
+
+Cause = tuple[str, list[Entity], str | None]
+
+
+def causes(sources: Sources, rule: Any, path: str, context: Context, frame: str | None) -> list[Cause]:
+    """The effects of a rule in order: a verb, what it is done to, and the status that `become` names."""
+    found = []
+    for number, source in enumerate(rule.cause):
+        site = f"{path}.cause[{number}]" if len(rule.cause) > 1 else f"{path}.cause"
+        value = sources.expression(site, source, frame)
+        found.append(cause(value.tree, replace(context, value=value)))
+    return found
+
+
+def cause(node: Any, context: Context) -> Cause:
+    """One effect."""
+    if isinstance(node, ast.Name):
+        return node.id, as_list(context.me), None
+    subject = as_list(context.me) if node.subject is None else as_list(of(node.subject, context))
+    status = None
+    if isinstance(node, ast.Call) and node.args:
+        status = node.args[0].id if isinstance(node.args[0], ast.Name) else str(of(node.args[0], context))
+    return node.name, subject, status
+
+
+def assignments(
+    sources: Sources, rule: Any, path: str, context: Context, frame: str | None
+) -> dict[str, Any]:
+    """What a rule gives to registers, computed before anything is done."""
+    return {
+        name: evaluate(sources.expression(f"{path}.set.{name}", source, frame), context)
+        for name, source in rule.set.items()
+    }
+
+
+def assign(world: World, me: Entity | None, values: dict[str, Any]) -> None:
+    """Sets registers of one's own, else those of the world. A given range saturates."""
+    for name, value in values.items():
+        holder: Any = me if me is not None and name in me.registers else world
+        low, high = holder.ranges.get(name, (value, value))
+        holder.registers[name] = min(max(value, low), high) if name in holder.ranges else value
+
+
+def affect(target: Entity, verb: str, status: str | None) -> None:
+    """One effect on one entity; what does not apply to its status changes nothing."""
+    if verb == "vanish":
+        target.cell = None
+    elif verb == "reset":
+        target.status = target.initial
+    elif verb == "become":
+        target.status = str(status)
+    elif verb == "unlock":
+        unlock(target)
+    elif target.type == "box":
+        target.status = {"open": "opened", "close": "shut", "lock": "locked"}[verb]
+    else:
+        target.status = {"open": "open", "close": "closed", "lock": "locked"}[verb]
+    assert target.sort != "object" or target.status in TYPES[target.type].states
+
+
+def unlock(target: Entity) -> None:
+    """What is locked becomes closed, a box shut."""
+    if target.status == "locked":
+        target.status = "shut" if target.type == "box" else "closed"

@@ -1,0 +1,380 @@
+"""A resolved scenario as plain records: only the shape of the language, and no key that is not understood."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import product
+from typing import Any, Final
+
+from socialai_dsl.loader import Resolved, resolve
+
+PRIMITIVES: Final = ("left", "right", "forward", "pickup", "drop", "toggle", "done")
+SHARED_GRAMMARS: Final = {
+    "body": {"templates": ["Move your <noun>", "Shake your <noun>"], "nouns": ["body", "head"]},
+}
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Conditions, all of which must hold, and effects; `goto` and `do` where the place allows them."""
+
+    id: str | None = None
+    hears: tuple[str, ...] = ()
+    when: Any = None
+    after: int | None = None
+    chance: float | None = None
+    once: bool = False
+    do: str | None = None
+    set: dict[str, Any] = field(default_factory=dict)
+    cause: tuple[str, ...] = ()
+    say: str | None = None
+    goto: str | None = None
+    goto_now: str | None = None
+
+
+@dataclass(frozen=True)
+class Step:
+    """An entry of `steps`."""
+
+    state: str | None = None
+    do: str | None = None
+    until: Any = None
+    for_: Any = None
+    set: dict[str, Any] = field(default_factory=dict)
+    cause: tuple[str, ...] = ()
+    say: str | None = None
+
+
+@dataclass(frozen=True)
+class State:
+    """An entry of `states`."""
+
+    first: tuple[Rule, ...] = ()
+    do: str | None = None
+    then: tuple[Rule, ...] = ()
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A protocol; either `states` or `steps` is None."""
+
+    slots: dict[str, str] = field(default_factory=dict)
+    let: dict[str, Any] = field(default_factory=dict)
+    define: dict[str, Any] = field(default_factory=dict)
+    start: str | None = None
+    states: dict[str, State] | None = None
+    steps: tuple[Step, ...] | None = None
+
+
+@dataclass(frozen=True)
+class Member:
+    """A member of the cast, or what an npc file says of one."""
+
+    role: str | None = None
+    kind: str | None = None
+    name: Any = None
+    color: Any = None
+    place: Any = None
+    at: Any = None
+    facing: Any = None
+    view: int | None = None
+    earshot: Any = None
+    frame: str | None = None
+    with_: dict[str, Any] = field(default_factory=dict)
+    audible: str | None = None
+    kind_code: int | None = None
+
+    def over(self, base: Member) -> Member:
+        """This with what it leaves out taken from `base`: a position replaces a place and the other way round."""
+        kept = {name: value for name, value in vars(self).items() if value is not None}
+        if self.place is not None or self.at is not None:
+            base = replace(base, place=None, at=None)
+        return replace(base, **{**kept, "with_": {**base.with_, **self.with_}})
+
+
+@dataclass(frozen=True)
+class Group:
+    """An object, or a group of them."""
+
+    type: str
+    count: int | None = None
+    place: Any = None
+    at: Any = None
+    color: Any = None
+    state: Any = None
+    pressed: Any = None
+    opened: Any = None
+    locked: Any = None
+    tagged: Any = None
+    unlocks: Any = None
+    one_way: bool = False
+    dark: bool = False
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """A `let` that draws a row of body actions, each with an utterance at some chance."""
+
+    length: int
+    moves: tuple[str, ...]
+    chance: float | None = None
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What the agent did last."""
+
+    last: int
+    of: str = "agent.acts"
+    while_: Any = None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One way the episode ends."""
+
+    success: Any = None
+    failure: Any = None
+    reward: int = 100
+    id: str | None = None
+
+
+@dataclass(frozen=True)
+class Observe:
+    """What the agent perceives."""
+
+    npcs: str = "shown"
+    image: str = "end"
+    names: str = "shown"
+    directions: str = "absolute"
+    own_voice: bool = False
+
+
+@dataclass(frozen=True)
+class Room:
+    """The size of the room and what is built into it."""
+
+    size: Any = None
+    width: Any = None
+    height: Any = None
+    build: tuple[dict[str, str], ...] = ()
+    canvas: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True)
+class Grammar:
+    """What the agent can say."""
+
+    templates: tuple[str, ...]
+    nouns: tuple[str | int, ...]
+
+    def utterance(self, template: int, noun: int) -> str:
+        """The text of a pair."""
+        return self.templates[template].replace("<noun>", str(self.nouns[noun]))
+
+    def pairs(self) -> list[tuple[int, int]]:
+        """All pairs in the order of their numbers, which start at 1: 0 is silence."""
+        return list(product(range(len(self.templates)), range(len(self.nouns))))
+
+
+@dataclass(frozen=True)
+class Script:
+    """One scenario."""
+
+    scenario: str
+    grammar: Grammar
+    room: Room
+    horizon: int = 100
+    earshot: Any = "next_to"
+    actions: tuple[str, ...] = PRIMITIVES
+    params: dict[str, Any] = field(default_factory=dict)
+    order: tuple[str, ...] = ()
+    objects: dict[str, Group] = field(default_factory=dict)
+    let: dict[str, Any] = field(default_factory=dict)
+    define: dict[str, Any] = field(default_factory=dict)
+    state: dict[str, Any] = field(default_factory=dict)
+    memory: dict[str, Memory] = field(default_factory=dict)
+    frames: dict[str, Frame] = field(default_factory=dict)
+    roles: dict[str, Member] = field(default_factory=dict)
+    npc_defaults: Member = field(default_factory=Member)
+    cast: dict[str, Member] = field(default_factory=dict)
+    files: dict[str, dict[str, Member]] = field(
+        default_factory=dict
+    )  # of `one_of`: member -> npc -> what it says
+    rules: tuple[Rule, ...] = ()
+    require: tuple[Any, ...] = ()
+    outcome: tuple[Outcome, ...] = ()
+    observe: Observe = field(default_factory=Observe)
+
+    def versions(self, name: str) -> list[Member]:
+        """All that a member can be, in the order of its files; one where nothing is drawn."""
+        own = self.cast[name]
+        bases = list(self.files[name].values()) if name in self.files else [Member()]
+        return [self.complete(name, own.over(base)) for base in bases]
+
+    def complete(self, name: str, member: Member) -> Member:
+        """A member's own keys, then those of its role, then of `npc_defaults`. A role does not drive the agent."""
+        if member.role is not None:
+            role = self.roles[member.role]
+            member = member.over(replace(role, frame=None) if name == "agent" else role)
+        return member if name == "agent" else member.over(self.npc_defaults)
+
+    def player_of(self, name: str) -> str:
+        """The member of the cast that a name means; a role means whoever plays it."""
+        players = [member for member, own in self.cast.items() if own.role == name]
+        return players[0] if name in self.roles and players else name
+
+
+# -- reading -----------------------------------------------------------------------------------------------
+
+
+def script_of(source: Any) -> Script:
+    """The records of a scenario: a resolved one, a name, its models, or its plain data."""
+    if isinstance(source, Script):
+        return source
+    if isinstance(source, str):
+        source = resolve(source)
+    if not isinstance(source, Resolved):
+        data = source if isinstance(source, Mapping) else source.model_dump(by_alias=True, exclude_unset=True)
+        return of_data(data)
+    assert isinstance(source.data, dict)
+    files = {
+        name: {str(file.data["npc"]): file.data for file in source.include_all(("cast", name, "one_of"))}  # type: ignore[index,call-overload]
+        for name, member in source.data["cast"].items()  # type: ignore[union-attr]
+        if "one_of" in (member or {})  # type: ignore[operator]
+    }
+    return of_data(source.data, source.params, files)
+
+
+def of_data(
+    data: Mapping[str, Any],
+    given: Mapping[str, str] | None = None,
+    files: Mapping[str, Mapping[str, Any]] | None = None,
+) -> Script:
+    """The records of plain data; `files` holds the data of the npc files of each member that is one of several."""
+    params = {
+        name: parameter(entry, (given or {}).get(name)) for name, entry in data.get("params", {}).items()
+    }
+    data = dict(substituted(tuples(data), params))
+    frames: dict[str, Any] = dict(data.get("frames", {}))
+    known: dict[str, dict[str, Member]] = {}
+    for name, npcs in (files or {}).items():
+        known[name] = {}
+        for npc, entry in npcs.items():
+            entry = dict(tuples(entry))
+            frames = {**entry.pop("frames", {}), **frames}
+            known[name][npc] = member_of({key: entry[key] for key in entry if key not in ("npc", "abstract")})
+    for key in ("about", "skills", "notes", "abstract", "check"):
+        data.pop(key, None)
+    data |= {"frames": frames, "params": params, "files": known}
+    return record(Script, data, READERS)
+
+
+def parameter(entry: Any, given: str | None) -> Any:
+    """The value of a parameter: what was given behind `?`, read as YAML reads it, else the default."""
+    values = entry.get("values") if isinstance(entry, dict) else None
+    value = entry["default"] if isinstance(entry, dict) else entry
+    if isinstance(values, Mapping):
+        return values[str(value) if given is None else given]
+    return value if given is None else scalar(given)
+
+
+def scalar(text: str) -> Any:
+    """A plain YAML scalar."""
+    if text in ("true", "false"):
+        return text == "true"
+    if re.fullmatch(r"-?\d+", text):
+        return int(text)
+    return float(text) if re.fullmatch(r"-?\d*\.\d+", text) else text
+
+
+def tuples(data: Any) -> Any:
+    """The data with tuples for lists."""
+    if isinstance(data, Mapping):
+        return {key: tuples(value) for key, value in data.items()}
+    return tuple(map(tuples, data)) if isinstance(data, list | tuple) else data
+
+
+def substituted(data: Any, params: Mapping[str, Any]) -> Any:
+    """The data with the value of a parameter wherever a whole scalar is `$name`."""
+    if isinstance(data, Mapping):
+        return {key: value if key == "params" else substituted(value, params) for key, value in data.items()}
+    if isinstance(data, tuple):
+        return tuple(substituted(item, params) for item in data)
+    whole = re.fullmatch(r"\$(\w+)", data) if isinstance(data, str) else None
+    return params[whole[1]] if whole else data
+
+
+def record(kind: type, data: Any, readers: Mapping[str, Callable[[Any], Any]]) -> Any:
+    """A record of this kind; words that Python reserves get an underscore; unknown keys are refused."""
+    reserved = {"for": "for_", "while": "while_", "with": "with_"}
+    values = {reserved.get(key, key): value for key, value in (data or {}).items()}
+    known = {**kind.__dataclass_fields__}  # type: ignore[attr-defined]
+    unknown = values.keys() - known.keys()
+    assert not unknown, f"the reference does not know {unknown} in a {kind.__name__}"
+    return kind(**{k: readers[k](v) if k in readers else v for k, v in values.items() if v is not None})
+
+
+def many(value: Any) -> tuple[Any, ...]:
+    """One or several."""
+    return value if isinstance(value, tuple) else (value,)
+
+
+def rules(entries: Any) -> tuple[Rule, ...]:
+    """A list of rules."""
+    return tuple(record(Rule, entry, {"hears": many, "cause": many}) for entry in entries)
+
+
+def frame_of(entry: Any) -> Frame:
+    """A frame."""
+    return record(
+        Frame,
+        entry,
+        {
+            "states": lambda states: {
+                name: record(State, state, {"first": rules, "then": rules}) for name, state in states.items()
+            },
+            "steps": lambda steps: tuple(record(Step, step, {"cause": many}) for step in steps),
+        },
+    )
+
+
+def member_of(entry: Any) -> Member:
+    """A member of the cast; where several files can be it, they are read apart from it."""
+    return record(Member, {key: value for key, value in (entry or {}).items() if key != "one_of"}, {})
+
+
+def let_of(entry: Any) -> Any:
+    """A `let`: an expression, or a sequence."""
+    if not isinstance(entry, Mapping):
+        return entry
+    moves = entry["moves"]
+    moves = moves if isinstance(moves, tuple) else tuple(word.strip() for word in str(moves).split("|"))
+    said = entry.get("utterance")
+    return Sequence(int(entry["sequence"]), moves, None if said is None else float(said["chance"]))
+
+
+def each(reader: Callable[[Any], Any]) -> Callable[[Any], dict[str, Any]]:
+    """Reads the values of a mapping."""
+    return lambda entries: {name: reader(entry) for name, entry in entries.items()}
+
+
+READERS: Final[dict[str, Callable[[Any], Any]]] = {
+    "grammar": lambda entry: record(Grammar, tuples(SHARED_GRAMMARS.get(str(entry), entry)), {}),
+    "room": lambda entry: record(Room, entry, {}),
+    "actions": many,
+    "order": many,
+    "objects": each(lambda entry: record(Group, entry, {})),
+    "let": each(let_of),
+    "memory": each(lambda entry: record(Memory, entry, {})),
+    "frames": each(frame_of),
+    "roles": each(member_of),
+    "npc_defaults": member_of,
+    "cast": each(member_of),
+    "rules": rules,
+    "require": many,
+    "outcome": lambda entries: tuple(record(Outcome, entry, {}) for entry in entries),
+    "observe": lambda entry: record(Observe, entry, {}),
+}

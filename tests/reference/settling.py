@@ -1,0 +1,48 @@
+"""How the world settles: links and computed statuses, which follow from everything else."""
+
+from __future__ import annotations
+
+from tests.reference.effects import unlock
+from tests.reference.evaluate import Context, NothingFoundError, holds
+from tests.reference.script import Group, Script
+from tests.reference.source import Sources
+from tests.reference.world import TYPES, Entity, World, as_list
+
+
+class Settling:
+    """Applies the links and computed statuses of one scenario."""
+
+    def __init__(self, scenario: Script, sources: Sources, world: World) -> None:
+        self.scenario, self.sources, self.world = scenario, sources, world
+
+    def all(self) -> None:
+        """Links, then computed statuses."""
+        self.links()
+        self.statuses()
+
+    def links(self) -> None:
+        """While something is active, what it unlocks and is locked becomes closed: a level, not an event."""
+        for thing in self.world.things():
+            if not thing.gone and thing.status in TYPES[thing.type].active:
+                for other in thing.unlocks:
+                    unlock(other)
+
+    def statuses(self) -> None:
+        """`locked:` and `tagged:`: on while they hold; what is found on while they do not becomes off."""
+        for name, group in self.scenario.objects.items():
+            for on in ("locked", "tagged"):
+                if getattr(group, on) is not None:
+                    for thing in as_list(self.world.objects[name]):
+                        self.settle(thing, group, on)
+
+    def settle(self, thing: Entity, group: Group, on: str) -> None:
+        """One computed status of one object, `it`."""
+        value = self.sources.expression(f"objects.{thing.key}.{on}", getattr(group, on))
+        try:
+            is_on = holds(value, Context(self.world, variables={"it": thing}))
+        except NothingFoundError:
+            is_on = False
+        if is_on:
+            thing.status = on
+        elif thing.status == on:
+            thing.status = {"locked": "shut" if thing.type == "box" else "closed", "tagged": "plain"}[on]
