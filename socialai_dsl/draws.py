@@ -26,6 +26,8 @@ on batch size, threads, or on what anybody else drew.
   An expression that comes from `define` counts as written where it is used; keys that come from `npc_defaults` count
   as written in the cast member.
 * `step` is t when the value is computed; 0 at reset.
+* A room that is not as required is drawn again: every draw of the next attempt, but that of a suite's member, takes
+  `attempt_key(key, attempt)` in place of the episode's key until the reset is over. Attempt 0 has the key itself.
 * A choice among n things takes the `below(u, n)`-th of them: members of a group by index, alternatives as written,
   colours by code, cells row by row, numbers ascending. `distinct` colours are drawn one after another, each among those
   not yet taken, in order of code.
@@ -54,6 +56,12 @@ def episode_key(seed: int, index: int, episode: int) -> int:
     key = mix(seed + GOLDEN)
     key = mix(key + (index + 1) * GOLDEN)
     return mix(key + (episode + 1) * GOLDEN)
+
+
+def attempt_key(key: int, attempt: int) -> int:
+    """The key of the draws at reset of an episode of which `attempt` rooms were not as required."""
+    # Sites are below 2**31, so no draw has this word.
+    return mix(key + ((1 << 63) | attempt) * GOLDEN) if attempt else key
 
 
 def site(path: str) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 
 from socialai_dsl import draws
 from socialai_dsl.engine.batch import Batch, Part
+from socialai_dsl.engine.kernel import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.program import (
     CONSTANT,
@@ -67,7 +68,8 @@ class FrameSpec:
 class Assembly:
     """A room of `size` on a canvas of `canvas`, entities put where `at` says, and code.
 
-    Entities are numbered agent, NPCs, objects. Object types: door (open, closed, locked) and lava.
+    Entities are numbered agent, NPCs, objects. Object types: door (open, closed, locked) and lava; who can walk
+    through something can look through it.
     Templates x nouns are 2 x 3; `classes` gives the utterance class of each pair.
     """
 
@@ -345,3 +347,31 @@ def batch_of(program: Program, rows: int = 1, threads: int = 1, seed: int = 7) -
     batch.state.keys[:, Key.INDEX] = np.arange(rows)
     batch.reset()
     return batch
+
+
+def step(batch: Batch, action: tuple[int, ...] = (7, 0, 0, 0)) -> None:
+    """One step of all rows, by default without a movement or word."""
+    batch.ports.actions[:] = action
+    assert batch.step(Task.STEP_ONLY) >= 0
+
+
+def result_of(block: Sequence[Instruction], register: int | None = None, **room: object) -> int:
+    """Value of a register, by default the program's first own one, after the rules `block` ran in one step."""
+    assembly = Assembly(rules=block, **room)  # type: ignore[arg-type]
+    batch = batch_of(assembly.program())
+    step(batch)
+    return int(batch.state.registers[0, assembly.own if register is None else register])
+
+
+def holds(test: Instruction, **room: object) -> bool:
+    """Whether a test holds in a room; it must skip exactly what follows it."""
+    own = Assembly(**room).own  # type: ignore[arg-type]
+    block = [
+        (*test, *[0] * (3 - len(test)), 2) if len(test) < 4 else test,
+        (Op.LOAD, own, constant(1)),
+        (Op.SKIP, 0, 0, 1),
+        (Op.LOAD, own, constant(2)),
+    ]
+    value = result_of(block, own, **room)
+    assert value in (1, 2), "neither branch of the test was taken"
+    return value == 1

@@ -13,7 +13,17 @@ from socialai_dsl.engine.kernel import BAD_ACTION, Task, prepare, serve
 from socialai_dsl.engine.picture import view_table
 from socialai_dsl.engine.pointers import make_book
 from socialai_dsl.engine.queries import identify, script
-from socialai_dsl.engine.state import Key, Link, Ports, State, Tables, empty_ports, empty_state, no_pins
+from socialai_dsl.engine.state import (
+    ATTEMPTS,
+    Key,
+    Link,
+    Ports,
+    State,
+    Tables,
+    empty_ports,
+    empty_state,
+    no_pins,
+)
 from socialai_dsl.program import VIEW, Header
 
 _ROWS_WORTH_A_THREAD: Final = 64
@@ -30,6 +40,7 @@ class Part:
         actions: Body of each body action of the batch.
         templates, nouns: the program's own index of each of the batch's, -1 if it has no such.
         tokens: the batch's id of each token id of the program.
+        name: what an error calls the program.
     """
 
     words: NDArray[np.int32]
@@ -39,6 +50,7 @@ class Part:
     templates: Sequence[int]
     nouns: Sequence[int]
     tokens: Sequence[int]
+    name: str = ""
 
 
 class Batch:
@@ -87,6 +99,7 @@ class Batch:
             self.state.keys[row, Key.PROGRAM] = self.offsets[pools[pool][0]]
         prepare()
         self._rows = rows
+        self._names = [part.name or f"program {number}" for number, part in enumerate(parts)]
         self._book = self._make_book()
         self._cuts = _cut(rows, threads)
         self._executor = ThreadPoolExecutor(len(self._cuts) - 1) if len(self._cuts) > 1 else None
@@ -96,10 +109,13 @@ class Batch:
         return np.searchsorted(self.offsets, self.state.keys[:, Key.PROGRAM].astype(np.int64))
 
     def step(self, task: Task) -> int:
-        """Step all rows with `ports.actions`; how many episodes ended, or BAD_ACTION and nothing happened."""
-        if self._executor is None:
-            return serve(self._book, int(task), 0, 0, self._rows)
-        if not self.actions_fit():
+        """Step all rows with `ports.actions`; how many episodes ended, or BAD_ACTION and nothing happened.
+
+        Raises:
+            RuntimeError: all rows were stepped, but one that was reset found no room as its scenario requires; it
+                is in the last room that was drawn, and play may go on.
+        """
+        if self._executor is not None and not self.actions_fit():
             return BAD_ACTION
         return self._share(task)
 
@@ -108,7 +124,11 @@ class Batch:
         return serve(self._book, int(Task.CHECK), 0, 0, self._rows) != BAD_ACTION
 
     def reset(self, pins: NDArray[np.int16] | None = None) -> None:
-        """Start the episodes that the keys of the rows `ports.chosen` name, from their layouts (`ports.layout`)."""
+        """Start the episodes that the keys of the rows `ports.chosen` name, from their layouts (`ports.layout`).
+
+        Raises:
+            RuntimeError: as `step` does.
+        """
         if pins is not None or len(self.ports.pins) > 1:
             registers = self.state.registers.shape[1]
             self.ports = self.ports._replace(pins=no_pins(registers) if pins is None else pins)
@@ -136,9 +156,23 @@ class Batch:
         return make_book((*tables, *self.state, *ports))
 
     def _share(self, task: Task) -> int:
+        """Let every thread do its rows; how many episodes ended, or BAD_ACTION."""
         if self._executor is None:
-            return serve(self._book, int(task), 0, 0, self._rows)
-        return self._ask(lambda *part: serve(part[0], int(task), *part[1:]))
+            ended = serve(self._book, int(task), 0, 0, self._rows)
+        else:
+            ended = self._ask(lambda *part: serve(part[0], int(task), *part[1:]))
+        if ended < BAD_ACTION:
+            self._report_refused()
+        return ended
+
+    def _report_refused(self) -> None:
+        row = int(np.flatnonzero(self.ports.refused)[0])
+        self.ports.refused[:] = False
+        key = self.state.keys[row]
+        raise RuntimeError(
+            f"{self._names[int(self.program_numbers()[row])]}: none of {ATTEMPTS} rooms was as `require` asks, in row "
+            f"{row} (seed {key[Key.SEED]}, index {key[Key.INDEX]}, episode {key[Key.EPISODE]})"
+        )
 
     def _ask(self, kernel: Callable[[Any, int, int, int], int]) -> int:
         """Let every thread do its rows; the sum of what they return."""

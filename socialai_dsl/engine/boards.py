@@ -80,12 +80,12 @@ def object_look(row: Row, entity: int) -> int:
 
 @inline
 def npc_look(row: Row, entity: int) -> int:
-    """Packed cell that shows an NPC. Its status register is added to its kind, which serves kinds drawn at reset."""
+    """Packed cell that shows an NPC. Its status is the code itself."""
     table = row.program[Header.TYPE_AT] + TypeColumn.COLUMNS * column(row, entity, EntityColumn.TYPE)
     return (
         row.program[table + TypeColumn.CODE]
         | field(row, entity, Field.COLOR) << 8
-        | (column(row, entity, EntityColumn.KIND) + field(row, entity, Field.STATUS)) << 16
+        | field(row, entity, Field.STATUS) << 16
         | field(row, entity, Field.DIR) << 24
     )
 

@@ -30,6 +30,9 @@ from socialai_dsl.program import Header, Register
 BAD_ACTION = -1
 """Returned instead of stepping if an action is outside its space."""
 
+NO_ROOM = -(1 << 32)
+"""Added to what is returned for each row that found no room as required; `Ports.refused` tells which."""
+
 
 class Task(IntEnum):
     """What a call of `serve` is to do."""
@@ -118,7 +121,7 @@ def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
         last: the row after the last.
 
     Returns:
-        How many episodes ended, or BAD_ACTION (then nothing was done).
+        How many episodes ended, plus NO_ROOM for each row without a room, or BAD_ACTION (then nothing was done).
     """
     ended = 0
     if task <= Task.CHECK and not _actions_fit(book, first, last):
@@ -148,7 +151,9 @@ def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
             uint64_of(book, Book.KEYS, row)[Key.EPISODE] += np.uint64(1)
         _open_episode(book, layout, row)
         fresh = open_row(book, thread, layout, row)
-        reset_row(fresh, layout != 0)
+        if not reset_row(fresh, layout != 0):
+            bytes_of(book, Book.REFUSED, ZERO)[row] = 1
+            ended += NO_ROOM
         take_picture(fresh, fresh.program[Header.SIZE])
     return ended
 

@@ -7,15 +7,16 @@ from numpy.typing import NDArray
 
 from socialai_dsl.engine import rng
 from socialai_dsl.engine.entities import field
-from socialai_dsl.engine.jit import inline
+from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.state import AGENT, Link, Row
-from socialai_dsl.program import VIEW, Field, Header, pack_cell
+from socialai_dsl.program import CODES_OF_TYPES, VIEW, Field, Flag, Header, pack_cell
 
 CELLS: Final = VIEW * VIEW
 OWN_PLACE: Final = (VIEW // 2) * VIEW + VIEW - 1
 """Where the agent is in the picture: image[3, 6]."""
 
 OWN_LOOK = pack_cell(1)
+_NPC = CODES_OF_TYPES["npc"]
 
 
 def view_table(width: int, height: int) -> NDArray[np.uint16]:
@@ -57,4 +58,16 @@ def take_picture(row: Row, link: int) -> None:
         view = (row.program[link + Link.VIEWS] + pose) * CELLS
         for i in range(CELLS):
             row.image[i] = row.board[row.views[view + i]]
+        if row.program[Header.FLAGS] & Flag.EGOCENTRIC:
+            _turn_npcs(row, field(row, AGENT, Field.DIR))
     row.image[OWN_PLACE] = OWN_LOOK
+
+
+@outline
+def _turn_npcs(row: Row, direction: int) -> None:
+    """Show the directions of NPCs relative to the agent's: 0 the opposite, 2 the same."""
+    stay_outline()
+    for i in range(CELLS):
+        look = row.image[i]
+        if look & 0xFF == _NPC:
+            row.image[i] = (look & 0xFFFFFF) | (((look >> 24) - direction + 2) & 3) << 24

@@ -5,15 +5,15 @@ import numpy as np
 from socialai_dsl import draws
 from socialai_dsl.engine import rng
 from socialai_dsl.engine.boards import draw_all
-from socialai_dsl.engine.entities import field, set_field
+from socialai_dsl.engine.entities import column, field, set_field
 from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.places import occupy
 from socialai_dsl.engine.sets import clear
 from socialai_dsl.engine.speech import clear_tokens, remember
-from socialai_dsl.engine.state import OCCUPIED, ONE, PIN_NONE, RESETTING, ZERO, Key, Row
+from socialai_dsl.engine.state import ATTEMPTS, OCCUPIED, ONE, PIN_NONE, RESETTING, ZERO, Key, Row
 from socialai_dsl.engine.turns import settle
 from socialai_dsl.engine.vm import run
-from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Body, Field, Header, Register
+from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Body, EntityColumn, Field, Header, Register
 
 MEMBER_SITE = np.int64(draws.site("member"))
 """Where a suite draws the program of an episode."""
@@ -28,8 +28,29 @@ def draw_member(key: np.uint64, count: int, pinned: int) -> int:
 
 
 @inline
-def reset_row(row: Row, pinned: bool) -> None:
-    """Start an episode; the row's key and program are set already."""
+def reset_row(row: Row, pinned: bool) -> bool:
+    """Start an episode; the row's key and program are set already.
+
+    Whether its room is as required. If not it is the last of `ATTEMPTS` rooms, complete as any other.
+    """
+    key = row.key[Key.KEY]
+    required = row.program[Header.REQUIRE_PC]
+    for attempt in range(ATTEMPTS):
+        row.key[Key.KEY] = rng.attempt_key(key, attempt)
+        _draw_room(row, pinned)
+        row.registers[Register.ATTEMPT] = attempt
+        if required != 0:
+            run(row, required)
+        if required == 0 or row.registers[Register.ACCEPTED] != 0:
+            row.key[Key.KEY] = key
+            return np.bool_(True)
+    row.registers[Register.ATTEMPT] = ATTEMPTS
+    row.key[Key.KEY] = key
+    return np.bool_(False)
+
+
+@inline
+def _draw_room(row: Row, pinned: bool) -> None:
     _blank(row)
     if pinned:
         _pin_early(row)
@@ -38,7 +59,9 @@ def reset_row(row: Row, pinned: bool) -> None:
     if pinned:
         _pin_late(row)
     draw_all(row)
+    row.registers[Register.CHANGED] = 1
     settle(row)
+    row.registers[Register.ACCEPTED] = 0
 
 
 @inline
@@ -53,6 +76,8 @@ def _blank(row: Row) -> None:
         registers[base + Field.X] = -1
         registers[base + Field.Y] = -1
         registers[base + Field.LAST] = Body.NONE
+    for npc in range(1, row.program[Header.NPCS] + 1):
+        set_field(row, npc, Field.STATUS, column(row, npc, EntityColumn.KIND))
     registers[Register.OUTCOME] = -1
     registers[Register.TEMPLATE] = -1
     registers[Register.NOUN] = -1

@@ -15,6 +15,7 @@ _U30 = np.uint64(30)
 _U31 = np.uint64(31)
 _U32 = np.uint64(32)
 _U48 = np.uint64(48)
+_TOP = np.uint64(1 << 63)
 
 
 @inline
@@ -31,6 +32,14 @@ def episode_key(seed: np.uint64, index: np.uint64, episode: np.uint64) -> np.uin
     key = mix(seed + GOLDEN)
     key = mix(key + (index + _U1) * GOLDEN)
     return mix(key + (episode + _U1) * GOLDEN)
+
+
+@inline
+def attempt_key(key: np.uint64, attempt: int) -> np.uint64:
+    """The key of the draws of a reset; see `draws.attempt_key`."""
+    if attempt == 0:
+        return key
+    return mix(key + (_TOP | np.uint64(attempt)) * GOLDEN)
 
 
 @inline

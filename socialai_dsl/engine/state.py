@@ -18,6 +18,9 @@ PIN_NONE = -32768
 RESETTING = -1
 """In `Register.ENDED` while reset code runs: nothing is drawn yet."""
 
+ATTEMPTS = 64
+"""How many rooms of an episode are drawn for one that is as required."""
+
 # Constants that are arguments have the type of all numbers here, or Numba compiles the callee for each of them.
 AGENT = np.int64(0)
 ZERO = np.int64(0)
@@ -94,7 +97,8 @@ class Book(IntEnum):
     SPARE_BOARDS = 22
     SPARE_COUNTERS = 23
     IMAGE_IDS = 24
-    SIZES = 25
+    REFUSED = 25
+    SIZES = 26
 
 
 class Size(IntEnum):
@@ -151,6 +155,7 @@ class Ports(NamedTuple):
     spare_boards: NDArray[np.uint32]  # (threads, board)
     spare_counters: NDArray[np.int64]  # (threads, counters of all programs)
     image_ids: NDArray[np.uint64]  # (E,) digests of the pictures
+    refused: NDArray[np.bool_]  # (E,) rows that were reset and found no room that is as required
     sizes: NDArray[np.int64]  # (Size.END,)
 
 
@@ -203,6 +208,7 @@ def empty_ports(state: State, counters: int, threads: int) -> Ports:
         spare_boards=np.zeros((threads, state.boards.shape[1]), np.uint32),
         spare_counters=np.zeros((threads, counters), np.int64),
         image_ids=np.zeros(rows, np.uint64),
+        refused=np.zeros(rows, np.bool_),
         sizes=np.array([registers, state.boards.shape[1], state.tokens.shape[1], counters], np.int64),
     )
 

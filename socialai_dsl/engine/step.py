@@ -8,7 +8,16 @@ from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.picture import take_picture
 from socialai_dsl.engine.speech import empty_inbox, inbox_class
 from socialai_dsl.engine.state import AGENT, Link, Row
-from socialai_dsl.engine.turns import conclude, move_agent, notice, say_as_agent, settle, take_turns
+from socialai_dsl.engine.turns import (
+    compute_statuses,
+    conclude,
+    follow_links,
+    move_agent,
+    notice,
+    say_as_agent,
+    settle,
+    take_turns,
+)
 from socialai_dsl.engine.vm import run
 from socialai_dsl.program import Field, Flag, FrameColumn, Header, Register
 
@@ -18,8 +27,10 @@ TRUNCATED = 2
 
 @inline
 def begin(row: Row) -> None:
-    """Time goes on; nothing is heard, used or said yet."""
+    """What asks how things were is answered; then time goes on, and nothing is heard, used or said yet."""
     registers = row.registers
+    if row.program[Header.BEFORE_PC] != 0:
+        run(row, row.program[Header.BEFORE_PC])
     registers[Register.T] += 1
     registers[Register.HEARD] = 0
     registers[Register.POKED] = -1
@@ -36,6 +47,7 @@ def decode(row: Row, link: int) -> None:
     registers[Register.TEMPLATE] = -1
     registers[Register.NOUN] = -1
     registers[Register.CLASS] = 0
+    registers[Register.UTTERANCE] = 0
     if row.action[1] == 1:
         table += program[link + Link.ACTIONS]
         template = program[table + row.action[2]]
@@ -44,6 +56,7 @@ def decode(row: Row, link: int) -> None:
             pair = template * program[Header.NOUNS] + noun
             registers[Register.TEMPLATE] = template
             registers[Register.NOUN] = noun
+            registers[Register.UTTERANCE] = 1 + pair
             registers[Register.CLASS] = program[program[Header.CLASS_AT] + pair]
 
 
@@ -63,14 +76,17 @@ def step_row(row: Row, link: int) -> float:
         heard = inbox_class(row, program[frame + FrameColumn.INBOX])
         chosen = notice(row, frame, heard)
     move_agent(row, registers[Register.ACTION])
-    settle(row)
+    if flags & Flag.PICTURE_BEFORE_NPCS:
+        changed = follow_links(row)
+        take_picture(row, link)
+        compute_statuses(row, changed)
+    else:
+        settle(row)
     say_as_agent(row)
     if flags & Flag.AGENT_FRAME:
         conclude(row, frame, heard, chosen)
         empty_inbox(row, program[frame + FrameColumn.INBOX])
         registers[Register.SAID_LINE] = 0
-    if flags & Flag.PICTURE_BEFORE_NPCS:
-        take_picture(row, link)
 
     take_turns(row)
     if program[Header.RULES_PC] != 0:

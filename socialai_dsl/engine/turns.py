@@ -20,10 +20,32 @@ from socialai_dsl.program import Body, Field, Flag, FrameColumn, Header, Registe
 
 @inline
 def settle(row: Row) -> None:
-    """Let statuses that follow from others follow."""
-    pc = row.program[Header.SETTLE_PC]
-    if pc != 0:
-        run(row, pc)
+    """Let statuses that follow from others follow, unless nothing that they depend on has changed."""
+    if row.registers[Register.CHANGED] != 0 or row.program[Header.FLAGS] & Flag.SETTLE_ALWAYS:
+        compute_statuses(row, follow_links(row))
+
+
+@outline
+def follow_links(row: Row) -> bool:
+    """Let statuses have their direct consequences in others, if any has changed; whether one had.
+
+    What changes from here on is settled next time, so to do nothing where nothing changed makes no difference.
+    """
+    stay_outline()
+    changed = row.registers[Register.CHANGED] != 0
+    row.registers[Register.CHANGED] = 0
+    if changed and row.program[Header.LINKS_PC] != 0:
+        run(row, row.program[Header.LINKS_PC])
+    return changed
+
+
+@outline
+def compute_statuses(row: Row, changed: bool) -> None:
+    """Let statuses follow from their conditions, if what these read may have changed."""
+    stay_outline()
+    changed |= row.program[Header.FLAGS] & Flag.SETTLE_ALWAYS != 0
+    if changed and row.program[Header.SETTLE_PC] != 0:
+        run(row, row.program[Header.SETTLE_PC])
 
 
 @inline
@@ -34,6 +56,7 @@ def _toggle_object(row: Row, x: int, y: int) -> int:
         status = row.program[type_row(row, entity) + TypeColumn.TOGGLED]
         if status != field(row, entity, Field.STATUS):
             set_field(row, entity, Field.STATUS, status)
+            row.registers[Register.CHANGED] = 1
             draw_cell(row, x, y)
     return entity
 

@@ -109,10 +109,12 @@ def _effect(row: Row, op: int, a: int, b: int, c: int) -> None:
         entity = value(row, a)
         if op == Op.SET_FIELD:
             set_field(row, entity, b, value(row, c))
-        elif op == Op.BECOME:
-            set_field(row, entity, Field.STATUS, value(row, b))
         else:
-            set_field(row, entity, Field.GONE, ONE)
+            name = Field.STATUS if op == Op.BECOME else Field.GONE
+            wanted = value(row, b) if op == Op.BECOME else ONE
+            if field(row, entity, name) != wanted:
+                registers[Register.CHANGED] = 1
+                set_field(row, entity, name, wanted)
         if registers[Register.ENDED] != RESETTING:
             draw_entity(row, entity)
 

@@ -139,6 +139,7 @@ def test_first_activity_then_and_clock() -> None:
         at=((1, 1), (2, 2)),
         npcs=1,
         settle=noting(own, 4, 5),
+        flags=int(Flag.SETTLE_ALWAYS),
         frames=(
             FrameSpec(
                 1,

@@ -1,14 +1,10 @@
 """Every instruction does what its line in `program.Op` says."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import pytest
 
 from socialai_dsl import draws
-from socialai_dsl.engine.batch import Batch
-from socialai_dsl.engine.kernel import Task
-from socialai_dsl.program import Field, Op, Register
+from socialai_dsl.program import CELL, Field, Op, Register
 from tests.assembly import (
     CLOSED,
     LOCKED,
@@ -17,37 +13,13 @@ from tests.assembly import (
     batch_of,
     constant,
     entity_register,
+    holds,
+    result_of,
+    step,
     temporary,
 )
 
 RESULT = Assembly().own  # entities: the agent alone
-ACTION_NONE = (7, 0, 0, 0)
-
-
-def step(batch: Batch, action: tuple[int, ...] = ACTION_NONE) -> None:
-    batch.ports.actions[:] = action
-    assert batch.step(Task.STEP_ONLY) >= 0
-
-
-def result_of(block: Sequence[Instruction], register: int = RESULT, **room: object) -> int:
-    """Value of a register after the rules `block` have run in one step."""
-    batch = batch_of(Assembly(rules=block, **room).program())  # type: ignore[arg-type]
-    step(batch)
-    return int(batch.state.registers[0, register])
-
-
-def holds(test: Instruction, **room: object) -> bool:
-    """Whether a test holds in a room; it must skip exactly what follows it."""
-    own = Assembly(**room).own  # type: ignore[arg-type]
-    block = [
-        (*test, *[0] * (3 - len(test)), 2) if len(test) < 4 else test,
-        (Op.LOAD, own, constant(1)),
-        (Op.SKIP, 0, 0, 1),
-        (Op.LOAD, own, constant(2)),
-    ]
-    value = result_of(block, own, **room)
-    assert value in (1, 2), "neither branch of the test was taken"
-    return value == 1
 
 
 @pytest.mark.parametrize(
@@ -241,15 +213,16 @@ def test_each_cell_visits_row_by_row_and_drops() -> None:
         (Op.IF_EQ, temporary(2), constant(2), 1),
         (Op.DROP_CELL, 0, 0, 0),
         (Op.END_EACH, 0, 0, 0),
-        (Op.EACH_CELL, 0, temporary(2), 4),
+        (Op.EACH_CELL, 0, temporary(2), 5),
         (Op.ADD, own, own, constant(1)),
-        (Op.MUL, temporary(4), temporary(3), constant(10)),
-        (Op.ADD, own + 1, temporary(4), temporary(2)),
+        (Op.MUL, temporary(5), temporary(3), constant(10)),
+        (Op.ADD, own + 1, temporary(5), temporary(2)),
+        (Op.LOAD, own + 3, temporary(4)),
         (Op.END_EACH, 0, 0, 0),
         (Op.LOAD, own + 2, constant(5)),
     ]
     batch = batch_of(Assembly(reset=reset).program())
-    assert batch.state.registers[0, own : own + 3].tolist() == [6, 33, 5]
+    assert batch.state.registers[0, own : own + 4].tolist() == [6, 33, 5, CELL + 32 * 3 + 3]
 
 
 def test_each_cell_of_nothing_runs_nothing() -> None:
@@ -353,3 +326,54 @@ def test_a_cell_of_an_empty_set_is_nowhere() -> None:
         int(batch.state.registers[0, entity_register(1, name)]) for name in (Field.X, Field.Y, Field.GONE)
     ]
     assert gone == [-1, -1, 1]
+
+
+CHOSEN = [
+    # Board 1: the floor cells of the first line without the first, and the one in the lower left corner.
+    *((Op.LOAD, temporary(4 + i), constant(n)) for i, n in enumerate((2, 3, 1, 1))),
+    (Op.B_RECT, 1, temporary(4)),
+    *((Op.LOAD, temporary(4 + i), constant(n)) for i, n in enumerate((1, 1, 3, 3))),
+    (Op.B_RECT, 2, temporary(4)),
+    (Op.B_OR, 1, 2),
+]
+NONE = [(Op.B_FLOOR, 1), (Op.B_WITHOUT, 1, 1)]
+
+
+@pytest.mark.parametrize(
+    ("block", "op", "thing", "expected"),
+    [
+        (CHOSEN, Op.FIRST_CELL, 0, (2, 1)),
+        (NONE, Op.FIRST_CELL, 0, (-1, -1)),
+        (CHOSEN, Op.NEAREST_CELL, 0, (2, 1)),
+        (CHOSEN, Op.NEAREST_CELL, CELL + 32 * 3 + 2, (1, 3)),
+        (CHOSEN, Op.NEAREST_CELL, CELL + 32 * 2 + 4, (3, 1)),
+        (NONE, Op.NEAREST_CELL, 0, (-1, -1)),
+    ],
+)
+def test_cells_are_found_on_boards(
+    block: list[Instruction], op: Op, thing: int, expected: tuple[int, int]
+) -> None:
+    rules = [
+        *block,
+        (op, temporary(0), 1, constant(thing)),
+        (Op.LOAD, RESULT, temporary(0)),
+        (Op.LOAD, RESULT + 1, temporary(1)),
+        (Op.B_COUNT, temporary(0), 1),
+        (Op.LOAD, RESULT + 2, temporary(0)),
+    ]
+    batch = batch_of(Assembly(at=((2, 2),), rules=rules).program())
+    step(batch)
+    count = 3 if block is CHOSEN else 0
+    assert batch.state.registers[0, RESULT : RESULT + 3].tolist() == [*expected, count]
+
+
+def test_cells_are_visited_in_the_widest_room() -> None:
+    reset = [
+        (Op.B_FLOOR, 0),
+        (Op.EACH_CELL, 0, temporary(0), 2),
+        (Op.ADD, RESULT, RESULT, constant(1)),
+        (Op.LOAD, RESULT + 1, temporary(2)),
+        (Op.END_EACH, 0, 0, 0),
+    ]
+    batch = batch_of(Assembly(size=(30, 30), canvas=(30, 30), reset=reset).program())
+    assert batch.state.registers[0, RESULT : RESULT + 2].tolist() == [28 * 28, CELL + 32 * 28 + 28]
