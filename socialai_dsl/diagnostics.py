@@ -56,6 +56,7 @@ CODES: Final[dict[str, str]] = {
     "W311": "a rule that never fires",
     "S312": "states that go round within one step",
     "S313": "two frames that move one body",
+    "S315": "files of `one_of` that differ where they must not",
     # S4xx: what can be said
     "S401": "an utterance that nobody can say",
     "S402": "a value that cannot be said",

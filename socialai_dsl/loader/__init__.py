@@ -5,7 +5,7 @@ from socialai_dsl.loader.document import Data, DataPath, Document, NodeSpan, Pos
 from socialai_dsl.loader.names import shipped_folder
 from socialai_dsl.loader.patches import Edit
 from socialai_dsl.loader.reader import read_document
-from socialai_dsl.loader.resolved import Resolved, resolve, shipped_names
+from socialai_dsl.loader.resolved import Member, Resolved, resolve, shipped_names
 
 __all__ = [
     "KINDS",
@@ -13,6 +13,7 @@ __all__ = [
     "DataPath",
     "Document",
     "Edit",
+    "Member",
     "NodeSpan",
     "Positions",
     "Resolved",

@@ -103,10 +103,24 @@ class Builder:
         if kind == "variant" and root.text("of") != ANY:
             base = self._base(root, "of", path, chain)
             self.patch(base, root)
-            return Build(base.tree, base.kind, name, path, lineage + base.lineage, base.edits)
+            built = Build(base.tree, base.kind, name, path, lineage + base.lineage, base.edits)
+            if base.kind == "suite":
+                self._pass_on(built, base, root)
+            return built
         if root.entry("extends") is not None:
             root = self._extended(root, kind, path, chain)
         return Build(root, kind, name, path, lineage)
+
+    @staticmethod
+    def _pass_on(built: Build, base: Build, root: Node) -> None:
+        """A suite's variant that is named directly is passed on to the members like one that is named by `+`."""
+        built.passed_on, built.own_variants = list(base.passed_on), list(base.own_variants)
+        stem = base.lineage[0].stem + "_"
+        declared = root.entry("variant")
+        if declared is not None and built.path.stem.startswith(stem):
+            variant = Part(built.path.stem.removeprefix(stem), declared.value_span())
+            built.passed_on.append(variant)
+            built.own_variants.append(variant.text)
 
     def read(self, path: Path, asked: Span | None) -> tuple[Node, str]:
         """A file as a tree of its own, and its kind; a variant's shape is checked, since no model sees it."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
 from socialai_dsl.loader.build import Build, Builder
-from socialai_dsl.loader.document import DataPath, Document, Positions
+from socialai_dsl.loader.document import Data, DataPath, Document, Positions
 from socialai_dsl.loader.files import is_file
 from socialai_dsl.loader.library import Library, yaml_files
 from socialai_dsl.loader.limits import MAX_CHAIN
@@ -23,6 +24,21 @@ from socialai_dsl.loader.names import (
 from socialai_dsl.loader.tree import Node
 from socialai_dsl.loader.variants import names_in, vary
 from socialai_dsl.source import Source, Span
+
+
+@dataclass(frozen=True)
+class Member:
+    """A scenario as a suite's file names it.
+
+    Attributes:
+        name: what the suite calls it: its name with the variants and parameters written there.
+        scenario: with the variants that the suite passes on.
+        place: where it is named.
+    """
+
+    name: str
+    scenario: Resolved
+    place: DataPath
 
 
 class Resolved(Positions):
@@ -164,40 +180,85 @@ class Resolved(Positions):
                     found.append(file)
         return found
 
-    def members(self) -> tuple[Resolved, ...]:
-        """The members of a suite, in order, with what `?split=` replaces and the variants it passes on.
+    def members(self) -> tuple[Member, ...]:
+        """The members of a suite in order: of the split that `?split=` chooses, with the variants passed on.
 
         Raises:
-            ScenarioError: whatever is wrong with a member; S503 if no member can take a variant; S206 if there is
+            ScenarioError: whatever is wrong with the members; S503 if no member can take a variant; S206 if there is
                 no such split.
         """
-        texts = self.part(("members",))
-        places: list[DataPath] = [("members", i) for i in range(len(texts) if isinstance(texts, list) else 0)]
-        replaced = self._replaced_by_split()
-        members = [self.include(replaced.get(str(self.part(place)), place)) for place in places]
+        places = self._member_places(self._chosen_split())
+        found = DiagnosticBag()
+        members = [member for place in places if (member := self._member(place, found)) is not None]
+        found.raise_errors(self.files)
         for variant in self._build.passed_on:
-            changed = [member._varied(variant) for member in members]
+            changed = [member.scenario._varied(variant) for member in members]
             if not any(changed) and variant.text not in self._build.own_variants:
                 message = f"no member of `{self.name}` has a variant `{variant.text}`"
                 raise self._builder.library.error("S503", message, variant.span)
-            members = [now or before for now, before in zip(changed, members, strict=True)]
+            members = [
+                replace(member, scenario=now or member.scenario)
+                for now, member in zip(changed, members, strict=True)
+            ]
         return tuple(members)
 
-    def _replaced_by_split(self) -> dict[str, DataPath]:
-        """Member as written -> path of what the chosen split puts in its place."""
-        split = self._given.get("split")
-        if split is None:
-            return {}
+    def check_splits(self) -> None:
+        """Whether every split names scenarios, also those that are not chosen.
+
+        Raises:
+            ScenarioError: whatever is wrong with them.
+        """
+        found = DiagnosticBag()
+        for split in self._splits():
+            for place in self._member_places(split):
+                if place[0] == "splits":
+                    self._member(place, found)
+        found.raise_errors(self.files)
+
+    def _member(self, place: DataPath, found: DiagnosticBag) -> Member | None:
+        """The scenario that is named at a place; None if something is wrong with it."""
+        try:
+            scenario = self.include(place)
+        except ScenarioError as error:
+            found.extend(error.diagnostics)
+            return None
+        abstract = isinstance(scenario.data, dict) and scenario.data.get("abstract") is True
+        if scenario.kind == "scenario" and not abstract:
+            return Member(_member_name(scenario), scenario, place)
+        what = "an abstract scenario" if abstract else f"a file of the kind `{scenario.kind}`"
+        message = f"`{self.part(place)}` is {what}; the members of a suite are scenarios"
+        found.error("S108", message, self.value_span(place))
+        return None
+
+    def _splits(self) -> dict[str, Data]:
         known = self.data.get("splits") if isinstance(self.data, dict) else None
-        splits = known if isinstance(known, dict) else {}
-        if split.text not in splits:
-            message = f"`{self.name}` has no split `{split.text}`"
-            near = did_you_mean(split.text, splits)
-            raise self._builder.library.error("S206", message, split.span, suggestion=near)
-        chosen = splits[split.text]
-        replace = chosen.get("replace") if isinstance(chosen, dict) else None
-        members = replace if isinstance(replace, dict) else {}
-        return {member: ("splits", split.text, "replace", member) for member in members}
+        return known if isinstance(known, dict) else {}
+
+    def _chosen_split(self) -> str | None:
+        split, known = self._given.get("split"), self._splits()
+        if split is None or split.text in known:
+            return split.text if split else None
+        near = did_you_mean(split.text, known)
+        hint = None if near else "it has " + ", ".join(known) if known else "it has none"
+        message = f"`{self.name}` has no split `{split.text}`"
+        raise self._builder.library.error("S206", message, split.span, hint, near)
+
+    def _member_places(self, split: str | None) -> list[DataPath]:
+        """Where the members of a split are named."""
+        written = self.part(("members",))
+        own: list[DataPath] = [("members", i) for i in range(len(written) if isinstance(written, list) else 0)]
+        chosen = self._splits().get(split) if split is not None else None
+        if not isinstance(chosen, dict) or split is None:
+            return own
+        others, swapped = chosen.get("members"), chosen.get("replace")
+        if isinstance(others, list):
+            return [("splits", split, "members", i) for i in range(len(others))]
+        if not isinstance(swapped, dict):
+            return own
+        return [
+            ("splits", split, "replace", name) if (name := str(self.part(place))) in swapped else place
+            for place in own
+        ]
 
     def _varied(self, variant: Part) -> Resolved | None:
         """This scenario with a variant that a suite passes on; None if it has no such variant."""
@@ -258,6 +319,11 @@ def _resolved(builder: Builder, path: Path, name: ScenarioName, asked: Span | No
     for variant in name.variants:
         vary(builder, build, variant)
     return Resolved(builder, build, name.params)
+
+
+def _member_name(scenario: Resolved) -> str:
+    given = "&".join(f"{name}={value}" for name, value in scenario.params.items())
+    return f"{scenario.name}?{given}" if given else scenario.name
 
 
 def _folder(document: Document) -> Path:

@@ -77,7 +77,7 @@ class Node:
         part = self
         for step in path:
             assert part.children is not None, "internal: the path leads into a scalar"
-            part = part.children[step]  # type: ignore[call-overload]
+            part = part.children[step]  # type: ignore[index]
         return part
 
     def text(self, key: str) -> str | None:

@@ -10,8 +10,9 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import resolve_groups
 from socialai_dsl.semantics.findings import FailedError
-from socialai_dsl.semantics.resolve_attributes import ENTITY, status_of
+from socialai_dsl.semantics.resolve_attributes import ENTITY, somewhere, status_of
 from socialai_dsl.semantics.scope import Scope
+from socialai_dsl.semantics.sequences import performed
 from socialai_dsl.semantics.signatures import ACTIVITIES, EFFECTS, SYNONYMS
 from socialai_dsl.semantics.terms import ACTION, DIRECTION, TURN, Activity, Const, Effect, FieldOf, Term
 from socialai_dsl.semantics.wording import quoted, wrong_count
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 
 _STATUS_AFTER = {"open": "open", "close": "closed", "lock": "locked", "unlock": "locked"}
 """The status that an object must be able to have for an effect to make sense."""
+
+_TO_CELLS = frozenset({"go_to", "go_next_to", "face"})
+"""Activities for which a cell will do."""
 
 _WANDERING = ("forward", "left", "right")
 
@@ -43,6 +47,8 @@ def activity(resolver: Resolver, path: DataPath, raw: str | None, scope: Scope) 
         return Activity("choose", actions, site, span, (1, 1, 1), scope.draws.number())
     if name == "choose":
         return _choice(resolver, path, args[0], scope)
+    if name == "perform":
+        return Activity("perform", performed(resolver, args[0], scope), site, span)
     expected = {"direction": DIRECTION, "turn": TURN}.get(signature.takes[0], ENTITY) if args else None
     terms = tuple(_argument(resolver, name, arg, expected, scope) for arg in args)
     return Activity(cast(Any, name), terms, site, span)
@@ -79,6 +85,8 @@ def _argument(resolver: Resolver, name: str, node: ast.Expr, expected: Any, scop
         group = quoted(node)
         hint = f"`{name}(nearest(x in {group} to self))`, or draw one in `let` with `pick({group})`"
         raise resolver.fail("S204", f"`{group}` is a group: say which of them", node, scope, hint=hint)
+    if name in _TO_CELLS:
+        return somewhere(resolver, node, scope)
     return resolver.value(node, expected, scope)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
-from socialai_dsl.schema import FirstRule, Frame, Rule, State, Step, ThenRule
+from socialai_dsl.schema import FirstRule, Rule, State, Step, ThenRule
 from socialai_dsl.schema.behaviour import Effects
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.activities import activity, effect
@@ -47,24 +47,25 @@ class Spoken:
     lines: dict[DataPath, Line] = field(default_factory=dict)
 
 
-def say_paths(frame: Frame, name: str) -> Iterator[tuple[DataPath, str, Effects]]:
+def entries(played: PlayedFrame) -> Iterator[tuple[DataPath, str, Effects]]:
     """Every rule and step of a frame in reading order: its path, its address and itself."""
-    base: DataPath = ("frames", name)
-    for state_name, state in (frame.states or {}).items():
+    base, address = played.path, dotted(played.address)
+    for name, state in (played.model.states or {}).items():
         for part, rules in (("first", state.first), ("then", state.then)):
             for i, rule in enumerate(rules):
-                path = (*base, "states", state_name, part, i)
-                address = dotted(path[:-1]) + f"[{rule.id or i}]"
-                yield path, address, rule
-    for i, step in enumerate(frame.steps or ()):
-        path = (*base, "steps", i)
-        yield path, dotted(path[:-1]) + f"[{step.state or i}]", step
+                yield (
+                    (*base, "states", name, part, i),
+                    f"{address}.states.{name}.{part}[{rule.id or i}]",
+                    rule,
+                )
+    for i, step in enumerate(played.model.steps or ()):
+        yield (*base, "steps", i), f"{address}.steps[{step.state or i}]", step
 
 
 def lines_of(resolver: Resolver, played: PlayedFrame) -> Spoken:
     """What a member says in its frame; resolved first, so that others can hear it."""
     spoken = Spoken()
-    for path, address, entry in say_paths(played.model, played.name):
+    for path, address, entry in entries(played):
         if entry.say is not None:
             with surviving():
                 scope = _scope(played, (*path, "say"), f"{address}.say")
@@ -80,7 +81,7 @@ def plan(resolver: Resolver, played: PlayedFrame, spoken: Spoken) -> FramePlan:
     """The whole frame of one member."""
     frame = played.model
     span = resolver.findings.places.key_span(played.path)
-    addresses = {path: address for path, address, _ in say_paths(frame, played.name)}
+    addresses = {path: address for path, address, _ in entries(played)}
     planner = _Planner(resolver, played, spoken, addresses)
     states = tuple(planner.state(name, state) for name, state in (frame.states or {}).items())
     steps = tuple(planner.step(i, step) for i, step in enumerate(frame.steps or ()))
@@ -100,7 +101,8 @@ class _Planner:
     def state(self, name: str, state: State) -> StatePlan:
         path = (*self.played.path, "states", name)
         first = self._rules(state.first, (*path, "first"), name)
-        doing = self._activity((*path, "do"), state.do, dotted(path)) or self._staying(path)
+        address = dotted((*self.played.address, "states", name))
+        doing = self._activity((*path, "do"), state.do, address) or self._staying(path)
         then = self._rules(state.then, (*path, "then"), name)
         return StatePlan(name, first, doing, then, self.resolver.findings.places.key_span(path))
 
@@ -256,7 +258,7 @@ class _Planner:
             return _FOR_EVER
         findings = self.resolver.findings
         try:
-            term = self.resolver.written(path, raw, _INT, _scope(self.played, path, dotted(path)))  # type: ignore[arg-type]
+            term = self.resolver.written(path, raw, _INT, _scope(self.played, path, ""))  # type: ignore[arg-type]
         except FailedError:
             return None
         if not isinstance(term, Const) or not 0 <= term.value <= self.resolver.symbols.scenario.horizon:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag
 from socialai_dsl.schema import PRIMITIVES, Scenario
 from socialai_dsl.schema.positions import DataPath, Positions
-from socialai_dsl.semantics import behaviour, checks, entities, setup
+from socialai_dsl.semantics import behaviour, checks, entities, sequences, setup, statuses, world
 from socialai_dsl.semantics.entities import AGENT, Prelude
 from socialai_dsl.semantics.findings import Findings, Scalar, surviving
 from socialai_dsl.semantics.inhabitants import entities_of
@@ -16,6 +16,7 @@ from socialai_dsl.semantics.ranges import Ranges
 from socialai_dsl.semantics.resolve import Resolver
 from socialai_dsl.semantics.room import room_plan, room_sizes
 from socialai_dsl.semantics.scope import PlayedFrame, at_every_step, reset_scope
+from socialai_dsl.semantics.sequences import performs
 from socialai_dsl.semantics.terms import BOOL, Checked, FramePlan, Line, OutcomePlan, Sited, Type
 from socialai_dsl.semantics.utterances import MAX_TEXTS, number_of_texts, texts_of
 from socialai_dsl.semantics.vocabulary import words_in_order
@@ -120,10 +121,12 @@ class _Run:
         self._look_at_unused()
         placed = setup.placings(resolver)
         colors, turned = list(setup.colorings(resolver)), list(setup.facings(resolver))
+        computed, rules = statuses.computed(resolver), tuple(world.rules(resolver))
+        remembered, required = tuple(sequences.memories(resolver)), tuple(world.requirements(resolver))
+        inhabitants = tuple(entities_of(resolver, placed))
         drawn = resolver.registers.drawn()
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)
         room = room_plan(resolver)
-        inhabitants = tuple(entities_of(resolver, placed))
         if findings.bag.has_errors:
             return None
         for plan in plans:
@@ -146,6 +149,12 @@ class _Run:
             picture_before_npcs=scenario.observe.image == "before_npcs",
             names_shown=scenario.observe.names == "shown",
             own_voice=scenario.observe.own_voice,
+            computed=computed,
+            remembered=tuple(resolver.registers.remembered),
+            memories=remembered,
+            rules=rules,
+            require=required,
+            egocentric=scenario.observe.directions == "egocentric",
         )
 
     def _spoken(self) -> _Spoken:
@@ -158,6 +167,8 @@ class _Run:
                     self._findings.error("S212", message, line.span)
                 elif member != AGENT:
                     self.resolver.npc_texts |= dict.fromkeys(texts_of(line))
+        if any(member != AGENT and performs(played.model) for member, played in self._played.items()):
+            self.resolver.npc_texts |= dict.fromkeys(self.resolver.utterances.all_texts())
         return _Spoken(found)
 
     def _plans(self, spoken: _Spoken) -> Iterator[FramePlan]:
@@ -171,8 +182,12 @@ class _Run:
         npc = next((name for name in self._symbols.cast if name != AGENT), AGENT)
         for name in self._scenario.frames:
             if name not in played:
+                path: DataPath = ("frames", name)
+                frame = self._scenario.frames[name]
                 self._look_at(
-                    entities.played_frame(self._symbols, self._findings, npc, name, {}, looked_at=True)
+                    entities.played_frame(
+                        self._symbols, self._findings, npc, name, frame, path, looked_at=True
+                    )
                 )
 
     def _look_at(self, frame: PlayedFrame) -> None:

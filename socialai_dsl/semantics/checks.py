@@ -9,8 +9,9 @@ from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.schema import Frame, Scenario, State
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.build import walk
+from socialai_dsl.semantics.entities import frames_of
 from socialai_dsl.semantics.findings import Findings
-from socialai_dsl.semantics.terms import FramePlan, Logic, Quantified, RulePlan, Term
+from socialai_dsl.semantics.terms import Chance, FramePlan, Logic, Quantified, RulePlan, Term
 
 GRAMMAR_CODE = "S104"
 """The code of a template that cannot be filled."""
@@ -38,8 +39,8 @@ def check_grammar(scenario: Scenario, findings: Findings) -> None:
 
 def check_flow(scenario: Scenario, findings: Findings) -> None:
     """Frames that have no form, states that do not exist or are never entered, circles within a step."""
-    for name, frame in scenario.frames.items():
-        path: DataPath = ("frames", name)
+    for path, frame in frames_of(scenario):
+        name = str(path[-1])
         if _has_form(name, frame, path, findings):
             if frame.states is not None:
                 _check_states(name, frame, frame.states, path, findings)
@@ -185,4 +186,7 @@ def _conjuncts(term: Term) -> tuple[Term, ...]:
 
 
 def _draws(term: Term) -> bool:
-    return any(isinstance(part, Quantified) and part.op == "pick" for part in walk(term))
+    return any(
+        isinstance(part, Chance) or (isinstance(part, Quantified) and part.op == "pick")
+        for part in walk(term)
+    )

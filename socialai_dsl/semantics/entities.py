@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from collections.abc import Sequence as Items
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
-from socialai_dsl.schema import CastMember, Scenario
+from socialai_dsl.schema import Frame, ObjectGroup, Scenario, Sequence
 from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics import sequences
+from socialai_dsl.semantics.alternatives import register_of, select
 from socialai_dsl.semantics.findings import Findings, dotted, surviving
 from socialai_dsl.semantics.registers import Declaration
 from socialai_dsl.semantics.resolve_names import slot_truth
 from socialai_dsl.semantics.scope import (
     Define,
+    Draws,
     Objects,
     PlayedFrame,
     Scope,
@@ -23,12 +27,24 @@ from socialai_dsl.semantics.scope import (
     reset_scope,
 )
 from socialai_dsl.semantics.signatures import WORDS
-from socialai_dsl.semantics.terms import COLOR, DIRECTION, Const, ObjectType, Type
+from socialai_dsl.semantics.terms import (
+    CELL,
+    COLOR,
+    DIRECTION,
+    Const,
+    ObjectType,
+    Quantified,
+    Sited,
+    Type,
+)
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
 
 AGENT = "agent"
+
+ANY_TEXT = Type("text", 0, -1)
+"""Expected: any text."""
 
 _TAKEN = frozenset({"name", "kind", "index", "cell", "frame", "clock"})
 """What a member of the cast has already, so that no slot or register of its frame may be called so."""
@@ -54,7 +70,9 @@ def symbols_of(
 ) -> Symbols:
     """The symbol table; reports names that are taken, unknown object types, and definitions of no form."""
     types = prelude.types
+    _check_files(scenario, findings)
     cast = scenario.members()
+    alternatives = {name: scenario.alternatives(name) for name in scenario.cast}
     npcs = [name for name in cast if name != AGENT]
     numbers = {AGENT: 0} | {name: i for i, name in enumerate(npcs, 1)}
     objects: dict[str, Objects] = {}
@@ -65,14 +83,62 @@ def symbols_of(
         if type_ is None:
             _unknown_type(group.type, types, findings, ("objects", name, "type"))
             type_ = next(iter(types.values()))
+        type_ = _own_type(type_, group)
         objects[name] = Objects(name, type_, range(following, following + (count or 1)), count is None)
         following += count or 1
     defines = _defines(scenario.define, ("define",), findings)
     _check_names(scenario, findings)
-    return Symbols(scenario, cast, numbers, objects, types, defines, *sizes, prelude.colors)
+    roles = _roles(scenario, findings)
+    return Symbols(
+        scenario, cast, alternatives, numbers, roles, objects, types, defines, *sizes, prelude.colors
+    )
 
 
-def _count(count: int | None, at: Sequence[object] | None) -> int | None:
+def _check_files(scenario: Scenario, findings: Findings) -> None:
+    """What `one_of` draws are files of different names, at least one."""
+    for name, member in scenario.cast.items():
+        if member.one_of is None:
+            continue
+        path: DataPath = ("cast", name, "one_of")
+        if not member.one_of:
+            findings.error("S106", "there is nothing to draw from", findings.places.key_span(path))
+        for i, file in enumerate(member.one_of):
+            if file.npc in [other.npc for other in member.one_of[:i]]:
+                span = findings.places.value_span((*path, i, "npc"))
+                findings.error("S213", f"`{file.npc}` is the name of another of these files", span)
+
+
+def _roles(scenario: Scenario, findings: Findings) -> dict[str, str]:
+    """Role -> who plays it; reports roles that do not exist or are played twice."""
+    played: dict[str, str] = {}
+    for name, member in scenario.cast.items():
+        role = member.role
+        if role is None:
+            continue
+        span = findings.at(("cast", name, "role"), 0, len(role))
+        if role not in scenario.roles:
+            near = did_you_mean(role, scenario.roles)
+            hint = None if near else "roles are declared under `roles:`"
+            findings.error("S201", f"unknown role `{role}`", span, suggestion=near, hint=hint)
+        elif role in played:
+            message = f"`{played[role]}` plays the role `{role}` already"
+            findings.error("S213", message, span, hint="a role is played by one member of the cast")
+        played.setdefault(role, name)
+    return played
+
+
+def _own_type(type_: ObjectType, group: ObjectGroup) -> ObjectType:
+    """The type of an object that is `one_way` or `dark`."""
+    if group.one_way:
+        toggled = {before: after for before, after in type_.toggled.items() if before == type_.initial}
+        type_ = replace(type_, toggled=toggled)
+    if group.dark:
+        looks = type_.shown.get(type_.initial, (type_.initial, 0))
+        type_ = replace(type_, shown=dict.fromkeys(range(len(type_.states)), looks))
+    return type_
+
+
+def _count(count: int | None, at: Items[object] | None) -> int | None:
     """How many a group has; None for a single object."""
     if count is None and at is not None and any(isinstance(cell, tuple) for cell in at):
         return len(at)
@@ -111,22 +177,33 @@ def _check_names(scenario: Scenario, findings: Findings) -> None:
         elif name in taken:
             findings.error("S213", f"`{name}` is the name of a {taken[name]} already", span)
         taken.setdefault(name, kind)
-    for frame_name, frame in scenario.frames.items():
-        own: dict[str, str] = {}
-        for kind, section in (("slot", frame.slots), ("register", frame.let), ("definition", frame.define)):
-            for key in section:
-                name = (parse_define(key) or (key, ()))[0]
-                part = {"slot": "slots", "register": "let", "definition": "define"}[kind]
-                span = findings.places.key_span(("frames", frame_name, part, key))
-                if name in WORDS or name in _TAKEN:
-                    findings.error(
-                        "S213", f"`{name}` is a word of the language; call the {kind} something else", span
-                    )
-                elif name in own:
-                    findings.error(
-                        "S213", f"`{name}` is the name of a {own[name]} of this frame already", span
-                    )
-                own.setdefault(name, kind)
+    for path, frame in frames_of(scenario):
+        _check_frame_names(path, frame, findings)
+
+
+def frames_of(scenario: Scenario) -> Iterator[tuple[DataPath, Frame]]:
+    """Every frame with the place where it is written; of the files of a `one_of`, which share theirs, the first's."""
+    for name, frame in scenario.frames.items():
+        yield ("frames", name), frame
+    for member, described in scenario.cast.items():
+        for name, frame in described.one_of[0].frames.items() if described.one_of else ():
+            yield ("cast", member, "one_of", 0, "frames", name), frame
+
+
+def _check_frame_names(path: DataPath, frame: Frame, findings: Findings) -> None:
+    own: dict[str, str] = {}
+    for kind, section in (("slot", frame.slots), ("register", frame.let), ("definition", frame.define)):
+        for key in section:
+            name = (parse_define(key) or (key, ()))[0]
+            part = {"slot": "slots", "register": "let", "definition": "define"}[kind]
+            span = findings.places.key_span((*path, part, key))
+            if name in WORDS or name in _TAKEN:
+                findings.error(
+                    "S213", f"`{name}` is a word of the language; call the {kind} something else", span
+                )
+            elif name in own:
+                findings.error("S213", f"`{name}` is the name of a {own[name]} of this frame already", span)
+            own.setdefault(name, kind)
 
 
 def _names(scenario: Scenario) -> Iterator[tuple[str, DataPath, str]]:
@@ -138,6 +215,10 @@ def _names(scenario: Scenario) -> Iterator[tuple[str, DataPath, str]]:
         yield "`let`", ("let", name), name
     for key in scenario.define:
         yield "`define`", ("define", key), (parse_define(key) or (key, ()))[0]
+    for name in scenario.memory:
+        yield "memory", ("memory", name), name
+    for name in scenario.roles:
+        yield "role", ("roles", name), name
 
 
 # -- frames and who plays them -----------------------------------------------------------------------------------
@@ -146,58 +227,84 @@ def _names(scenario: Scenario) -> Iterator[tuple[str, DataPath, str]]:
 def played_frames(symbols: Symbols, findings: Findings) -> dict[str, PlayedFrame]:
     """Member -> its frame; reports unknown frames, slots left empty, and slots that do not exist."""
     played: dict[str, PlayedFrame] = {}
-    for name, member in symbols.cast.items():
-        if member.frame is None:
-            if member.with_:
-                _check_no_slots(name, member, symbols, findings)
+    for name, alternatives in symbols.alternatives.items():
+        found = [_played(symbols, findings, name, which) for which in range(len(alternatives))]
+        frames = [frame for frame in found if frame is not None]
+        if len(frames) < len(found) and not (frames and symbols.scenario.cast[name].one_of):
             continue
-        frame = symbols.scenario.frames.get(member.frame)
-        if frame is None:
-            path = symbols.member_path(name, "frame")
-            near = did_you_mean(member.frame, symbols.scenario.frames)
-            span = findings.at(path, 0, len(member.frame))
-            findings.error("S201", f"unknown frame `{member.frame}`", span, suggestion=near)
-            continue
-        _check_slots(name, member, symbols, findings)
-        played[name] = played_frame(symbols, findings, name, member.frame, member.with_)
+        other = next(
+            (i for i, frame in enumerate(found) if frame is None or frame.model != frames[0].model), None
+        )
+        if other is not None:
+            _differ(symbols, findings, name, other)
+        played[name] = frames[0]
     return played
+
+
+def _differ(symbols: Symbols, findings: Findings, name: str, which: int) -> None:
+    files = symbols.scenario.cast[name].one_of or ()
+    message = f"`{files[which].npc}` and `{files[0].npc}` follow different frames; what is drawn by `one_of` shares one"
+    span = findings.places.value_span(("cast", name, "one_of", which, "npc"))
+    hint = "let both extend a file with the frame, and put what differs into its slots"
+    findings.error("S315", message, span, hint=hint)
+
+
+def _played(symbols: Symbols, findings: Findings, name: str, which: int) -> PlayedFrame | None:
+    """The frame that a member follows as one of its alternatives."""
+    member = symbols.alternatives[name][which]
+    if member.frame is None:
+        if member.with_:
+            _check_no_slots(name, symbols, findings)
+        return None
+    followed = symbols.frame_of(name, which)
+    if followed is None:
+        path = symbols.member_path(name, "frame", which)
+        near = did_you_mean(member.frame, symbols.scenario.frames)
+        span = findings.at(path, 0, len(member.frame))
+        findings.error("S201", f"unknown frame `{member.frame}`", span, suggestion=near)
+        return None
+    frame, path = followed
+    _check_slots(name, which, frame, symbols, findings)
+    return played_frame(symbols, findings, name, member.frame, frame, path)
 
 
 def played_frame(
     symbols: Symbols,
     findings: Findings,
     member: str,
-    frame_name: str,
-    filled: Mapping[str, object],
+    name: str,
+    frame: Frame,
+    path: DataPath,
     looked_at: bool = False,
 ) -> PlayedFrame:
-    """A frame as a member plays it; slots that are not `filled` have no text."""
-    frame = symbols.scenario.frames[frame_name]
+    """A frame as a member plays it; slots that nobody fills have no text."""
+    alternatives = symbols.alternatives[member]
     texts = {
-        slot: symbols.with_path(member, slot) if slot in filled else None
+        slot: tuple(symbols.with_path(member, slot, which) for which in range(len(alternatives)))
+        if not looked_at and all(slot in alternative.with_ for alternative in alternatives)
+        else None
         for slot, type_ in frame.slots.items()
         if type_ in SUBSTITUTED
     }
-    defines = _defines(frame.define, ("frames", frame_name, "define"), findings)
-    return PlayedFrame(member, symbols.numbers[member], frame_name, frame, defines, texts, looked_at)
+    defines = _defines(frame.define, (*path, "define"), findings)
+    return PlayedFrame(member, symbols.numbers[member], name, frame, path, defines, texts, looked_at)
 
 
 def check_slots(resolver: Resolver) -> None:
     """Everything that fills a slot is looked at, though the frame may never use it."""
     for member, played in resolver.frames.items():
-        filled = resolver.symbols.cast[member].with_
-        for slot, path in played.texts.items():
-            if path is None:
-                continue
-            scope = at_every_step(reset_scope(path, f"cast.{member}.with.{slot}", member))
-            with surviving():
-                if played.model.slots[slot] == "bool":
-                    slot_truth(resolver, member, slot, scope)
-                else:
-                    resolver.utterances.parts(resolver.findings.text(path, str(filled[slot])), scope)
+        for slot, paths in played.texts.items():
+            for which, path in enumerate(paths or ()):
+                filled = resolver.symbols.alternatives[member][which].with_[slot]
+                scope = at_every_step(reset_scope(path, f"cast.{member}.with.{slot}", member))
+                with surviving():
+                    if played.model.slots[slot] == "bool":
+                        slot_truth(resolver, slot, filled, scope)
+                    else:
+                        resolver.utterances.parts(resolver.findings.text(path, str(filled)), scope)
 
 
-def _check_no_slots(name: str, member: CastMember, symbols: Symbols, findings: Findings) -> None:
+def _check_no_slots(name: str, symbols: Symbols, findings: Findings) -> None:
     own = symbols.scenario.cast[name].with_
     for slot in own:
         findings.error(
@@ -206,23 +313,23 @@ def _check_no_slots(name: str, member: CastMember, symbols: Symbols, findings: F
         )  # fmt: skip
 
 
-def _check_slots(name: str, member: CastMember, symbols: Symbols, findings: Findings) -> None:
-    assert member.frame is not None, "internal: only for members with a frame"
-    slots = symbols.scenario.frames[member.frame].slots
-    for slot, type_ in slots.items():
-        if (
-            slot not in member.with_
-            and did_you_mean(slot, [s for s in member.with_ if s not in slots]) is None
-        ):
+def _check_slots(name: str, which: int, frame: Frame, symbols: Symbols, findings: Findings) -> None:
+    member = symbols.alternatives[name][which]
+    files = symbols.scenario.cast[name].one_of
+    called = files[which].npc if files else name
+    place: DataPath = ("cast", name, "one_of", which, "npc") if files else ("cast", name)
+    for slot, type_ in frame.slots.items():
+        near = did_you_mean(slot, [s for s in member.with_ if s not in frame.slots])
+        if slot not in member.with_ and near is None:
             findings.error(
-                "S302", f"frame `{member.frame}` has a slot `{slot}` ({type_}) that `{name}` does not fill",
-                findings.places.key_span(("cast", name)), hint=f"add `with: {{{slot}: ...}}`",
+                "S302", f"frame `{member.frame}` has a slot `{slot}` ({type_}) that `{called}` does not fill",
+                findings.places.key_span(place), hint=f"add `with: {{{slot}: ...}}`",
             )  # fmt: skip
     for slot in member.with_:
-        path = symbols.with_path(name, slot)
-        if slot not in slots and path[0] == "cast":
-            near = did_you_mean(slot, slots)
-            has = "its slots are " + ", ".join(slots) if slots else "it has no slots"
+        path = symbols.with_path(name, slot, which)
+        if slot not in frame.slots and path[0] == "cast":
+            near = did_you_mean(slot, frame.slots)
+            has = "its slots are " + ", ".join(frame.slots) if frame.slots else "it has no slots"
             findings.error(
                 "S303", f"frame `{member.frame}` has no slot `{slot}`", findings.places.key_span(path),
                 suggestion=near, hint=None if near else has,
@@ -233,30 +340,58 @@ def _check_slots(name: str, member: CastMember, symbols: Symbols, findings: Find
 
 
 def declare_registers(resolver: Resolver) -> None:
-    """Make every register known: lets, names, and each frame's slots and registers."""
+    """Make every register known: what is drawn by `one_of`, lets, names, and each frame's slots and registers."""
     symbols, registers = resolver.symbols, resolver.registers
+    for name in symbols.cast:
+        _declare_file(resolver, name)
     for name, raw in symbols.scenario.let.items():
         path: DataPath = ("let", name)
-        registers.declare(Declaration(f"let.{name}", name, path, raw, reset_scope(path)))
-    for name, member in symbols.cast.items():
-        declare_name(resolver, name, member)
+        if isinstance(raw, Sequence):
+            sequences.declare(resolver, name, raw)
+        else:
+            registers.declare(Declaration(f"let.{name}", name, path, raw, reset_scope(path)))
+    for name in symbols.cast:
+        declare_name(resolver, name)
     for played in resolver.frames.values():
         declare_frame(resolver, played)
 
 
-def declare_name(resolver: Resolver, name: str, member: CastMember) -> None:
-    """The name of a member of the cast; by default its key."""
-    path = resolver.symbols.member_path(name, "name")
-    raw = member.name if member.name is not None else name[:1].upper() + name[1:].replace("_", " ")
-    scope = reset_scope(path, f"cast.{name}.name", name)
-    text = Type("text", 0, -1)
-    if member.name is None or (isinstance(raw, str) and is_plain_name(resolver, raw)):
-        known = Const(Type("text", 0, 0, (str(raw),)), 0)
-        resolver.registers.known(f"{name}.name", known)
+def _declare_file(resolver: Resolver, name: str) -> None:
+    """Which of the files of a `one_of` is drawn."""
+    files = resolver.symbols.scenario.cast[name].one_of
+    if not files:
         return
-    raw = str(raw) if isinstance(raw, int) else raw
+    words = tuple(file.npc for file in files)
+    type_ = Type("text", 0, len(words) - 1, words)
+    values = tuple(Const(type_, value) for value in range(len(words)))
+    drawn = Quantified(type_, "pick", "each", values, None)
+    span = resolver.findings.places.key_span(("cast", name, "one_of"))
+    resolver.registers.put(register_of(name), Sited(drawn, f"cast.{name}.one_of", span))
+
+
+def declare_name(resolver: Resolver, name: str) -> None:
+    """The name of a member of the cast; by default its key."""
+    symbols = resolver.symbols
+    default = name[:1].upper() + name[1:].replace("_", " ")
+    names = [member.name if member.name is not None else default for member in symbols.alternatives[name]]
+    raws = [str(raw) if isinstance(raw, int) else raw for raw in names]
+    plain = [symbols.cast[name].name is None or is_plain_name(resolver, raw) for raw in raws]
+    if all(plain):
+        known = [Const(Type("text", 0, 0, (raw,)), 0) for raw in raws]
+        term = select(resolver, name, known)
+        if isinstance(term, Const):
+            resolver.registers.known(f"{name}.name", term)
+        else:
+            span = resolver.findings.places.key_span(("cast", name, "one_of"))
+            resolver.registers.put(f"{name}.name", Sited(term, f"cast.{name}.name", span))
+        return
+    written = [(symbols.member_path(name, "name", which), raw) for which, raw in enumerate(raws)]
+    (path, raw), *others = written
+    scope = reset_scope(path, f"cast.{name}.name", name)
     resolver.registers.declare(
-        Declaration(f"{name}.name", f"{name}.name", path, raw, scope, text, constant=True)
+        Declaration(
+            f"{name}.name", f"{name}.name", path, raw, scope, ANY_TEXT, constant=True, others=tuple(others)
+        )
     )
 
 
@@ -269,8 +404,22 @@ def is_plain_name(resolver: Resolver, raw: str) -> bool:
 
 def declare_frame(resolver: Resolver, played: PlayedFrame) -> None:
     """Slots that are registers, and the frame's `let`."""
-    symbols, member = resolver.symbols, played.member
-    nouns = symbols.nouns
+    for slot, kind in played.model.slots.items():
+        if kind not in SUBSTITUTED and kind != "sequence" and not played.looked_at:
+            _declare_slot(resolver, played.member, slot, kind)
+    for name, raw in played.model.let.items():
+        path = (*played.path, "let", name)
+        site = f"{played.member}/{dotted((*played.address, 'let', name))}"
+        framed = Scope(path, Draws(site), played.member, played, at_reset=True)
+        register = played.register(name)
+        resolver.registers.declare(Declaration(register, name, path, raw, framed, imagined=played.looked_at))
+
+
+def _declare_slot(resolver: Resolver, member: str, slot: str, kind: str) -> None:
+    symbols = resolver.symbols
+    alternatives = symbols.alternatives[member]
+    if not all(slot in alternative.with_ for alternative in alternatives):
+        return
     entity, number = Type("entity", 0, 0), Type("int", 0, 0)
     types = {
         "object": entity,
@@ -278,18 +427,15 @@ def declare_frame(resolver: Resolver, played: PlayedFrame) -> None:
         "direction": DIRECTION,
         "color": COLOR,
         "int": number,
-        "noun": nouns,
+        "noun": symbols.nouns,
+        "cell": CELL,
     }
-    for slot, kind in played.model.slots.items():
-        if kind in SUBSTITUTED or played.looked_at or slot not in symbols.cast[member].with_:
-            continue
-        path = symbols.with_path(member, slot)
-        scope = reset_scope(path, f"cast.{member}.with.{slot}", member)
-        raw = symbols.cast[member].with_[slot]
-        resolver.registers.declare(Declaration(f"{member}.{slot}", slot, path, raw, scope, types[kind]))
-    for name, raw in played.model.let.items():
-        path = (*played.path, "let", name)
-        scope = reset_scope(path, f"{member}/{dotted(path)}", member)
-        framed = Scope(path, scope.draws, member, played, at_reset=True)
-        register = played.register(name)
-        resolver.registers.declare(Declaration(register, name, path, raw, framed, imagined=played.looked_at))
+    written = [
+        (symbols.with_path(member, slot, which), alternative.with_[slot])
+        for which, alternative in enumerate(alternatives)
+    ]
+    (path, raw), *others = written
+    scope = reset_scope(path, f"cast.{member}.with.{slot}", member)
+    resolver.registers.declare(
+        Declaration(f"{member}.{slot}", slot, path, raw, scope, types[kind], others=tuple(others))
+    )

@@ -2,34 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.schema import CastMember
 from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics.alternatives import select
+from socialai_dsl.semantics.build import number as number_of
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.findings import surviving
 from socialai_dsl.semantics.places import lies_in_wall
 from socialai_dsl.semantics.scope import Objects, reset_scope
-from socialai_dsl.semantics.terms import Const, Entity, Placing, Term, Type
+from socialai_dsl.semantics.statuses import initial
+from socialai_dsl.semantics.terms import Const, Entity, Placing, Read, Term, Type
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
 
+VIEW = 7
+"""Side of the view square where none is given."""
 
-def entities_of(resolver: Resolver, placings: Mapping[int, Placing]) -> Iterator[Entity]:
+
+def entities_of(resolver: Resolver, placings: Mapping[int, Sequence[Placing]]) -> Iterator[Entity]:
     """The agent, the NPCs in cast order, the objects in file order."""
     symbols = resolver.symbols
     kinds: list[str] = []
     for name in (AGENT, *(n for n in symbols.cast if n != AGENT)):
-        member = symbols.cast[name]
-        kind = member.kind or "peer"
-        if name != AGENT and kind not in kinds:
-            kinds.append(kind)
-        near, far = _voice(resolver, name, member)
-        code = member.kind_code
+        members = symbols.alternatives[name]
+        member = members[0]
+        codes = [] if name == AGENT else [_code(one, kinds) for one in members]
         with surviving():
+            _check_shared(resolver, name)
+            near, far = _voice(resolver, name, member)
             number = symbols.numbers[name]
             yield Entity(
                 number=number,
@@ -37,32 +41,59 @@ def entities_of(resolver: Resolver, placings: Mapping[int, Placing]) -> Iterator
                 index=None,
                 role="agent" if name == AGENT else "npc",
                 span=resolver.findings.places.key_span(("cast", name)),
-                kind="" if name == AGENT else kind,
-                kind_code=0 if name == AGENT else code if code is not None else kinds.index(kind),
+                kind=""
+                if name == AGENT
+                else " or ".join(dict.fromkeys(one.kind or "peer" for one in members)),
+                kind_code=max(codes, default=0),
+                kind_drawn=select(resolver, name, [number_of(c) for c in codes])
+                if len(set(codes)) > 1
+                else None,
                 name=resolver.registers.read(f"{name}.name"),
                 near=near,
                 far=far,
                 audible=member.audible == "always",
-                in_wall=number in placings and lies_in_wall(resolver, placings[number]),
+                in_wall=_in_wall(resolver, placings.get(number, ())),
+                view=member.view if member.view is not None else VIEW,
             )
+    statuses = initial(resolver)
     for objects in symbols.objects.values():
-        yield from _objects(resolver, objects, placings)
+        yield from _objects(resolver, objects, placings, statuses)
 
 
-def _objects(resolver: Resolver, objects: Objects, placings: Mapping[int, Placing]) -> Iterator[Entity]:
-    state = resolver.symbols.scenario.objects[objects.name].state
-    status = objects.type.initial
-    if state is not None:
-        if state in objects.type.states:
-            status = objects.type.states.index(state)
-        else:
-            path = ("objects", objects.name, "state")
-            findings = resolver.findings
-            findings.error(
-                "S204", f"a {objects.type.name} is never `{state}`; it is {' or '.join(objects.type.states)}",
-                findings.at(path, 0, len(state)), suggestion=did_you_mean(state, objects.type.states),
-            )  # fmt: skip
+def _code(member: CastMember, kinds: list[str]) -> int:
+    """The status code in the picture: the place of its kind in order of first appearance, if none is given."""
+    kind = member.kind or "peer"
+    if kind not in kinds:
+        kinds.append(kind)
+    return member.kind_code if member.kind_code is not None else kinds.index(kind)
+
+
+def _check_shared(resolver: Resolver, name: str) -> None:
+    """What the files of a `one_of` must have in common."""
+    members = resolver.symbols.alternatives[name]
+    for key in ("earshot", "view", "audible"):
+        other = next(
+            (i for i, one in enumerate(members) if getattr(one, key) != getattr(members[0], key)), None
+        )
+        if other is not None:
+            span = resolver.findings.places.key_span(resolver.symbols.member_path(name, key, other))
+            message = f"what is drawn by `one_of` has one and the same `{key}`"
+            hint = f"give `{key}` beside `one_of`"
+            raise resolver.findings.fail("S315", message, span, hint=hint)
+
+
+def _in_wall(resolver: Resolver, placings: Sequence[Placing]) -> bool:
+    return bool(placings) and all(lies_in_wall(resolver, placing) for placing in placings)
+
+
+def _objects(
+    resolver: Resolver,
+    objects: Objects,
+    placings: Mapping[int, Sequence[Placing]],
+    statuses: Mapping[int, int | Read],
+) -> Iterator[Entity]:
     for index, number in enumerate(objects.numbers):
+        status = statuses.get(number, objects.type.initial)
         yield Entity(
             number=number,
             key=objects.name,
@@ -70,8 +101,10 @@ def _objects(resolver: Resolver, objects: Objects, placings: Mapping[int, Placin
             role="object",
             span=resolver.findings.places.key_span(("objects", objects.name)),
             type=objects.type,
-            status=status,
-            in_wall=number in placings and lies_in_wall(resolver, placings[number]),
+            status=status if isinstance(status, int) else objects.type.initial,
+            initial=None if isinstance(status, int) else status,
+            unlocks=resolver.unlocks.get(number, ()),
+            in_wall=_in_wall(resolver, placings.get(number, ())),
         )
 
 

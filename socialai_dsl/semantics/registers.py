@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.semantics import resolve_names
+from socialai_dsl.semantics import alternatives, resolve_names
 from socialai_dsl.semantics.findings import FailedError, Scalar
 from socialai_dsl.semantics.scope import Scope
 from socialai_dsl.semantics.terms import Const, Drawn, Read, Sited, Term, Type
@@ -26,6 +26,7 @@ class Declaration:
     Attributes:
         path: its name, `let.exit` or `wizard.goal`. label: how messages call it.
         source, raw: the expression and where it stands. scope: what its names mean.
+        others: what stands in its place in the other files of a `one_of` whose first file `source` is in.
         expected: its type, if its declaration says it.
         constant: a known value needs no register.
         imagined: it is only looked at, and never drawn.
@@ -39,6 +40,7 @@ class Declaration:
     expected: Type | None = None
     constant: bool = False
     imagined: bool = False
+    others: tuple[tuple[DataPath, Scalar], ...] = ()
 
 
 class Registers:
@@ -47,6 +49,7 @@ class Registers:
     Attributes:
         words: types that uses settled for registers whose value is bare words, such as `pick(left | right)`.
         ranges: for registers that are set, the range they were found to need.
+        remembered: what is computed at the start of every step, for `prev`.
     """
 
     def __init__(self, resolver: Resolver, words: Mapping[str, Type], ranges: Mapping[str, Type]) -> None:
@@ -55,6 +58,8 @@ class Registers:
         self._terms: dict[str, Term | None] = {}
         self._drawn: dict[str, Drawn] = {}
         self._busy: list[str] = []
+        self._put: list[str] = []
+        self.remembered: list[Drawn] = []
         self._settled: dict[str, tuple[Type, Span]] = {}
         self.words = dict(words)
         self._given_ranges = dict(ranges)
@@ -67,6 +72,22 @@ class Registers:
     def known(self, path: str, value: Const) -> None:
         """A register that is a known value."""
         self._terms[path] = value
+
+    def put(self, path: str, value: Sited) -> Read:
+        """A register that takes a value at reset which is resolved already."""
+        type_ = value.term.type
+        self._terms[path] = Read(type_, path)
+        self._drawn[path] = Drawn(path, type_, value)
+        self._put.append(path)
+        return Read(type_, path)
+
+    def remember(self, value: Sited) -> Read:
+        """A register that takes a value at the start of every step."""
+        known = next((drawn for drawn in self.remembered if drawn.value.term == value.term), None)
+        if known is None:
+            known = Drawn(f"prev.{len(self.remembered)}", value.term.type, value)
+            self.remembered.append(known)
+        return Read(known.type, known.path)
 
     def __contains__(self, path: str) -> bool:
         return path in self._declared or path in self._terms
@@ -81,7 +102,7 @@ class Registers:
             with suppress(FailedError):
                 self.read(path)
         kept = [path for path, declaration in self._declared.items() if not declaration.imagined]
-        return [self._drawn[path] for path in kept if path in self._drawn]
+        return [self._drawn[path] for path in (*self._put, *kept) if path in self._drawn]
 
     def read(self, path: str, expected: Type | None = None, span: Span | None = None) -> Term:
         """The register (or its constant) as a term; `expected` and `span` are those of the use."""
@@ -133,7 +154,7 @@ class Registers:
         self._busy.append(path)
         try:
             expected = declaration.expected or self.words.get(path)
-            term = self._resolver.written(declaration.source, declaration.raw, expected, declaration.scope)
+            term = self._written(declaration, expected)
         finally:
             self._busy.pop()
         if declaration.constant and isinstance(term, Const):
@@ -146,6 +167,19 @@ class Registers:
         sited = Sited(term, declaration.scope.draws.site, findings.at(declaration.source))
         self._terms[path] = Read(widened, path)
         self._drawn[path] = Drawn(path, widened, sited)
+
+    def _written(self, declaration: Declaration, expected: Type | None) -> Term:
+        """The value of a declaration: what its expression says, or what that of the file says which was drawn."""
+        scope = declaration.scope
+        written = [(declaration.source, declaration.raw), *declaration.others]
+        terms = [
+            self._resolver.written(source, raw, expected, scope.at(source, scope.draws.site))
+            for source, raw in written
+        ]
+        if len(terms) == 1:
+            return terms[0]
+        assert scope.member is not None, "internal: only members of the cast have alternatives"
+        return alternatives.select(self._resolver, scope.member, terms)
 
     def _circle(self, path: str) -> FailedError:
         circle = [self._declared[p] for p in self._busy[self._busy.index(path) :]]

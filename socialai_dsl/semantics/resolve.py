@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.semantics import resolve_calls, resolve_groups, resolve_names
+from socialai_dsl.semantics import links, resolve_calls, resolve_groups, resolve_names, sequences
 from socialai_dsl.semantics.build import all_of, any_of, arithmetic, between, number, one_of
 from socialai_dsl.semantics.findings import FailedError, Findings, Scalar
 from socialai_dsl.semantics.registers import Registers
@@ -59,6 +60,11 @@ class Resolver:
         self.registers = Registers(self, words, ranges)
         self.utterances = Utterances(self, symbols.scenario.grammar)
         self.npc_texts: dict[str, None] = {}
+
+    @cached_property
+    def unlocks(self) -> Mapping[int, tuple[int, ...]]:
+        """Object -> the objects it unlocks."""
+        return links.unlocked(self)
 
     def written(self, path: DataPath, raw: Scalar, expected: Type | None, scope: Scope) -> Term:
         """The value of the expression that is written at `path`; raises FailedError once it has been reported."""
@@ -160,6 +166,10 @@ class Resolver:
 
     def _comparison(self, node: ast.Compare, scope: Scope) -> Term:
         if node.op in ("==", "!="):
+            acts = [sequences.acts_at(self, side, scope) for side in (node.left, node.right)]
+            if acts[0] is not None and acts[1] is not None:
+                alike = sequences.same(self, acts[0], acts[1], node, scope)
+                return alike if node.op == "==" else _negated(alike)
             if resolve_groups.is_group(self, node.right, scope):
                 member = ast.Member(node.left, node.right, node.op == "!=", at=node.at)
                 return self._membership(member, scope)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics import resolve_groups, resolve_names
+from socialai_dsl.semantics import links, resolve_groups, resolve_names
 from socialai_dsl.semantics.build import arithmetic, number
 from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.scope import Scope
@@ -15,8 +15,10 @@ from socialai_dsl.semantics.signatures import VALUE_SYNONYMS, VALUES, Signature
 from socialai_dsl.semantics.terms import (
     ACTION,
     BOOL,
+    CELL,
     COLOR,
     DIRECTION,
+    CellOf,
     Compare,
     Const,
     FieldOf,
@@ -34,6 +36,9 @@ if TYPE_CHECKING:
 
 ENTITY = Type("entity", 0, 0)
 """Expected: somebody or something in the room."""
+
+OF_CELLS = frozenset({"in_line", "unobstructed", "distance", "dir_to", "x", "y"})
+"""What a cell that is no candidate for a placement can be asked as well."""
 
 
 def check_moment(resolver: Resolver, signature: Signature, node: ast.Expr, scope: Scope) -> None:
@@ -70,7 +75,16 @@ def subject_of(
         asked = f"{letter}.{usage(signature)}"
         hint = f"`any({letter} in {group} where {asked} ...)`, or `all`, `first`, `pick`"
         raise resolver.fail("S204", f"`{group}` is a group: say which of them", subject, scope, hint=hint)
-    return resolver.value(subject, ENTITY, scope)
+    who = resolver.value(subject, None, scope)
+    if who.type.kind == "cell" and (signature.cell or signature.name in OF_CELLS):
+        return who
+    return resolver.fit(who, ENTITY, subject, scope)
+
+
+def somewhere(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
+    """Something that has a place: an object, a member of the cast, or a cell."""
+    term = resolver.value(node, None, scope)
+    return term if term.type.kind == "cell" else resolver.fit(term, ENTITY, node, scope)
 
 
 def must_be_agent(resolver: Resolver, node: ast.Call | ast.Attribute | ast.Name, scope: Scope) -> None:
@@ -105,6 +119,8 @@ def without_arguments(
     who = subject_of(resolver, subject, signature, node, scope)
     if who is None:
         return _cell_coordinate(resolver, name)
+    if name == "unlocked_by":
+        return links.unlocker(resolver, who, node, scope)
     if signature.subject == "object":
         return _status(resolver, name, who, node, scope)
     return _attribute(resolver, name, who, node, scope)
@@ -165,6 +181,8 @@ def _attribute(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: 
             return PokedNow(who)
         case "index":
             return _index(resolver, who, node, scope)
+        case "cell":
+            return CellOf(CELL, who)
         case "kind":
             return _kind(resolver, who, node, scope)
     assert name == "name", f"internal: no meaning for the attribute `{name}`"

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any, cast
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import resolve_groups, resolve_names
-from socialai_dsl.semantics.build import arithmetic, one_of
+from socialai_dsl.semantics.build import arithmetic, one_of, walk
 from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.resolve_attributes import (
     ENTITY,
     check_moment,
     must_be_agent,
+    somewhere,
     subject_of,
     without_arguments,
 )
@@ -31,8 +32,11 @@ from socialai_dsl.semantics.terms import (
     DIRECTION,
     Compare,
     Const,
+    Heard,
     InState,
     Measure,
+    Sees,
+    Sited,
     Term,
     Test,
     Type,
@@ -43,7 +47,12 @@ from socialai_dsl.semantics.wording import usage, wrong_count
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
 
-_RELATIONS = ("at", "next_to", "in_front_of", "faces", "faces_toward", "eye_contact", "in_line", "can_reach")
+_RELATIONS = (
+    *("at", "next_to", "in_front_of", "faces", "faces_toward", "eye_contact", "in_line", "can_reach"),
+    *("looks_at", "unobstructed"),
+)
+_OF_BODIES = ("in_front_of", "eye_contact")
+"""Relations to something that can be turned to somewhere, which a cell is not."""
 _FINISHED = "finished"
 
 
@@ -78,7 +87,10 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
     subject = subject_of(resolver, node.subject, signature, node, scope)
     if node.name in _RELATIONS:
         return _relation(resolver, node.name, subject, argument, scope)
-    other = resolver.value(argument, ENTITY, scope)
+    if node.name in ("sees", "would_see"):
+        assert subject is not None, "internal: a cell sees nothing"
+        return _sees(resolver, subject, node, scope)
+    other = somewhere(resolver, argument, scope)
     assert subject is not None, "internal: only relations have the candidate cell as a subject"
     if node.name == "distance":
         (_, width), (_, height) = resolver.symbols.width, resolver.symbols.height
@@ -140,8 +152,24 @@ def _function(resolver: Resolver, node: ast.Call, expected: Type | None, scope: 
             usage = "d in doors to agent" if node.name == "nearest" else "d in doors where ..."
             raise resolver.fail("S211", f"write `{node.name}({usage})`", node, scope)
         return resolve_groups.pick(resolver, node, expected, scope)
+    if node.name == "prev":
+        return _before(resolver, node, expected, scope)
     whole = Type("int", 0, 0)
     return arithmetic(node.name, *(resolver.value(argument, whole, scope) for argument in node.args))
+
+
+def _before(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope) -> Term:
+    """`prev(e)`: a register that takes the value of e when a step begins."""
+    if scope.nested:
+        message = "`prev` cannot stand inside any(...), pick(...) and the like; put them inside `prev`"
+        raise resolver.fail("S211", message, node, scope)
+    check_moment(resolver, VALUES["prev"], node, scope)
+    term = resolver.value(node.args[0], expected, scope)
+    if any(isinstance(part, Heard) for part in walk(term)):
+        message = "what was heard is forgotten when a step ends; note it in a register of the frame"
+        raise resolver.fail("S211", message, node, scope)
+    site = f"{scope.draws.site}.prev[{node.at}]"
+    return resolver.registers.remember(Sited(term, site, resolver.findings.node(scope.path, node)))
 
 
 def _listener(resolver: Resolver, node: ast.Call, scope: Scope) -> None:
@@ -155,8 +183,28 @@ def _listener(resolver: Resolver, node: ast.Call, scope: Scope) -> None:
 
 def _relation(resolver: Resolver, name: str, subject: Term | None, argument: ast.Expr, scope: Scope) -> Term:
     if resolve_groups.is_group(resolver, argument, scope):
-        return resolve_groups.any_member(resolver, argument, scope, Test, name, subject)
-    return Test(cast(Any, name), subject, resolver.value(argument, ENTITY, scope))
+        return resolve_groups.any_member(
+            resolver, argument, scope, lambda other: Test(cast(Any, name), subject, other)
+        )
+    other = (
+        resolver.value(argument, ENTITY, scope)
+        if name in _OF_BODIES
+        else somewhere(resolver, argument, scope)
+    )
+    return Test(cast(Any, name), subject, other)
+
+
+def _sees(resolver: Resolver, viewer: Term, node: ast.Call, scope: Scope) -> Term:
+    """`a.sees(x)`, `a.would_see(x, direction)`; of a group, any of it."""
+    if viewer.type.high >= len(resolver.symbols.numbers):
+        raise resolver.fail(
+            "S211", f"only a member of the cast has a view: `agent.{node.name}(...)`", node, scope
+        )
+    target, *rest = node.args
+    facing = resolver.value(rest[0], DIRECTION, scope) if rest else None
+    if resolve_groups.is_group(resolver, target, scope):
+        return resolve_groups.any_member(resolver, target, scope, lambda other: Sees(viewer, other, facing))
+    return Sees(viewer, somewhere(resolver, target, scope), facing)
 
 
 def _did(resolver: Resolver, argument: ast.Expr, scope: Scope) -> Term:
@@ -172,6 +220,8 @@ def _is_in_state(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
     argument = node.args[0]
     own = scope.frame is not None and node.subject is None
     frame = scope.frame if own else resolver.frames.get(member)
+    if frame is None and resolver.symbols.cast[member].frame is not None:
+        raise FailedError  # an unknown frame is reported where it is named
     if frame is None:
         raise resolver.fail("S310", f"`{member}` follows no frame, so it has no states", node, scope)
     states = list(frame.model.states or ())

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, cast
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics import resolve_names
+from socialai_dsl.semantics import resolve_attributes, resolve_names
 from socialai_dsl.semantics.build import all_of, between
 from socialai_dsl.semantics.scope import Macro, Scope
 from socialai_dsl.semantics.signatures import QUANTIFIERS, WORDS
-from socialai_dsl.semantics.terms import BOOL, COLOR, Const, Quantified, Term, Type, Variable
+from socialai_dsl.semantics.terms import BOOL, CELL, COLOR, Const, Quantified, Term, Type, Variable
 from socialai_dsl.semantics.wording import described, quoted, spoken
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 MAX_GROUP = 256
 MAX_WEIGHT = 100
+_MOST_CELLS = 28 * 28
 
 Op = Literal["any", "all", "count", "first", "pick", "nearest"]
 
@@ -43,7 +44,7 @@ def is_group(resolver: Resolver, node: ast.Expr, scope: Scope) -> bool:
             if bound is not None:
                 return isinstance(bound, Macro) and is_group(resolver, bound.node, bound.scope)
             objects = resolver.symbols.objects.get(word)
-            return word in ("colors", "nouns") or (objects is not None and not objects.single)
+            return word in ("colors", "nouns", "cells") or (objects is not None and not objects.single)
     return False
 
 
@@ -58,6 +59,8 @@ def group(resolver: Resolver, node: ast.Expr, expected: Type | None, scope: Scop
             bound = scope.variables.get(word)
             if isinstance(bound, Macro) and is_group(resolver, bound.node, bound.scope):
                 return group(resolver, bound.node, expected, bound.scope)
+            if bound is None and word == "cells":
+                return _cells(resolver, node, scope)
             if bound is None and word in ("colors", "nouns"):
                 type_ = COLOR if word == "colors" else resolver.symbols.nouns
                 return Group(type_, _values(type_))
@@ -73,6 +76,17 @@ def group(resolver: Resolver, node: ast.Expr, expected: Type | None, scope: Scop
         "a group is the name of objects with `count`, `colors`, `nouns`, a range 1..3, or alternatives a | b"
     )
     raise resolver.fail("S204", message, node, scope, hint=hint)
+
+
+def _cells(resolver: Resolver, node: ast.Name, scope: Scope) -> Group:
+    """All floor cells of the room; a search over cells cannot be done for each of many cells."""
+    bound = (term for term in scope.variables.values() if isinstance(term, Variable))
+    if scope.here or any(term.type.kind == "cell" for term in bound):
+        message = "`cells` cannot stand inside another search over cells"
+        raise resolver.fail(
+            "S211", message, node, scope, hint="draw or compute one of the two in `let` first"
+        )
+    return Group(CELL, ())
 
 
 def _values(type_: Type) -> tuple[Const, ...]:
@@ -172,7 +186,7 @@ def quantified(resolver: Resolver, node: ast.Quantifier, expected: Type | None, 
     variable = _named(node.var, scope)
     inner = replace(scope.binding(node.var, Variable(members.type, variable)), nested=scope.nested + 1)
     condition = resolver.value(node.where, BOOL, inner) if node.where is not None else None
-    to = resolver.value(node.to, Type("entity", 0, 0), scope) if node.to is not None else None
+    to = resolve_attributes.somewhere(resolver, node.to, scope) if node.to is not None else None
     return made(cast(Op, node.name), members, variable, condition, scope, ordinal, to)
 
 
@@ -202,21 +216,22 @@ def made(
     elif op == "count":
         type_ = Type("int", 0, len(members.items))
     site = scope.pick_site if op == "pick" else ""
-    return Quantified(type_, op, variable, members.items, condition, to, ordinal, site)
+    cells = members.type.kind == "cell"
+    if cells and op == "count":
+        type_ = Type("int", 0, _MOST_CELLS)
+    return Quantified(type_, op, variable, members.items, condition, to, ordinal, site, cells)
 
 
-def any_member(
-    resolver: Resolver, node: ast.Expr, scope: Scope, relation: type, name: str, subject: Term | None
-) -> Term:
+def any_member(resolver: Resolver, node: ast.Expr, scope: Scope, relation: Callable[[Term], Term]) -> Term:
     """Whether a relation holds to any member of the group at `node`."""
     members = group(resolver, node, None, scope)
-    if members.type.kind != "entity":
+    if members.type.kind not in ("entity", "cell"):
         message = (
             f"`{quoted(node)}` is {described(members.type)}, here somebody or something in the room is needed"
         )
         raise resolver.fail("S204", message, node, scope)
     variable = _named("each", scope)
-    condition = relation(name, subject, Variable(members.type, variable))
+    condition = relation(Variable(members.type, variable))
     return made("any", members, variable, condition, scope)
 
 

@@ -9,9 +9,13 @@ from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
+from socialai_dsl.schema import Sequence
+from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import resolve_attributes
+from socialai_dsl.semantics.alternatives import by_value, drawn
+from socialai_dsl.semantics.build import FALSE, all_of, any_of
 from socialai_dsl.semantics.findings import FailedError
-from socialai_dsl.semantics.scope import Define, Draws, Macro, Scope
+from socialai_dsl.semantics.scope import Define, Draws, Macro, PlayedFrame, Scope
 from socialai_dsl.semantics.signatures import ACTIVITIES, EFFECTS, PLACES, QUANTIFIERS, VALUES, WORDS
 from socialai_dsl.semantics.terms import (
     ACTION,
@@ -82,6 +86,8 @@ def _own(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope
         return None
     if word in frame.texts:
         return _substituted(resolver, node, expected, scope)
+    if frame.model.slots.get(word) == "sequence":
+        raise _not_a_value(resolver, "sequence", node, scope)
     if word in frame.defines:
         return expanded(resolver, frame.defines[word], {}, node, expected, scope)
     if word not in frame.model.let and word not in frame.model.slots:
@@ -98,24 +104,37 @@ def _substituted(resolver: Resolver, node: ast.Name, expected: Type | None, scop
     if frame.model.slots[node.id] != "bool":
         message = f"`{node.id}` is a text: it can be said or heard, not computed with"
         raise resolver.fail("S204", message, node, scope)
-    if frame.texts[node.id] is None:
+    return member_truth(resolver, frame, node.id, scope)
+
+
+def member_truth(resolver: Resolver, frame: PlayedFrame, slot: str, scope: Scope) -> Term:
+    """The condition that fills a slot of type bool, in the file that was drawn if there are several."""
+    member, paths = frame.member, frame.texts[slot]
+    if paths is None:
         raise FailedError  # nobody fills it, which is reported where it is left empty
-    return slot_truth(resolver, frame.member, node.id, with_scope(resolver, frame.member, node.id, scope))
+    described = resolver.symbols.alternatives[member]
+    truths = [
+        slot_truth(resolver, slot, described[which].with_[slot], with_scope(path, member, slot, scope))
+        for which, path in enumerate(paths)
+    ]
+    cases = []
+    for truth, numbers in by_value(truths).items():
+        chosen = drawn(resolver, member, numbers)
+        cases.append(truth if chosen is None else all_of([chosen, truth]))
+    return any_of(case for case in cases if case != FALSE)
 
 
-def slot_truth(resolver: Resolver, member: str, slot: str, scope: Scope) -> Term:
-    """The condition that fills a slot of type bool."""
-    raw = resolver.symbols.cast[member].with_[slot]
+def slot_truth(resolver: Resolver, slot: str, raw: object, scope: Scope) -> Term:
+    """A condition that fills a slot of type bool."""
     if isinstance(raw, str) and raw.casefold() in _YES_AND_NO:
         truth = "true" if raw.casefold() in ("yes", "on", "y", "always") else "false"
         span = resolver.findings.at(scope.path, 0, len(raw))
         raise resolver.findings.fail("S204", f"slot `{slot}` is a bool: write `{truth}`", span)
-    return resolver.written(scope.path, raw, BOOL, scope)
+    return resolver.written(scope.path, raw, BOOL, scope)  # type: ignore[arg-type]
 
 
-def with_scope(resolver: Resolver, member: str, slot: str, user: Scope) -> Scope:
-    """The scope of what fills a slot of a member's frame, where it is substituted."""
-    path = resolver.symbols.with_path(member, slot)
+def with_scope(path: DataPath, member: str, slot: str, user: Scope) -> Scope:
+    """The scope of what fills, at `path`, a slot of a member's frame, where it is substituted."""
     draws = Draws(f"cast.{member}.with.{slot}")
     return Scope(path, draws, member=member, at_reset=user.at_reset, outer=user.draws, nested=user.nested)
 
@@ -123,10 +142,19 @@ def with_scope(resolver: Resolver, member: str, slot: str, user: Scope) -> Scope
 def _declared(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope) -> Term | None:
     """What the scenario declares under this name."""
     symbols, word = resolver.symbols, node.id
+    if word in symbols.scenario.memory or isinstance(symbols.scenario.let.get(word), Sequence):
+        raise _not_a_value(resolver, "memory" if word in symbols.scenario.memory else "sequence", node, scope)
     if word in symbols.scenario.let:
         return resolver.registers.read(f"let.{word}", expected, resolver.findings.node(scope.path, node))
     if word in symbols.defines:
         return expanded(resolver, symbols.defines[word], {}, node, expected, scope)
+    if word in symbols.scenario.roles:
+        if word not in symbols.roles:
+            message = f"nobody plays the role `{word}`"
+            raise resolver.fail(
+                "S201", message, node, scope, hint=f"add `role: {word}` to a member of the cast"
+            )
+        word = symbols.roles[word]
     if word in symbols.numbers:
         return entity(symbols.numbers[word])
     if word in symbols.objects:
@@ -138,6 +166,11 @@ def _declared(resolver: Resolver, node: ast.Name, expected: Type | None, scope: 
             hint=f"`pick({word})` draws one, `any(x in {word} where ...)` asks for any",
         )  # fmt: skip
     return None
+
+
+def _not_a_value(resolver: Resolver, kind: str, node: ast.Name, scope: Scope) -> FailedError:
+    message = f"`{node.id}` is a {kind}; it can only be compared with == or performed"
+    return resolver.fail("S204", message, node, scope)
 
 
 def _language(resolver: Resolver, node: ast.Name, scope: Scope) -> Term | None:
@@ -240,7 +273,7 @@ def _names_something(resolver: Resolver, word: str, scope: Scope) -> bool:
     if (
         word in scope.variables
         or word in resolver.symbols.declared()
-        or word in ("t", "W", "H", "self", "it")
+        or word in ("t", "W", "H", "self", "it", "cells")
     ):
         return True
     if frame is not None and (word in frame.model.slots or word in frame.model.let or word in frame.defines):
@@ -273,10 +306,13 @@ def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
         if owner == "here" and node.name in ("x", "y") and scope.here:
             _, high = resolver.symbols.width if node.name == "x" else resolver.symbols.height
             return Here(Type("int", 0, high - 1), "x" if node.name == "x" else "y")
-        register = f"{owner}.{node.name}"
-        builtin = node.name in VALUES
-        if owner not in scope.variables and not builtin and register in resolver.registers:
-            return resolver.registers.read(register)
+        if owner not in scope.variables and node.name not in VALUES:
+            owner = resolver.symbols.roles.get(owner, owner)
+            register, played = f"{owner}.{node.name}", resolver.frames.get(owner)
+            if register in resolver.registers:
+                return resolver.registers.read(register)
+            if played is not None and played.model.slots.get(node.name) == "bool":
+                return member_truth(resolver, played, node.name, scope)
     return resolve_attributes.without_arguments(resolver, node.name, node.subject, node, scope)
 
 
@@ -303,8 +339,8 @@ def expanded(
     inner = replace(
         scope,
         path=define.path,
-        frame=scope.frame if define.path[0] == "frames" else None,
-        member=scope.member if define.path[0] == "frames" else None,
+        frame=scope.frame if "frames" in define.path else None,
+        member=scope.member if "frames" in define.path else None,
         variables={parameter: Macro(argument, scope) for parameter, argument in arguments.items()},
         within=(*scope.within, define.name),
     )

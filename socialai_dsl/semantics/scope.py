@@ -25,6 +25,10 @@ class Objects:
     numbers: range
     single: bool
 
+    def called(self, index: int) -> str:
+        """How one of them is called: `doors[0]`."""
+        return self.name if self.single else f"{self.name}[{index}]"
+
 
 @dataclass(frozen=True)
 class Define:
@@ -42,7 +46,9 @@ class Symbols:
 
     Attributes:
         cast: member -> its description with defaults filled in, the agent too, in the order written.
+        alternatives: member -> everything it can be: one for each file of its `one_of`, else only `cast[member]`.
         numbers: member -> number of its entity.
+        roles: role -> the member that plays it.
         objects: name -> its entities.
         types: the object types of the prelude. default_colors: type -> its colour where none is given.
         width, height: least and largest size of the room.
@@ -50,7 +56,9 @@ class Symbols:
 
     scenario: Scenario
     cast: Mapping[str, CastMember]
+    alternatives: Mapping[str, tuple[CastMember, ...]]
     numbers: Mapping[str, int]
+    roles: Mapping[str, str]
     objects: Mapping[str, Objects]
     types: Mapping[str, ObjectType]
     defines: Mapping[str, Define]
@@ -77,25 +85,50 @@ class Symbols:
         """The cast member with this number; None for objects."""
         return next((name for name, n in self.numbers.items() if n == number), None)
 
-    def member_path(self, name: str, key: str) -> DataPath:
-        """Where a key of a cast member was written: there, or in `npc_defaults`."""
+    def member_path(self, name: str, key: str, which: int = 0) -> DataPath:
+        """Where a key of a cast member, as alternative `which`, was written: there, in the file that was drawn, in its
+        role, or in `npc_defaults`.
+        """
         attribute = {"with": "with_"}.get(key, key)
         own = self.scenario.cast[name]
-        if attribute in own.model_fields_set or name == "agent":
+        if attribute in own.model_fields_set:
             return ("cast", name, key)
-        if attribute in self.scenario.npc_defaults.model_fields_set:
+        if own.one_of and attribute in own.one_of[which].model_fields_set:
+            return ("cast", name, "one_of", which, key)
+        role = self.scenario.roles.get(own.role) if own.role is not None else None
+        if role is not None and attribute in role.model_fields_set:
+            return ("roles", str(own.role), key)
+        if attribute in self.scenario.npc_defaults.model_fields_set and name != "agent":
             return ("npc_defaults", key)
         return ("cast", name, key)
 
-    def with_path(self, name: str, slot: str) -> DataPath:
+    def with_path(self, name: str, slot: str, which: int = 0) -> DataPath:
         """Where the value of a member's slot was written."""
-        own = slot in self.scenario.cast[name].with_
-        return ("cast", name, "with", slot) if own else ("npc_defaults", "with", slot)
+        own = self.scenario.cast[name]
+        if slot in own.with_:
+            return ("cast", name, "with", slot)
+        if own.one_of and slot in own.one_of[which].with_:
+            return ("cast", name, "one_of", which, "with", slot)
+        return ("npc_defaults", "with", slot)
+
+    def frame_of(self, name: str, which: int = 0) -> tuple[Frame, DataPath] | None:
+        """The frame that a member follows and where it is written; None if it follows none, or an unknown one."""
+        called = self.alternatives[name][which].frame
+        own = self.scenario.cast[name]
+        if called is None:
+            return None
+        if own.one_of and called in own.one_of[which].frames:
+            return own.one_of[which].frames[called], ("cast", name, "one_of", which, "frames", called)
+        if called in self.scenario.frames:
+            return self.scenario.frames[called], ("frames", called)
+        return None
 
     def declared(self) -> dict[str, str]:
-        """Every name of the scenario and what it is: let, object, cast, define."""
+        """Every name of the scenario and what it is: let, object, cast, define, memory, roles."""
         found = dict.fromkeys(self.scenario.let, "let")
         found |= dict.fromkeys(self.defines, "define")
+        found |= dict.fromkeys(self.scenario.memory, "memory")
+        found |= dict.fromkeys(self.scenario.roles, "roles")
         found |= {name: "object" if o.single else "objects" for name, o in self.objects.items()}
         return found | dict.fromkeys(self.cast, "cast")
 
@@ -108,8 +141,9 @@ class PlayedFrame:
         member: who; `number` is its entity.
         name, model: the frame.
         defines: its definitions.
-        texts: slots that are substituted wherever they are used (text, utterance, bool) -> where they are filled;
-            None if nobody fills them, as when a frame is only looked at.
+        path: where it is written.
+        texts: slots that are substituted wherever they are used (text, utterance, bool) -> where each alternative of
+            the member fills them; None if nobody does, as when a frame is only looked at.
         looked_at: nobody plays it; it is checked all the same.
     """
 
@@ -117,8 +151,9 @@ class PlayedFrame:
     number: int
     name: str
     model: Frame
+    path: DataPath
     defines: Mapping[str, Define]
-    texts: Mapping[str, DataPath | None]
+    texts: Mapping[str, tuple[DataPath, ...] | None]
     looked_at: bool = False
 
     def register(self, name: str) -> str:
@@ -126,8 +161,8 @@ class PlayedFrame:
         return f"{self.name} of nobody.{name}" if self.looked_at else f"{self.member}.{name}"
 
     @property
-    def path(self) -> DataPath:
-        """Where the frame is written."""
+    def address(self) -> DataPath:
+        """What its draw sites are named by, wherever it is written."""
         return ("frames", self.name)
 
 
@@ -197,6 +232,13 @@ class Scope:
 def reset_scope(path: DataPath, site: str | None = None, member: str | None = None) -> Scope:
     """The scope of a value computed at reset."""
     return Scope(path, Draws(site or dotted(path)), member=member, at_reset=True)
+
+
+def object_scope(objects: Objects, index: int, path: DataPath, key: str, *, at_reset: bool) -> Scope:
+    """The scope of a value of one member of a group of objects, which is `it`."""
+    number = objects.numbers[index]
+    it = Const(Type("entity", number, number), number)
+    return Scope(path, Draws(f"objects.{objects.called(index)}.{key}"), at_reset=at_reset, it=it)
 
 
 def at_every_step(scope: Scope) -> Scope:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
@@ -11,20 +12,22 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.schema import CastMember, ObjectGroup
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import places, resolve_groups
+from socialai_dsl.semantics.alternatives import by_value, drawn
 from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.findings import FailedError, surviving
-from socialai_dsl.semantics.scope import Draws, Objects, Scope, reset_scope
+from socialai_dsl.semantics.scope import Objects, Scope, object_scope, reset_scope
 from socialai_dsl.semantics.terms import (
     COLOR,
     DIRECTION,
+    CellOf,
     Coloring,
-    Const,
     Drawn,
     Facing,
     FieldOf,
     Measure,
     Placing,
     Read,
+    Sees,
     Setup,
     Sited,
     Term,
@@ -37,29 +40,41 @@ if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
 
 _ENTITY = Type("entity", 0, 0)
-_FACING_TESTS = frozenset({"faces", "faces_toward", "eye_contact"})
+_FACING_TESTS = frozenset({"faces", "faces_toward", "eye_contact", "looks_at"})
 
 
 # -- placements --------------------------------------------------------------------------------------------------
 
 
-def placings(resolver: Resolver) -> dict[int, Placing]:
-    """Entity -> where it is put."""
-    found: dict[int, Placing] = {}
-    for name, member in resolver.symbols.cast.items():
+def placings(resolver: Resolver) -> dict[int, tuple[Placing, ...]]:
+    """Entity -> where it is put; several, each with its condition, where the files of a `one_of` differ."""
+    found: dict[int, tuple[Placing, ...]] = {}
+    for name, members in resolver.symbols.alternatives.items():
         with surviving():
-            placing = _member_placing(resolver, name, member)
-            found[placing.entity] = placing
+            number = resolver.symbols.numbers[name]
+            keys = [(member.place, member.at) for member in members]
+            found[number] = tuple(
+                replace(_member_placing(resolver, name, members[numbers[0]], numbers[0]), when=when)
+                for numbers, when in _distinct(resolver, name, keys)
+            )
     for objects in resolver.symbols.objects.values():
         with surviving():
             for placing in _object_placings(resolver, objects):
-                found[placing.entity] = placing
+                found[placing.entity] = (placing,)
     return found
 
 
-def _member_placing(resolver: Resolver, name: str, member: CastMember) -> Placing:
+def _distinct(
+    resolver: Resolver, name: str, keys: Sequence[Hashable]
+) -> Iterator[tuple[list[int], Term | None]]:
+    """The alternatives of a member that have the same keys, with the condition that one of them was drawn."""
+    for numbers in by_value(keys).values():
+        yield numbers, drawn(resolver, name, numbers)
+
+
+def _member_placing(resolver: Resolver, name: str, member: CastMember, which: int) -> Placing:
     key = "at" if member.at is not None else "place"
-    path = resolver.symbols.member_path(name, key)
+    path = resolver.symbols.member_path(name, key, which)
     spot = places.Spot(resolver.symbols.numbers[name], path, f"cast.{name}.cell", 0)
     scope = reset_scope(path, f"cast.{name}.{key}", name)
     if member.at is not None:
@@ -87,7 +102,7 @@ def _object_placings(resolver: Resolver, objects: Objects) -> Iterator[Placing]:
         for i, cell in enumerate(cells):
             path = (*base, "at", i) if nested else (*base, "at")
             spot = _spot(objects, i, path, count)
-            yield places.at(resolver, spot, cell, _member_scope(resolver, objects, i, path, "at"))  # type: ignore[arg-type]
+            yield places.at(resolver, spot, cell, object_scope(objects, i, path, "at", at_reset=True))  # type: ignore[arg-type]
         return
     listed = group.place or ("anywhere",)
     single = not (group.place and resolver.findings.is_list((*base, "place")))
@@ -96,19 +111,12 @@ def _object_placings(resolver: Resolver, objects: Objects) -> Iterator[Placing]:
     for i in range(count):
         path = (*base, "place") if single else (*base, "place", i)
         raw = listed[0 if single else i]
-        scope = _member_scope(resolver, objects, i, path, "place")
+        scope = object_scope(objects, i, path, "place", at_reset=True)
         yield places.place(resolver, _spot(objects, i, path, count), str(raw), scope)
 
 
 def _spot(objects: Objects, index: int, path: DataPath, count: int) -> places.Spot:
     return places.Spot(objects.numbers[index], path, f"objects.{objects.name}.cell", index, index, count)
-
-
-def _member_scope(resolver: Resolver, objects: Objects, index: int, path: DataPath, key: str) -> Scope:
-    """The scope of a value of one member of a group, which is `it`."""
-    name = objects.name if objects.single else f"{objects.name}[{index}]"
-    it = Const(Type("entity", objects.numbers[index], objects.numbers[index]), objects.numbers[index])
-    return Scope(path, Draws(f"objects.{name}.{key}"), at_reset=True, it=it)
 
 
 def _check_length(resolver: Resolver, given: int, count: int, path: DataPath) -> None:
@@ -122,13 +130,15 @@ def _check_length(resolver: Resolver, given: int, count: int, path: DataPath) ->
 
 def colorings(resolver: Resolver) -> Iterator[Coloring]:
     """The colour of every entity."""
-    for name, member in resolver.symbols.cast.items():
+    for name, members in resolver.symbols.alternatives.items():
         with surviving():
-            path = resolver.symbols.member_path(name, "color")
-            scope = reset_scope(path, f"cast.{name}.color", name)
-            value = None if member.color is None else _color(resolver, path, member.color, scope)
-            number = resolver.symbols.numbers[name]
-            yield Coloring(number, f"cast.{name}.color", 0, resolver.findings.at(path), value)
+            for numbers, when in _distinct(resolver, name, [member.color for member in members]):
+                path = resolver.symbols.member_path(name, "color", numbers[0])
+                scope = reset_scope(path, f"cast.{name}.color", name)
+                color = members[numbers[0]].color
+                value = None if color is None else _color(resolver, path, color, scope)
+                number = resolver.symbols.numbers[name]
+                yield Coloring(number, f"cast.{name}.color", 0, resolver.findings.at(path), value, when=when)
     for objects in resolver.symbols.objects.values():
         with surviving():
             yield from _object_colors(resolver, objects, resolver.symbols.scenario.objects[objects.name])
@@ -161,7 +171,7 @@ def _object_colors(resolver: Resolver, objects: Objects, group: ObjectGroup) -> 
         if distinct:
             yield Coloring(number, site, i, span, None, tuple(objects.numbers[:i]))
             continue
-        scope = _member_scope(resolver, objects, i, path, "color")
+        scope = object_scope(objects, i, path, "color", at_reset=True)
         value = _of_group(resolver, path, raw, i, count, scope) or _color(resolver, path, raw, scope)
         yield Coloring(number, site, i, span, value)
 
@@ -184,13 +194,15 @@ def _of_group(
 
 def facings(resolver: Resolver) -> Iterator[Facing]:
     """The direction of every member of the cast."""
-    for name, member in resolver.symbols.cast.items():
+    for name, members in resolver.symbols.alternatives.items():
         with surviving():
-            yield _facing(resolver, name, member)
+            for numbers, when in _distinct(resolver, name, [member.facing for member in members]):
+                facing = _facing(resolver, name, members[numbers[0]], numbers[0])
+                yield replace(facing, when=when)
 
 
-def _facing(resolver: Resolver, name: str, member: CastMember) -> Facing:
-    path = resolver.symbols.member_path(name, "facing")
+def _facing(resolver: Resolver, name: str, member: CastMember, which: int) -> Facing:
+    path = resolver.symbols.member_path(name, "facing", which)
     span, site = resolver.findings.at(path), f"cast.{name}.facing"
     number = resolver.symbols.numbers[name]
     if member.facing is None or member.facing == "random":
@@ -210,19 +222,21 @@ def _facing(resolver: Resolver, name: str, member: CastMember) -> Facing:
 
 def ordered(
     resolver: Resolver,
-    placed: Mapping[int, Placing],
+    placed: Mapping[int, Sequence[Placing]],
     colors: Sequence[Coloring],
     turned: Sequence[Facing],
-    drawn: Sequence[Drawn],
+    registers: Sequence[Drawn],
 ) -> tuple[Setup, ...]:
     """Everything drawn at reset: placements in their order, what they need before them, the rest after."""
-    items: dict[str, Setup] = {}
+    items: dict[str, list[Setup]] = {}
     for number in _placement_order(resolver):
         if number in placed:
-            items[f"cell {number}"] = placed[number]
-    items |= {f"color {coloring.entity}": coloring for coloring in colors}
-    items |= {drawing.path: drawing for drawing in drawn}
-    items |= {f"facing {facing.entity}": facing for facing in turned}
+            items[f"cell {number}"] = list(placed[number])
+    for coloring in colors:
+        items.setdefault(f"color {coloring.entity}", []).append(coloring)
+    items |= {drawing.path: [drawing] for drawing in registers}
+    for facing in turned:
+        items.setdefault(f"facing {facing.entity}", []).append(facing)
     return tuple(_Sorter(resolver, items).sorted())
 
 
@@ -248,10 +262,10 @@ def _placement_order(resolver: Resolver) -> list[int]:
 class _Sorter:
     """Depth-first: an item comes after everything it needs."""
 
-    def __init__(self, resolver: Resolver, items: Mapping[str, Setup]) -> None:
+    def __init__(self, resolver: Resolver, items: Mapping[str, Sequence[Setup]]) -> None:
         self._resolver = resolver
         self._items = items
-        self._done: dict[str, Setup] = {}
+        self._done: dict[str, Sequence[Setup]] = {}
         self._path: list[str] = []
         self._circular: set[str] = set()
 
@@ -259,7 +273,7 @@ class _Sorter:
         for key in self._items:
             with surviving():
                 self._visit(key)
-        return iter(self._done.values())
+        return chain.from_iterable(self._done.values())
 
     def _visit(self, key: str) -> None:
         if key in self._done or key not in self._items:
@@ -272,8 +286,9 @@ class _Sorter:
             raise self._circle([*circle, key])
         self._path.append(key)
         try:
-            for need in needs(self._items[key]):
-                self._visit(need)
+            for item in self._items[key]:
+                for need in needs(item):
+                    self._visit(need)
         finally:
             self._path.pop()
         self._done[key] = self._items[key]
@@ -281,7 +296,7 @@ class _Sorter:
     def _circle(self, keys: list[str]) -> FailedError:
         names = [self._called(key) for key in keys]
         message = " and ".join(f"{a} needs {b}" for a, b in pairwise(names))
-        item = self._items[keys[0]]
+        item = self._items[keys[0]][0]
         span = item.value.span if isinstance(item, Drawn) else item.span
         return self._resolver.findings.fail("S208", message, span)
 
@@ -328,8 +343,14 @@ def _needs(term: Term) -> Iterator[str]:
                 yield from (f"facing {n}" for n in entities)
         case Measure(args=args):
             yield from (f"cell {n}" for arg in args for n in _numbers(arg))
+        case Sees(viewer=viewer, target=target, facing=facing):
+            yield from (f"cell {n}" for one in (viewer, target) for n in _numbers(one))
+            if facing is None:
+                yield from (f"facing {n}" for n in _numbers(viewer))
+        case CellOf(entity=entity):
+            yield from (f"cell {n}" for n in _numbers(entity))
 
 
 def _numbers(term: Term) -> range:
     """The entities that a term can stand for."""
-    return range(term.type.low, term.type.high + 1)
+    return range(term.type.low, term.type.high + 1) if term.type.kind == "entity" else range(0)

@@ -21,7 +21,9 @@ Argument = Literal[
     "action",
     "side",
     "group",
+    "any",
     "actions",
+    "sequence",
 ]
 Subject = Literal["entity", "member", "agent", "object", "cell", "none"]
 Use = Literal["value", "place", "activity", "effect"]
@@ -77,6 +79,10 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     _value("eye_contact", "entity", ("entities",), "condition", "same row or column, each turned to the other"),
     _value("in_line", "entity", ("entities",), "condition", "same row or same column"),
     _value("can_reach", "entity", ("entities",), "condition", "a free path to x, or next to x, exists now"),
+    _value("unobstructed", "entity", ("entities",), "condition", "in line with x and nothing opaque between"),
+    _value("looks_at", "member", ("entities",), "condition", "x is straight ahead in its view, nothing opaque between"),
+    _value("sees", "member", ("entities",), "condition", "x is in its view square"),
+    _value("would_see", "member", ("entities", "direction"), "condition", "x would be, if it faced this direction"),
     # what was said and done
     _value("said", "agent", ("utterance",), "condition", "said in this step, however far away", momentary=True),
     _value("spoke", "agent", (), "condition", "the agent said something in this step", momentary=True),
@@ -96,6 +102,8 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     _value("name", "member", (), "text", "its name"),
     _value("kind", "entity", (), "text", "its kind, or the object's type"),
     _value("index", "entity", (), "number", "its place in its group, from 0"),
+    _value("cell", "entity", (), "cell", "the cell it is on"),
+    _value("unlocked_by", "object", (), "object", "what unlocks it"),
     # measures
     _value("distance", "entity", ("entity",), "number", "Manhattan distance"),
     _value("dir_to", "entity", ("entity",), "direction", "the quadrant in which x lies"),
@@ -103,6 +111,7 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     _value("min", "none", ("int", "int"), "number", "the smaller"),
     _value("max", "none", ("int", "int"), "number", "the larger"),
     _value("abs", "none", ("int",), "number", "without its sign"),
+    _value("prev", "none", ("any",), "the same", "prev(e): e as it was when the step began", momentary=True),
     _value("any", "none", ("group",), "condition", "any(x in group where ...): one of them does"),
     _value("all", "none", ("group",), "condition", "all(x in group where ...): each of them does"),
     _value("count", "none", ("group",), "number", "count(x in group where ...): how many do"),
@@ -134,6 +143,7 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     Signature("go_next_to", "none", ("entity",), "activity", "activity", "walk to a cell next to x"),
     Signature("use", "none", ("entity",), "activity", "activity", "go next to x, face it, toggle it"),
     Signature("enter", "none", ("entity",), "activity", "activity", "open x if it is closed, then go in"),
+    Signature("perform", "none", ("sequence",), "activity", "activity", "one act of a sequence a turn, words included"),
     Signature("choose", "none", ("actions",), "activity", "activity", "one at random: choose(a | b | 2 * c)"),
     Signature("wander", "none", (), "activity", "activity", "choose(forward | left | right)"),
     # effects
@@ -157,13 +167,14 @@ SYNONYMS: Final = {
     "walk": "go_to", "walk_to": "go_to", "go": "go_to", "move_to": "go_to", "move": "go_to", "goto": "go_to",
     "approach": "go_next_to", "come_to": "go_next_to", "look": "face", "look_at": "face", "watch": "face",
     "gaze": "face", "wait": "stay", "nothing": "stay", "none": "stay", "idle": "stay", "random": "wander",
-    "go_through": "enter", "rotate": "turn", "exit": "enter",
+    "go_through": "enter", "rotate": "turn", "exit": "enter", "dance": "perform", "repeat": "perform",
 }  # fmt: skip
 """What authors write for an activity -> what it is called here."""
 
 VALUE_SYNONYMS: Final = {
     "near": "next_to", "close_to": "next_to", "beside": "next_to", "adjacent": "next_to", "adjacent_to": "next_to",
-    "by": "next_to", "reaches": "at", "on": "at", "in_cell": "at", "looks_at": "faces", "looking_at": "faces",
+    "by": "next_to", "reaches": "at", "on": "at", "in_cell": "at", "looking_at": "looks_at", "can_see": "sees",
+    "see": "sees", "previous": "prev", "before": "prev",
     "says": "said", "say": "said", "hears": "heard", "colour": "color", "direction": "facing", "dir": "facing",
     "type": "kind", "disappeared": "gone", "vanished": "gone", "does": "did", "in_state": "is", "state": "is",
     "number": "index", "toggled": "poked", "dist": "distance", "distance_to": "distance",
@@ -171,7 +182,7 @@ VALUE_SYNONYMS: Final = {
 """What authors write for a condition or value -> what it is called here."""
 
 WORDS: Final = frozenset(
-    [s.name for s in SIGNATURES if s.name not in ("name", "kind", "index")]
+    [s.name for s in SIGNATURES if s.name not in ("name", "kind", "index", "cell")]
     + ["here", "it", "self", "t", "W", "H", "cells", "colors", "nouns", "toward", "random", "distinct", "ever"]
     + ["finished"]
     + ["red", "green", "blue", "purple", "yellow", "grey", "up", "down", "pickup", "drop", "done", "none"]

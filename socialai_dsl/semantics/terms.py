@@ -49,6 +49,9 @@ DIRECTION = Type("direction", 0, 3, ("right", "down", "left", "up"))
 COLOR = Type("color", 0, 5, ("red", "green", "blue", "purple", "yellow", "grey"))
 ACTION = Type("action", 0, 7, ("left", "right", "forward", "pickup", "drop", "toggle", "done", "none"))
 
+CELL = Type("cell", 2048, 2048 + 32 * 29 + 31)
+"""Any cell: CELL.low + 32 * y + x (`program.CELL`)."""
+
 
 @dataclass(frozen=True, slots=True)
 class Const:

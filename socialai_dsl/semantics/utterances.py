@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -12,6 +12,7 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.schema import UtteranceGrammar
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import resolve_groups
+from socialai_dsl.semantics.alternatives import by_value, drawn, select
 from socialai_dsl.semantics.build import all_of, any_of
 from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.scope import Draws, Scope
@@ -47,50 +48,67 @@ class Utterances:
 
     def said(self, node: ast.Expr, scope: Scope) -> Term:
         """Whether the agent said one of the texts at `node` in this step."""
+        span = self._resolver.findings.node(scope.path, node)
         return any_of(
-            all_of([Said(pattern), *([given] if given is not None else [])])
-            for text in self._texts(node, scope)
-            for pattern, given in self.patterns(
-                text, scope, self._resolver.findings.node(scope.path, node), False
-            )
+            all_of([Said(pattern), *_given(drawn), *_given(given)])
+            for text, drawn in self._texts(node, scope)
+            for pattern, given in self.patterns(text, scope, span, False)
         )
 
     def heard(self, node: ast.Expr, scope: Scope) -> Term:
         """Whether the NPC whose frame it is heard one of the texts at `node` since its last turn."""
+        span = self._resolver.findings.node(scope.path, node)
         return any_of(
-            all_of([Heard((pattern,)), *([given] if given is not None else [])])
-            for text in self._texts(node, scope)
-            for pattern, given in self.patterns(
-                text, scope, self._resolver.findings.node(scope.path, node), True
-            )
+            all_of([Heard((pattern,)), *_given(drawn), *_given(given)])
+            for text, drawn in self._texts(node, scope)
+            for pattern, given in self.patterns(text, scope, span, True)
         )
 
-    def _texts(self, node: ast.Expr, scope: Scope) -> list[ast.Text]:
+    def _texts(self, node: ast.Expr, scope: Scope) -> list[tuple[ast.Text, Term | None]]:
+        """The texts that an argument names, each with the condition on what `one_of` drew."""
         resolver = self._resolver
         options = node.options if isinstance(node, ast.Alternatives) else (node,)
-        texts = []
+        texts: list[tuple[ast.Text, Term | None]] = []
         for option in options:
-            if isinstance(option, ast.Name):
-                option = self.slot_text(option.id, scope) or option
-            if not isinstance(option, ast.Text):
+            slot = self._slot(option, scope)
+            if slot is not None:
+                texts += [(filling.text, filling.drawn) for filling in slot]
+            elif isinstance(option, ast.Text):
+                texts.append((option, None))
+            else:
                 message = f'`{quoted(option)}` is not a text; what is said is quoted: "Open sesame"'
                 raise resolver.fail("S211", message, option, scope)
-            texts.append(option)
         return texts
 
-    def slot_text(self, slot: str, scope: Scope) -> ast.Text | None:
-        """The text that fills a slot of type utterance or text, with its `<...>` parts; None if it is no such slot."""
-        frame = scope.frame
-        if (
-            frame is None
-            or frame.model.slots.get(slot) not in ("text", "utterance")
-            or slot in scope.variables
-        ):
+    def _slot(self, node: ast.Expr, scope: Scope) -> list[_Filling] | None:
+        """What fills the slot of type text or utterance that an expression names, `<formula>` of one's own frame or
+        `<teacher.formula>` of a member's: one text, or several where the files of a `one_of` differ. None if it names
+        no such slot.
+        """
+        frame, name = scope.frame, ""
+        match node:
+            case ast.Name(id=name) if name not in scope.variables:
+                pass
+            case ast.Attribute(subject=ast.Name(id=owner), name=name) if owner not in scope.variables:
+                frame = self._resolver.frames.get(self._resolver.symbols.roles.get(owner, owner))
+            case _:
+                return None
+        if frame is None or frame.model.slots.get(name) not in ("text", "utterance"):
             return None
-        path = frame.texts.get(slot)
-        if path is None:
+        paths = frame.texts.get(name)
+        if paths is None:
             raise FailedError  # nobody fills it, which is reported where it is left empty
-        return self._resolver.findings.text(path, str(self._resolver.symbols.cast[frame.member].with_[slot]))
+        described = self._resolver.symbols.alternatives[frame.member]
+        return [
+            _Filling(
+                frame.member,
+                name,
+                paths[numbers[0]],
+                self._resolver.findings.text(paths[numbers[0]], raw),
+                drawn(self._resolver, frame.member, numbers),
+            )
+            for raw, numbers in by_value([str(one.with_[name]) for one in described]).items()
+        ]
 
     def patterns(
         self, text: ast.Text, scope: Scope, span: Span, from_npcs: bool
@@ -99,7 +117,22 @@ class Utterances:
 
         Reports S401 if nobody can say it and S402 if some value in it cannot be said.
         """
-        parts = [self._spoken_part(part, scope) for part in self._spliced(text, scope)]
+        return [
+            found
+            for spliced in self._spliced(text, scope)
+            for found in self._meant(*spliced, scope, span, from_npcs)
+        ]
+
+    def _meant(
+        self,
+        spliced: Sequence[str | ast.Expr],
+        drawn: Sequence[Term],
+        scope: Scope,
+        span: Span,
+        from_npcs: bool,
+    ) -> list[tuple[Pattern, Term | None]]:
+        """The patterns of a text without slots, on the condition that what `drawn` says was drawn."""
+        parts = [self._spoken_part(part, scope) for part in spliced]
         found: list[tuple[Pattern, Term | None]] = []
         unsayable: list[tuple[str, str]] = []
         for choice in product(*(self._choices(part) for part in parts)):
@@ -108,7 +141,7 @@ class Utterances:
             by_npcs = frozenset(
                 t for t in self._resolver.npc_texts if from_npcs and normal(t) == normal(said)
             )
-            conditions = [condition for _, condition in choice if condition is not None]
+            conditions = [*drawn, *(condition for _, condition in choice if condition is not None)]
             if pairs or by_npcs:
                 found.append((Pattern(pairs, said, by_npcs), all_of(conditions) if conditions else None))
             else:
@@ -117,14 +150,16 @@ class Utterances:
             self._report_unsayable(unsayable, parts, bool(found), span, from_npcs)
         return found
 
-    def _spliced(self, text: ast.Text, scope: Scope) -> Iterator[str | ast.Expr]:
-        """The parts of a text, with texts that fill slots put in their place."""
+    def _spliced(self, text: ast.Text, scope: Scope) -> Iterator[tuple[list[str | ast.Expr], list[Term]]]:
+        """The parts of a text, with texts that fill slots put in their place; all ways to do so, where files that
+        `one_of` draws differ, each with its conditions.
+        """
+        choices: list[list[tuple[tuple[str | ast.Expr, ...], Term | None]]] = []
         for part in text.parts:
-            slot = self.slot_text(part.id, scope) if isinstance(part, ast.Name) else None
-            if slot is None:
-                yield part
-            else:
-                yield from slot.parts
+            slot = None if isinstance(part, str) else self._slot(part, scope)
+            choices.append([((part,), None)] if slot is None else [(f.text.parts, f.drawn) for f in slot])
+        for choice in product(*choices):
+            yield [part for parts, _ in choice for part in parts], [d for _, d in choice if d is not None]
 
     def _spoken_part(self, part: str | ast.Expr, scope: Scope) -> str | Term | None:
         """A piece of text, a value in it, or None for any noun."""
@@ -191,11 +226,10 @@ class Utterances:
         text = findings.text(path, raw)
         span = findings.at(path)
         only = text.parts[0] if len(text.parts) == 1 else None
-        if isinstance(only, ast.Name):
-            slot = self.slot_text(only.id, scope)
-            if slot is not None:
-                # All of it is the slot's value, so its picks are drawn at the slot's site.
-                text, scope = slot, replace(self._slot_scope(only.id, scope), outer=None)
+        slot = self._slot(only, scope) if only is not None and not isinstance(only, str) else None
+        if slot is not None and len(slot) == 1:
+            # All of it is the slot's value, so its picks are drawn at the slot's site.
+            text, scope = slot[0].text, replace(slot[0].scope(scope), outer=None)
         line = Line(tuple(_merged(self.parts(text, scope))), scope.draws.site, span)
         if scope.member == "agent":
             return self._agents(line)
@@ -210,19 +244,32 @@ class Utterances:
             if isinstance(part, str):
                 yield part
                 continue
-            slot = self.slot_text(part.id, scope) if isinstance(part, ast.Name) else None
-            if slot is not None and isinstance(part, ast.Name) and scope.frame is not None:
-                yield from self.parts(slot, self._slot_scope(part.id, scope))
+            slot = self._slot(part, scope)
+            if slot is not None:
+                yield from self._filled(slot, scope)
                 continue
             term = sayable(self._resolver, part, scope)
             yield spoken(term.type, term.value) if isinstance(term, Const) else term
 
-    def _slot_scope(self, slot: str, scope: Scope) -> Scope:
-        frame = scope.frame
-        assert frame is not None, "internal: a slot outside a frame"
-        path = frame.texts[slot]
-        assert path is not None, "internal: a slot without a value"
-        return Scope(path, Draws(f"cast.{frame.member}.with.{slot}"), member=frame.member, outer=scope.draws)
+    def _filled(self, slot: list[_Filling], scope: Scope) -> list[str | Term]:
+        """What a slot contributes to a line; where files that `one_of` draws differ, one value with their texts."""
+        if len(slot) == 1:
+            return self.parts(slot[0].text, slot[0].scope(scope))
+        resolver = self._resolver
+        values = next((filling for filling in slot if filling.text.plain is None), None)
+        if values is not None:
+            message = f"files of `{values.member}` say different things here, so none may have values in it"
+            raise resolver.findings.fail(
+                "S315",
+                message,
+                resolver.findings.at(values.path),
+                hint="put what differs into a slot of its own",
+            )
+        plain = [
+            Const(Type("text", 0, 0, (str(one.with_[slot[0].slot]),)), 0)
+            for one in resolver.symbols.alternatives[slot[0].member]
+        ]
+        return [select(resolver, slot[0].member, plain)]
 
     def _agents(self, line: Line) -> Line:
         """The line in the grammar's own spelling."""
@@ -236,6 +283,26 @@ class Utterances:
         if len(line.parts) == 1 and isinstance(line.parts[0], str):
             return Line((spelled[normal(line.parts[0])],), line.site, line.span)
         return line
+
+
+@dataclass(frozen=True)
+class _Filling:
+    """A text that fills a slot of a member's frame; `drawn` is the condition that it is this one of several."""
+
+    member: str
+    slot: str
+    path: DataPath
+    text: ast.Text
+    drawn: Term | None
+
+    def scope(self, user: Scope) -> Scope:
+        """What its names mean where it is put in."""
+        draws = Draws(f"cast.{self.member}.with.{self.slot}")
+        return Scope(self.path, draws, member=self.member, outer=user.draws)
+
+
+def _given(condition: Term | None) -> list[Term]:
+    return [] if condition is None else [condition]
 
 
 def sayable(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:

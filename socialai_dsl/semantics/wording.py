@@ -18,6 +18,8 @@ _KINDS: Final = {
     "text": "a text",
     "noun": "a noun",
     "status": "a status",
+    "utterance": "an utterance",
+    "cell": "a cell",
 }
 
 
@@ -34,6 +36,8 @@ _PLACEHOLDERS: Final = {
     "side": "top",
     "group": "group",
     "actions": "a | b",
+    "any": "x",
+    "sequence": "dance",
 }
 
 

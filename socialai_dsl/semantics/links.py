@@ -1,0 +1,112 @@
+"""Links between objects: what a switch unlocks, and what unlocks a door."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from socialai_dsl.grammar import ast
+from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics import resolve_groups
+from socialai_dsl.semantics.build import arithmetic, number
+from socialai_dsl.semantics.findings import surviving
+from socialai_dsl.semantics.scope import Objects, Scope, reset_scope
+from socialai_dsl.semantics.terms import Compare, Const, Select, Term, Type
+from socialai_dsl.semantics.wording import quoted
+
+if TYPE_CHECKING:
+    from socialai_dsl.semantics.resolve import Resolver
+
+
+def unlocked(resolver: Resolver) -> dict[int, tuple[int, ...]]:
+    """Object -> the objects it unlocks; reports what is no lock, or has nothing to do with one."""
+    found: dict[int, tuple[int, ...]] = {}
+    for objects in resolver.symbols.objects.values():
+        with surviving():
+            found |= _links_of(resolver, objects)
+    return found
+
+
+def _links_of(resolver: Resolver, objects: Objects) -> dict[int, tuple[int, ...]]:
+    raw = resolver.symbols.scenario.objects[objects.name].unlocks
+    if raw is None:
+        return {}
+    path: DataPath = ("objects", objects.name, "unlocks")
+    findings, scope = resolver.findings, reset_scope(path)
+    node = findings.expression(path, raw)
+    if not objects.type.active:
+        message = f"a {objects.type.name} cannot unlock anything"
+        able = [name for name, type_ in resolver.symbols.types.items() if type_.active]
+        raise resolver.fail("S204", message, node, scope, hint="what can: " + ", ".join(able))
+    targets = list(_objects_at(resolver, node, scope))
+    for target in targets:
+        type_ = resolver.symbols.object_of(target)
+        assert type_ is not None, "internal: a target is an object"
+        if not {"locked", "closed"} <= set(type_.type.states):
+            message = f"a {type_.type.name} has no lock: it is {' or '.join(type_.type.states)}"
+            raise resolver.fail("S204", message, node, scope)
+    numbers = list(objects.numbers)
+    if len(numbers) == len(targets):
+        return {a: (b,) for a, b in zip(numbers, targets, strict=True)}
+    if len(numbers) == 1 or len(targets) == 1:
+        return dict.fromkeys(numbers, tuple(targets))
+    message = f"{len(numbers)} of `{objects.name}` cannot be linked to {len(targets)} of `{quoted(node)}`"
+    hint = "as many as there are, or one for all"
+    raise resolver.fail("S106", message, node, scope, hint=hint)
+
+
+def _objects_at(resolver: Resolver, node: ast.Expr, scope: Scope) -> Iterator[int]:
+    if resolve_groups.is_group(resolver, node, scope):
+        terms: tuple[Term, ...] = resolve_groups.group(resolver, node, None, scope).items
+    else:
+        terms = (resolver.value(node, Type("entity", 0, 0), scope),)
+    for term in terms:
+        if not isinstance(term, Const) or resolver.symbols.object_of(term.value) is None:
+            message = f"`{quoted(node)}` is not an object of the room"
+            raise resolver.fail("S204", message, node, scope, hint="name an object, or a group of them")
+        yield term.value
+
+
+def unlocker(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
+    """`door.unlocked_by`: what unlocks it, whichever of its group it is."""
+    found: dict[int, int] = {}
+    for key, locks in resolver.unlocks.items():
+        for lock in locks:
+            if lock in found and who.type.low <= lock <= who.type.high:
+                message = f"several things unlock `{_called(resolver, lock)}`"
+                raise resolver.fail("S204", message, node, scope, hint="name the one that is meant")
+            found[lock] = key
+    numbers = [who.value] if isinstance(who, Const) else range(who.type.low, who.type.high + 1)
+    for lock in numbers:
+        if lock not in found:
+            message = f"nothing unlocks `{_called(resolver, lock)}`"
+            hint = "an object unlocks another with `unlocks:`"
+            raise resolver.fail("S204", message, node, scope, hint=hint)
+    keys = [found[lock] for lock in numbers]
+    type_ = Type("entity", min(keys), max(keys))
+    if len(set(keys)) == 1:
+        return Const(type_, keys[0])
+    shifts = {key - lock for lock, key in zip(numbers, keys, strict=True)}
+    if len(shifts) == 1:
+        return _shifted(who, shifts.pop(), type_)
+    *others, last = zip(numbers, keys, strict=True)
+    return Select(
+        type_,
+        tuple(Compare("==", who, Const(who.type, lock)) for lock, _ in others),
+        tuple(Const(type_, key) for _, key in others),
+        Const(type_, last[1]),
+    )
+
+
+def _shifted(who: Term, shift: int, type_: Type) -> Term:
+    """Objects that stand in the same order in two groups are found by adding to their number."""
+    as_number = replace(who, type=Type("int", who.type.low, who.type.high))
+    return replace(arithmetic("+", as_number, number(shift)), type=type_)
+
+
+def _called(resolver: Resolver, entity: int) -> str:
+    objects = resolver.symbols.object_of(entity)
+    if objects is None:
+        return resolver.symbols.member_of(entity) or "agent"
+    return objects.called(entity - objects.numbers[0])

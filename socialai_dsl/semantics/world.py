@@ -1,0 +1,63 @@
+"""What belongs to nobody's frame: rules of the world, and what a drawn room has to be like."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from socialai_dsl.schema import WorldRule
+from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics.activities import effect
+from socialai_dsl.semantics.findings import dotted, surviving
+from socialai_dsl.semantics.scope import Scope, at_every_step, reset_scope
+from socialai_dsl.semantics.terms import BOOL, Effect, RulePlan, Sited
+
+if TYPE_CHECKING:
+    from socialai_dsl.semantics.resolve import Resolver
+
+
+def rules(resolver: Resolver) -> Iterator[RulePlan]:
+    """The rules of the world, in the order written."""
+    for i, rule in enumerate(resolver.symbols.scenario.rules):
+        yield _rule(resolver, rule, ("rules", i))
+
+
+def _rule(resolver: Resolver, rule: WorldRule, path: DataPath) -> RulePlan:
+    name = f"rules[{rule.id}]" if rule.id else dotted(path)
+    when: Sited | None = None
+    with surviving():
+        if rule.when is not None:
+            scope = _scope((*path, "when"), f"{name}.when")
+            term = resolver.written((*path, "when"), rule.when, BOOL, scope)
+            when = Sited(term, scope.draws.site, resolver.findings.at((*path, "when")))
+    return RulePlan(
+        name=rule.id or name,
+        site=name,
+        span=resolver.findings.places.value_span(path),
+        when=when,
+        chance=rule.chance,
+        once=rule.once,
+        causes=tuple(_effects(resolver, rule, (*path, "cause"), name)),
+    )
+
+
+def _scope(path: DataPath, site: str) -> Scope:
+    return at_every_step(reset_scope(path, site))
+
+
+def _effects(resolver: Resolver, rule: WorldRule, path: DataPath, name: str) -> Iterator[Effect]:
+    single = not resolver.findings.is_list(path)
+    for i, raw in enumerate(rule.cause):
+        place = path if single else (*path, i)
+        with surviving():
+            yield effect(resolver, place, raw, _scope(place, f"{name}.cause[{i}]"))
+
+
+def requirements(resolver: Resolver) -> Iterator[Sited]:
+    """The conditions on a drawn room."""
+    for i, raw in enumerate(resolver.symbols.scenario.require):
+        path: DataPath = ("require", i)
+        with surviving():
+            scope = reset_scope(path)
+            term = resolver.written(path, raw, BOOL, scope)
+            yield Sited(term, scope.draws.site, resolver.findings.at(path))
