@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from socialai_dsl.engine.picture import view_table
-from socialai_dsl.program import Field, Op, pack_cell
-from tests.assembly import HIDDEN, Assembly, batch_of, constant, entity_register
+from socialai_dsl.program import Field, Flag, Op, pack_cell
+from tests.assembly import HIDDEN, Assembly, batch_of, constant, entity_register, step
 
 
 @pytest.mark.parametrize(("width", "height"), [(8, 8), (5, 9), (30, 4)])
@@ -71,3 +71,46 @@ def test_a_digest_depends_on_every_cell() -> None:
     for k in range(49):
         batch.state.image[k, k] ^= 1 << 24
     assert len(set(batch.identify().tolist())) == 50
+
+
+@pytest.mark.parametrize("own", range(4))
+def test_egocentric_directions_of_npcs(own: int) -> None:
+    """(direction - the agent's + 2) mod 4 for NPCs in view, after a reset and after steps; things stay as they are."""
+    ahead = ((3, 2), (2, 3), (1, 2), (2, 1))[own]
+    side = ((3, 3), (1, 3), (1, 1), (3, 1))[own]
+    shown = {}
+    for flags in (0, int(Flag.EGOCENTRIC)):
+        for direction in range(4):
+            room = Assembly(
+                at=((2, 2), ahead, side), npcs=1, objects=("door",), facing=(own, direction), flags=flags
+            )
+            batch = batch_of(room.program())
+            image = batch.state.image.view(np.uint8).reshape(7, 7, 4)
+            shown[flags, direction] = image.copy()
+            step(batch)
+            np.testing.assert_array_equal(batch.state.image.view(np.uint8).reshape(7, 7, 4), image)
+    for direction in range(4):
+        plain, turned = shown[0, direction], shown[int(Flag.EGOCENTRIC), direction]
+        assert plain[3, 5].tolist() == [11, 0, 1, direction]
+        assert turned[3, 5].tolist() == [11, 0, 1, (direction - own + 2) % 4]
+        turned[3, 5, 3] = direction
+        np.testing.assert_array_equal(plain, turned)
+
+
+def test_egocentric_directions_turn_with_the_agent() -> None:
+    room = Assembly(at=((2, 2), (3, 2)), npcs=1, facing=(0, 1), flags=int(Flag.EGOCENTRIC))
+    batch = batch_of(room.program())
+    image = batch.state.image.view(np.uint8).reshape(7, 7, 4)
+    assert image[3, 5].tolist() == [11, 0, 1, 3]
+    step(batch, (1, 0, 0, 0))
+    assert image[2, 6].tolist() == [11, 0, 1, 2]
+
+
+def test_the_status_of_an_npc_is_its_code() -> None:
+    """The greatest code unless the reset draws another one."""
+    room = {"at": ((1, 2), (2, 2), (3, 2)), "npcs": 2}
+    drawn = [(Op.LOAD, entity_register(2, Field.STATUS), constant(0))]
+    for reset, expected in (((), [1, 2]), (drawn, [1, 0])):
+        batch = batch_of(Assembly(reset=reset, **room).program())  # type: ignore[arg-type]
+        image = batch.state.image.view(np.uint8).reshape(7, 7, 4)
+        assert image[3, [5, 4], 2].tolist() == expected

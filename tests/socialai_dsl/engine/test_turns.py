@@ -260,3 +260,95 @@ def test_scripted_actions_leave_everything_as_it_is() -> None:
     assert entity(batch, 0, Field.LAST) == [Body.FORWARD], "but its body does what the action says"
     assert batch.state.registers[0, Register.TEMPLATE] == -1, "and it says what the action says"
     assert batch.state.registers[0, Register.SAID_LINE] == 0
+
+
+def cell_at(batch: Batch, x: int, y: int) -> tuple[list[int], bool]:
+    """How a cell looks (type, colour, status, direction) and whether it is solid."""
+    look = int(batch.state.boards[0, 6 * y + x])
+    return [look >> 8 * i & 0xFF for i in range(4)], bool(batch.state.boards[0, 43 + y] >> x & 1)
+
+
+OPENED = [(Op.LOAD, entity_register(2, Field.STATUS), constant(OPEN))]
+
+
+@pytest.mark.parametrize(
+    ("thing", "look"), [("door", [4, 0, OPEN, 0]), ("lava", [9, 0, 0, 0])], ids=["door", "lava"]
+)
+def test_an_npc_hides_what_it_stands_on_until_it_leaves(thing: str, look: list[int]) -> None:
+    batch = npc_program(FORWARD, at=((1, 1), (1, 2), (2, 2)), objects=(thing,), reset=OPENED)
+    assert cell_at(batch, 2, 2) == (look, False)
+    play(batch, body(Body.NONE))
+    assert cell_at(batch, 2, 2) == ([11, 0, 1, 0], False)
+    play(batch, body(Body.NONE))
+    assert cell_at(batch, 2, 2) == (look, False)
+    assert cell_at(batch, 3, 2) == ([11, 0, 1, 0], False)
+
+
+@pytest.mark.parametrize("hidden", [0, HIDDEN])
+def test_where_an_npc_vanishes_the_door_reappears(hidden: int) -> None:
+    vanish = [(Op.IF_EQ, Register.T, constant(2), 1), (Op.VANISH, constant(1))]
+    room = {"at": ((1, 1), (1, 2), (2, 2)), "objects": ("door",), "reset": OPENED}
+    batch = npc_program(FORWARD, rules=vanish, flags=hidden, **{**room, "at": ((1, 1), (2, 2), (2, 2))})
+    for npc in (
+        batch,
+        npc_program([], rules=vanish, flags=hidden, **{**room, "at": ((3, 3), (2, 2), (2, 2))}),
+    ):
+        play(npc, body(Body.NONE), body(Body.NONE))
+        assert cell_at(npc, 2, 2) == ([4, 0, OPEN, 0], False)
+        assert cell_at(npc, 3, 2) == ([1, 0, 0, 0], False)
+
+
+def test_a_door_that_shuts_under_an_npc_is_shut_when_it_leaves() -> None:
+    shut = [(Op.BECOME, constant(2), constant(CLOSED))]
+    activity = [(Op.IF_EQ, Register.T, constant(2), 1), (Op.BODY, constant(Body.FORWARD))]
+    batch = npc_program(activity, at=((1, 1), (2, 2), (2, 2)), objects=("door",), reset=OPENED, rules=shut)
+    play(batch, body(Body.NONE))
+    assert cell_at(batch, 2, 2) == ([11, 0, 1, 0], True), "the NPC is seen, the cell is shut"
+    play(batch, body(Body.NONE))
+    assert cell_at(batch, 2, 2) == ([4, 0, CLOSED, 0], True)
+    assert entity(batch, 1, Field.X) == [3]
+
+
+def test_a_thing_that_vanishes_under_an_npc_leaves_floor() -> None:
+    gone = [(Op.VANISH, constant(2))]
+    activity = [(Op.IF_EQ, Register.T, constant(2), 1), (Op.BODY, constant(Body.FORWARD))]
+    batch = npc_program(activity, at=((1, 1), (2, 2), (2, 2)), objects=("door",), rules=gone)
+    play(batch, body(Body.NONE))
+    assert cell_at(batch, 2, 2) == ([11, 0, 1, 0], False)
+    play(batch, body(Body.NONE))
+    assert cell_at(batch, 2, 2) == ([1, 0, 0, 0], False)
+
+
+def test_of_two_in_one_cell_the_other_reappears() -> None:
+    rules = [(Op.IF_EQ, Register.T, constant(1), 2), (Op.VANISH, constant(1)), (Op.VANISH, constant(3))]
+    room = Assembly(
+        at=((1, 1), (2, 2), (2, 2), (3, 3), (3, 3)), npcs=2, objects=("lava", "door"), rules=rules
+    )
+    batch = batch_of(room.program())
+    assert cell_at(batch, 2, 2) == ([11, 0, 1, 0], False)
+    assert cell_at(batch, 3, 3) == ([9, 0, 0, 0], False)
+    play(batch, body(Body.NONE))
+    assert cell_at(batch, 2, 2) == ([11, 0, 2, 0], False)
+    assert cell_at(batch, 3, 3) == ([4, 0, CLOSED, 0], True)
+
+
+@pytest.mark.parametrize(("thing", "look"), [("door", [4, 0, OPEN, 0]), ("lava", [9, 0, 0, 0])])
+def test_the_agent_and_a_hidden_npc_in_one_cell_with_a_thing(thing: str, look: list[int]) -> None:
+    """Neither changes how the cell looks; the agent's own place in the picture reads empty."""
+    room = {"at": ((1, 2), (2, 2), (2, 2)), "npcs": 1, "objects": (thing,), "flags": HIDDEN, "reset": OPENED}
+    batch = batch_of(Assembly(**room).program())  # type: ignore[arg-type]
+    image = batch.state.image.view(np.uint8).reshape(7, 7, 4)
+    assert image[3, 5].tolist() == look
+    play(batch, body(Body.FORWARD))
+    assert entity(batch, 0, *POSE) == [2, 2, 0]
+    assert image[3, 6].tolist() == [1, 0, 0, 0]
+    assert cell_at(batch, 2, 2) == (look, False)
+    play(batch, body(Body.FORWARD), body(Body.RIGHT), body(Body.RIGHT))
+    assert image[3, 5].tolist() == look, "turned round, it sees the thing again"
+
+
+def test_lava_under_a_hidden_npc_is_deadly() -> None:
+    room = {"at": ((1, 2), (2, 2), (2, 2)), "npcs": 1, "objects": ("lava",), "flags": HIDDEN, "deadly": True}
+    batch = batch_of(Assembly(**room).program())  # type: ignore[arg-type]
+    play(batch, body(Body.FORWARD))
+    assert batch.state.registers[0, Register.OUTCOME] == 2
