@@ -27,7 +27,7 @@ def episode(seed: int, index: int, number: int) -> int:
 
 def attempt(key: int, number: int) -> int:
     """The key of the draws of a room: that of the episode, until a room was refused."""
-    return key if number == 0 else scramble(key + number * STRIDE)
+    return key if number == 0 else scramble(key + (TEST_SET | number) * STRIDE)
 
 
 def bits(key: int, path: str, step: int, number: int) -> int:

@@ -253,23 +253,34 @@ def of_data(
     given: Mapping[str, str] | None = None,
     files: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Script:
-    """The records of plain data; `files` holds the data of the npc files of each member that is one of several."""
+    """The records of plain data; `files` holds the npc files of each member that is one of several."""
     params = {
         name: parameter(entry, (given or {}).get(name)) for name, entry in data.get("params", {}).items()
     }
     data = dict(substituted(tuples(data), params))
     frames: dict[str, Any] = dict(data.get("frames", {}))
     known: dict[str, dict[str, Member]] = {}
-    for name, npcs in (files or {}).items():
+    for name, npcs in (files or written_out(data["cast"])).items():
         known[name] = {}
         for npc, entry in npcs.items():
             entry = dict(tuples(entry))
             frames = {**entry.pop("frames", {}), **frames}
-            known[name][npc] = member_of({key: entry[key] for key in entry if key not in ("npc", "abstract")})
+            known[name][npc] = member_of(
+                {key: entry[key] for key in entry if key not in ("npc", "abstract", "about", "notes")}
+            )
     for key in ("about", "skills", "notes", "abstract", "check"):
         data.pop(key, None)
     data |= {"frames": frames, "params": params, "files": known}
     return record(Script, data, READERS)
+
+
+def written_out(cast: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """The npc files of members whose `one_of` holds what is in the files, not their names."""
+    return {
+        name: {npc["npc"]: npc for npc in member["one_of"]}
+        for name, member in cast.items()
+        if member and isinstance(member.get("one_of"), tuple)
+    }
 
 
 def parameter(entry: Any, given: str | None) -> Any:
