@@ -1,0 +1,207 @@
+"""Which registers decide how an episode can go on: two states that agree on them are one state to a search.
+
+Everything a program does after a reset lies in the code at a few addresses. What no instruction there reads, such as
+the time or what was heard so far, cannot matter. Where it is in doubt a register counts as read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.program import (
+    CONSTANT,
+    ENTITY_FIELDS,
+    FIRST_ENTITY,
+    TEMPORARY,
+    TESTS,
+    Field,
+    FrameColumn,
+    Header,
+    LineColumn,
+    Op,
+    Program,
+    Register,
+)
+
+_UNLIMITED = np.iinfo(np.int16).max
+_ADDRESSES = (Header.SETTLE_PC, Header.RULES_PC, Header.BEFORE_PC, Header.LINKS_PC)
+
+_OF_ONE_STEP = (
+    Register.ACTION,
+    Register.CLASS,
+    Register.TEMPLATE,
+    Register.NOUN,
+    Register.UTTERANCE,
+    Register.POKED,
+    Register.SAID_LINE,
+    Register.LAST_TURN,
+)
+"""Written anew in every step; code can read what the last step left only at BEFORE_PC."""
+
+_RECORDS = (Register.HEARD, Register.LOGGED, Register.TOKENS, Register.ATTEMPT, Register.ACCEPTED)
+"""For the observation and for resets alone."""
+
+_WHOLE_UTTERANCE = (Register.TEMPLATE, Register.NOUN, Register.UTTERANCE)
+
+_READ: dict[Op, tuple[int, ...]] = {
+    **dict.fromkeys((Op.HALT, Op.SKIP, Op.IF_UNPINNED, Op.IF_CHANCE, Op.GOTO, Op.COUNT, Op.END), ()),
+    **dict.fromkeys((Op.IF_EQ, Op.IF_NE, Op.IF_LT, Op.IF_LE, Op.IF_BIT), (0, 1)),
+    Op.IF_HEARD: (0,),
+    **dict.fromkeys(map(Op, range(Op.IF_SAME_CELL, Op.IF_UNOBSTRUCTED + 1)), (0, 1)),
+    **dict.fromkeys((Op.LOAD, Op.ABS, Op.FIELD, Op.DRAW, Op.CELL_OF), (1,)),
+    **dict.fromkeys((Op.COUNT_BITS, Op.LOWEST_BIT, Op.PICK_BIT), (1,)),
+    **dict.fromkeys((Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.MOD, Op.MIN, Op.MAX), (1, 2)),
+    **dict.fromkeys((Op.DISTANCE, Op.QUADRANT), (1, 2)),
+    Op.SET_BIT: (0, 1),
+    Op.SEES: (0, 1, 2),
+    Op.SET_FIELD: (0, 2),
+    **dict.fromkeys((Op.BECOME, Op.SAY, Op.TURN_TO, Op.GO_TO, Op.GO_NEXT_TO), (0, 1)),
+    **dict.fromkeys((Op.VANISH, Op.BODY), (0,)),
+}
+"""Positions of the operands that are read; of other instructions all may be."""
+
+_COMPARISONS = (Op.IF_EQ, Op.IF_NE, Op.IF_LT, Op.IF_LE)
+_DRAWS = (Op.DRAW, Op.PICK_BIT, Op.PICK_CELL)
+_CHANCY = (Op.IF_CHANCE, Op.TURN_TO, Op.GO_TO, Op.GO_NEXT_TO)
+_VALUES = (*map(Op, range(Op.LOAD, Op.ABS + 1)), Op.FIELD, Op.DISTANCE, Op.QUADRANT, Op.SET_BIT, Op.COUNT_BITS,
+           Op.LOWEST_BIT, Op.SEES, Op.CELL_OF)  # fmt: skip
+
+Instruction = tuple[Op, tuple[int, int, int]]
+
+
+@dataclass(frozen=True)
+class Relevance:
+    """What matters in a program's states.
+
+    Attributes:
+        registers: numbers of the registers that decide how an episode goes on.
+        limits: for each of them the value from which on all values are alike.
+        whole_utterance: whether utterances of one class may have different effects.
+        chance: whether anything but what is said is drawn after the reset.
+    """
+
+    registers: NDArray[np.intp]
+    limits: NDArray[np.int16]
+    whole_utterance: bool
+    chance: bool
+
+    @classmethod
+    def of(cls, program: Program) -> Relevance:
+        """Find out from the code."""
+        blocks = [list(_block(program, pc)) for pc in sorted(set(_entries(program))) if pc != 0]
+        limits = _limits(blocks)
+        limits |= _of_entities(program, blocks)
+        before = program.header(Header.BEFORE_PC)
+        read_before = set(_limits([list(_block(program, before))])) if before else set()
+        ignored: set[int] = {register for register in _OF_ONE_STEP if register not in read_before} | set(
+            _RECORDS
+        )
+        ignored |= {register for register in (Register.T, *_clocks(program)) if register not in limits}
+        ignored |= {register for register in _lasts(program) if register not in limits}
+        h = program.header
+        for first, size in ((Header.LOG, Header.LOG_SIZE), (Header.HEARD, Header.HEARD_SIZE)):
+            ignored |= set(range(h(first), h(first) + h(size)))
+        kept = [register for register in range(h(Header.REGISTERS)) if register not in ignored]
+        counting = {Register.T, *_clocks(program)}
+        return cls(
+            np.array(kept, np.intp),
+            np.array([limits[r] if r in counting else _UNLIMITED for r in kept], np.int16),
+            any(register in limits for register in _WHOLE_UTTERANCE),
+            any(_draws_matter(program, block) for block in blocks),
+        )
+
+
+def _entries(program: Program) -> Iterator[int]:
+    """Addresses of all code that a step may run."""
+    h, words = program.header, program.words
+    yield from (h(address) for address in _ADDRESSES)
+    states = h(Header.STATES) * (1 + 2 * (h(Header.CLASSES) + 1))
+    for table, size in ((Header.STATE_AT, states), (Header.OUTCOME_AT, 8 * h(Header.CLASSES))):
+        yield from (int(pc) for pc in words[h(table) : h(table) + size])
+
+
+def _block(program: Program, start: int) -> Iterator[Instruction]:
+    """The instructions that can be reached from an address."""
+    code = program.code.tolist()
+    waiting, reached = [start], set()
+    while waiting:
+        pc = waiting.pop()
+        if pc in reached:
+            continue
+        reached.add(pc)
+        op, a, b, c = code[pc]
+        yield Op(op), (a, b, c)
+        if op == Op.HALT:
+            continue
+        if op == Op.SKIP or op in TESTS:
+            waiting.append(pc + 1 + c)
+        if op != Op.SKIP:
+            waiting.append(pc + 1)
+
+
+def _limits(blocks: list[list[Instruction]]) -> dict[int, int]:
+    """Each register that is read, with the value from which on no comparison tells its values apart."""
+    limits: dict[int, int] = {}
+    for block in blocks:
+        for op, operands in block:
+            for position in _READ.get(op, (0, 1, 2)):
+                register = operands[position]
+                if not 0 <= register < TEMPORARY:
+                    continue
+                limit = _UNLIMITED
+                if op in _COMPARISONS and operands[1 - position] >= CONSTANT // 2:
+                    limit = min(max(operands[1 - position] - CONSTANT, -1) + 1, _UNLIMITED)
+                limits[register] = max(limits.get(register, 0), limit)
+    return limits
+
+
+def _of_entities(program: Program, blocks: list[list[Instruction]]) -> dict[int, int]:
+    """What instructions read of entities by name of the field; the last turn is the only one that may be left out."""
+    if any(op == Op.FIELD and operands[2] == Field.LAST for block in blocks for op, operands in block):
+        return dict.fromkeys(_lasts(program), _UNLIMITED)
+    return {}
+
+
+def _lasts(program: Program) -> list[int]:
+    return [FIRST_ENTITY + ENTITY_FIELDS * number + Field.LAST for number in range(len(program.entities))]
+
+
+def _clocks(program: Program) -> list[int]:
+    start, rows = program.header(Header.FRAME_AT), program.header(Header.FRAMES)
+    table = program.words[start : start + rows * FrameColumn.COLUMNS].reshape(rows, FrameColumn.COLUMNS)
+    return [int(register) for register in table[:, FrameColumn.CLOCK]]
+
+
+def _draws_matter(program: Program, block: list[Instruction]) -> bool:
+    """Whether chance decides anything there but which line is said, to somebody for whom lines are only words."""
+    if any(op in _CHANCY for op, _ in block):
+        return True
+    drawn = {operands[0] for op, operands in block if op in _DRAWS}
+    while True:
+        more = {
+            operands[0]
+            for op, operands in block
+            if op in _VALUES and any(operands[position] in drawn for position in _READ[op])
+        } - drawn
+        if not more:
+            break
+        drawn |= more
+    if any(0 <= register < TEMPORARY for register in drawn):
+        return True
+    for op, operands in block:
+        if op in _VALUES or op in _DRAWS:
+            continue
+        used = [position for position in _READ.get(op, (0, 1, 2)) if operands[position] in drawn]
+        if used and not (op == Op.SAY and used == [1] and not _lines_are_triggers(program)):
+            return True
+    return False
+
+
+def _lines_are_triggers(program: Program) -> bool:
+    start, lines = program.header(Header.LINE_AT), program.header(Header.LINES)
+    table = program.words[start : start + lines * LineColumn.COLUMNS].reshape(lines, LineColumn.COLUMNS)
+    return bool((table[:, LineColumn.CLASS] > 1).any())

@@ -1,0 +1,211 @@
+"""Whether a room can be solved at all: a search through everything that the agent can do in it.
+
+States are searched breadth first and played on in batches by the engine itself, so the search knows no rule of its
+own. Two states are one if they agree on everything that decides how they go on (`relevance`), whatever the time: the
+first to be found is the earlier one, and with more time left nothing is lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.draws import GOLDEN, MASK, mix
+from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.state import Key
+from socialai_dsl.envs.relevance import Relevance
+from socialai_dsl.envs.table import Table
+from socialai_dsl.envs.vector_env import ScenarioVectorEnv
+from socialai_dsl.program import Header, Program, Register
+
+STATES: Final = 300_000
+"""How many different states a search looks at before it gives up."""
+
+_ROWS: Final = 4096
+_CHANCES: Final = 6
+"""How many draws are tried of each step in which something is drawn; the first is the episode's own."""
+
+
+class Verdict(Enum):
+    """What a search found."""
+
+    SOLVABLE = "solvable"
+    UNSOLVABLE = "unsolvable"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a search found out about one room.
+
+    Attributes:
+        verdict: undecided where there are more states than it may look at.
+        states: how many different states it looked at.
+        plan: actions of a success, int64 (4,) each; None without one, or where it needs chance to fall otherwise.
+        exact: False where chance may still open a way that was not drawn.
+    """
+
+    verdict: Verdict
+    states: int
+    plan: tuple[NDArray[np.int64], ...] | None
+    exact: bool
+
+
+def search_rooms(envs: ScenarioVectorEnv, rows: list[int], states: int = STATES) -> Iterator[Finding]:
+    """Search the rooms that these environments are in, one after the other; the environments stay as they are."""
+    searches: dict[str, Search] = {}
+    table = envs._table
+    for row in rows:
+        program = table.program(row)
+        if program.sha256 not in searches:
+            searches[program.sha256] = Search(program)
+        state = table.state
+        yield searches[program.sha256].solve(state.registers[row], state.boards[row], state.keys[row], states)
+
+
+@dataclass
+class _Layer:
+    """States that are reached in the same number of steps, and how: (S, ...) each."""
+
+    registers: NDArray[np.int16]
+    boards: NDArray[np.uint32]
+    keys: NDArray[np.uint64]
+    nodes: NDArray[np.int64]  # number of each state in the tree
+
+
+class Search:
+    """Searches rooms of one program."""
+
+    def __init__(self, program: Program) -> None:
+        self._program = program
+        self._relevance = Relevance.of(program)
+        actions = _useful_actions(program, self._relevance.whole_utterance)
+        chances = _CHANCES if self._relevance.chance else 1
+        self._actions = np.repeat(actions, chances, axis=0)
+        self._marks = np.tile(
+            np.array([mix(k * GOLDEN) & MASK if k else 0 for k in range(chances)], np.uint64), len(actions)
+        )
+        self._at_once = max(1, _ROWS // len(self._actions))
+        self._table = Table([program], self._at_once * len(self._actions), 1)
+        self._table.reset(0, None)
+        self._wins = np.array([outcome.success for outcome in program.outcome_table] + [False])
+        generator = np.random.default_rng(0)
+        self._multipliers = generator.integers(
+            0, 1 << 63, len(self._relevance.registers), np.uint64
+        ) * np.uint64(2) + np.uint64(1)
+
+    def solve(
+        self,
+        registers: NDArray[np.int16],
+        board: NDArray[np.uint32],
+        key: NDArray[np.uint64],
+        states: int = STATES,
+    ) -> Finding:
+        """Search from one state: registers, int16 (R,), board, uint32 (C,), key, uint64 (Key.WORDS,)."""
+        state = self._table.state
+        layer = _Layer(
+            registers[None, : state.registers.shape[1]].copy(),
+            board[None, : state.boards.shape[1]].copy(),
+            key[None].copy(),
+            np.zeros(1, np.int64),
+        )
+        # Rows of another batch name programs by their place in it.
+        own = [Key.PROGRAM, Key.POOL]
+        layer.keys[:, own] = state.keys[0, own]
+        self._parents, self._choices = [-1], [-1]
+        self._seen = set(self._digests(layer.registers).tolist())
+        while len(layer.nodes):
+            following: list[_Layer] = []
+            for first in range(0, len(layer.nodes), self._at_once):
+                part = slice(first, first + self._at_once)
+                winner = self._expand(layer, part, following)
+                if winner is not None:
+                    return Finding(Verdict.SOLVABLE, len(self._parents), self._plan(*winner), True)
+                if len(self._parents) > states:
+                    return Finding(Verdict.UNDECIDED, len(self._parents), None, False)
+            layer = _joined(following, layer)
+        return Finding(Verdict.UNSOLVABLE, len(self._parents), None, not self._relevance.chance)
+
+    def _expand(self, layer: _Layer, part: slice, following: list[_Layer]) -> tuple[int, int] | None:
+        """Do everything in a part of the states; the node and choice of a success, or the new states are noted."""
+        state, ports = self._table.state, self._table.batch.ports
+        nodes, choices = layer.nodes[part], len(self._actions)
+        used = len(nodes) * choices
+        state.registers[:used] = np.repeat(layer.registers[part], choices, axis=0)
+        state.registers[used:, Register.ENDED] = 1
+        state.boards[:used] = np.repeat(layer.boards[part], choices, axis=0)
+        keys = np.repeat(layer.keys[part], choices, axis=0)
+        episode_keys = keys[:, Key.KEY].copy()
+        keys[:, Key.KEY] ^= np.tile(self._marks, len(nodes))
+        state.keys[:used] = keys
+        ports.actions[:used] = np.tile(self._actions, (len(nodes), 1))
+        self._table.batch.step(Task.STEP_ONLY)
+
+        reached = state.registers[:used]
+        ended = reached[:, Register.ENDED] != 0
+        wins = np.flatnonzero(ended & self._wins[reached[:, Register.OUTCOME]])
+        if len(wins):
+            # Of several take one without foreign chance, if there is one.
+            best = min(wins.tolist(), key=lambda row: int(self._marks[row % choices] != 0))
+            return int(nodes[best // choices]), best % choices
+        going = np.flatnonzero(~ended)
+        digests = self._digests(reached[going])
+        # Of the same state reached twice the first row counts: among them the episode's own chance comes first.
+        _, firsts = np.unique(digests, return_index=True)
+        new = [k for k in np.sort(firsts).tolist() if int(digests[k]) not in self._seen]
+        if not new:
+            return None
+        self._seen.update(digests[new].tolist())
+        rows = going[new]
+        count = len(self._parents)
+        self._parents += nodes[rows // choices].tolist()
+        self._choices += (rows % choices).tolist()
+        keys = state.keys[rows].copy()
+        keys[:, Key.KEY] = episode_keys[rows]
+        following.append(
+            _Layer(
+                state.registers[rows].copy(),
+                state.boards[rows].copy(),
+                keys,
+                np.arange(count, count + len(rows)),
+            )
+        )
+        return None
+
+    def _digests(self, registers: NDArray[np.int16]) -> NDArray[np.uint64]:
+        """One number for each state, (S,): equal for equal states, else almost surely different."""
+        relevant = np.minimum(registers[:, self._relevance.registers], self._relevance.limits)
+        digests: NDArray[np.uint64] = relevant.astype(np.int64).view(np.uint64) @ self._multipliers
+        return digests
+
+    def _plan(self, node: int, choice: int) -> tuple[NDArray[np.int64], ...] | None:
+        choices = [choice]
+        while self._parents[node] >= 0:
+            choices.append(self._choices[node])
+            node = self._parents[node]
+        if any(self._marks[one] != 0 for one in choices):
+            return None
+        return tuple(self._actions[one].copy() for one in reversed(choices))
+
+
+def _useful_actions(program: Program, whole_utterance: bool) -> NDArray[np.int64]:
+    """Every body action with silence and with one utterance of each class, or with every one, int64 (A, 4)."""
+    h = program.header
+    start, nouns = h(Header.CLASS_AT), h(Header.NOUNS)
+    classes = program.words[start : start + h(Header.TEMPLATES) * nouns]
+    pairs = np.arange(len(classes)) if whole_utterance else np.unique(classes, return_index=True)[1]
+    said = [(0, 0, 0), *((1, int(pair) // nouns, int(pair) % nouns) for pair in pairs)]
+    return np.array([(body, *words) for body in range(h(Header.PRIMITIVES) + 1) for words in said], np.int64)
+
+
+def _joined(layers: list[_Layer], empty_like: _Layer) -> _Layer:
+    if not layers:
+        return _Layer(*(array[:0] for array in vars(empty_like).values()))
+    return _Layer(
+        *(np.concatenate(arrays) for arrays in zip(*(vars(one).values() for one in layers), strict=True))
+    )
