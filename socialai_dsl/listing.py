@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from socialai_dsl.program import (
+    CELL,
     CONSTANT,
     ENTITY_FIELDS,
     FIRST_ENTITY,
@@ -16,10 +17,18 @@ from socialai_dsl.program import (
     Register,
 )
 
-_ENTITIES = frozenset({*range(Op.IF_SAME_CELL, Op.IF_REACHES + 1), Op.GO_TO, Op.GO_NEXT_TO})
+_ENTITIES = frozenset({*range(Op.IF_SAME_CELL, Op.IF_UNOBSTRUCTED + 1), Op.GO_TO, Op.GO_NEXT_TO})
 _FIRST_IS_ENTITY = _ENTITIES | {Op.PUT, Op.SAY, Op.TURN_TO, Op.BECOME, Op.VANISH, Op.SET_FIELD}
-_SECOND_IS_ENTITY = _ENTITIES | {Op.FIELD, Op.DISTANCE, Op.QUADRANT, Op.B_NEXT_TO, Op.B_IN_FRONT_OF}
-_THIRD_IS_ENTITY = frozenset({Op.DISTANCE, Op.QUADRANT})
+_SECOND_IS_ENTITY = _ENTITIES | {
+    Op.FIELD,
+    Op.DISTANCE,
+    Op.QUADRANT,
+    Op.SEES,
+    Op.CELL_OF,
+    Op.B_NEXT_TO,
+    Op.B_IN_FRONT_OF,
+}
+_THIRD_IS_ENTITY = frozenset({Op.DISTANCE, Op.QUADRANT, Op.SEES, Op.NEAREST_CELL})
 _LITERALS: dict[Op, tuple[int, ...]] = {
     Op.IF_UNPINNED: (),
     Op.IF_CHANCE: (0, 1),
@@ -35,10 +44,19 @@ _LITERALS: dict[Op, tuple[int, ...]] = {
     Op.GO_TO: (2,),
     Op.GO_NEXT_TO: (2,),
     Op.PICK_CELL: (1, 2),
+    **dict.fromkeys((Op.FIRST_CELL, Op.NEAREST_CELL, Op.B_COUNT), (1,)),
     **dict.fromkeys(map(Op, range(Op.B_FLOOR, Op.B_FREE + 1)), (0,)),
     Op.B_WALL: (0, 1, 2),
     **dict.fromkeys((Op.B_AND, Op.B_OR, Op.B_WITHOUT, Op.B_COPY), (0, 1)),
     Op.EACH_CELL: (0,),
+}
+_ENTRIES = {
+    Header.RESET_PC: "reset",
+    Header.REQUIRE_PC: "require",
+    Header.BEFORE_PC: "before",
+    Header.LINKS_PC: "links",
+    Header.SETTLE_PC: "settle",
+    Header.RULES_PC: "rules",
 }
 
 
@@ -54,6 +72,7 @@ def _head(program: Program) -> list[str]:
         f"  {h(Header.SIZE)} words, {h(Header.REGISTERS)} registers, {h(Header.INSTRUCTIONS)} instructions, "
         f"{h(Header.CLASSES)} utterance classes, {h(Header.LINES)} lines, history of {h(Header.TOKENS)} tokens",
         f"  canvas {h(Header.CANVAS_WIDTH)}x{h(Header.CANVAS_HEIGHT)}, horizon {h(Header.HORIZON)}",
+        "  " + ", ".join(f"{name} at {h(word)}" for word, name in _ENTRIES.items() if h(word)),
     ]
 
 
@@ -146,15 +165,31 @@ class _Names:
         if word >= CONSTANT // 2:
             value = word - CONSTANT
             entity = (op in _FIRST_IS_ENTITY, op in _SECOND_IS_ENTITY, op in _THIRD_IS_ENTITY)[position]
-            return str(self.program.entities[value]) if entity else f"#{value}"
+            return self._place(value) if entity else f"#{value}"
         if word >= TEMPORARY:
             return f"%{word - TEMPORARY}"
         if word == 0 and position >= _least_operands(op):
             return "0"
         return self.registers.get(word, f"r{word}")
 
+    def _place(self, number: int) -> str:
+        """An entity by its name, a cell by its coordinates."""
+        if number < CELL:
+            return str(self.program.entities[number])
+        return f"({(number - CELL) % 32}, {(number - CELL) // 32})"
+
 
 def _least_operands(op: Op) -> int:
     one = (Op.COUNT, Op.BODY, Op.VANISH, Op.IF_UNPINNED, Op.B_FLOOR, Op.B_FREE)
-    three = (*range(Op.ADD, Op.ABS), Op.FIELD, Op.DISTANCE, Op.QUADRANT, Op.DRAW, Op.PICK_BIT, Op.SET_FIELD)
+    three = (
+        *range(Op.ADD, Op.ABS),
+        Op.FIELD,
+        Op.DISTANCE,
+        Op.QUADRANT,
+        Op.DRAW,
+        Op.PICK_BIT,
+        Op.SEES,
+        Op.NEAREST_CELL,
+        Op.SET_FIELD,
+    )
     return 1 if op in one else 3 if op in three else 2

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 
-from socialai_dsl.compiler.assembler import CodeTable, Sites
+from socialai_dsl.compiler.assembler import Block, CodeTable, Sites
 from socialai_dsl.compiler.behaviour import Behaviour
 from socialai_dsl.compiler.classes import Classes
+from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.lines import Lines
+from socialai_dsl.compiler.memories import push_acts, remember
 from socialai_dsl.compiler.outcomes import outcome_table
 from socialai_dsl.compiler.registers import Registers
-from socialai_dsl.compiler.setup import reset_code
+from socialai_dsl.compiler.setup import require, reset
+from socialai_dsl.compiler.statuses import ComputedStatuses, links
 from socialai_dsl.compiler.tables import Tables
 from socialai_dsl.compiler.verifier import verify
-from socialai_dsl.program import Program
+from socialai_dsl.compiler.world_rules import world_rules
+from socialai_dsl.program import Flag, Header, Program
 from socialai_dsl.semantics.terms import Checked
 
 __all__ = ["compile_loaded", "compile_scenario", "verify"]
@@ -32,14 +37,29 @@ def compile_scenario(checked: Checked) -> Program:
     lines = Lines(checked, classes)
     code = CodeTable()
     tables = Tables(checked, registers, classes, sites, lines, code)
+    computed = ComputedStatuses(checked)
 
-    reset_pc = code.add(reset_code(checked, registers, classes, sites), "reset")
+    def entry(label: str, *emitters: Callable[[Expressions], None]) -> int:
+        to = Expressions(Block(), checked, registers, classes, sites)
+        for emit in emitters:
+            emit(to)
+        return code.add(to.block, label)
+
+    entries = {Header.RESET_PC: entry("reset", lambda to: reset(to, computed))}
     inboxes = tables.reserve_inboxes()
     behaviour = Behaviour(checked, registers, classes, sites, lines, code, [], inboxes)
     frames = [(frame, behaviour.rows(number, frame)) for number, frame in enumerate(checked.frames)]
+    entries |= {
+        Header.REQUIRE_PC: entry("require", require),
+        Header.BEFORE_PC: entry("before", remember),
+        Header.LINKS_PC: entry("links", links),
+        Header.SETTLE_PC: entry("settle", computed.settle),
+        Header.RULES_PC: entry("rules", push_acts, lambda to: world_rules(to, lines, behaviour.rules)),
+    }
     outcomes = outcome_table(checked, registers, classes, sites, code)
+    flags = Flag.SETTLE_ALWAYS if computed.settle_always else 0
 
-    program = tables.program(reset_pc, frames, outcomes, tuple(behaviour.rules))
+    program = tables.program(entries, flags, frames, outcomes, tuple(behaviour.rules))
     verify(program)
     assert program.words.dtype == np.int32, "internal: a program is a vector of int32"
     return program

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.expressions import Expressions
+from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.registers import entity_register
 from socialai_dsl.program import Body, Field, Op
 from socialai_dsl.semantics.terms import Activity, Checked, Const, ObjectType, Term
@@ -14,10 +15,10 @@ GOING = ("go_to", "go_next_to", "enter")
 
 
 class Activities:
-    """Emits the activities of one cast member through `to`."""
+    """Emits the activities of one cast member through `to`; `clock` is the register of its frame's clock."""
 
-    def __init__(self, to: Expressions, checked: Checked, entity: int) -> None:
-        self.to, self.checked, self.entity = to, checked, entity
+    def __init__(self, to: Expressions, checked: Checked, lines: Lines, entity: int, clock: int) -> None:
+        self.to, self.checked, self.lines, self.entity, self.clock = to, checked, lines, entity, clock
         self.turn = to.sites.row(f"cast.{checked.entities[entity].key}.turn")
 
     def emit(self, activity: Activity) -> None:
@@ -44,6 +45,8 @@ class Activities:
                 self._use(to.value(activity.args[0]))
             case "enter":
                 self._enter(activity.args[0])
+            case "perform":
+                self._perform(activity)
             case "choose":
                 self._choose(activity)
 
@@ -105,6 +108,22 @@ class Activities:
         self._use(entity)
         block.bind(done)
 
+    def _perform(self, activity: Activity) -> None:
+        """In turn k of the state the k-th move and utterance, after the last nothing."""
+        block = self.to.block
+        done = Label()
+        for k, (move, utterance) in enumerate(_elements(activity)):
+            following = Label()
+            mark = block.taken
+            block.test(Op.IF_EQ, self.clock, constant(k), following)
+            block.emit(Op.BODY, self.to.value(move))
+            self.lines.perform(self.to, self.checked.entities[self.entity], utterance)
+            block.skip(done)
+            block.bind(following)
+            block.release(mark)
+        block.emit(Op.BODY, constant(Body.NONE))
+        block.bind(done)
+
     def _choose(self, activity: Activity) -> None:
         block = self.to.block
         weights = activity.weights or (1,) * len(activity.args)
@@ -125,12 +144,14 @@ class Activities:
     def unless_finished(self, activity: Activity, otherwise: Label) -> None:
         """Fall through if the activity is finished, else skip; what has no end of its own lasts one step."""
         to, block = self.to, self.to.block
-        if activity.name not in (*GOING, "use"):
+        if activity.name not in (*GOING, "use", "perform"):
             return
         to.site, block.span = activity.site, activity.span
         own = constant(self.entity)
         mark = block.taken
-        if activity.name == "use":
+        if activity.name == "perform":
+            block.test(Op.IF_LE, constant(len(_elements(activity))), self.clock, otherwise)
+        elif activity.name == "use":
             last = entity_register(self.entity, Field.LAST)
             goal = to.value(activity.args[0])
             block.test(Op.IF_EQ, last, constant(Body.TOGGLE), otherwise)
@@ -139,6 +160,11 @@ class Activities:
             op = Op.IF_NEXT_TO if activity.name == "go_next_to" else Op.IF_SAME_CELL
             block.test(op, own, to.value(activity.args[0]), otherwise)
         block.release(mark)
+
+
+def _elements(activity: Activity) -> list[tuple[Term, Term]]:
+    """Moves and utterances of a sequence."""
+    return list(zip(activity.args[::2], activity.args[1::2], strict=True))
 
 
 def _kind_of(checked: Checked, goal: Term) -> ObjectType:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from socialai_dsl.draws import site as site_number
-from socialai_dsl.program import CONSTANT, TEMPORARIES, TEMPORARY, Op
+from socialai_dsl.program import BOARDS, CONSTANT, TEMPORARIES, TEMPORARY, Op
 from socialai_dsl.source import Span
 
 LARGEST = CONSTANT // 2 - 1
@@ -51,6 +51,7 @@ class Block:
         self.spans: list[Span | None] = []
         self.span: Span | None = None
         self._temporaries = 0
+        self._boards = 0
 
     def emit(self, op: Op, a: int = 0, b: int = 0, c: int = 0) -> None:
         """Append an instruction, attributed to `self.span`."""
@@ -95,6 +96,21 @@ class Block:
     def taken(self) -> int:
         """How many temporaries are in use."""
         return self._temporaries
+
+    def board(self) -> int:
+        """A fresh board."""
+        self._boards += 1
+        assert self._boards <= BOARDS, "internal: a set of cells needs more boards than the engine has"
+        return self._boards - 1
+
+    def release_boards(self, mark: int) -> None:
+        """Give back the boards from number `mark` on."""
+        self._boards = mark
+
+    @property
+    def boards_taken(self) -> int:
+        """How many boards are in use."""
+        return self._boards
 
 
 class CodeTable:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from socialai_dsl.compiler.activities import GOING, Activities
 from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Sites, constant
 from socialai_dsl.compiler.classes import Classes
-from socialai_dsl.compiler.expressions import Expressions
+from socialai_dsl.compiler.effects import Effects
+from socialai_dsl.compiler.expressions import Expressions, chance_word
 from socialai_dsl.compiler.folding import FALSE, SEVERAL, Facts, fold
 from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.registers import Registers, state_names
-from socialai_dsl.program import Field, Op
+from socialai_dsl.program import Op
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.terms import BOOL, Checked, Effect, FramePlan, RulePlan, Sited, StepPlan
+from socialai_dsl.semantics.terms import BOOL, Checked, FramePlan, RulePlan, StepPlan
 
 FOR_EVER = -1
 
@@ -109,80 +111,19 @@ class _FrameCompiler:
         return self.shared.code.add(to.block, f"{label}.do")
 
     def _activities(self, to: Expressions) -> Activities:
-        return Activities(to, self.shared.checked, self.frame.entity)
+        shared = self.shared
+        return Activities(to, shared.checked, shared.lines, self.frame.entity, self.clock)
 
     def _idle_row(self) -> list[int]:
         return [0] * (1 + 2 * (self.shared.classes.count + 1))
 
     def _effects(self, to: Expressions, what: RulePlan | StepPlan, failed: Label) -> None:
-        """Compute all values first, then act: set, cause, say (the body action comes before, `goto` after)."""
-        block = to.block
-        to.failed = failed
-        values = [(path, sited, self._kept(to, sited)) for path, sited in what.sets]
-        entities = [self._targets(to, effect) for effect in what.causes]
-        line = None
-        if what.say is not None:
-            line = self.shared.lines.say(to, self.shared.checked.entities[self.frame.entity], what.say)
-        to.failed = None
-        block.span = what.span
-        block.emit(Op.COUNT, self.counters[what.name])
+        """What a rule does (its body action first, `goto` comes after), or a step at its end."""
+        speaker = self.shared.checked.entities[self.frame.entity]
+        body = None
         if isinstance(what, RulePlan) and what.do is not None:
-            self._activities(to).emit(what.do)
-            block.span = what.span
-        for path, sited, value in values:
-            self._store(to, path, sited, value)
-        for effect, targets in zip(what.causes, entities, strict=True):
-            for term, entity in zip(effect.entities, targets, strict=True):
-                self._cause(to, effect, term, entity)
-        if line is not None:
-            block.emit(Op.SAY, constant(self.frame.entity), line)
-
-    @staticmethod
-    def _targets(to: Expressions, effect: Effect) -> list[int]:
-        to.site = effect.site
-        return [to.value(entity) for entity in effect.entities]
-
-    @staticmethod
-    def _kept(to: Expressions, sited: Sited) -> int:
-        """A value in a temporary, so that no later effect of the same rule can change it."""
-        value = to.sited_value(sited)
-        kept = to.block.temporary()
-        to.block.emit(Op.LOAD, kept, value)
-        return kept
-
-    def _store(self, to: Expressions, path: str, sited: Sited, value: int) -> None:
-        """Registers with a range of integers saturate."""
-        name = next(name for name in self.shared.registers.names if name.path == path)
-        if not name.values:
-            to.block.emit(Op.MAX, value, value, constant(name.low))
-            to.block.emit(Op.MIN, value, value, constant(name.high))
-        to.block.emit(Op.LOAD, name.register, value)
-
-    def _cause(self, to: Expressions, effect: Effect, term: terms.Term, entity: int) -> None:
-        block = to.block
-        block.span = effect.span
-        if effect.name == "vanish":
-            block.emit(Op.VANISH, entity)
-            return
-        if effect.name == "become":
-            assert effect.value is not None
-            block.emit(Op.BECOME, entity, to.value(effect.value))
-            return
-        number = term.value if isinstance(term, terms.Const) else term.type.low
-        thing = self.shared.checked.entities[number]
-        assert thing.type is not None, "internal: only objects have a status"
-        if effect.name == "reset":
-            block.emit(Op.BECOME, entity, constant(thing.status))
-            return
-        states = thing.type.states
-        target = {"open": "open", "close": "closed", "lock": "locked", "unlock": "closed"}[effect.name]
-        done = Label()
-        if effect.name == "unlock":
-            status = block.temporary()
-            block.emit(Op.FIELD, status, entity, Field.STATUS)
-            block.test(Op.IF_EQ, status, constant(states.index("locked")), done)
-        block.emit(Op.BECOME, entity, constant(states.index(target)))
-        block.bind(done)
+            body = partial(self._activities(to).emit, what.do)
+        Effects(to, self.shared.lines).emit(what, self.counters[what.name], failed, speaker, body)
 
     # --- frames by states ---
 
@@ -225,8 +166,7 @@ class _FrameCompiler:
         block.span = rule.span
         if rule.chance is not None:
             site = self.shared.sites.row(f"{rule.site}.chance")
-            following.uses.append(len(block.instructions))
-            block.emit(Op.IF_CHANCE, round(rule.chance * 65536), site)
+            block.test(Op.IF_CHANCE, chance_word(rule.chance), site, following)
         self._effects(to, rule, following)
         if rule.once:
             block.emit(Op.LOAD, self.once[rule.name], constant(1))

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import Any, TypeVar
 
-from socialai_dsl.semantics.terms import Checked, Pattern
+from socialai_dsl.semantics.terms import Activity, Checked, Pattern
+
+_Kind = TypeVar("_Kind")
 
 SILENCE = 0
 OTHER = 1
@@ -18,27 +20,41 @@ def normal(text: str) -> str:
 
 
 class Classes:
-    """Numbers the classes: 0 silence, 1 said but nothing any rule waits for, then one for each set of patterns."""
+    """Numbers the classes: 0 silence, 1 said but nothing any rule waits for, then one for each set of patterns.
+
+    Attributes:
+        of_pair: class of each pair that the agent says. of_performed: class of each pair that an NPC says as part of a
+        sequence; empty where nobody performs one.
+    """
 
     def __init__(self, checked: Checked) -> None:
-        self.patterns = list(dict.fromkeys(_patterns(checked)))
+        self.patterns = list(dict.fromkeys(_all(checked, Pattern)))
         self._numbers: dict[frozenset[int], int] = {frozenset(): OTHER}
         self._texts = [frozenset(normal(text) for text in pattern.said_by_npcs) for pattern in self.patterns]
         nouns = len(checked.nouns)
-        self.of_pair = [
-            self._number(frozenset(i for i, p in enumerate(self.patterns) if divmod(k, nouns) in p.pairs))
-            for k in range(len(checked.templates) * nouns)
-        ]
+        self.of_pair = [self._number(self._of_pair(k, nouns)) for k in range(len(checked.templates) * nouns)]
         for texts in self._texts:
             for text in sorted(texts):
                 self.of_text(text)
+        performs = any(activity.name == "perform" for activity in _all(checked.frames, Activity))
+        self.of_performed = [
+            self._number(self._of_pair(k, nouns) | self._of_text(text))
+            for k, text in enumerate(texts_of_pairs(checked))
+            if performs
+        ]
 
     def _number(self, signature: frozenset[int]) -> int:
         return self._numbers.setdefault(signature, len(self._numbers) + 1)
 
     def of_text(self, text: str) -> int:
         """Class of what an NPC says."""
-        return self._number(frozenset(i for i, texts in enumerate(self._texts) if normal(text) in texts))
+        return self._number(self._of_text(text))
+
+    def _of_text(self, text: str) -> frozenset[int]:
+        return frozenset(i for i, texts in enumerate(self._texts) if normal(text) in texts)
+
+    def _of_pair(self, k: int, nouns: int) -> frozenset[int]:
+        return frozenset(i for i, pattern in enumerate(self.patterns) if divmod(k, nouns) in pattern.pairs)
 
     def matching(self, pattern: Pattern) -> frozenset[int]:
         """The classes whose utterances fit the pattern."""
@@ -51,12 +67,18 @@ class Classes:
         return len(self._numbers) + 1
 
 
-def _patterns(node: Any) -> Iterator[Pattern]:
-    if isinstance(node, Pattern):
+def texts_of_pairs(checked: Checked) -> list[str]:
+    """Texts of all pairs, row by row."""
+    return [template.replace("<noun>", noun) for template in checked.templates for noun in checked.nouns]
+
+
+def _all(node: Any, kind: type[_Kind]) -> Iterator[_Kind]:
+    """All parts of this kind, in order of the fields."""
+    if isinstance(node, kind):
         yield node
-    elif isinstance(node, tuple):
+    if isinstance(node, tuple):
         for item in node:
-            yield from _patterns(item)
+            yield from _all(item, kind)
     elif is_dataclass(node):
-        for item in fields(node):
-            yield from _patterns(getattr(node, item.name))
+        for field in fields(node):
+            yield from _all(getattr(node, field.name), kind)

@@ -6,9 +6,11 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from socialai_dsl.compiler.assembler import Block, Label, Sites, constant
+from socialai_dsl.compiler.cells import LoopCell, coordinate, count_cells, one_cell
 from socialai_dsl.compiler.classes import SILENCE, Classes
 from socialai_dsl.compiler.folding import TRUE, Facts, fold, substitute
 from socialai_dsl.compiler.registers import Registers, entity_register, state_names
+from socialai_dsl.compiler.selects import selected_condition, selected_value
 from socialai_dsl.program import Field, Op, Register
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.terms import Checked, Const, Term
@@ -38,6 +40,8 @@ _TESTS = {
     "eye_contact": Op.IF_EYE_CONTACT,
     "in_line": Op.IF_IN_LINE,
     "can_reach": Op.IF_REACHES,
+    "looks_at": Op.IF_LOOKS_AT,
+    "unobstructed": Op.IF_UNOBSTRUCTED,
 }
 _ARITHMETIC = {
     "+": Op.ADD,
@@ -52,13 +56,18 @@ _COMPARE = {"==": Op.IF_EQ, "!=": Op.IF_NE, "<": Op.IF_LT, "<=": Op.IF_LE}
 _OPPOSITE = {"==": "!=", "!=": "=="}
 
 
+def chance_word(probability: float) -> int:
+    """A probability as an operand."""
+    return round(probability * 65536)
+
+
 class Expressions:
     """Emits conditions and values into one block.
 
     Attributes:
         block: where to. site: path of the picks of the value being emitted. facts: what is known. inbox: first register
         of the inbox of the member whose frame this is, or -1.
-        here: operands of x and y of the candidate cell inside the loop of a place, or None.
+        loop: the cell that the loop over cells is at, outside of loops None.
         failed: label to skip to when a pick finds nothing; None: it takes the first item.
     """
 
@@ -75,7 +84,7 @@ class Expressions:
         self.classes, self.sites, self.inbox = classes, sites, inbox
         self.site = ""
         self.facts = Facts()
-        self.here: tuple[int, int] | None = None
+        self.loop: LoopCell | None = None
         self.failed: Label | None = None
 
     # --- conditions ---
@@ -110,7 +119,19 @@ class Expressions:
                 self._about_here(term, otherwise)
             case terms.Test():
                 assert term.subject is not None
-                block.test(_TESTS[term.name], self.value(term.subject), self.value(term.object), otherwise)
+                subject = self.value(term.subject)
+                block.test(_TESTS[term.name], subject, self.value(term.object), otherwise)
+            case terms.Sees():
+                self._sees(term, otherwise)
+            case terms.Chance():
+                site = self.sites.row(term.site or self.site, term.ordinal)
+                block.test(Op.IF_CHANCE, chance_word(term.probability), site, otherwise)
+            case terms.Select():
+                selected_condition(self, term, otherwise)
+            case terms.Quantified(op="any", cells=True):
+                block.test(Op.IF_NE, count_cells(self, term), constant(0), otherwise)
+            case terms.Quantified(op="all", cells=True):
+                block.test(Op.IF_EQ, count_cells(self, term, opposite=True), constant(0), otherwise)
             case terms.Quantified(op="any" | "all"):
                 self.condition(fold(term, self.facts, self.classes), otherwise)
             case terms.PokedNow():
@@ -118,10 +139,10 @@ class Expressions:
             case terms.Spoke():
                 block.test(Op.IF_NE, Register.CLASS, constant(SILENCE), otherwise)
             case terms.Said():
-                self._one_of(Op.IF_EQ, Register.CLASS, self.classes.matching(term.pattern), otherwise)
+                self.one_of(Op.IF_EQ, Register.CLASS, self.classes.matching(term.pattern), otherwise)
             case terms.Heard():
                 heard = frozenset[int]().union(*(self.classes.matching(pattern) for pattern in term.patterns))
-                self._one_of(Op.IF_HEARD, self.inbox, heard, otherwise)
+                self.one_of(Op.IF_HEARD, self.inbox, heard, otherwise)
             case terms.InState():
                 self._in_state(term, otherwise)
             case _:  # a value of type bool
@@ -147,7 +168,7 @@ class Expressions:
         self.block.bind(false)
         return None
 
-    def _one_of(self, op: Op, left: int, numbers: frozenset[int], otherwise: Label) -> None:
+    def one_of(self, op: Op, left: int, numbers: frozenset[int], otherwise: Label) -> None:
         """Whether a class (or state) is among these numbers."""
         if not numbers:
             self.block.skip(otherwise)
@@ -168,22 +189,26 @@ class Expressions:
         frame = next(f for f in self.checked.frames if f.member == term.member and f.frame == term.frame)
         register = self.registers.by_path[f"{term.member}.frame"]
         numbers = frozenset(i for i, name in enumerate(state_names(frame)) if name == term.state)
-        self._one_of(Op.IF_EQ, register, numbers, otherwise)
+        self.one_of(Op.IF_EQ, register, numbers, otherwise)
 
     def _about_here(self, term: terms.Test, otherwise: Label) -> None:
-        assert self.here is not None, "internal: `here` outside of a place"
         assert term.name in ("next_to", "at"), f"internal: here.{term.name} is a board of its own"
-        block = self.block
-        total = block.temporary()
-        difference = block.temporary()
-        entity = self.value(term.object)
-        block.emit(Op.LOAD, total, constant(0))
-        for here, which in zip(self.here, (Field.X, Field.Y), strict=True):
-            block.emit(Op.FIELD, difference, entity, which)
-            block.emit(Op.SUB, difference, difference, here)
-            block.emit(Op.ABS, difference, difference)
-            block.emit(Op.ADD, total, total, difference)
-        block.test(Op.IF_EQ, total, constant(1 if term.name == "next_to" else 0), otherwise)
+        here = self._loop("").cell
+        self.block.test(_TESTS[term.name], here, self.value(term.object), otherwise)
+
+    def _loop(self, name: str) -> LoopCell:
+        """The cell that a variable stands for; `here` has the empty name."""
+        assert self.loop is not None, f"internal: {name or 'here'} outside of a loop over cells"
+        assert self.loop.name == name, f"internal: the variable {name or 'here'} is free"
+        return self.loop
+
+    def _sees(self, term: terms.Sees, otherwise: Label) -> None:
+        """The op takes the direction from where it leaves its answer."""
+        facing = term.facing or terms.FieldOf(terms.DIRECTION, term.viewer, "dir")
+        seen = self.into_temporary(Op.LOAD, self.value(facing))
+        target = self.value(term.target)
+        self.block.emit(Op.SEES, seen, self.value(term.viewer), target)
+        self.block.test(Op.IF_NE, seen, constant(0), otherwise)
 
     # --- values ---
 
@@ -202,32 +227,43 @@ class Expressions:
             case terms.World():
                 return int(_WORLD[term.name])
             case terms.Here():
-                assert self.here is not None, "internal: `here` outside of a place"
-                return self.here[0] if term.name == "x" else self.here[1]
+                return self._loop("").x if term.name == "x" else self._loop("").y
+            case terms.FieldOf() if term.entity.type.kind == "cell":
+                return coordinate(self, term)
             case terms.FieldOf(entity=Const(value=entity)):
                 return entity_register(entity, _FIELDS[term.name])
             case terms.FieldOf():
                 entity = self.value(term.entity)
-                return self._into_temporary(Op.FIELD, entity, _FIELDS[term.name])
+                return self.into_temporary(Op.FIELD, entity, _FIELDS[term.name])
             case terms.Operation():
                 return self._operation(term)
             case terms.Measure():
                 op = Op.DISTANCE if term.name == "distance" else Op.QUADRANT
-                return self._into_temporary(op, self.value(term.args[0]), self.value(term.args[1]))
+                return self.into_temporary(op, self.value(term.args[0]), self.value(term.args[1]))
+            case terms.CellOf():
+                of = self.value(term.entity)
+                return of if term.entity.type.kind == "cell" else self.into_temporary(Op.CELL_OF, of)
+            case terms.Select():
+                return selected_value(self, term)
+            case terms.Quantified(op="count", cells=True):
+                return count_cells(self, term)
+            case terms.Quantified(op="first" | "pick" | "nearest", cells=True):
+                return one_cell(self, term)
             case terms.Quantified(op="pick"):
                 return self._pick(term)
             case terms.Quantified(op="first"):
                 return self._chosen(term, Op.LOWEST_BIT)
             case terms.Quantified(op="count"):
-                return self._into_temporary(Op.COUNT_BITS, self._mask(term))
+                return self.into_temporary(Op.COUNT_BITS, self._mask(term))
             case terms.Quantified(op="nearest"):
                 return self._nearest(term)
             case terms.Variable():
-                raise AssertionError(f"internal: the variable {term.name} is free")
+                return self._loop(term.name).cell
             case _:
                 return self._truth_value(term)
 
-    def _into_temporary(self, op: Op, b: int, c: int = 0) -> int:
+    def into_temporary(self, op: Op, b: int, c: int = 0) -> int:
+        """A fresh temporary with the result of an instruction."""
         result = self.block.temporary()
         self.block.emit(op, result, b, c)
         return result
@@ -235,15 +271,15 @@ class Expressions:
     def _operation(self, term: terms.Operation) -> int:
         if term.op in ("abs", "neg"):
             value = self.value(term.args[0])
-            return self._into_temporary(
+            return self.into_temporary(
                 *((Op.ABS, value) if term.op == "abs" else (Op.SUB, constant(0), value))
             )
         if term.op == "turn":
-            total = self._into_temporary(Op.ADD, self.value(term.args[0]), self.value(term.args[1]))
-            return self._into_temporary(Op.MOD, total, constant(4))
+            total = self.into_temporary(Op.ADD, self.value(term.args[0]), self.value(term.args[1]))
+            return self.into_temporary(Op.MOD, total, constant(4))
         result = self.value(term.args[0])
         for arg in term.args[1:]:
-            result = self._into_temporary(_ARITHMETIC[term.op], result, self.value(arg))
+            result = self.into_temporary(_ARITHMETIC[term.op], result, self.value(arg))
         return result
 
     def _truth_value(self, term: Term) -> int:
@@ -277,20 +313,20 @@ class Expressions:
         site = self.sites.row(term.site or self.site, term.ordinal)
         if term.condition is not None:
             return self._chosen(term, Op.PICK_BIT, site)
-        return self._item(term.items, self._into_temporary(Op.DRAW, constant(len(term.items)), site))
+        return self._item(term.items, self.into_temporary(Op.DRAW, constant(len(term.items)), site))
 
     def _chosen(self, term: terms.Quantified, op: Op, site: int = 0) -> int:
         mask = self._mask(term)
         if self.failed is not None:
             self.block.test(Op.IF_NE, mask, constant(0), self.failed)
-        return self._item(term.items, self._into_temporary(op, mask, site))
+        return self._item(term.items, self.into_temporary(op, mask, site))
 
     def _item(self, items: tuple[Const, ...], position: int) -> int:
         """The item at a position that is in a temporary."""
         values = [item.value for item in items]
         if values == list(range(values[0], values[0] + len(values))):
-            return self._into_temporary(Op.ADD, position, constant(values[0])) if values[0] else position
-        result = self._into_temporary(Op.LOAD, constant(values[0]))
+            return self.into_temporary(Op.ADD, position, constant(values[0])) if values[0] else position
+        result = self.into_temporary(Op.LOAD, constant(values[0]))
         for i, value in enumerate(values[1:], 1):
             following = Label()
             self.block.test(Op.IF_EQ, position, constant(i), following)
@@ -301,14 +337,14 @@ class Expressions:
     def _nearest(self, term: terms.Quantified) -> int:
         assert term.to is not None
         block = self.block
-        result = self._into_temporary(Op.LOAD, constant(term.items[0].value))
-        least = self._into_temporary(Op.LOAD, constant(4096))
+        result = self.into_temporary(Op.LOAD, constant(term.items[0].value))
+        least = self.into_temporary(Op.LOAD, constant(4096))
         to = self.value(term.to)
         for item in term.items:
             following = Label()
             mark = block.taken
             self.condition(self.instance(term, item), following)
-            distance = self._into_temporary(Op.DISTANCE, constant(item.value), to)
+            distance = self.into_temporary(Op.DISTANCE, constant(item.value), to)
             block.test(Op.IF_LT, distance, least, following)
             block.emit(Op.LOAD, least, distance)
             block.emit(Op.LOAD, result, constant(item.value))

@@ -87,7 +87,11 @@ def _decide(term: Term) -> Term:
         )
     if isinstance(term, terms.Logic):
         return _decide_logic(term)
-    if isinstance(term, terms.Quantified) and term.op in ("any", "all"):
+    if isinstance(term, terms.Compare) and isinstance(term.left, terms.Select):
+        return _decide_compared(term, term.left)
+    if isinstance(term, terms.Select):
+        return _decide_select(term)
+    if isinstance(term, terms.Quantified) and term.op in ("any", "all") and not term.cells:
         return _decide_quantified(term)
     return term
 
@@ -103,6 +107,31 @@ def _decide_logic(term: terms.Logic) -> Term:
     if not rest:
         return _truth(not decisive)
     return rest[0] if len(rest) == 1 else replace(term, args=tuple(rest))
+
+
+def _decide_select(term: terms.Select) -> Term:
+    """Without conditions that never hold, and without what stands after one that always does."""
+    kept = []
+    default = term.default
+    for condition, value in zip(term.conditions, term.values, strict=True):
+        if not isinstance(condition, Const):
+            kept.append((condition, value))
+        elif condition.value:
+            default = value
+            break
+    if all(value == default for _, value in kept) and (not kept or isinstance(default, Const)):
+        return default
+    conditions, values = zip(*kept, strict=True)
+    return replace(term, conditions=conditions, values=values, default=default)
+
+
+def _decide_compared(term: terms.Compare, left: terms.Select) -> Term:
+    """Known values compared with a known value: which conditions make it true is known as well."""
+    if not all(isinstance(part, Const) for part in (term.right, left.default, *left.values)):
+        return term
+    values = tuple(_decide(replace(term, left=value)) for value in left.values)
+    default = _decide(replace(term, left=left.default))
+    return _decide_select(terms.Select(BOOL, left.conditions, values, default))
 
 
 def _decide_quantified(term: terms.Quantified) -> Term:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from socialai_dsl.program import (
@@ -45,12 +46,17 @@ class Ranges:
         header = program.header
         ranges = [WHOLE_REGISTER] * header(Header.REGISTERS)
         width, height = header(Header.CANVAS_WIDTH), header(Header.CANVAS_HEIGHT)
+        least = header(Header.MIN_HEIGHT)
         ranges[Register.T] = (0, header(Header.HORIZON))
-        ranges[Register.WIDTH], ranges[Register.HEIGHT] = (0, width), (0, height)
-        ranges[Register.ACTION] = ranges[Register.LAST_TURN] = (-1, 7)
+        ranges[Register.WIDTH] = (header(Header.MIN_WIDTH), width)
+        ranges[Register.HEIGHT] = (least, least + header(Header.HEIGHTS) - 1)
+        ranges[Register.ACTION] = (0, 7)
+        ranges[Register.LAST_TURN] = (-1, 7)
         ranges[Register.CLASS] = (0, header(Header.CLASSES) - 1)
         ranges[Register.TEMPLATE] = (-1, header(Header.TEMPLATES) - 1)
         ranges[Register.NOUN] = (-1, header(Header.NOUNS) - 1)
+        ranges[Register.UTTERANCE] = (0, header(Header.TEMPLATES) * header(Header.NOUNS))
+        ranges[Register.CHANGED] = ranges[Register.ACCEPTED] = (0, 1)
         ranges[Register.POKED] = (-1, header(Header.ENTITIES) - 1)
         for entity in range(header(Header.ENTITIES)):
             for which, interval in _field_ranges(program, entity, width, height).items():
@@ -74,7 +80,7 @@ def _field_ranges(program: Program, entity: int, width: int, height: int) -> dic
         Field.Y: (-1, height - 1),
         Field.DIR: (0, 3),
         Field.COLOR: (0, 5),
-        Field.STATUS: (0, max(1, len(program.entities[entity].states)) - 1),
+        Field.STATUS: (0, greatest_status(program, entity)),
         Field.GONE: (0, 1),
         Field.POKED: (0, 1),
         Field.LAST: (-1, 7),
@@ -82,11 +88,21 @@ def _field_ranges(program: Program, entity: int, width: int, height: int) -> dic
 
 
 class Known:
-    """Ranges of the temporaries on a path; a temporary that is absent was never written."""
+    """What is known on a path: ranges of temporaries, boards that are filled (what is absent was never written), and
+    whether the room has its size.
+    """
 
-    def __init__(self, ranges: Ranges, temporaries: dict[int, Interval] | None = None) -> None:
+    def __init__(self, ranges: Ranges, has_room: bool) -> None:
         self.ranges = ranges
-        self.temporaries = dict(temporaries or {})
+        self.has_room = has_room
+        self.temporaries: dict[int, Interval] = {}
+        self.boards: set[int] = set()
+
+    def copy(self) -> Known:
+        """The same, to be changed by itself."""
+        known = Known(self.ranges, self.has_room)
+        known.temporaries, known.boards = dict(self.temporaries), set(self.boards)
+        return known
 
     def value(self, operand: int) -> Interval | None:
         """The range of an operand; None if it is nothing that can be read."""
@@ -94,6 +110,8 @@ class Known:
             return operand - CONSTANT, operand - CONSTANT
         if operand >= TEMPORARY:
             return self.temporaries.get(operand - TEMPORARY)
+        if operand in (Register.WIDTH, Register.HEIGHT) and not self.has_room:
+            return WHOLE_REGISTER
         if 0 <= operand < len(self.ranges.of_register):
             return self.ranges.of_register[operand]
         return None
@@ -112,14 +130,31 @@ class Known:
 
     def joined(self, other: Known | None) -> Known:
         """What is known where two paths meet."""
-        if other is None:
-            return Known(self.ranges, self.temporaries)
-        both = self.temporaries.keys() & other.temporaries.keys()
-        return Known(self.ranges, {k: hull(self.temporaries[k], other.temporaries[k]) for k in both})
+        known = self.copy()
+        if other is not None:
+            both = self.temporaries.keys() & other.temporaries.keys()
+            known.temporaries = {k: hull(self.temporaries[k], other.temporaries[k]) for k in both}
+            known.boards &= other.boards
+            known.has_room &= other.has_room
+        return known
+
+    def after_loop(self, written: Iterable[int], before: Known) -> Known:
+        """What is left of it behind a loop that ran any number of times, none included.
+
+        A temporary that was written inside may hold anything, or was never written unless it was before the loop.
+        """
+        known = self.copy()
+        known.boards &= before.boards
+        for temporary in written:
+            known.temporaries.pop(temporary, None)
+            if temporary in before.temporaries:
+                known.temporaries[temporary] = ANYTHING
+        return known
 
 
-def entity_type_row(program: Program, entity: int) -> int:
-    """First row of the type table of an entity."""
-    return int(
-        program.words[program.header(Header.ENTITY_AT) + entity * EntityColumn.COLUMNS + EntityColumn.TYPE]
-    )
+def greatest_status(program: Program, entity: int) -> int:
+    """The last status of an object; the greatest status code of an NPC."""
+    if program.entities[entity].role == "object":
+        return max(1, len(program.entities[entity].states)) - 1
+    at = program.header(Header.ENTITY_AT) + entity * EntityColumn.COLUMNS
+    return int(program.words[at + EntityColumn.KIND])

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from itertools import product
 
 from socialai_dsl.compiler.assembler import Label, constant
-from socialai_dsl.compiler.classes import OTHER, Classes, normal
+from socialai_dsl.compiler.classes import OTHER, Classes, normal, texts_of_pairs
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.program import Op
-from socialai_dsl.semantics.terms import Checked, Const, Entity, Line, Term
+from socialai_dsl.semantics.terms import Checked, Const, Entity, Line, Term, Type, Variable
 
 UNKNOWN = 1
 MAX_TOKENS = 256
@@ -42,6 +42,7 @@ class Lines:
 
     def __post_init__(self) -> None:
         self._known: dict[tuple[int, tuple[str | Term, ...]], int] = {}
+        self.grammar = tuple(texts_of_pairs(self.checked))
         self.vocabulary = ("<pad>", "<unk>", *self.checked.words_in_order)
         self._ids = {word: number for number, word in enumerate(self.vocabulary)}
         if self.checked.own_voice or any(frame.entity == 0 for frame in self.checked.frames):
@@ -50,8 +51,8 @@ class Lines:
     def _add_agent(self) -> None:
         self.agent_says = 1 + len(self.texts)
         agent = self.checked.entities[0]
-        for k, (template, noun) in enumerate(product(self.checked.templates, self.checked.nouns)):
-            line = self._append(agent, self._word(agent.name), template.replace("<noun>", noun))
+        for k, text in enumerate(self.grammar):
+            line = self._append(agent, self._word(agent.name), text)
             self.classes[line] = self.classes_of.of_pair[k]
 
     def _append(self, speaker: Entity, name: str, text: str) -> int:
@@ -78,6 +79,35 @@ class Lines:
         varying = [part for part in parts if not isinstance(part, str | Const)]
         first = self._family(speaker, parts)
         return self._index(to, varying, first)
+
+    def perform(self, to: Expressions, speaker: Entity, utterance: Term) -> None:
+        """Emit that `speaker` says an utterance of the grammar as part of a sequence; 0 is silence."""
+        if isinstance(utterance, Const) and utterance.value == 0:
+            return
+        block = to.block
+        silent = Label()
+        said = to.value(utterance)
+        if not isinstance(utterance, Const):
+            block.test(Op.IF_NE, said, constant(0), silent)
+            said = to.into_temporary(Op.MAX, said, constant(1))
+        line = to.into_temporary(Op.ADD, said, constant(self._first_performed(speaker) - 1))
+        if speaker.number != 0 and speaker.name is not None and not isinstance(speaker.name, Const):
+            named = self._index(to, [speaker.name], 0)
+            block.emit(Op.MUL, named, named, constant(len(self.grammar)))
+            block.emit(Op.ADD, line, line, named)
+        block.emit(Op.SAY, constant(speaker.number), line)
+        block.bind(silent)
+
+    def _first_performed(self, speaker: Entity) -> int:
+        """The line of the first pair; the others follow."""
+        if speaker.number == 0:
+            return self.agent_says - 1
+        texts = self.grammar
+        anything = Variable(Type("utterance", 1, len(texts), texts), "performed")
+        first = self._family(speaker, (speaker.name or "", anything))
+        for k in range(len(_choices(speaker.name or "")) * len(texts)):
+            self.classes[first + k] = self.classes_of.of_performed[k % len(texts)]
+        return first
 
     @staticmethod
     def _index(to: Expressions, varying: Sequence[Term], first: int) -> int:
@@ -106,10 +136,7 @@ class Lines:
 
     def _utterance(self, to: Expressions, line: Line) -> int:
         """The agent's line among the utterances of the grammar: its parts are a fixed text, or enumerated."""
-        pairs = {
-            normal(template.replace("<noun>", noun)): self.agent_says - 1 + k
-            for k, (template, noun) in enumerate(product(self.checked.templates, self.checked.nouns))
-        }
+        pairs = {normal(text): self.agent_says - 1 + k for k, text in enumerate(self.grammar)}
         numbers = [
             pairs[normal("".join(pieces))] for pieces in product(*(_choices(part) for part in line.parts))
         ]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from socialai_dsl.compiler.assembler import Label, constant
+from socialai_dsl.compiler.cells import keep_each
 from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.program import BOARDS, Op, Register, Side
+from socialai_dsl.program import Op, Register, Side
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.terms import Placing, Region, Term
 
@@ -17,7 +18,6 @@ class Places:
 
     def __init__(self, to: Expressions) -> None:
         self.to = to
-        self._boards = 0
 
     def put(self, placing: Placing) -> None:
         """Emit the draw of a cell and the putting of the entity there."""
@@ -34,30 +34,26 @@ class Places:
                 block.emit(Op.LOAD, target, constant(-1))
         else:
             to.site = placing.where_site
+            boards = block.boards_taken
             board = self._union(placing.regions)
             block.emit(Op.B_FREE, board)
             if placing.where is not None:
                 self._keep(board, placing.where)
             block.emit(Op.PICK_CELL, cell, board, to.sites.row(placing.site, placing.number))
-            self._boards = 0
+            block.release_boards(boards)
         block.emit(Op.PUT, constant(placing.entity), cell)
         block.release(mark)
-
-    def _board(self) -> int:
-        self._boards += 1
-        assert self._boards <= BOARDS, "internal: a place needs more boards than the engine has"
-        return self._boards - 1
 
     def _union(self, regions: tuple[Region, ...]) -> int:
         first, *rest = [self._region(region) for region in regions]
         for board in rest:
             self.to.block.emit(Op.B_OR, first, board)
-        self._boards = first + 1
+        self.to.block.release_boards(first + 1)
         return first
 
     def _region(self, region: Region) -> int:
-        board = self._board()
         block = self.to.block
+        board = block.board()
         match region.name:
             case "anywhere":
                 block.emit(Op.B_FLOOR, board)
@@ -81,19 +77,21 @@ class Places:
             return
         drawn = self.to.value(region.args[0])
         done = Label()
-        for side in Side:
+        *others, last = Side
+        for side in others:
             following = Label()
             block.test(Op.IF_EQ, drawn, constant(side), following)
             block.emit(Op.B_WALL, board, side, region.margin)
             block.skip(done)
             block.bind(following)
+        block.emit(Op.B_WALL, board, last, region.margin)
         block.bind(done)
 
     def _only_floor(self, board: int) -> None:
-        floor = self._board()
+        floor = self.to.block.board()
         self.to.block.emit(Op.B_FLOOR, floor)
         self.to.block.emit(Op.B_AND, board, floor)
-        self._boards = floor
+        self.to.block.release_boards(floor)
 
     def _rectangle(self, board: int, region: Region) -> None:
         """Halves, rows, columns and rectangles: x from corner to corner + 1, y from corner + 2 to corner + 3."""
@@ -137,17 +135,17 @@ class Places:
                 self._keep_not(board, where.arg)
             case terms.Logic():
                 self._keep_either(board, where.args)
-            case terms.Quantified(op="any"):
+            case terms.Quantified(op="any", cells=False):
                 self._keep_either(board, tuple(self.to.instance(where, item) for item in where.items))
-            case terms.Quantified(op="all"):
+            case terms.Quantified(op="all", cells=False):
                 for item in where.items:
                     self._keep(board, self.to.instance(where, item))
             case terms.Test(subject=None, name="in_front_of" | "next_to"):
                 near = self._near(where)
                 block.emit(Op.B_AND, board, near)
-                self._boards = near
+                block.release_boards(near)
             case _:
-                self._keep_each(board, where)
+                keep_each(self.to, board, where)
 
     def _keep_not(self, board: int, arg: Term) -> None:
         """Take out the cells for which `arg` is true."""
@@ -156,21 +154,21 @@ class Places:
             case terms.Logic(op="or"):
                 for part in arg.args:
                     self._keep_not(board, part)
-            case terms.Quantified(op="any"):
+            case terms.Quantified(op="any", cells=False):
                 for item in arg.items:
                     self._keep_not(board, self.to.instance(arg, item))
             case terms.Test(subject=None, name="in_front_of" | "next_to"):
                 near = self._near(arg)
                 block.emit(Op.B_WITHOUT, board, near)
-                self._boards = near
+                block.release_boards(near)
             case _:
                 held = self._copy(board)
                 self._keep(held, arg)
                 block.emit(Op.B_WITHOUT, board, held)
-                self._boards = held
+                block.release_boards(held)
 
     def _copy(self, board: int) -> int:
-        copy = self._board()
+        copy = self.to.block.board()
         self.to.block.emit(Op.B_COPY, copy, board)
         return copy
 
@@ -180,30 +178,12 @@ class Places:
             held = self._copy(rest)
             self._keep(held, arg)
             self.to.block.emit(Op.B_WITHOUT, rest, held)
-            self._boards = held
+            self.to.block.release_boards(held)
         self.to.block.emit(Op.B_WITHOUT, board, rest)
-        self._boards = rest
+        self.to.block.release_boards(rest)
 
     def _near(self, where: terms.Test) -> int:
-        near = self._board()
+        near = self.to.block.board()
         op = Op.B_IN_FRONT_OF if where.name == "in_front_of" else Op.B_NEXT_TO
         self.to.block.emit(op, near, self.to.value(where.object))
         return near
-
-    def _keep_each(self, board: int, where: Term) -> None:
-        block = self.to.block
-        mark = block.taken
-        here = block.temporary(2)
-        keep, drop = Label(), Label()
-        self.to.here = (here, here + 1)
-        start = len(block.instructions)
-        block.emit(Op.EACH_CELL, board, here)
-        self.to.condition(where, drop)
-        block.skip(keep)
-        block.bind(drop)
-        block.emit(Op.DROP_CELL)
-        block.bind(keep)
-        block.instructions[start][3] = len(block.instructions) - start - 1
-        block.emit(Op.END_EACH)
-        self.to.here = None
-        block.release(mark)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Field, RegisterName
-from socialai_dsl.semantics.terms import Checked, Drawn, FramePlan, Type
+from socialai_dsl.compiler.cells import NOWHERE
+from socialai_dsl.program import CELL, ENTITY_FIELDS, FIRST_ENTITY, Field, RegisterName
+from socialai_dsl.semantics.terms import ACTION, BOOL, Checked, Drawn, FramePlan, MemoryPlan, Type
 
 
 def entity_register(entity: int, which: Field) -> int:
@@ -18,13 +19,14 @@ class Registers:
     """Allocates registers in order of need and remembers their names and ranges."""
 
     next_free: int
+    canvas: tuple[int, int]
     by_path: dict[str, int] = field(default_factory=dict)
     names: list[RegisterName] = field(default_factory=list)
 
     @classmethod
     def of(cls, checked: Checked) -> Registers:
-        """Entities, then draws in the order of the setup, then states and clocks of the frames."""
-        registers = cls(FIRST_ENTITY + ENTITY_FIELDS * len(checked.entities))
+        """Entities, draws in the order of the setup, states and clocks of the frames, then what is remembered."""
+        registers = cls(FIRST_ENTITY + ENTITY_FIELDS * len(checked.entities), checked.room.canvas)
         for item in checked.setup:
             if isinstance(item, Drawn):
                 registers.add(item.path, item.type)
@@ -33,10 +35,25 @@ class Registers:
                 f"{frame.member}.frame", Type("status", 0, len(state_names(frame)) - 1, state_names(frame))
             )
             registers.add(f"{frame.member}.clock", Type("int", 0, checked.horizon))
+        for item in checked.remembered:
+            registers.add(item.path, item.type)
+        for memory in checked.memories:
+            registers._add_memory(memory)
         return registers
 
+    def _add_memory(self, memory: MemoryPlan) -> None:
+        for k in range(memory.length):
+            self.add(f"{memory.path}[{k}].move", ACTION)
+            self.add(f"{memory.path}[{k}].utterance", memory.utterances)
+        self.add(f"{memory.path}.filled", Type("int", 0, memory.length))
+        if memory.open is not None:
+            self.add(f"{memory.path}.open", BOOL)
+
     def add(self, path: str, type_: Type) -> int:
-        """A named register."""
+        """A named register. One of a cell may hold any cell of the canvas, and none."""
+        if type_.kind == "cell":
+            width, height = self.canvas
+            type_ = replace(type_, low=NOWHERE, high=CELL + 32 * (height - 1) + width - 1)
         register = self.reserve(1)
         self.by_path[path] = register
         self.names.append(RegisterName(path, register, type_.words, type_.low, type_.high, type_.kind))

@@ -2,34 +2,84 @@
 
 from __future__ import annotations
 
-from socialai_dsl.compiler.assembler import Block, Label, Sites, constant
+from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.behaviour import FOR_EVER
-from socialai_dsl.compiler.classes import Classes
 from socialai_dsl.compiler.expressions import Expressions
+from socialai_dsl.compiler.folding import fold
 from socialai_dsl.compiler.places import Places
-from socialai_dsl.compiler.registers import Registers, entity_register, state_names
+from socialai_dsl.compiler.registers import entity_register, state_names
+from socialai_dsl.compiler.statuses import ComputedStatuses
 from socialai_dsl.program import COLORS, Field, Op, Register
-from socialai_dsl.semantics.terms import Checked, Coloring, Drawn, Facing, FramePlan, Placing, RoomPlan
+from socialai_dsl.semantics.terms import (
+    Checked,
+    Coloring,
+    Drawn,
+    Entity,
+    Facing,
+    FramePlan,
+    Placing,
+    RoomPlan,
+    Term,
+)
 
 ALL_COLORS = (1 << len(COLORS)) - 1
 
 
-def reset_code(checked: Checked, registers: Registers, classes: Classes, sites: Sites) -> Block:
-    """Everything that happens at reset, in one block."""
-    to = Expressions(Block(), checked, registers, classes, sites)
+def reset(to: Expressions, computed: ComputedStatuses) -> None:
+    """Emit everything that happens at reset."""
+    checked, registers = to.checked, to.registers
     _room(to, checked.room)
     for entity in checked.entities:
-        if entity.status:
-            to.block.emit(Op.LOAD, entity_register(entity.number, Field.STATUS), constant(entity.status))
+        if status := entity.status if entity.role == "object" else entity.kind_code:
+            to.block.emit(Op.LOAD, entity_register(entity.number, Field.STATUS), constant(status))
     for item in checked.setup:
         mark = to.block.taken
         _item(to, item)
         to.block.release(mark)
+    for entity in checked.entities:
+        _drawn_status(to, entity)
     for frame in checked.frames:
         if start := first_state(frame):
             to.block.emit(Op.LOAD, registers.by_path[f"{frame.member}.frame"], constant(start))
-    to.block.halt()
-    return to.block
+    for item in checked.remembered:
+        _not_yet(to, registers.by_path[item.path])
+    computed.fix(to)
+
+
+def require(to: Expressions) -> None:
+    """Emit whether the room is as required."""
+    rejected = Label()
+    for sited in to.checked.require:
+        to.sited_condition(sited, rejected)
+    if to.checked.require:
+        to.block.emit(Op.LOAD, Register.ACCEPTED, constant(1))
+    to.block.bind(rejected)
+
+
+def _drawn_status(to: Expressions, entity: Entity) -> None:
+    """The drawn status of an object, or the drawn kind of an NPC, once everything else is set up."""
+    drawn = entity.initial if entity.role == "object" else entity.kind_drawn
+    if drawn is None:
+        return
+    pinned = Label()
+    register = entity_register(entity.number, Field.STATUS)
+    mark = to.block.taken
+    to.block.span = entity.span
+    to.block.test(Op.IF_UNPINNED, register, 0, pinned)
+    to.block.emit(Op.LOAD, register, to.value(drawn))
+    to.block.bind(pinned)
+    to.block.release(mark)
+
+
+def _not_yet(to: Expressions, register: int) -> None:
+    """A value that nothing was remembered for yet, where 0 is no value of it."""
+    name = next(name for name in to.registers.names if name.register == register)
+    if name.low <= 0 <= name.high:
+        return
+    pinned = Label()
+    to.block.test(Op.IF_UNPINNED, register, 0, pinned)
+    to.block.emit(Op.LOAD, register, constant(name.low))
+    to.block.bind(pinned)
 
 
 def first_state(frame: FramePlan) -> int:
@@ -81,10 +131,18 @@ def _item(to: Expressions, item: Drawn | Coloring | Placing | Facing) -> None:
         case Placing():
             block.span = item.span
             block.test(Op.IF_UNPINNED, entity_register(item.entity, Field.X), 0, pinned)
+            _only_if(to, item.when, item.site, pinned)
             Places(to).put(item)
         case Facing():
             _facing(to, item, pinned)
     block.bind(pinned)
+
+
+def _only_if(to: Expressions, when: Term | None, site: str, otherwise: Label) -> None:
+    """Of several ways to set up a thing, the one whose condition holds."""
+    if when is not None:
+        to.site = site
+        to.condition(fold(when, to.facts, to.classes), otherwise)
 
 
 def _color(to: Expressions, item: Coloring, pinned: Label) -> None:
@@ -92,6 +150,7 @@ def _color(to: Expressions, item: Coloring, pinned: Label) -> None:
     block.span = item.span
     register = entity_register(item.entity, Field.COLOR)
     block.test(Op.IF_UNPINNED, register, 0, pinned)
+    _only_if(to, item.when, item.site, pinned)
     if item.value is not None:
         block.emit(Op.LOAD, register, to.sited_value(item.value))
         return
@@ -129,6 +188,7 @@ def _facing(to: Expressions, item: Facing, pinned: Label) -> None:
     block.span = item.span
     register = entity_register(item.entity, Field.DIR)
     block.test(Op.IF_UNPINNED, register, 0, pinned)
+    _only_if(to, item.when, item.site, pinned)
     if item.toward is not None:
         to.site = item.site
         block.emit(Op.QUADRANT, register, constant(item.entity), to.value(item.toward))

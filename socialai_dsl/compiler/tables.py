@@ -53,12 +53,13 @@ class Tables:
 
     def program(
         self,
-        reset_pc: int,
+        entries: dict[Header, int],
+        flags: int,
         frames: list[tuple[FramePlan, list[list[int]]]],
         outcomes: list[int],
         rules: tuple[str, ...],
     ) -> Program:
-        """Lay out everything; see program.Header for the order."""
+        """Lay out everything; see program.Header for the order. `flags` are those that the code decides."""
         checked, lines = self.checked, self.lines
         length = lines.history_length
         heard_size = max(1, len(lines.speakers))
@@ -89,7 +90,7 @@ class Tables:
         table(Header.TOKEN_AT, [token for tokens in lines.tokens for token in tokens])
         table(Header.SITE_AT, self.sites.words())
 
-        header |= {
+        header |= entries | {
             Header.SIZE: Header.END + len(body),
             Header.REGISTERS: self.registers.next_free,
             Header.CANVAS_WIDTH: checked.room.canvas[0],
@@ -101,7 +102,7 @@ class Tables:
             Header.NOUNS: len(checked.nouns),
             Header.CLASSES: self.classes.count,
             Header.HORIZON: checked.horizon,
-            Header.FLAGS: self._flags(),
+            Header.FLAGS: flags | self._flags(),
             Header.TOKENS: length,
             Header.LOG: log,
             Header.LOG_SIZE: log_size,
@@ -116,7 +117,6 @@ class Tables:
             Header.HEIGHTS: checked.room.height[1] - checked.room.height[0] + 1,
             Header.OUTSIDE: WALL,
             Header.INSTRUCTIONS: len(self.code.instructions),
-            Header.RESET_PC: reset_pc,
             Header.LINES: len(lines.texts),
             Header.STATES: sum(len(rows) for _, rows in frames),
             Header.SITES: len(self.sites.rows),
@@ -153,6 +153,7 @@ class Tables:
             Flag.PICTURE_BEFORE_NPCS: checked.picture_before_npcs,
             Flag.AGENT_FRAME: any(frame.entity == 0 for frame in checked.frames),
             Flag.OWN_VOICE: checked.own_voice,
+            Flag.EGOCENTRIC: checked.egocentric,
         }
         return sum(flag for flag, on in flags.items() if on)
 
@@ -194,13 +195,13 @@ class _TypeTable:
         self.deadly = 0
         self.agent = self._add(code=CODES_OF_TYPES["empty"], status=0, toggled=0)
         self.npc = self._add(code=CODES_OF_TYPES["npc"], status=0, toggled=0, transparent=1)
-        self._first: dict[str, int] = {}
+        self._first: dict[ObjectType, int] = {}
         for kind in [
             *(e.type for e in checked.entities if e.type),
             *(kind for kind, _, _ in checked.room.build),
         ]:
-            if kind.name not in self._first:
-                self._first[kind.name] = self._object(kind)
+            if kind not in self._first:
+                self._first[kind] = self._object(kind)
 
     def _add(
         self,
@@ -240,7 +241,7 @@ class _TypeTable:
     def of(self, entity: Entity) -> int:
         """First row of an entity's type."""
         if entity.type is not None:
-            return self._first[entity.type.name]
+            return self._first[entity.type]
         return self.npc if entity.role == "npc" else self.agent
 
 
@@ -252,6 +253,7 @@ def _entity_row(entity: Entity, types: _TypeTable) -> list[int]:
         EntityColumn.FAR: entity.far,
         EntityColumn.AUDIBLE: int(entity.audible),
         EntityColumn.IN_WALL: int(entity.in_wall),
+        EntityColumn.VIEW: entity.view,
     }
     return [row[column] for column in EntityColumn if column != EntityColumn.COLUMNS]
 

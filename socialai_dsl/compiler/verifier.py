@@ -108,6 +108,7 @@ def _registers(program: Program) -> None:
     _require(areas[-1][1] <= h(Header.REGISTERS) < 8192, "registers beyond the end of the row")
     _require(h(Header.INBOX_SIZE) >= 1 + h(Header.FRAMES), "an inbox could overflow")
     named = [name.register for name in program.registers]
+    _require(len(set(named)) == len(named), "a register has two names")
     for start, end, name in areas:
         _require(not any(start <= register < end for register in named), f"a named register lies in {name}")
 
@@ -128,6 +129,9 @@ def _entities(program: Program) -> None:
         first = int(program.words[at + EntityColumn.TYPE])
         statuses = max(1, len(entity.states))
         _require(first >= 0 and first + statuses <= rows, f"the type of {entity} is out of range")
+        kind, view = (int(program.words[at + column]) for column in (EntityColumn.KIND, EntityColumn.VIEW))
+        _require(0 <= kind < 256, f"the status code of {entity} does not fit into the picture")
+        _require(0 < view <= 2 * MAX_SIDE, f"{entity} sees {view} cells far")
         for status in range(statuses):
             toggled = int(
                 program.words[h(Header.TYPE_AT) + TypeColumn.COLUMNS * (first + status) + TypeColumn.TOGGLED]

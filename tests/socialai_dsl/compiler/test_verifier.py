@@ -90,6 +90,7 @@ def unknown_op(words: Words, program: Program) -> None:
 def board_in_a_rule(words: Words, program: Program) -> None:
     at = code_word(words, program, Op.GOTO, 0) - 1
     words[at : at + 4] = [Op.B_FLOOR, 0, 0, 0]
+    words[at + 4 : at + 8] = [Op.B_FREE, 0, 0, 0]
 
 
 MUTANTS: dict[str, Callable[[Words, Program], None]] = {

@@ -1,0 +1,53 @@
+"""What is remembered to code: `prev(...)` and open memories at the start of a step, the agent's acts at its end."""
+
+from __future__ import annotations
+
+from socialai_dsl.compiler.assembler import Label, constant
+from socialai_dsl.compiler.effects import store
+from socialai_dsl.compiler.expressions import Expressions
+from socialai_dsl.program import Op, Register
+from socialai_dsl.semantics.terms import MemoryPlan
+
+
+def remember(to: Expressions) -> None:
+    """Before anything happens in a step: what rules will want to know about the state that the last step left."""
+    block = to.block
+    for item in to.checked.remembered:
+        mark = block.taken
+        value = to.into_temporary(Op.LOAD, to.sited_value(item.value))
+        store(to.registers, block.emit, item.path, value)
+        block.release(mark)
+    for memory in to.checked.memories:
+        _ask_whether_open(to, memory)
+
+
+def _ask_whether_open(to: Expressions, memory: MemoryPlan) -> None:
+    if memory.open is None:
+        return
+    register = to.registers.by_path[f"{memory.path}.open"]
+    shut = Label()
+    to.block.span = memory.open.span
+    to.block.emit(Op.LOAD, register, constant(0))
+    to.sited_condition(memory.open, shut)
+    to.block.emit(Op.LOAD, register, constant(1))
+    to.block.bind(shut)
+
+
+def push_acts(to: Expressions) -> None:
+    """Each open memory takes in what the agent did in this step and forgets the oldest act."""
+    block, by_path = to.block, to.registers.by_path
+    for memory in to.checked.memories:
+        shut = Label()
+        if memory.open is not None:
+            block.span = memory.open.span
+            block.test(Op.IF_NE, by_path[f"{memory.path}.open"], constant(0), shut)
+        for part, newest in (("move", Register.ACTION), ("utterance", Register.UTTERANCE)):
+            places = [by_path[f"{memory.path}[{k}].{part}"] for k in range(memory.length)]
+            for place, newer in zip(places, (*places[1:], newest), strict=True):
+                block.emit(Op.LOAD, place, newer)
+        filled = by_path[f"{memory.path}.filled"]
+        mark = block.taken
+        more = to.into_temporary(Op.ADD, filled, constant(1))
+        block.emit(Op.MIN, filled, more, constant(memory.length))
+        block.release(mark)
+        block.bind(shut)

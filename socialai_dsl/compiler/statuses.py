@@ -1,0 +1,77 @@
+"""Statuses that follow from other things to code: links (`unlocks`), and statuses that are computed from conditions."""
+
+from __future__ import annotations
+
+from socialai_dsl.compiler.assembler import Label, constant
+from socialai_dsl.compiler.changes import Changes, When
+from socialai_dsl.compiler.expressions import Expressions
+from socialai_dsl.compiler.registers import entity_register
+from socialai_dsl.program import Field, Op
+from socialai_dsl.semantics.terms import Checked, Computed, Entity
+
+
+def links(to: Expressions) -> None:
+    """While a switch is in an active status, what it unlocks is not locked."""
+    for switch in to.checked.entities:
+        targets = [to.checked.entities[number] for number in switch.unlocks]
+        lockable = [target for target in targets if target.type and "locked" in target.type.states]
+        if switch.type is None or not lockable:
+            continue
+        to.block.span = switch.span
+        following = Label()
+        status = entity_register(switch.number, Field.STATUS)
+        to.one_of(Op.IF_EQ, status, switch.type.active, following)
+        for target in lockable:
+            _unlock(to, target)
+        to.block.bind(following)
+
+
+def _unlock(to: Expressions, target: Entity) -> None:
+    assert target.type is not None
+    states = target.type.states
+    left_alone = Label()
+    status = entity_register(target.number, Field.STATUS)
+    to.block.test(Op.IF_EQ, status, constant(states.index("locked")), left_alone)
+    to.block.emit(Op.BECOME, constant(target.number), constant(states.index("closed")))
+    to.block.bind(left_alone)
+
+
+class ComputedStatuses:
+    """The computed statuses of a scenario: those that a reset decides for good, and those that are settled."""
+
+    def __init__(self, checked: Checked) -> None:
+        changes = Changes(checked)
+        whens = [(item, changes.of(item.condition.term)) for item in checked.computed]
+        self.fixed = tuple(item for item, when in whens if when == When.NEVER)
+        self.settled = tuple(item for item, when in whens if when != When.NEVER)
+        self.settle_always = any(when == When.ANY_TIME for _, when in whens)
+
+    def fix(self, to: Expressions) -> None:
+        """Emit those that never change, each unless a layout gives the status."""
+        for item in self.fixed:
+            pinned = Label()
+            to.block.span = item.condition.span
+            to.block.test(Op.IF_UNPINNED, entity_register(item.entity, Field.STATUS), 0, pinned)
+            _settle(to, item)
+            to.block.bind(pinned)
+
+    def settle(self, to: Expressions) -> None:
+        """Emit those that can change, each after those it reads."""
+        for item in self.settled:
+            _settle(to, item)
+
+
+def _settle(to: Expressions, item: Computed) -> None:
+    """On while the condition holds; off where it was on and the condition does not hold; else left alone."""
+    block = to.block
+    status = entity_register(item.entity, Field.STATUS)
+    entity, on, off = (constant(number) for number in (item.entity, item.on, item.off))
+    false, done = Label(), Label()
+    to.sited_condition(item.condition, false)
+    block.test(Op.IF_NE, status, on, done)
+    block.emit(Op.BECOME, entity, on)
+    block.skip(done)
+    block.bind(false)
+    block.test(Op.IF_EQ, status, on, done)
+    block.emit(Op.BECOME, entity, off)
+    block.bind(done)
