@@ -2,8 +2,8 @@
 
 The public surface, imported on first use so that checking a file loads neither Gymnasium nor Numba:
 
-* `load(name)`: check a scenario file, or a shipped scenario by name, with variants: `talkitout+unsocial`.
-* `compile(scenario)`: its `Program`, the integer tables with vocabulary and source map.
+* `load(name)`: check a file, or a shipped scenario or suite by name, with variants: `talkitout+unsocial`.
+* `compile(scenario)`: its `Program`, the integer tables with vocabulary and source map; of a suite a `ProgramSuite`.
 * `make(name)` and `make_vec(name, num_envs=...)`: Gymnasium environments, single and vectorised.
 
 Importing this package makes the ids `SocialAI/...-v1` known to Gymnasium.
@@ -17,19 +17,22 @@ from typing import TYPE_CHECKING, Any
 from socialai_dsl import _gymnasium_hook
 
 if TYPE_CHECKING:
-    from socialai_dsl.compiler import compile_loaded as compile
+    from socialai_dsl.compilation import compile_loaded as compile
     from socialai_dsl.diagnostics import Diagnostic, ScenarioError
     from socialai_dsl.envs import ScenarioEnv, ScenarioVectorEnv, make, make_vec
-    from socialai_dsl.frontend import LoadedScenario, load
+    from socialai_dsl.frontend import LoadedScenario, LoadedSuite, load
     from socialai_dsl.program import Program
+    from socialai_dsl.program_suite import ProgramSuite
 
 __version__ = "0.1.0"
 
 _HOME = {
     "load": ("socialai_dsl.frontend", "load"),
     "LoadedScenario": ("socialai_dsl.frontend", "LoadedScenario"),
-    "compile": ("socialai_dsl.compiler", "compile_loaded"),
+    "LoadedSuite": ("socialai_dsl.frontend", "LoadedSuite"),
+    "compile": ("socialai_dsl.compilation", "compile_loaded"),
     "Program": ("socialai_dsl.program", "Program"),
+    "ProgramSuite": ("socialai_dsl.program_suite", "ProgramSuite"),
     "make": ("socialai_dsl.envs", "make"),
     "make_vec": ("socialai_dsl.envs", "make_vec"),
     "ScenarioEnv": ("socialai_dsl.envs", "ScenarioEnv"),
@@ -41,7 +44,9 @@ _HOME = {
 __all__ = [
     "Diagnostic",
     "LoadedScenario",
+    "LoadedSuite",
     "Program",
+    "ProgramSuite",
     "ScenarioEnv",
     "ScenarioError",
     "ScenarioVectorEnv",

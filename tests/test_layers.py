@@ -20,6 +20,7 @@ TEXT_SIDE = {
     "loader",
     "library",
     "parameters",
+    "checking",
     "frontend",
 }
 
@@ -31,17 +32,32 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "grammar": ({"source", "diagnostics"}, {"lark"}),
     "schema": ({"source", "diagnostics", "grammar"}, {"pydantic", "pydantic_core"}),
     "semantics": ({"source", "diagnostics", "draws", "grammar", "schema"}, set()),
-    "loader": (TEXT_SIDE - {"frontend", "library", "parameters"}, {"yaml", "pydantic", "pydantic_core"}),
-    "library": (TEXT_SIDE - {"frontend", "parameters"}, {"pydantic"}),
-    "parameters": (TEXT_SIDE - {"frontend", "library"}, set()),
+    "loader": (
+        TEXT_SIDE - {"frontend", "checking", "library", "parameters"},
+        {"yaml", "pydantic", "pydantic_core"},
+    ),
+    "library": (TEXT_SIDE - {"frontend", "checking", "parameters"}, {"pydantic"}),
+    "parameters": (TEXT_SIDE - {"frontend", "checking", "library"}, set()),
+    "checking": (TEXT_SIDE - {"frontend"}, set()),
     "frontend": (TEXT_SIDE, set()),
     "program": ({"source", "listing"}, {"numpy"}),
+    "program_suite": ({"program"}, set()),
     "listing": ({"source", "program"}, {"numpy"}),
-    "compiler": (TEXT_SIDE - {"loader", "library", "parameters", "frontend"} | {"program"}, {"numpy"}),
+    "compiler": (
+        TEXT_SIDE - {"loader", "library", "parameters", "checking", "frontend"} | {"program"},
+        {"numpy"},
+    ),
+    "compilation": (TEXT_SIDE - {"frontend"} | {"program", "program_suite", "compiler"}, set()),
     "engine": ({"program", "draws"}, {"numpy", "numba", "llvmlite"}),
-    "envs": (TEXT_SIDE | {"program", "compiler", "engine"}, {"numpy", "gymnasium", "PIL"}),
+    "envs": (
+        TEXT_SIDE | {"program", "program_suite", "compilation", "engine"},
+        {"numpy", "gymnasium", "PIL"},
+    ),
     "_gymnasium_hook": ({"envs"}, set()),
-    "": (TEXT_SIDE | {"program", "compiler", "engine", "envs", "_gymnasium_hook"}, set()),
+    "": (
+        TEXT_SIDE | {"program", "program_suite", "compilation", "engine", "envs", "_gymnasium_hook"},
+        set(),
+    ),
 }
 
 # What the trainer may use: the facade's names, nothing below it.

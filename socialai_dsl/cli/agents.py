@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from socialai_dsl.cli.episode import Episode
     from socialai_dsl.cli.settings import Settings
-    from socialai_dsl.program import Program
+    from socialai_dsl.program_suite import Playable
     from trainer.config import TrainConfig
     from trainer.evaluate import EvalResult
     from trainer.policies import Policy
@@ -133,7 +133,7 @@ def train_agent(settings: "Settings", folder: Path, resume: bool, stream: IO[str
 
 
 def evaluate_agent(
-    agent: str, scenario: str, program: "Program", episodes: int, device: str, label: str
+    agent: str, scenario: str, program: "Playable", episodes: int, device: str, label: str
 ) -> tuple[dict[str, Any], "Episode"]:
     """Play test episodes and record one of them: the first success, or the first if there is none.
 
@@ -178,16 +178,16 @@ def evaluate_agent(
     return figures, _record(scenario, program, number, actions, label)
 
 
-def _with_script(scenario: str, program: "Program") -> str:
+def _with_script(scenario: str, program: "Playable") -> str:
     """The scenario itself if it scripts the agent, else its variant `oracle`, in which everything else is the same.
 
     Raises:
         UsageError: there is no script.
     """
     import socialai_dsl
-    from socialai_dsl.program import Flag, Header
+    from socialai_dsl.program_suite import is_scripted
 
-    if program.header(Header.FLAGS) & Flag.AGENT_FRAME:
+    if is_scripted(program):
         return scenario
     name, mark, parameters = scenario.partition("?")
     scripted = f"{name}+oracle{mark}{parameters}"
@@ -214,7 +214,7 @@ def _make_policy(agent: str, envs: Any, device: str) -> "Policy":
     return CheckpointPolicy.load(checkpoints if checkpoints.is_dir() else path, envs, device=device)
 
 
-def _evaluate_human(scenario: str, program: "Program", episodes: int) -> tuple[dict[str, Any], "Episode"]:
+def _evaluate_human(scenario: str, program: "Playable", episodes: int) -> tuple[dict[str, Any], "Episode"]:
     """Let a person play test episodes until they quit."""
     import socialai_dsl
     from socialai_dsl.cli.play import HELP, Played, Quit, play_episode
@@ -269,7 +269,7 @@ class _Remembering:
 
 
 def _record(
-    scenario: str, program: "Program", number: int, actions: "list[NDArray[np.int64]]", label: str
+    scenario: str, program: "Playable", number: int, actions: "list[NDArray[np.int64]]", label: str
 ) -> "Episode":
     import socialai_dsl
     from socialai_dsl.cli.episode import record

@@ -11,7 +11,7 @@ from PIL import Image
 
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.envs.panel import DialogueLine, compose_frame
-from socialai_dsl.program import Program
+from socialai_dsl.program_suite import Playable
 
 _STEP_MILLISECONDS: Final = 450
 _END_MILLISECONDS: Final = 2500
@@ -87,7 +87,7 @@ class Episode:
 
 
 def record(
-    env: Any, program: Program, actions: Sequence[NDArray[np.int64]], title: str, reset: dict[str, Any]
+    env: Any, program: Playable, actions: Sequence[NDArray[np.int64]], title: str, reset: dict[str, Any]
 ) -> Episode:
     """Play one episode with given actions and record it.
 
@@ -119,7 +119,7 @@ def record(
 
 
 def describe_step(
-    program: Program, action: Sequence[int] | NDArray[np.int64], t: int, utterance: str
+    program: Playable, action: Sequence[int] | NDArray[np.int64], t: int, utterance: str
 ) -> Step:
     """Put an action and what was heard into words."""
     primitive, speaks, template, noun = (int(part) for part in action)

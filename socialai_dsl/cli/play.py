@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from socialai_dsl.program import Program
+    from socialai_dsl.program_suite import Playable
 
 SUMMARY: Final = "play a scenario yourself, from the keyboard"
 
@@ -72,7 +72,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
 
 def play_episode(
-    env: Any, program: "Program", reset: dict[str, Any], ask: Callable[[str], str] = input
+    env: Any, program: "Playable", reset: dict[str, Any], ask: Callable[[str], str] = input
 ) -> Played:
     """Let the player play one episode.
 
@@ -103,7 +103,7 @@ def play_episode(
     return played
 
 
-def _ask_action(env: Any, program: "Program", ask: Callable[[str], str]) -> "NDArray[np.int64]":
+def _ask_action(env: Any, program: "Playable", ask: Callable[[str], str]) -> "NDArray[np.int64]":
     while True:
         try:
             line = ask("> ").strip()
@@ -135,7 +135,7 @@ def split_line(line: str, actions: Sequence[str]) -> tuple[str | None, str | Non
     return None, line or None
 
 
-def _choices(program: "Program") -> str:
+def _choices(program: "Playable") -> str:
     return (
         f"  movements:  {', '.join(program.actions)}\n"
         f"  utterances: {', '.join(program.templates)}\n"

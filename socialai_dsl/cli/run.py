@@ -22,7 +22,7 @@ from socialai_dsl.cli.run_folder import (
 from socialai_dsl.cli.settings import Settings
 
 if TYPE_CHECKING:
-    from socialai_dsl.program import Program
+    from socialai_dsl.program_suite import Playable
 
 SUMMARY: Final = "train an agent on a scenario, evaluate it and write pictures and figures"
 
@@ -202,7 +202,7 @@ def _resumed(arguments: argparse.Namespace) -> Settings:
     return replace(settings, frames=arguments.frames or settings.frames)
 
 
-def _draw_curve(settings: Settings, program: "Program", folder: Path, result: dict[str, Any]) -> None:
+def _draw_curve(settings: Settings, program: "Playable", folder: Path, result: dict[str, Any]) -> None:
     from socialai_dsl.cli.curve import draw_learning_curve, read_curve
 
     test = (result["frames"], result["eval"]["success_rate"], result["eval"]["success_rate_se"])
@@ -212,7 +212,7 @@ def _draw_curve(settings: Settings, program: "Program", folder: Path, result: di
     draw_learning_curve(curve, title, folder / "learning_curve.png")
 
 
-def _size(program: "Program") -> str:
+def _size(program: "Playable") -> str:
     """The size of the agent's choices, in one phrase."""
     said = len(program.templates) * len(program.nouns)
     return f"{len(program.actions)} actions, {said} utterances, {len(program.vocabulary)} words"

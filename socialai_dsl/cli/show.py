@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from socialai_dsl.cli.errors import Exit
 
 if TYPE_CHECKING:
-    from socialai_dsl.frontend import LoadedScenario
+    from socialai_dsl.frontend import Loaded
 
 SUMMARY: Final = "print a scenario after extends and variants, or the program it compiles to"
 
@@ -40,7 +40,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     return Exit.GOOD
 
 
-def _origins(scenario: "LoadedScenario") -> Iterator[str]:
+def _origins(scenario: "Loaded") -> Iterator[str]:
     """One line for each value that is no container: its place, its path, itself."""
     for path, value in _leaves(scenario.resolved.data, ()):
         written = json.dumps(value, ensure_ascii=False)

@@ -9,6 +9,7 @@ from socialai_dsl.program import (
     ENTITY_FIELDS,
     FIRST_ENTITY,
     Body,
+    EntityColumn,
     Field,
     FrameColumn,
     Header,
@@ -76,6 +77,10 @@ def _common(program: Program) -> list[Range]:
         Register.POKED: (-1, h(Header.ENTITIES) - 1),
         Register.SAID_LINE: (0, lines),
         Register.LAST_TURN: (-1, int(Body.NONE)),
+        Register.UTTERANCE: (0, h(Header.TEMPLATES) * h(Header.NOUNS)),
+        Register.CHANGED: (0, 1),
+        Register.ACCEPTED: (0, 1),
+        Register.ATTEMPT: (0, 64),
     }
     return [(register, 1, *bounds) for register, bounds in greatest.items()]
 
@@ -89,14 +94,17 @@ def _rooms_that_fit(program: Program) -> int:
 
 def _entities(program: Program) -> list[Range]:
     ranges: list[Range] = []
+    start = program.header(Header.ENTITY_AT)
     for number, entity in enumerate(program.entities):
-        statuses = max(len(entity.states), 1) if entity.role == "object" else 128
+        # The status of an NPC is its code in the picture, that of the agent is 0.
+        kind = start + EntityColumn.COLUMNS * number + EntityColumn.KIND
+        greatest_status = len(entity.states) - 1 if entity.states else int(program.words[kind])
         greatest = {
             Field.X: (-1, program.header(Header.CANVAS_WIDTH) - 1),
             Field.Y: (-1, program.header(Header.CANVAS_HEIGHT) - 1),
             Field.DIR: (0, 3),
             Field.COLOR: (0, 5),
-            Field.STATUS: (0, statuses - 1),
+            Field.STATUS: (0, greatest_status),
             Field.GONE: (0, 1),
             Field.POKED: (0, 1),
             Field.LAST: (0, int(Body.NONE)),

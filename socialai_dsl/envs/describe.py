@@ -7,7 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.envs.addresses import Acts, Addresses
+from socialai_dsl.envs.values import shown, utterance_text
 from socialai_dsl.program import (
+    BODY_WORDS,
     COLORS,
     DIRECTIONS,
     ENTITY_FIELDS,
@@ -20,33 +23,51 @@ from socialai_dsl.program import (
     RegisterName,
 )
 
+Row = NDArray[np.int16]
 
-def describe(program: Program, registers: NDArray[np.int16]) -> dict[str, Any]:
+
+def describe(program: Program, registers: Row) -> dict[str, Any]:
     """Everything that decides how the episode goes on, from the registers, int16 (R,), of one environment.
 
-    Keys: `t`, `room`, one for each cast member and object, `let`, `heard` (lines since the reset), and `pending`: for
-    NPCs, what was said near them since their last turn, as utterance classes.
+    Keys: `t`, `room`, one for each cast member and object, `one_of` (which file was drawn), `let`, `memory` (what it
+    holds, oldest first), `last` (what the agent did in the last step), `heard` (lines since the reset), and `pending`:
+    for NPCs, what was said near them since their last turn, as utterance classes.
     """
+    addresses = Addresses(program)
     state: dict[str, Any] = {
         "t": int(registers[Register.T]),
         "room": {"width": int(registers[Register.WIDTH]), "height": int(registers[Register.HEIGHT])},
     }
     for number, entity in enumerate(program.entities):
         described = _entity(program, registers, number)
+        for key in ("name", "state", "clock", "initial"):
+            owned = addresses.owned.get((str(entity), key))
+            if owned is not None:
+                described[key] = _value(program, registers, owned)
         if entity.index is None:
             state[entity.key] = described
         else:
             state.setdefault(entity.key, []).append(described)
-    state["let"] = {}
-    for name in program.registers:
-        _place(state, name, register_value(program, name, int(registers[name.register])))
+    if addresses.one_of:
+        state["one_of"] = {key: _value(program, registers, n) for key, n in addresses.one_of.items()}
+    state["let"] = {key: _value(program, registers, name) for key, name in addresses.plain.items()}
+    for key, acts in addresses.sequences.items():
+        state["let"][key] = [_act(program, registers, acts, k) for k in range(acts.length)]
+    if addresses.memories:
+        state["memory"] = _memories(program, registers, addresses)
+    if state["t"]:
+        state["last"] = _last(program, registers)
     log = program.header(Header.LOG)
     state["heard"] = [program.lines[line] for line in registers[log : log + int(registers[Register.LOGGED])]]
     state["pending"] = _pending(program, registers)
     return state
 
 
-def _entity(program: Program, registers: NDArray[np.int16], number: int) -> dict[str, Any]:
+def _value(program: Program, registers: Row, name: RegisterName) -> Any:
+    return shown(program, name, int(registers[name.register]))
+
+
+def _entity(program: Program, registers: Row, number: int) -> dict[str, Any]:
     base = FIRST_ENTITY + ENTITY_FIELDS * number
     field = {name: int(registers[base + name]) for name in Field}
     entity = program.entities[number]
@@ -66,29 +87,34 @@ def _entity(program: Program, registers: NDArray[np.int16], number: int) -> dict
     return described
 
 
-def _place(state: dict[str, Any], name: RegisterName, value: Any) -> None:
-    """`let.exit` under `let`, `wizard.name` with the wizard, where `frame` is called `state`."""
-    owner, _, rest = name.path.partition(".")
-    if owner == "let":
-        state["let"][rest] = value
-    elif rest in ("name", "clock"):
-        state[owner][rest] = value
-    elif rest == "frame":
-        state[owner]["state"] = value
-    else:
-        state["let"][name.path] = value
+def _act(program: Program, registers: Row, acts: Acts, k: int) -> list[Any]:
+    """One element of a sequence or memory: its move and its utterance, None for silence."""
+    utterance = acts.utterances.get(k)
+    said = _value(program, registers, utterance) if utterance is not None else None
+    return [_value(program, registers, acts.moves[k]), said or None]
 
 
-def register_value(program: Program, name: RegisterName, value: int) -> Any:
-    """What a number in a register stands for."""
-    if name.kind == "entity":
-        return str(program.entities[value])
-    if name.kind == "bool":
-        return bool(value)
-    return name.values[value - name.low] if name.values else value
+def _memories(program: Program, registers: Row, addresses: Addresses) -> dict[str, list[Any]]:
+    held = {key: int(registers[name.register]) for key, name in addresses.filled.items()}
+    return {
+        key: [_act(program, registers, acts, k) for k in range(acts.length - held[key], acts.length)]
+        for key, acts in addresses.memories.items()
+    }
 
 
-def _pending(program: Program, registers: NDArray[np.int16]) -> dict[str, list[int]]:
+def _last(program: Program, registers: Row) -> dict[str, Any]:
+    """What the agent did in the last step; the next one may still ask for it (`prev`)."""
+    template, noun = int(registers[Register.TEMPLATE]), int(registers[Register.NOUN])
+    silent = template < 0 or noun < 0
+    poked = int(registers[Register.POKED])
+    return {
+        "action": BODY_WORDS[int(registers[Register.ACTION])],
+        "said": None if silent else utterance_text(program, 1 + template * len(program.nouns) + noun),
+        "poked": str(program.entities[poked]) if poked >= 0 else None,
+    }
+
+
+def _pending(program: Program, registers: Row) -> dict[str, list[int]]:
     start, rows = program.header(Header.FRAME_AT), program.header(Header.FRAMES)
     table = program.words[start : start + rows * FrameColumn.COLUMNS].reshape(rows, FrameColumn.COLUMNS)
     pending = {}

@@ -3,31 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
-from socialai_dsl.compiler import compile_loaded
+from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.envs.scenario_env import ScenarioEnv
 from socialai_dsl.envs.vector_env import ScenarioVectorEnv
 from socialai_dsl.frontend import load
-from socialai_dsl.program import Program
+from socialai_dsl.program_suite import Playable
 
-Scenario = str | Program
+Scenario = str | Path | Playable
 
 
-def program_of(scenario: Scenario) -> Program:
-    """The program of a scenario given by name or path, or itself."""
-    return scenario if isinstance(scenario, Program) else compile_loaded(load(str(scenario)))
+def playable_of(scenario: Scenario) -> Playable:
+    """The program of a scenario, or the programs of a suite, given by name or path, or itself."""
+    return scenario if isinstance(scenario, Playable) else compile_loaded(load(scenario))
 
 
 def make(scenario: Scenario, render_mode: str | None = None) -> ScenarioEnv:
-    """One environment of a scenario: `make("talkitout+unsocial")`, `make("my/scenario.yaml")`.
+    """One environment of a scenario or suite: `make("talkitout+unsocial")`, `make("my/scenario.yaml")`.
 
     Raises:
         ScenarioError: the scenario does not exist or has mistakes; `.diagnostics` lists them all.
     """
-    return ScenarioEnv(program_of(scenario), render_mode)
+    return ScenarioEnv(playable_of(scenario), render_mode)
 
 
 def make_vec(
@@ -38,15 +39,16 @@ def make_vec(
     copy: bool = True,
     render_mode: str | None = None,
 ) -> ScenarioVectorEnv:
-    """Many environments of a scenario, or of several in turn; see ScenarioVectorEnv.
+    """Many environments of a scenario or suite, or of several in turn; see ScenarioVectorEnv.
 
     Raises:
         ScenarioError: a scenario does not exist or has mistakes.
         ValueError: an argument is not what was expected.
     """
-    names = [scenario] if isinstance(scenario, str | Program) else list(scenario)
+    names = [scenario] if isinstance(scenario, str | Path | Playable) else list(scenario)
+    made = {name: playable_of(name) for name in dict.fromkeys(names)}
     return ScenarioVectorEnv(
-        [program_of(name) for name in names], num_envs, num_threads, autoreset_mode, copy, render_mode
+        [made[name] for name in names], num_envs, num_threads, autoreset_mode, copy, render_mode
     )
 
 

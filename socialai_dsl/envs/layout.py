@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.engine.state import PIN_NONE
+from socialai_dsl.envs.addresses import Acts, Addresses
+from socialai_dsl.envs.values import cell_pair, meant, read, utterance_number, whole_number, word
 from socialai_dsl.program import (
+    BODY_WORDS,
     COLORS,
     DIRECTIONS,
     ENTITY_FIELDS,
@@ -30,42 +32,56 @@ _WORDS: dict[str, tuple[Field, Sequence[str]]] = {
 _KEYS = {
     "agent": ("at", "clock", "color", "facing", "gone", "name", "state"),
     "npc": ("at", "clock", "color", "facing", "gone", "name", "poked", "state"),
-    "object": ("at", "color", "gone", "state"),
+    "object": ("at", "color", "gone", "initial", "state"),
 }
+_OTHER_KEYS = ("t", "room", "one_of", "let", "memory", "last", "heard", "pending")
 
 
-def pins_of(program: Program, layout: Mapping[str, Any]) -> NDArray[np.int16]:
+def pinned_member(given: Any, members: Sequence[str]) -> int:
+    """Which member of a suite a layout's `member` names. Raises ValueError if there is none of that name."""
+    return word("member", given, members)
+
+
+def pins_of(program: Program, layout: Mapping[str, Any], in_suite: bool = False) -> NDArray[np.int16]:
     """Pinned registers, int16 (R,): the value of each register that the layout gives, PIN_NONE for the others.
 
     Only the shape of a layout is checked: things lie on the grid and not on each other, words and lengths are known.
 
+    Args:
+        program: the scenario that is played.
+        layout: in the scenario's own names.
+        in_suite: whether the layout may have a key `member`, which is the caller's affair.
+
     Raises:
         ValueError: naming the key at fault, what was got and what was expected.
     """
-    return _Layout(program).pins(layout)
+    return _Layout(program, in_suite).pins(layout)
 
 
 class _Layout:
-    def __init__(self, program: Program) -> None:
+    def __init__(self, program: Program, in_suite: bool) -> None:
         self.program = program
         self.row = np.full(program.header(Header.REGISTERS), PIN_NONE, np.int16)
-        self.registers = {name.path: name for name in program.registers}
+        self.addresses = Addresses(program)
+        self.others = ("member", *_OTHER_KEYS) if in_suite else _OTHER_KEYS
         self.groups: dict[str, list[int]] = {}
         for number, entity in enumerate(program.entities):
             self.groups.setdefault(entity.key, []).append(number)
 
     def pins(self, layout: Mapping[str, Any]) -> NDArray[np.int16]:
         self._mapping("layout", layout)
-        others = ("t", "room", "let", "heard", "pending")
         for key in layout:
-            if key not in self.groups and key not in others:
-                raise ValueError(f"layout: there is no {key!r}{_meant(key, [*self.groups, *others])}")
+            if key not in self.groups and key not in self.others:
+                raise ValueError(f"layout: there is no {key!r}{meant(key, [*self.groups, *self.others])}")
         self.width, self.height = self._room(layout.get("room"))
         if layout.get("t") is not None:
-            self.row[Register.T] = _number("t", layout["t"], 0, self.program.header(Header.HORIZON) - 1)
+            self.row[Register.T] = whole_number("t", layout["t"], 0, self.program.header(Header.HORIZON) - 1)
         for key, numbers in self.groups.items():
             self._group(key, numbers, layout.get(key))
+        self._one_of(layout.get("one_of"))
         self._let(layout.get("let"))
+        self._memory(layout.get("memory"))
+        self._last(layout.get("last"))
         self._heard(layout.get("heard"))
         self._pending(layout.get("pending"))
         return self.row
@@ -86,7 +102,7 @@ class _Layout:
         sizes = list(least)
         for i, (name, register) in enumerate((("width", Register.WIDTH), ("height", Register.HEIGHT))):
             if room.get(name) is not None:
-                sizes[i] = _number(f"room.{name}", room[name], least[i], most[i])
+                sizes[i] = whole_number(f"room.{name}", room[name], least[i], most[i])
                 self.row[register] = sizes[i]
         _only("room", room, ("width", "height"))
         return sizes[0], sizes[1]
@@ -111,14 +127,15 @@ class _Layout:
         _only(key, given, _KEYS[entity.role])
         for name, (field, words) in _WORDS.items():
             if given.get(name) is not None:
-                self._set(number, field, _word(f"{key}.{name}", given[name], words))
+                self._set(number, field, word(f"{key}.{name}", given[name], words))
         if given.get("state") is not None and entity.role == "object":
-            self._set(number, Field.STATUS, _word(f"{key}.state", given["state"], entity.states))
+            self._set(number, Field.STATUS, word(f"{key}.state", given["state"], entity.states))
+            self._start_with(key, given)
         elif given.get("state") is not None:
-            self._named(f"{key}.frame", given["state"], f"{key}.state")
-        for name in ("name", "clock"):
+            self._owned(key, "state", given["state"])
+        for name in ("name", "clock", "initial"):
             if given.get(name) is not None:
-                self._named(f"{key}.{name}", given[name], f"{key}.{name}")
+                self._owned(key, name, given[name])
         if given.get("poked"):
             self._set(number, Field.POKED, 1)
         if given.get("gone"):
@@ -130,11 +147,16 @@ class _Layout:
     def _set(self, number: int, field: Field, value: int) -> None:
         self.row[FIRST_ENTITY + ENTITY_FIELDS * number + field] = value
 
+    def _start_with(self, key: str, given: Mapping[str, Any]) -> None:
+        """A status that is given is also the initial one, where that is drawn and could be it."""
+        name = self.addresses.owned.get((key, "initial"))
+        if name is not None and given.get("initial") is None and given["state"] in name.values:
+            self._pin(name, given["state"], f"{key}.state")
+
     def _at(self, key: str, number: int, given: Any) -> None:
-        if not isinstance(given, Sequence) or isinstance(given, str) or len(given) != 2:
-            raise ValueError(f"{key}.at: got {given!r}; expected [x, y]")
-        x = _number(f"{key}.at[0]", given[0], 0, self.width - 1, self._hint())
-        y = _number(f"{key}.at[1]", given[1], 0, self.height - 1, self._hint())
+        across, down = cell_pair(f"{key}.at", given)
+        x = whole_number(f"{key}.at[0]", across, 0, self.width - 1, self._hint())
+        y = whole_number(f"{key}.at[1]", down, 0, self.height - 1, self._hint())
         taken = self._taken(number, x, y)
         if taken is not None:
             raise ValueError(f"{key}.at: got [{x}, {y}], where {self.program.entities[taken]} is already")
@@ -165,32 +187,95 @@ class _Layout:
 
     # --- registers ---
 
+    def _pin(self, name: RegisterName, value: Any, key: str) -> None:
+        self.row[name.register] = read(self.program, name, value, key)
+
+    def _owned(self, owner: str, key: str, value: Any) -> None:
+        name = self.addresses.owned.get((owner, key))
+        if name is None:
+            raise ValueError(f"{owner}.{key}: got {value!r}, but this scenario does not draw it")
+        self._pin(name, value, f"{owner}.{key}")
+
+    def _one_of(self, given: Any) -> None:
+        """Which of its files a cast member is."""
+        if not given:
+            return
+        self._mapping("one_of", given)
+        for key, value in given.items():
+            name = self.addresses.one_of.get(key)
+            if name is None:
+                raise ValueError(f"one_of: {key!r} is not drawn{meant(key, self.addresses.one_of)}")
+            if value is not None:
+                self._pin(name, value, f"one_of.{key}")
+
     def _let(self, given: Any) -> None:
         if not given:
             return
         self._mapping("let", given)
-        names = {path.removeprefix("let."): path for path in self.registers}
+        plain, sequences = self.addresses.plain, self.addresses.sequences
         for key, value in given.items():
-            if key not in names:
-                raise ValueError(f"let: there is no {key!r}{_meant(key, names)}")
-            if value is not None:
-                self._named(names[key], value, f"let.{key}")
+            if key not in plain and key not in sequences:
+                raise ValueError(f"let: there is no {key!r}{meant(key, [*plain, *sequences])}")
+            if value is None:
+                continue
+            if key in plain:
+                self._pin(plain[key], value, f"let.{key}")
+            else:
+                acts = sequences[key]
+                for k, act in enumerate(_listed(f"let.{key}", value, acts.length)):
+                    if act is not None:
+                        self._act(acts, k, act, f"let.{key}[{k}]")
 
-    def _named(self, path: str, value: Any, key: str) -> None:
-        name = self.registers.get(path)
-        if name is None:
-            raise ValueError(f"{key}: got {value!r}, but this scenario does not draw it")
-        self.row[name.register] = self._value(name, value, key)
+    def _memory(self, given: Any) -> None:
+        """What memories hold, oldest first; the latest act has the last place."""
+        if not given:
+            return
+        self._mapping("memory", given)
+        for key, value in given.items():
+            acts = self.addresses.memories.get(key)
+            if acts is None:
+                raise ValueError(f"memory: there is no {key!r}{meant(key, self.addresses.memories)}")
+            if value is None:
+                continue
+            held = _listed(f"memory.{key}", value, acts.length)
+            for k, act in enumerate(held):
+                self._act(acts, acts.length - len(held) + k, act, f"memory.{key}[{k}]")
+            self.row[self.addresses.filled[key].register] = len(held)
 
-    def _value(self, name: RegisterName, value: Any, key: str) -> int:
-        if name.kind == "entity":
-            words = [str(entity) for entity in self.program.entities]
-            return name.low + _word(key, value, words[name.low : name.high + 1])
-        if name.kind == "bool":
-            return _word(key, value, (False, True))
-        if name.values:
-            return name.low + _word(key, value, name.values)
-        return _number(key, value, name.low, name.high)
+    def _act(self, acts: Acts, k: int, given: Any, key: str) -> None:
+        """An element of a sequence or memory: [move, utterance], where None is silence."""
+        if not isinstance(given, Sequence) or isinstance(given, str) or len(given) != 2:
+            raise ValueError(f"{key}: got {given!r}; expected [move, utterance]")
+        move, said = given
+        if move is not None:
+            self._pin(acts.moves[k], move, f"{key}[0]")
+        if k in acts.utterances:
+            self._pin(acts.utterances[k], "" if said is None else said, f"{key}[1]")
+        elif said is not None:
+            raise ValueError(f"{key}[1]: got {said!r}, but this sequence is silent")
+
+    def _last(self, given: Any) -> None:
+        """What the agent did in the last step."""
+        if not given:
+            return
+        self._mapping("last", given)
+        _only("last", given, ("action", "said", "poked"))
+        if given.get("action") is not None:
+            self.row[Register.ACTION] = word("last.action", given["action"], BODY_WORDS)
+        if given.get("said") is not None:
+            self._said(utterance_number(self.program, given["said"], "last.said"))
+        if given.get("poked") is not None:
+            entities = [str(entity) for entity in self.program.entities]
+            self.row[Register.POKED] = word("last.poked", given["poked"], entities)
+
+    def _said(self, utterance: int) -> None:
+        if utterance == 0:
+            return
+        pair = utterance - 1
+        template, noun = divmod(pair, len(self.program.nouns))
+        self.row[Register.UTTERANCE] = utterance
+        self.row[Register.TEMPLATE], self.row[Register.NOUN] = template, noun
+        self.row[Register.CLASS] = self.program.words[self.program.header(Header.CLASS_AT) + pair]
 
     # --- what was heard ---
 
@@ -203,7 +288,7 @@ class _Layout:
         log = self.program.header(Header.LOG)
         # Older lines than fit are forgotten, as in an episode.
         for i, line in enumerate(given[-size:]):
-            self.row[log + i] = _word(f"heard[{i}]", line, self.program.lines)
+            self.row[log + i] = word(f"heard[{i}]", line, self.program.lines)
         self.row[Register.LOGGED] = min(len(given), size)
 
     def _pending(self, given: Any) -> None:
@@ -220,37 +305,23 @@ class _Layout:
         }
         for key, classes in given.items():
             if key not in inboxes:
-                raise ValueError(f"pending: there is no {key!r} who listens{_meant(key, inboxes)}")
+                raise ValueError(f"pending: there is no {key!r} who listens{meant(key, inboxes)}")
             size = self.program.header(Header.INBOX_SIZE)
             if not isinstance(classes, Sequence) or isinstance(classes, str) or len(classes) > size:
                 raise ValueError(f"pending.{key}: got {classes!r}; expected a list of at most {size}")
             self.row[inboxes[key]] = len(classes)
             for i, number in enumerate(classes):
                 highest = self.program.header(Header.CLASSES) - 1
-                self.row[inboxes[key] + 1 + i] = _number(f"pending.{key}[{i}]", number, 1, highest)
+                self.row[inboxes[key] + 1 + i] = whole_number(f"pending.{key}[{i}]", number, 1, highest)
 
 
 def _only(key: str, given: Mapping[str, Any], allowed: Sequence[str]) -> None:
     for name in given:
         if name not in allowed:
-            raise ValueError(f"{key}: there is no {name!r}{_meant(name, allowed)}")
+            raise ValueError(f"{key}: there is no {name!r}{meant(name, allowed)}")
 
 
-def _meant(word: str, among: Any) -> str:
-    near = did_you_mean(word, among)
-    return f"; did you mean {near!r}?" if near else f"; expected one of {', '.join(sorted(among))}"
-
-
-def _number(key: str, value: Any, low: int, high: int, hint: str = "") -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not low <= value <= high:
-        raise ValueError(f"{key}: got {value!r}; expected a number from {low} to {high}{hint}")
-    return int(value)
-
-
-def _word(key: str, value: Any, words: Sequence[Any]) -> int:
-    for i, word in enumerate(words):
-        if value == word and isinstance(value, type(word)):
-            return i
-    if len(words) > 12:
-        raise ValueError(f"{key}: got {value!r}{_meant(str(value), map(str, words))[:200]}")
-    raise ValueError(f"{key}: got {value!r}; expected one of {', '.join(map(str, words))}")
+def _listed(key: str, given: Any, most: int) -> Sequence[Any]:
+    if not isinstance(given, Sequence) or isinstance(given, str) or len(given) > most:
+        raise ValueError(f"{key}: got {given!r}; expected a list of at most {most}")
+    return given

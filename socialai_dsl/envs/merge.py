@@ -1,4 +1,4 @@
-"""Several programs as one batch: one action space, one vocabulary, and how each program is read in their terms."""
+"""The programs of a batch: one action space, one vocabulary, and how each program is read in their terms."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from gymnasium import spaces
 
 from socialai_dsl.engine.batch import Part
 from socialai_dsl.program import BODY_WORDS, VIEW, Body, EntityColumn, Header, Program, TypeColumn
+from socialai_dsl.program_suite import Playable, ProgramSuite, mixture, prefixed
 
 
 @dataclass(frozen=True)
@@ -17,54 +18,55 @@ class Merged:
     """What the programs of a batch have in common.
 
     Attributes:
-        actions, templates, nouns: words of the action space; each string once, in order of appearance.
-        vocabulary: word of each token id.
+        playable: the scenario or suite; of several their mixture.
+        programs: the programs of all of them. members: what each is called among several.
+        pools: for each scenario or suite given, the numbers of its programs.
         outcomes: every way an episode can end: its name and whether it is a success.
         length: tokens in a history, L.
         parts: the programs as the engine takes them.
         highest: greatest value of each channel of the picture.
     """
 
-    actions: tuple[str, ...]
-    templates: tuple[str, ...]
-    nouns: tuple[str, ...]
-    vocabulary: tuple[str, ...]
+    playable: Playable
+    programs: tuple[Program, ...]
+    members: tuple[str, ...]
+    pools: tuple[tuple[int, ...], ...]
     outcomes: tuple[tuple[str, bool], ...]
     length: int
     parts: tuple[Part, ...]
     highest: tuple[int, int, int, int]
 
     @classmethod
-    def of(cls, programs: Sequence[Program]) -> Merged:
-        """The union of action spaces and vocabularies."""
-        actions = _union([p.actions for p in programs])
-        templates = _union([p.templates for p in programs])
-        nouns = _union([p.nouns for p in programs])
-        vocabulary = _union([p.vocabulary for p in programs])
-        endings = [[(o.name, o.success) for o in p.outcome_table] for p in programs]
-        outcomes = tuple(dict.fromkeys(ending for own in endings for ending in own))
-        parts = tuple(
-            Part(
-                words=program.words,
-                rules=len(program.rules),
-                outcomes=[outcomes.index(ending) for ending in own],
-                actions=[*(_body(program, word) for word in actions), int(Body.NONE)],
-                templates=_positions(templates, program.templates),
-                nouns=_positions(nouns, program.nouns),
-                tokens=_positions(program.vocabulary, vocabulary),
-            )
-            for program, own in zip(programs, endings, strict=True)
-        )
-        length = max(program.header(Header.TOKENS) for program in programs)
+    def of(cls, playables: Sequence[Playable]) -> Merged:
+        """Scenarios and suites, each given once."""
+        playable = playables[0] if len(playables) == 1 else mixture(playables)
+        suite = playable if isinstance(playable, ProgramSuite) else mixture([playable])
+        outcomes = tuple((outcome.name, outcome.success) for outcome in playable.outcome_table)
+        parts = _parts(suite, [name for name, _ in outcomes], playable)
+        length = max(program.header(Header.TOKENS) for program in suite.programs)
         kinds, colors, statuses, orientations = np.max(
-            [_highest_codes(program) for program in programs], axis=0
+            [_highest_codes(program) for program in suite.programs], axis=0
         ).tolist()
-        highest = (kinds, colors, statuses, orientations)
-        return cls(actions, templates, nouns, vocabulary, outcomes, length, parts, highest)
+        return cls(
+            playable,
+            suite.programs,
+            suite.members,
+            _pools(playables),
+            outcomes,
+            length,
+            parts,
+            (kinds, colors, statuses, orientations),
+        )
+
+    @property
+    def vocabulary(self) -> tuple[str, ...]:
+        """Word of each token id."""
+        return self.playable.vocabulary
 
     def action_space(self) -> spaces.MultiDiscrete:
         """[P + 1, 2, T, N]: body action (the last is no movement), speak or not, template, noun."""
-        return spaces.MultiDiscrete([len(self.actions) + 1, 2, len(self.templates), len(self.nouns)])
+        words = self.playable
+        return spaces.MultiDiscrete([len(words.actions) + 1, 2, len(words.templates), len(words.nouns)])
 
     def observation_space(self) -> spaces.Dict:
         """Image uint8 (7, 7, 4) and tokens int16 (L,), both with true bounds."""
@@ -77,14 +79,38 @@ class Merged:
         )
 
 
-def _union(lists: Sequence[Sequence[str]]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(word for words in lists for word in words))
+def _pools(playables: Sequence[Playable]) -> tuple[tuple[int, ...], ...]:
+    """Numbers of programs, counted on from scenario to scenario."""
+    sizes = [len(p.programs) if isinstance(p, ProgramSuite) else 1 for p in playables]
+    ends = np.cumsum(sizes).tolist()
+    return tuple(tuple(range(end - size, end)) for size, end in zip(sizes, ends, strict=True))
 
 
-def _positions(words: Sequence[str], among: Sequence[str]) -> list[int]:
-    """For each word its index in `among`, -1 if it is not there."""
-    index = {word: i for i, word in enumerate(among)}
-    return [index.get(word, -1) for word in words]
+def _parts(suite: ProgramSuite, outcomes: Sequence[str], playable: Playable) -> tuple[Part, ...]:
+    """Each program with its links into the batch."""
+    token = {word: i for i, word in enumerate(playable.vocabulary)}
+    ending = {name: i for i, name in enumerate(outcomes)}
+    return tuple(
+        Part(
+            words=program.words,
+            rules=len(program.rules),
+            outcomes=[ending[name] for name in _endings(member, program, playable)],
+            actions=[*(_body(program, word) for word in suite.actions), int(Body.NONE)],
+            templates=list(templates),
+            nouns=list(nouns),
+            tokens=[token[word] for word in program.vocabulary],
+        )
+        for member, program, templates, nouns in zip(
+            suite.members, suite.programs, suite.template_maps, suite.noun_maps, strict=True
+        )
+    )
+
+
+def _endings(member: str, program: Program, playable: Playable) -> list[str]:
+    """What the ways to end of one program are called in the batch."""
+    if isinstance(playable, Program):
+        return program.outcomes
+    return [prefixed(member, name) for name in program.outcomes]
 
 
 def _body(program: Program, word: str) -> int:

@@ -14,7 +14,8 @@ from socialai_dsl.engine.step import TRUNCATED
 from socialai_dsl.envs.actions import encode_action
 from socialai_dsl.envs.picture import frame
 from socialai_dsl.envs.table import Table
-from socialai_dsl.program import Program, Register
+from socialai_dsl.program import Register
+from socialai_dsl.program_suite import Playable, ProgramSuite
 
 Observation = dict[str, NDArray[Any]]
 
@@ -27,17 +28,17 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
 
     Observation: `image` uint8 (7, 7, 4), `tokens` int16 (L,). Action: int64 (4,): body action (the last is no
     movement), speak or not, template, noun; the last two are ignored in silence. Info: `utterance` (what is heard
-    now, one line for each speaker, "NA" in silence), `history` (all lines since the reset), and at the end `success`
-    and `outcome`.
+    now, one line for each speaker, "NA" in silence), `history` (all lines since the reset), of a suite `member` (which
+    scenario this episode plays), and at the end `success` and `outcome`.
 
     Args:
-        program: what `socialai_dsl.compile` returns.
+        program: what `socialai_dsl.compile` returns, for a scenario or a suite.
         render_mode: rgb_array, ansi or human (a picture in the terminal).
     """
 
     metadata = {"render_modes": ["rgb_array", "ansi", "human"], "render_fps": 4}  # noqa: RUF012 - Gymnasium's protocol
 
-    def __init__(self, program: Program, render_mode: str | None = None) -> None:
+    def __init__(self, program: Playable, render_mode: str | None = None) -> None:
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             modes = ", ".join(self.metadata["render_modes"])
             raise ValueError(f"render_mode: got {render_mode!r}; expected None or one of {modes}")
@@ -46,7 +47,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._table = Table([program], 1, 1)
         self.observation_space = self._table.merged.observation_space()  # type: ignore[assignment]
         self.action_space = self._table.merged.action_space()
-        self._successes = [outcome.success for outcome in program.outcome_table]
+        self._suite = isinstance(program, ProgramSuite)
         # One row of each array, so that a step makes no views.
         self._image, self._tokens = self._table.image[0], self._table.tokens[0]
         self._registers = self._table.state.registers[0]
@@ -54,6 +55,8 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._reward = self._table.batch.ports.reward
         self._history = ""
         self._ended = True
+        self._playing = self._table.program(0)
+        self._always: dict[str, Any] = {}
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -69,7 +72,8 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._history = "\n".join(self._table.history(0))
         if self.render_mode == "human":
             self.render()
-        return self._observation(), {"utterance": SILENCE, "history": self._history}
+        self._begin()
+        return self._observation(), {"utterance": SILENCE, "history": self._history, **self._always}
 
     def step(
         self, action: NDArray[np.int64] | Sequence[int]
@@ -85,19 +89,29 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         if ended == BAD_ACTION:
             raise self._refusal(action)
         info: dict[str, Any] = {"utterance": SILENCE, "history": self._history}
+        if self._suite:
+            info |= self._always
         if self._registers.item(_HEARD):
             self._history = "\n".join(self._table.history(0))
-            info = {"utterance": "\n".join(self._table.heard(0)), "history": self._history}
+            info |= {"utterance": "\n".join(self._table.heard(0)), "history": self._history}
         terminated = truncated = False
         if ended:
             self._ended = True
             truncated = self._registers.item(Register.ENDED) == TRUNCATED
             terminated = not truncated
             outcome = self._registers.item(Register.OUTCOME)
-            info |= {"success": self._successes[outcome], "outcome": self.program.outcomes[outcome]}
+            info |= {
+                "success": self._playing.outcome_table[outcome].success,
+                "outcome": self._playing.outcomes[outcome],
+            }
         if self.render_mode == "human":
             self.render()
         return self._observation(), self._reward.item(), terminated, truncated, info
+
+    def _begin(self) -> None:
+        """Look up which program this episode plays."""
+        self._playing = self._table.program(0)
+        self._always = {"member": self._table.member(0)} if self._suite else {}
 
     def _refusal(self, action: Any) -> ValueError:
         return ValueError(f"step: got the action {action!r}; expected one of {self.action_space}")
@@ -107,7 +121,8 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
 
     def encode_action(self, action: Sequence[Any]) -> NDArray[np.int64]:
         """The action of the space for the paper's notation or words: see `actions.encode_action`."""
-        return encode_action(action, self.program.actions, self.program.templates, self.program.nouns)
+        live = self.program.live(self._table.number(0)) if isinstance(self.program, ProgramSuite) else None
+        return encode_action(action, self.program.actions, self.program.templates, self.program.nouns, live)
 
     def scripted_action(self) -> NDArray[np.int64]:
         """What the agent's frame would do now, int64 (4,). Raises ValueError if the agent follows no frame."""
@@ -125,6 +140,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
     def restore(self, data: bytes) -> None:
         """Put back a snapshot of this scenario. Raises ValueError for any other."""
         self._table.restore(data)
+        self._begin()
         self._ended = bool(self._registers[Register.ENDED])
         self._history = "\n".join(self._table.history(0))
 

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.draws import GOLDEN, MASK, mix
+from socialai_dsl.draws import GOLDEN, MASK, below, draw, episode_key, mix, site
 from socialai_dsl.engine.batch import Batch
 from socialai_dsl.engine.kernel import BAD_ACTION, Task
 from socialai_dsl.engine.state import PIN_NONE, Key
 from socialai_dsl.envs import snapshot
 from socialai_dsl.envs.audit import first_unsound
 from socialai_dsl.envs.describe import describe
-from socialai_dsl.envs.layout import pins_of
+from socialai_dsl.envs.layout import pinned_member, pins_of
 from socialai_dsl.envs.merge import Merged
 from socialai_dsl.envs.seats import check_options, choose_episodes
 from socialai_dsl.program import (
@@ -27,28 +27,35 @@ from socialai_dsl.program import (
     Program,
     Register,
 )
+from socialai_dsl.program_suite import Playable, prefixed
+
+_PROGRAM = int(Key.PROGRAM)  # members of an enumeration are slow indices
 
 # Odd multipliers, one for each line heard at once.
 _MULTIPLIERS = np.array([mix(k * GOLDEN) | 1 for k in range(1, 65)], np.uint64)
 
 
 class Table:
-    """Rows of environments; row i plays `programs[program_of[i]]`.
+    """Rows of environments: row i plays `playables[i modulo their number]`, of a suite one member each episode.
 
     Attributes:
         image: uint8 (E, 7, 7, 4), tokens: int16 (E, L): the engine's own buffers.
     """
 
-    def __init__(self, programs: Sequence[Program], rows: int, threads: int) -> None:
-        self.programs = tuple(programs)
-        self.merged = Merged.of(self.programs)
-        self.program_of = np.arange(rows) % len(self.programs)
-        pools = [[number] for number in range(len(self.programs))]
-        self.batch = Batch(self.merged.parts, pools, self.program_of.tolist(), self.merged.length, threads)
+    def __init__(self, playables: Sequence[Playable], rows: int, threads: int) -> None:
+        different = list({id(playable): playable for playable in playables}.values())
+        self.merged = Merged.of(different)
+        self.programs = self.merged.programs
+        number = {id(playable): i for i, playable in enumerate(different)}
+        self.pool_of = np.array([number[id(playables[row % len(playables)])] for row in range(rows)])
+        self.batch = Batch(
+            self.merged.parts, self.merged.pools, self.pool_of.tolist(), self.merged.length, threads
+        )
         self.state, self.rows = self.batch.state, rows
         self.image = self.state.image.view(np.uint8).reshape(rows, VIEW, VIEW, 4)
         self.tokens = self.state.tokens
         self.fresh = True
+        self._number_at = {offset: i for i, offset in enumerate(self.batch.offsets)}
 
     # --- playing ---
 
@@ -56,8 +63,11 @@ class Table:
         """Start episodes; see `seats.choose_episodes` for the meaning of seeds, `layout.pins_of` for layouts."""
         given = check_options(options)
         chosen = self._mask(given.get("reset_mask"))
-        pins, rows = self._pins(given.get("layout"))
-        choose_episodes(self.state.keys, chosen, seed, given, self.fresh)
+        keys = self.state.keys.copy()
+        choose_episodes(keys, chosen, seed, given, self.fresh)
+        pins, rows = self._pins(given.get("layout"), keys, chosen)
+        # Nothing has changed so far, should something be wrong with what was given.
+        self.state.keys[:] = keys
         self.fresh = False
         ports = self.batch.ports
         ports.chosen[:] = chosen
@@ -91,7 +101,9 @@ class Table:
             raise ValueError(f"options['reset_mask']: got {mask!r}; expected {self.rows} booleans")
         return given
 
-    def _pins(self, layout: Any) -> tuple[NDArray[np.int16] | None, NDArray[np.int32]]:
+    def _pins(
+        self, layout: Any, keys: NDArray[np.uint64], chosen: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.int16] | None, NDArray[np.int32]]:
         """The table of pins (row 0 pins nothing) and which of its rows each environment uses."""
         rows = np.zeros(self.rows, np.int32)
         if layout is None:
@@ -103,19 +115,34 @@ class Table:
             )
         width = self.state.registers.shape[1] + 1
         pins = [np.full(width, PIN_NONE, np.int16)]
-        known: dict[tuple[int, int], int] = {}
-        for i, one in enumerate(layouts):
-            if one is None:
+        known: dict[tuple[int, int, int], int] = {}
+        for i in np.flatnonzero(chosen).tolist():
+            if layouts[i] is None:
                 continue
-            key = id(one), int(self.program_of[i])
+            pool = int(self.pool_of[i])
+            place = self._place_in_pool(layouts[i], pool, keys[i])
+            key = id(layouts[i]), pool, place
             if key not in known:
                 known[key] = len(pins)
                 row = np.full(width, PIN_NONE, np.int16)
-                given = pins_of(self.programs[key[1]], one)
+                programs = self.merged.pools[pool]
+                given = pins_of(self.programs[programs[place]], layouts[i], in_suite=len(programs) > 1)
                 row[: len(given)] = given
+                row[-1] = place
                 pins.append(row)
             rows[i] = known[key]
         return np.stack(pins), rows
+
+    def _place_in_pool(self, layout: Any, pool: int, key: NDArray[np.uint64]) -> int:
+        """Which program of its pool a row with a layout will play: the one that is named, else the one it draws."""
+        programs = self.merged.pools[pool]
+        if len(programs) == 1:
+            return 0
+        named = layout.get("member") if isinstance(layout, Mapping) else None
+        if named is not None:
+            return pinned_member(named, [self.merged.members[number] for number in programs])
+        seed, index, episode = (int(key[word]) for word in (Key.SEED, Key.INDEX, Key.EPISODE))
+        return below(draw(episode_key(seed, index, episode), site("member"), 0, 0), len(programs))
 
     def scripted_actions(self) -> NDArray[np.int64]:
         """What the agents' frames would do now, int64 (E, 4); nothing changes."""
@@ -128,9 +155,18 @@ class Table:
 
     # --- looking ---
 
+    def number(self, row: int) -> int:
+        """Which program a row plays in this episode."""
+        return self._number_at[self.state.keys.item(row, _PROGRAM)]
+
     def program(self, row: int) -> Program:
-        """The program that a row plays."""
-        return self.programs[int(self.program_of[row])]
+        """The program that a row plays in this episode."""
+        return self.programs[self.number(row)]
+
+    def member(self, row: int) -> str | None:
+        """What the suite calls the scenario that a row plays in this episode; None if it plays no suite."""
+        alone = len(self.merged.pools[self.pool_of.item(row)]) == 1
+        return None if alone else self.merged.members[self.number(row)]
 
     def heard(self, row: int) -> list[str]:
         """Lines heard in the last step."""
@@ -146,7 +182,9 @@ class Table:
 
     def describe(self, row: int) -> dict[str, Any]:
         """The state of a row in the scenario's own names; a superset of a layout."""
-        return describe(self.program(row), self.state.registers[row])
+        member = self.member(row)
+        described = describe(self.program(row), self.state.registers[row])
+        return described if member is None else {"member": member, **described}
 
     def cells(self, row: int) -> tuple[NDArray[np.uint8], tuple[int, int, int]]:
         """The canvas as it looks, uint8 (H, W, 4), and the agent's x, y, direction."""
@@ -165,13 +203,13 @@ class Table:
 
     def utterance_ids(self) -> NDArray[np.int64]:
         """A number for what was heard in the last step, int64 (E,); 0 for silence."""
-        registers = self.state.registers
+        registers, played = self.state.registers, self.batch.program_numbers()
         ids = np.zeros(self.rows, np.uint64)
         for number, program in enumerate(self.programs):
             first = program.header(Header.HEARD)
             heard = registers[:, Register.HEARD]
             for k in range(program.header(Header.HEARD_SIZE)):
-                rows = np.flatnonzero((self.program_of == number) & (heard > k))
+                rows = np.flatnonzero((played == number) & (heard > k))
                 lines = registers[rows, first + k].astype(np.uint64) + np.uint64(1)
                 ids[rows] = (ids[rows] + lines + np.uint64(number << 32)) * np.uint64(_MULTIPLIERS[k])
         return ids.view(np.int64)
@@ -182,7 +220,7 @@ class Table:
         if len(self.programs) > 1:
             # Lines are numbered by program, so equal numbers of two programs may be different texts.
             marks = np.array([mix(number * GOLDEN) & MASK for number in range(len(self.programs))], np.uint64)
-            ids[ids != 0] ^= marks[self.program_of][ids != 0]
+            ids[ids != 0] ^= marks[self.batch.program_numbers()][ids != 0]
         return ids.view(np.int64)
 
     def image_ids(self) -> NDArray[np.int64]:
@@ -192,18 +230,22 @@ class Table:
     def counters(self) -> dict[str, Any]:
         """How often each outcome and each rule happened since the environments were made, and episodes ended.
 
-        With several programs, names are preceded by the scenario's.
+        With several programs, names are preceded by the member's or scenario's: `dance: timeout`.
         """
         totals = self.batch.ports.counters.sum(axis=0)
         counted: dict[str, Any] = {"outcomes": {}, "rules": {}, "episodes": 0}
-        for program, first in zip(self.programs, self.batch.first_counters, strict=True):
-            prefix = f"{program.name}: " if len(self.programs) > 1 else ""
+        alone = isinstance(self.merged.playable, Program)
+        for member, program, first in zip(
+            self.merged.members, self.programs, self.batch.first_counters, strict=True
+        ):
             numbers = totals[first : first + program.header(Header.COUNTERS)].tolist()
             rules = len(program.rules)
-            for name, number in zip(program.rules, numbers, strict=False):
-                counted["rules"][prefix + name] = number
-            for name, number in zip(program.outcomes, numbers[rules:], strict=False):
-                counted["outcomes"][prefix + name] = number
+            for kind, names, counts in (
+                ("rules", program.rules, numbers),
+                ("outcomes", program.outcomes, numbers[rules:]),
+            ):
+                for name, number in zip(names, counts, strict=False):
+                    counted[kind][name if alone else prefixed(member, name)] = number
             counted["episodes"] += numbers[-1]
         return counted
 
@@ -228,15 +270,24 @@ class Table:
 
     def _check(self, read: Mapping[str, NDArray[Any]]) -> None:
         """The engine trusts its state, so what comes from outside must be a state that it can be in."""
-        fixed = [Key.POOL, Key.PROGRAM]
-        if not np.array_equal(read["keys"][:, fixed], self.state.keys[:, fixed]):
-            raise ValueError("the snapshot is damaged: rows play other programs")
+        played = self._played(read["keys"])
         if read["tokens"].min(initial=0) < 0 or read["tokens"].max(initial=0) >= len(self.merged.vocabulary):
             raise ValueError("the snapshot is damaged: a token is outside the vocabulary")
         for number, program in enumerate(self.programs):
-            wrong = first_unsound(program, read["registers"][self.program_of == number])
+            wrong = first_unsound(program, read["registers"][played == number])
             if wrong:
                 raise ValueError(f"the snapshot is damaged: {wrong}")
+
+    def _played(self, keys: NDArray[np.uint64]) -> NDArray[np.intp]:
+        """Which program each row plays by keys from outside, (E,)."""
+        numbers = [self._number_at.get(offset, -1) for offset in keys[:, Key.PROGRAM].tolist()]
+        allowed = all(
+            number in self.merged.pools[pool]
+            for number, pool in zip(numbers, self.pool_of.tolist(), strict=True)
+        )
+        if not allowed or not np.array_equal(keys[:, Key.POOL], self.state.keys[:, Key.POOL]):
+            raise ValueError("the snapshot is damaged: rows play other programs")
+        return np.array(numbers)
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         return {**self.state._asdict(), "counters": self.batch.ports.counters.sum(axis=0)}

@@ -14,6 +14,7 @@ from socialai_dsl.engine.kernel import Task
 from socialai_dsl.envs.picture import frame
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import VIEW, Program
+from socialai_dsl.program_suite import Playable
 
 _TASKS = {
     AutoresetMode.NEXT_STEP: Task.STEP_NEXT,
@@ -26,7 +27,7 @@ Observation = dict[str, NDArray[Any]]
 
 
 class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]]):
-    """Environments of one program, or of several in turn (environment i plays program i modulo their number).
+    """Environments of one scenario or suite, or of several in turn (environment i plays number i modulo their number).
 
     Observation: `image` uint8 (E, 7, 7, 4), `tokens` int16 (E, L). Action: int64 (E, 4): body action (the last is no
     movement), speak or not, template, noun. Infos, only in steps that end episodes: `success` bool (E,), `outcome` int
@@ -34,7 +35,7 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
     (arrays as in an observation) and `final_info`.
 
     Args:
-        programs: at least one program.
+        playables: at least one program or suite of programs; of a suite every episode plays a member, drawn anew.
         num_envs: E.
         num_threads: threads that share a step; results do not depend on it.
         autoreset_mode: NextStep, SameStep or Disabled (`reset(options={"reset_mask": ...})` restarts some).
@@ -44,15 +45,15 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
 
     def __init__(
         self,
-        programs: Sequence[Program],
+        playables: Sequence[Playable],
         num_envs: int,
         num_threads: int = 1,
         autoreset_mode: str | AutoresetMode = "NextStep",
         copy: bool = True,
         render_mode: str | None = None,
     ) -> None:
-        if not programs:
-            raise ValueError("programs: got none; expected at least one")
+        if not playables:
+            raise ValueError("scenarios: got none; expected at least one")
         for what, number in (("num_envs", num_envs), ("num_threads", num_threads)):
             if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < 1:
                 raise ValueError(f"{what}: got {number!r}; expected a whole number, at least 1")
@@ -70,7 +71,7 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
             "render_fps": 4,
         }
         self._task = _TASKS[self.autoreset_mode]
-        self._table = Table(programs, int(num_envs), int(num_threads))
+        self._table = Table(playables, int(num_envs), int(num_threads))
         self._copy = copy
         # The last entry answers for -1: nothing ended.
         self._successes = np.array([success for _, success in self._table.merged.outcomes] + [False])
@@ -83,22 +84,22 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
 
     @property
     def programs(self) -> tuple[Program, ...]:
-        """The programs played."""
+        """The programs played, the members of suites each for itself."""
         return self._table.programs
 
     @property
-    def program(self) -> Program:
-        """The program, or the first of several."""
-        return self._table.programs[0]
+    def program(self) -> Playable:
+        """The program or suite that is played; of several scenarios their mixture."""
+        return self._table.merged.playable
 
     @property
     def outcomes(self) -> list[str]:
-        """Name of each number in `infos["outcome"]`: `program.outcomes`, of several programs the union."""
+        """Name of each number in `infos["outcome"]`: `program.outcomes`."""
         return [name for name, _ in self._table.merged.outcomes]
 
     @property
     def vocabulary(self) -> tuple[str, ...]:
-        """Word of each token id; of several programs the union."""
+        """Word of each token id: `program.vocabulary`."""
         return self._table.merged.vocabulary
 
     def reset(
@@ -162,6 +163,10 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
     def histories(self) -> list[str]:
         """What was heard since the reset, as far as it is kept."""
         return ["\n".join(self._table.history(row)) for row in range(self.num_envs)]
+
+    def members(self) -> list[str | None]:
+        """What a suite calls the scenario that each environment plays in this episode; None without a suite."""
+        return [self._table.member(row) for row in range(self.num_envs)]
 
     def describe(self, index: int) -> dict[str, Any]:
         """The state of one environment in the scenario's own names; can be put back as a layout."""

@@ -170,7 +170,9 @@ class Resolved(Positions):
                 document, there = self.find(one)
                 span = document.value_span(there)
                 if file.kind != "npc":
-                    message = f"`{file.path.name}` is a file of the kind `{file.kind}`; only npc files can be drawn"
+                    message = (
+                        f"`{file.path.name}` is a file of the kind `{file.kind}`; only npc files can be drawn"
+                    )
                     raise self._builder.library.error("S108", message, span)
                 abstract = isinstance(file.data, dict) and file.data.get("abstract") is True
                 if abstract and len(files) == 1:
@@ -246,7 +248,9 @@ class Resolved(Positions):
     def _member_places(self, split: str | None) -> list[DataPath]:
         """Where the members of a split are named."""
         written = self.part(("members",))
-        own: list[DataPath] = [("members", i) for i in range(len(written) if isinstance(written, list) else 0)]
+        own: list[DataPath] = [
+            ("members", i) for i in range(len(written) if isinstance(written, list) else 0)
+        ]
         chosen = self._splits().get(split) if split is not None else None
         if not isinstance(chosen, dict) or split is None:
             return own

@@ -21,6 +21,7 @@ from socialai_dsl.schema.behaviour import (
 )
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.schema.scenario import Memory, Outcome, Parameter, Scenario, Sequence, SungWith
+from socialai_dsl.schema.suite import Split, Suite
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
 
 CALLED: Final[dict[type, str]] = {
@@ -43,6 +44,8 @@ CALLED: Final[dict[type, str]] = {
     UtteranceGrammar: "a grammar",
     Outcome: "an outcome",
     Parameter: "a parameter",
+    Suite: "a suite",
+    Split: "a split",
 }
 """How messages call what a model describes."""
 

@@ -126,10 +126,9 @@ def _scripted(member: Checked) -> Iterator[str]:
 
 
 def _lines(frame: FramePlan) -> Iterator[Line]:
-    rules = [rule for state in frame.states for rule in (*state.first, *state.then)]
-    for part in (*rules, *frame.steps):
-        if part.say is not None:
-            yield part.say
+    rules = (rule for state in frame.states for rule in (*state.first, *state.then))
+    said = (*(rule.say for rule in rules), *(step.say for step in frame.steps))
+    yield from (line for line in said if line is not None)
 
 
 def _patterns(part: object) -> Iterator[Pattern]:

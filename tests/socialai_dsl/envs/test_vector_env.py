@@ -211,7 +211,7 @@ def test_a_mixed_batch_plays_each_program_as_it_would_alone() -> None:
     [
         (lambda: sd.make_vec("talkitout", 0), "num_envs: got 0"),
         (lambda: sd.make_vec("talkitout", 2, autoreset_mode="Never"), "autoreset_mode: got 'Never'"),
-        (lambda: sd.make_vec([], 2), "programs: got none"),
+        (lambda: sd.make_vec([], 2), "scenarios: got none"),
         (lambda: sd.make_vec("talkitout", 2).reset(seed=-1), "seed: got -1"),
         (lambda: sd.make_vec("talkitout", 2).reset(seed=[1]), "seed: got \\[1\\]"),
         (lambda: sd.make_vec("talkitout", 2).reset(options={"layouts": {}}), "got 'layouts'"),

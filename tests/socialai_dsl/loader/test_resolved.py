@@ -179,11 +179,51 @@ def test_suites_pass_variants_on() -> None:
     found = resolve("both+hidden+quiet")
     assert found.variants == ("hidden", "quiet")
     assert "observe" not in data("both+hidden+quiet")
-    assert [member.name for member in found.members()] == ["market+hidden+quiet", "garden+hidden"]
+    assert [member.scenario.name for member in found.members()] == ["market+hidden+quiet", "garden+hidden"]
+    assert [member.name for member in found.members()] == ["market", "garden"]
     assert [member.name for member in resolve("both?split=test").members()] == ["market", "market_swap"]
+    assert [member.name for member in resolve("both?split=train").members()] == ["market", "garden"]
     tuned = resolve("both+tuned")
     assert data("both+tuned")["draw"] == "uniform"
     assert [member.name for member in tuned.members()] == ["market", "garden"]
+
+
+def test_a_suites_own_variant_is_passed_on_however_it_is_named(write: Write) -> None:
+    write("shipped/both_quiet.yaml", "variant: both_quiet\nof: both.yaml\nset: {about: Quiet.}\n")
+    for name in ("both+quiet", "both_quiet", "both_quiet+quiet"):
+        found = resolve(name)
+        assert data(name)["about"] == "Quiet."
+        assert [member.scenario.name for member in found.members()] == ["market+quiet", "garden"], name
+
+
+def test_members_with_parameters_and_whole_splits(write: Write) -> None:
+    write(
+        "user/three.yaml",
+        "suite: three\nmembers: [market, garden?n=1, market+quiet]\nsplits: {one: {members: [deep/inner]}}\n",
+    )
+    members = resolve("three").members()
+    assert [member.name for member in members] == ["market", "garden?n=1", "market+quiet"]
+    assert members[1].place == ("members", 1)
+    assert [member.name for member in resolve("three?split=one").members()] == ["inner"]
+
+
+def test_what_is_wrong_with_members_is_said_in_one_go(write: Write) -> None:
+    write(
+        "user/bad.yaml",
+        "suite: bad\nmembers: [marke, hidden, deep/base, zoes/z_1, market]\n"
+        "splits: {a: {replace: {market: nowhere}}, b: {members: [both]}}\n",
+    )
+    with pytest.raises(ScenarioError) as raised:
+        resolve("bad").members()
+    assert [str(d).removeprefix("bad.yaml:") for d in raised.value.diagnostics] == [
+        "2:11: S504 there is no file `marke` in .",
+        "2:18: S108 `hidden` is a file of the kind `variant`; the members of a suite are scenarios",
+        "2:26: S108 `deep/base` is an abstract scenario; the members of a suite are scenarios",
+        "2:37: S108 `zoes/z_1` is a file of the kind `npc`; the members of a suite are scenarios",
+    ]
+    with pytest.raises(ScenarioError) as raised:
+        resolve("bad").check_splits()
+    assert [d.code for d in raised.value.diagnostics] == ["S504", "S108"]
 
 
 def test_a_suite_none_of_whose_members_has_the_variant() -> None:

@@ -1,0 +1,17 @@
+"""Resolved files to what they mean, or to what is wrong with them: one module for each kind of file."""
+
+from socialai_dsl.checking.libraries import check_library, check_npc
+from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
+from socialai_dsl.checking.scenarios import check_scenario, naming_the_patch
+from socialai_dsl.checking.suites import check_suite
+
+__all__ = [
+    "Loaded",
+    "LoadedScenario",
+    "LoadedSuite",
+    "check_library",
+    "check_npc",
+    "check_scenario",
+    "check_suite",
+    "naming_the_patch",
+]

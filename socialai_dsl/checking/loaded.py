@@ -1,0 +1,60 @@
+"""What is right and can be compiled: scenarios, and suites of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from socialai_dsl.diagnostics import Diagnostic
+from socialai_dsl.loader import Resolved
+from socialai_dsl.schema import Scenario
+from socialai_dsl.schema.suite import Suite
+from socialai_dsl.semantics.suite import SharedSpace
+from socialai_dsl.semantics.terms import Checked
+
+
+@dataclass(frozen=True)
+class LoadedScenario:
+    """A scenario that is right: what `compile` takes.
+
+    Attributes:
+        name: with variants, e.g. `talkitout+unsocial`.
+        checked: everything resolved. scenario: the models. resolved: the data with its positions.
+        warnings: findings that do not keep it from running.
+    """
+
+    name: str
+    checked: Checked
+    scenario: Scenario
+    resolved: Resolved
+    warnings: tuple[Diagnostic, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<LoadedScenario {self.name}: {len(self.checked.entities)} entities, horizon {self.checked.horizon}>"
+
+
+@dataclass(frozen=True)
+class LoadedSuite:
+    """A suite that is right: scenarios of which each episode plays one.
+
+    Attributes:
+        name: with variants, e.g. `social_env+unsocial`.
+        members: the scenarios in order. member_names: what the suite's file calls them.
+        space: the action space and how each member's utterances are found in it.
+        suite: the models. resolved: the data with its positions.
+        warnings: findings that do not keep it from running.
+    """
+
+    name: str
+    members: tuple[LoadedScenario, ...]
+    member_names: tuple[str, ...]
+    space: SharedSpace
+    suite: Suite
+    resolved: Resolved
+    warnings: tuple[Diagnostic, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<LoadedSuite {self.name}: {', '.join(self.member_names)}>"
+
+
+Loaded = LoadedScenario | LoadedSuite
+"""What `load` returns."""

@@ -1,0 +1,35 @@
+"""What `load` returned to what environments are made of."""
+
+from __future__ import annotations
+
+from typing import overload
+
+from socialai_dsl.checking import Loaded, LoadedScenario, LoadedSuite
+from socialai_dsl.compiler import compile_scenario
+from socialai_dsl.program import Program
+from socialai_dsl.program_suite import ProgramSuite
+
+
+@overload
+def compile_loaded(loaded: LoadedScenario) -> Program: ...
+@overload
+def compile_loaded(loaded: LoadedSuite) -> ProgramSuite: ...
+@overload
+def compile_loaded(loaded: Loaded) -> Program | ProgramSuite: ...
+
+
+def compile_loaded(loaded: Loaded) -> Program | ProgramSuite:
+    """The program of a scenario, or the programs of a suite."""
+    if isinstance(loaded, LoadedScenario):
+        return compile_scenario(loaded.checked)
+    space = loaded.space
+    return ProgramSuite(
+        loaded.name,
+        tuple(compile_scenario(member.checked) for member in loaded.members),
+        loaded.member_names,
+        space.actions,
+        space.templates,
+        space.nouns,
+        space.template_maps,
+        space.noun_maps,
+    )

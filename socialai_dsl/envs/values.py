@@ -1,0 +1,130 @@
+"""What the numbers in a program's own registers stand for, as plain data, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.program import CELL, Header, Program, RegisterName
+
+NOWHERE = "nowhere"
+"""The cell of what is not in the room."""
+
+SILENCE = ""
+"""The utterance of who says nothing."""
+
+
+def shown(program: Program, name: RegisterName, value: int) -> Any:
+    """A register's value as plain data: a word, a number, true or false, a text, or [x, y]."""
+    match name.kind:
+        case "entity":
+            return str(program.entities[value])
+        case "bool":
+            return bool(value)
+        case "cell":
+            return NOWHERE if value < CELL else [(value - CELL) % 32, (value - CELL) // 32]
+        case "utterance":
+            return utterance_text(program, value)
+    return name.values[value - name.low] if name.values else value
+
+
+def read(program: Program, name: RegisterName, given: Any, key: str) -> int:
+    """The number for a value as `shown` gives it. Raises ValueError that names the key for any other."""
+    match name.kind:
+        case "entity":
+            words = [str(entity) for entity in program.entities]
+            return name.low + word(key, given, words[name.low : name.high + 1])
+        case "bool":
+            return word(key, given, (False, True))
+        case "cell":
+            return _cell(program, given, key)
+        case "utterance":
+            return utterance_number(program, given, key)
+    if name.values:
+        return name.low + word(key, given, name.values)
+    return whole_number(key, given, name.low, name.high)
+
+
+def utterance_text(program: Program, value: int) -> str | list[int]:
+    """What an utterance says, "" for silence; [template, noun] if another pair before it says the same."""
+    if value == 0:
+        return SILENCE
+    pair = divmod(value - 1, len(program.nouns))
+    text = _text(program, *pair)
+    return text if _pair_of(program, text) == pair else list(pair)
+
+
+def utterance_number(program: Program, given: Any, key: str) -> int:
+    """0 for silence, else 1 + template * nouns + noun."""
+    if given == SILENCE and isinstance(given, str):
+        return 0
+    if isinstance(given, str):
+        pair = _pair_of(program, given)
+        if pair is None:
+            texts = [_text(program, t, n) for t, n in _pairs(program)]
+            near = did_you_mean(given, texts)
+            hint = f"; did you mean {near!r}?" if near else ""
+            raise ValueError(f"{key}: got {given!r}, which the grammar cannot say{hint}")
+    elif isinstance(given, Sequence) and len(given) == 2:
+        pair = (
+            whole_number(f"{key}[0]", given[0], 0, len(program.templates) - 1),
+            whole_number(f"{key}[1]", given[1], 0, len(program.nouns) - 1),
+        )
+    else:
+        raise ValueError(f'{key}: got {given!r}; expected a text, [template, noun], or "" for silence')
+    return 1 + pair[0] * len(program.nouns) + pair[1]
+
+
+def whole_number(key: str, value: Any, low: int, high: int, hint: str = "") -> int:
+    """A whole number in a range. Raises ValueError that names the key for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not low <= value <= high:
+        raise ValueError(f"{key}: got {value!r}; expected a number from {low} to {high}{hint}")
+    return int(value)
+
+
+def word(key: str, value: Any, words: Sequence[Any]) -> int:
+    """The index of a word. Raises ValueError that names the key and what is possible for any other."""
+    for i, known in enumerate(words):
+        if value == known and isinstance(value, type(known)):
+            return i
+    if len(words) > 12:
+        raise ValueError(f"{key}: got {value!r}{meant(str(value), map(str, words))[:200]}")
+    raise ValueError(f"{key}: got {value!r}; expected one of {', '.join(map(str, words))}")
+
+
+def meant(given: str, among: Any) -> str:
+    """What may have been meant by a name that does not exist, to be added to a message."""
+    known = list(among)
+    near = did_you_mean(given, known)
+    return f"; did you mean {near!r}?" if near else f"; expected one of {', '.join(sorted(known))}"
+
+
+def cell_pair(key: str, given: Any) -> tuple[Any, Any]:
+    """The two parts of [x, y]."""
+    if not isinstance(given, Sequence) or isinstance(given, str) or len(given) != 2:
+        raise ValueError(f"{key}: got {given!r}; expected [x, y]")
+    return given[0], given[1]
+
+
+def _cell(program: Program, given: Any, key: str) -> int:
+    if given == NOWHERE and isinstance(given, str):
+        return CELL - 1
+    x, y = cell_pair(key, given)
+    across = whole_number(f"{key}[0]", x, 0, program.header(Header.CANVAS_WIDTH) - 1)
+    return CELL + 32 * whole_number(f"{key}[1]", y, 0, program.header(Header.CANVAS_HEIGHT) - 1) + across
+
+
+def _text(program: Program, template: int, noun: int) -> str:
+    return program.templates[template].replace("<noun>", program.nouns[noun])
+
+
+def _pairs(program: Program) -> list[tuple[int, int]]:
+    return [(t, n) for t in range(len(program.templates)) for n in range(len(program.nouns))]
+
+
+def _pair_of(program: Program, text: str) -> tuple[int, int] | None:
+    """The first pair that says a text; None if none does."""
+    return next((pair for pair in _pairs(program) if _text(program, *pair) == text), None)

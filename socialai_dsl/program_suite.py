@@ -1,0 +1,156 @@
+"""Several programs behind one action space and one vocabulary: what a suite compiles to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
+from itertools import chain
+
+from socialai_dsl.program import Flag, Header, Outcome, Program
+
+Positions = tuple[int, ...]
+"""For each word of the shared list a member's own index, -1 if it has no such word."""
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramSuite:
+    """Programs of which each episode plays one.
+
+    Attributes:
+        name: canonical name with its variants.
+        programs: in the order of the suite. members: what each is called in layouts, infos and counters.
+        actions, templates, nouns: words of the action space, in order of index.
+        template_maps, noun_maps: for each program its own index of each template and noun.
+    """
+
+    name: str
+    programs: tuple[Program, ...]
+    members: tuple[str, ...]
+    actions: tuple[str, ...]
+    templates: tuple[str, ...]
+    nouns: tuple[str, ...]
+    template_maps: tuple[Positions, ...]
+    noun_maps: tuple[Positions, ...]
+
+    @cached_property
+    def vocabulary(self) -> tuple[str, ...]:
+        """Token id -> word; 0 pads, 1 is unknown; each word once, in the order of the members."""
+        return _union(program.vocabulary for program in self.programs)
+
+    @cached_property
+    def outcome_table(self) -> tuple[Outcome, ...]:
+        """Every way that an episode can end; the members' names come first: `dance: timeout`."""
+        table: dict[str, Outcome] = {}
+        for member, program in zip(self.members, self.programs, strict=True):
+            for outcome in program.outcome_table:
+                name = prefixed(member, outcome.name)
+                table.setdefault(name, Outcome(name, outcome.success, outcome.span))
+        return tuple(table.values())
+
+    @cached_property
+    def outcomes(self) -> list[str]:
+        """Names of the ways an episode can end, by index."""
+        return [outcome.name for outcome in self.outcome_table]
+
+    @cached_property
+    def sha256(self) -> str:
+        """Digest of everything that decides what an environment does and shows."""
+        digest = sha256()
+        for program in self.programs:
+            digest.update(program.sha256.encode())
+        for words in (self.members, self.actions, self.templates, self.nouns):
+            digest.update("\x1f".join(words).encode())
+            digest.update(b"\x1e")
+        digest.update(repr((self.template_maps, self.noun_maps)).encode())
+        return digest.hexdigest()
+
+    def live(self, number: int) -> tuple[frozenset[int], frozenset[int]]:
+        """Indices of the templates and of the nouns that mean something while one program is played."""
+        own = self.template_maps[number], self.noun_maps[number]
+        templates, nouns = (frozenset(i for i, at in enumerate(one) if at >= 0) for one in own)
+        return templates, nouns
+
+    def listing(self) -> str:
+        """The programs as text, one behind the other."""
+        return "\n".join(
+            f"=== {member} ===\n{program.listing()}"
+            for member, program in zip(self.members, self.programs, strict=True)
+        )
+
+
+Playable = Program | ProgramSuite
+"""What environments are made of."""
+
+
+def is_scripted(playable: Playable) -> bool:
+    """Whether the agent follows a frame, in every member of a suite."""
+    programs = playable.programs if isinstance(playable, ProgramSuite) else (playable,)
+    return all(program.header(Header.FLAGS) & Flag.AGENT_FRAME for program in programs)
+
+
+def prefixed(member: str, name: str) -> str:
+    """How a name of one member is called among those of several."""
+    return f"{member}: {name}"
+
+
+def mixture(playables: Sequence[Playable]) -> ProgramSuite:
+    """Programs and suites as one suite: templates and nouns are shared by text, each member keeps its own pairs."""
+    templates = _union(playable.templates for playable in playables)
+    nouns = _union(playable.nouns for playable in playables)
+    parts = [part for playable in playables for part in _parts(playable)]
+    actions = _union(playable.actions for playable in playables)
+    return ProgramSuite(
+        " | ".join(dict.fromkeys(playable.name for playable in playables)),
+        tuple(part.program for part in parts),
+        _distinct([part.name for part in parts]),
+        actions,
+        templates,
+        nouns,
+        tuple(_positions(templates, part.templates) for part in parts),
+        tuple(_positions(nouns, part.nouns) for part in parts),
+    )
+
+
+def _distinct(names: Sequence[str]) -> tuple[str, ...]:
+    """The names, numbered where one comes again."""
+    return tuple(
+        name if name not in names[:i] else f"{name} #{names[:i].count(name) + 1}"
+        for i, name in enumerate(names)
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A program of a mixture: what it is called, and its own index of each text that can be said in it."""
+
+    name: str
+    program: Program
+    templates: Mapping[str, int]
+    nouns: Mapping[str, int]
+
+
+def _parts(playable: Playable) -> list[_Part]:
+    if isinstance(playable, Program):
+        templates = {word: i for i, word in enumerate(playable.templates)}
+        return [_Part(playable.name, playable, templates, {w: i for i, w in enumerate(playable.nouns)})]
+    return [
+        _Part(
+            prefixed(playable.name, member),
+            program,
+            {word: i for word, i in zip(playable.templates, own_templates, strict=True) if i >= 0},
+            {word: i for word, i in zip(playable.nouns, own_nouns, strict=True) if i >= 0},
+        )
+        for member, program, own_templates, own_nouns in zip(
+            playable.members, playable.programs, playable.template_maps, playable.noun_maps, strict=True
+        )
+    ]
+
+
+def _positions(words: Sequence[str], own: Mapping[str, int]) -> Positions:
+    return tuple(own.get(word, -1) for word in words)
+
+
+def _union(lists: Iterable[Sequence[str]]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(chain.from_iterable(lists)))
