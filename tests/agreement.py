@@ -123,6 +123,7 @@ def _state_of_env(env: ScenarioEnv) -> dict[str, Any]:
     """Everything that both sides can name, from the registers of the engine."""
     program, state = env.program, env.describe()
     common = {"t": state["t"], "room": state["room"], "cast": {}, "objects": {}, "let": {}}
+    common |= {"memory": state.get("memory", {}), "one_of": state.get("one_of", {})}
     for entity in program.entities:
         if entity.role == "object":
             group = state[entity.key] if entity.index is not None else [state[entity.key]]
@@ -136,7 +137,7 @@ def _state_of_env(env: ScenarioEnv) -> dict[str, Any]:
         owner, dot, register = name.partition(".")
         if not dot:
             common["let"][name] = value
-        elif not register.startswith("fired."):
+        elif owner in common["cast"] and not register.startswith("fired."):
             common["cast"][owner].setdefault("registers", {})[register] = value
     return dict(_flatten(common))
 
@@ -172,7 +173,8 @@ def _state_of_reference(env: ScenarioEnv, reference: Reference) -> dict[str, Any
         }
         if not member["registers"]:
             del member["registers"]
-    state["let"] = {k: v for k, v in state["let"].items() if f"let.{k}" in held}
+    sequences = {path.removeprefix("let.").partition("[")[0] for path in held if "[0].move" in path}
+    state["let"] = {k: v for k, v in state["let"].items() if f"let.{k}" in held or k in sequences}
     return dict(_flatten(state))
 
 

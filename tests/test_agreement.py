@@ -1,34 +1,63 @@
 """The engine and the reference interpreter of the language agree on everything an episode shows and does."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from socialai_dsl.diagnostics import ScenarioError
+from socialai_dsl.loader import resolve, shipped_names
 from tests.agreement import agree
 
 SAMPLES = sorted(str(path) for path in (Path(__file__).parent / "data" / "agreement").glob("*.yaml"))
-SHIPPED = [
-    "talkitout",
-    "talkitout_no_liar",
-    "talkitout+unsocial",
-    "talkitout+as_coded",
-    "talkitout_no_liar+as_coded",
-    "talkitout_no_liar+as_coded+unsocial",
-    "talkitout+oracle",
-    "talkitout_no_liar+oracle",
-]
-# Samples have no oracle that shortens their episodes, so fewer of them make as many steps.
-SHORT = dict.fromkeys(SHIPPED, 60) | dict.fromkeys(SAMPLES, 30)
+VARIANTS = ("+unsocial", "+oracle", "+as_coded", "+as_coded+unsocial")
 
 
-@pytest.mark.parametrize("name", SHORT, ids=lambda name: Path(name).stem)
+def shipped() -> Iterator[str]:
+    """Every shipped scenario, alone, with its variants, and with each value of its parameters."""
+    for name in shipped_names():
+        if resolve(name).kind != "scenario" or name.endswith(("_oracle", "_as_coded")):
+            continue
+        yield name
+        yield from (name + variants for variants in VARIANTS if exists(name + variants))
+        yield from (f"{name}?{choice}" for choice in choices(resolve(name).data.get("params", {})))  # type: ignore[union-attr]
+
+
+def exists(name: str) -> bool:
+    """Whether a scenario has these variants."""
+    try:
+        resolve(name)
+    except ScenarioError:
+        return False
+    return True
+
+
+def choices(params: dict) -> Iterator[str]:
+    """Each value of each parameter, the others as they are."""
+    for name, declared in params.items():
+        for value in declared.get("values", ()) if isinstance(declared, dict) else ():
+            if str(value) != str(declared["default"]):
+                yield f"{name}={value}"
+
+
+def episodes(name: str) -> int:
+    """How many are played: changes of a scenario share most of what it does."""
+    return 60 if name in shipped_names() or name in SAMPLES else 25
+
+
+NAMES = [*shipped(), *SAMPLES]
+
+
+@pytest.mark.parametrize("name", NAMES, ids=lambda name: Path(name).stem)
 def test_agreement(name: str) -> None:
-    steps = agree(name, SHORT[name], seed=11)
-    assert steps > SHORT[name], "the episodes were too short to mean anything"
+    steps = agree(name, episodes(name), seed=11)
+    assert steps > episodes(name), "the episodes were too short to mean anything"
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize("name", SHORT, ids=lambda name: Path(name).stem)
+@pytest.mark.parametrize("name", NAMES, ids=lambda name: Path(name).stem)
 def test_agreement_over_a_thousand_episodes(name: str) -> None:
     agree(name, 1000, seed=12)

@@ -296,9 +296,20 @@ class Reference:
                 name: [self.describe_object(thing) for thing in as_list(group)]
                 for name, group in world.objects.items()
             },
-            "let": described_lets(world),
+            "let": {name: self.describe_value(value) for name, value in world.lets.items()},
+            "memory": {name: self.acts(memory.entries) for name, memory in world.memories.items()},
             "state": dict(world.registers),
+            "one_of": {name: m.drawn_from for name, m in world.cast.items() if m.drawn_from is not None},
         }
+
+    def describe_value(self, value: Any) -> Any:
+        """A value as data; a sequence as its acts."""
+        return self.acts(value.elements) if isinstance(value, Performance) else plain(value)
+
+    def acts(self, elements: Any) -> list[list[str | None]]:
+        """Body actions, each with the text of its utterance or None."""
+        grammar = self.scenario.grammar
+        return [[move, speech.pair(grammar, said)[0] if said else None] for move, said in elements]
 
     def describe_member(self, member: Entity) -> dict[str, Any]:
         """A member of the cast."""
@@ -308,7 +319,6 @@ class Reference:
             "color": member.color,
             "name": member.name,
             "kind_code": member.kind_code,
-            "one_of": member.drawn_from,
             "state": self.state_name(member),
             "clock": member.clock,
             "registers": {name: plain(value) for name, value in member.registers.items()},
@@ -330,18 +340,6 @@ class Reference:
     def describe_object(thing: Entity) -> dict[str, Any]:
         """An object."""
         return {"at": plain(thing.cell), "color": thing.color, "state": thing.status, "gone": thing.gone}
-
-
-def described_lets(world: World) -> dict[str, Any]:
-    """All that was drawn or computed once; a sequence element by element."""
-    found: dict[str, Any] = {}
-    for name, value in world.lets.items():
-        if isinstance(value, Performance):
-            for k, (move, said) in enumerate(value.elements):
-                found |= {f"{name}[{k}].move": move, f"{name}[{k}].utterance": said}
-        else:
-            found[name] = plain(value)
-    return found
 
 
 def plain(value: Any) -> Any:
