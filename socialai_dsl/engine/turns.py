@@ -21,7 +21,7 @@ from socialai_dsl.program import Body, Field, Flag, FrameColumn, Header, Registe
 @inline
 def settle(row: Row) -> None:
     """Let statuses that follow from others follow, unless nothing that they depend on has changed."""
-    if row.registers[Register.CHANGED] != 0 or row.program[Header.FLAGS] & Flag.SETTLE_ALWAYS:
+    if row.registers[Register.CHANGED] != 0:
         compute_statuses(row, follow_links(row))
 
 
@@ -41,11 +41,15 @@ def follow_links(row: Row) -> bool:
 
 @outline
 def compute_statuses(row: Row, changed: bool) -> None:
-    """Let statuses follow from their conditions, if what these read may have changed."""
+    """Let statuses follow from their conditions, if what these read may have changed.
+
+    Where they read more than statuses this counts as changed again at once: a step then asks for one thing only.
+    """
     stay_outline()
-    changed |= row.program[Header.FLAGS] & Flag.SETTLE_ALWAYS != 0
     if changed and row.program[Header.SETTLE_PC] != 0:
         run(row, row.program[Header.SETTLE_PC])
+    if row.program[Header.FLAGS] & Flag.SETTLE_ALWAYS:
+        row.registers[Register.CHANGED] = 1
 
 
 @inline

@@ -28,19 +28,21 @@ EARLY = int(Flag.PICTURE_BEFORE_NPCS)
 
 
 def note(register: int, digit: int) -> list[Instruction]:
-    """Append a digit to a trace that is kept in two registers, five digits of base 8 in each."""
+    """Append a digit to a trace that is kept in three registers, five digits of base 8 in each."""
     return [
-        (Op.IF_LT, register, constant(8**4), 3),
-        (Op.MUL, register, register, constant(8)),
-        (Op.ADD, register, register, constant(digit)),
-        (Op.SKIP, 0, 0, 2),
-        (Op.MUL, register + 1, register + 1, constant(8)),
-        (Op.ADD, register + 1, register + 1, constant(digit)),
+        instruction
+        for k in range(3)
+        for instruction in (
+            (Op.IF_LT, register + k, constant(8**4), 3),
+            (Op.MUL, register + k, register + k, constant(8)),
+            (Op.ADD, register + k, register + k, constant(digit)),
+            (Op.SKIP, 0, 0, 4 * (2 - k)),
+        )
     ]
 
 
 def trace(batch: Batch, register: int) -> str:
-    return "".join(f"{int(batch.state.registers[0, register + i]):o}".strip("0") for i in range(2))
+    return "".join(f"{int(batch.state.registers[0, register + i]):o}".strip("0") for i in range(3))
 
 
 # The agent at (1, 2) looks at a door in the left wall; an NPC far from it.
@@ -79,9 +81,9 @@ def traced(flags: int = 0, **room: object) -> Batch:
         (0, SILENT, "12347"),
         (0, TOGGLE, "1562347"),
         (EARLY, TOGGLE, "1562347"),
-        (ALWAYS, SILENT, "16236476"),
-        (ALWAYS | EARLY, SILENT, "16236476"),
-        (ALWAYS, TOGGLE, "156236476"),
+        (ALWAYS, SILENT, "15623564756"),
+        (ALWAYS | EARLY, SILENT, "15623564756"),
+        (ALWAYS, TOGGLE, "15623564756"),
     ],
 )
 def test_the_order_of_a_step(flags: int, action: tuple[int, ...], expected: str) -> None:
@@ -97,7 +99,7 @@ def test_what_changes_on_a_turn_is_settled_at_the_next_point() -> None:
     batch = traced(frames=(frame,))
     step(batch)
     assert trace(batch, OWN) == "1756", "a change in `then` of the last NPC waits for the rules"
-    batch.state.registers[0, [OWN, OWN + 1]] = 0
+    batch.state.registers[0, OWN : OWN + 3] = 0
     step(batch)
     assert trace(batch, OWN) == "17", "to become what it is is no change"
 
@@ -115,7 +117,7 @@ def test_what_counts_as_a_change(rule: Instruction, expected: str) -> None:
     batch = traced(frames=(), rules=[rule], before=())
     step(batch)
     assert trace(batch, OWN) == expected
-    batch.state.registers[0, [OWN, OWN + 1]] = 0
+    batch.state.registers[0, OWN : OWN + 3] = 0
     step(batch)
     assert trace(batch, OWN) == "", "once"
 
