@@ -12,6 +12,7 @@ from socialai_dsl.cli import (
     evaluate,
     fidelity,
     new,
+    oracles,
     play,
     run,
     schema,
@@ -31,6 +32,7 @@ _COMMANDS: Final = {
     "play": play,
     "bench": bench,
     "fidelity": fidelity,
+    "oracles": oracles,
 }
 
 

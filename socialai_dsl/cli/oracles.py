@@ -1,0 +1,133 @@
+"""This module is `socialai oracles`: scenarios' own scripts play, and what they do not solve is searched."""
+
+import argparse
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Final
+
+from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.oracle_play import OracleReport, Room, play_oracle
+from socialai_dsl.cli.run_folder import write_text
+from socialai_dsl.cli.shipped import shipped_scenarios, variants_of
+
+SUMMARY: Final = "let the scenarios' own scripts play, and search the rooms that they do not solve"
+
+_ROOMS_SHOWN: Final = 12
+_STATES: Final = 300_000
+_UNPROVEN: Final = ", as far as chance was tried"
+_MEANING: Final = {
+    "unsolvable": "cannot be solved",
+    "solvable": "can be solved: a fault of the script, or only luck would find it",
+    "undecided": "are undecided: too many states",
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this command."""
+    parser.add_argument(
+        "scenarios",
+        nargs="*",
+        metavar="SCENARIO",
+        help="a path or a name (default: all shipped ones with a variant `oracle`)",
+    )
+    parser.add_argument(
+        "--episodes", type=int, default=5000, metavar="N", help="rooms to play (default: 5000)"
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="default: 0")
+    parser.add_argument(
+        "--states",
+        type=int,
+        default=_STATES,
+        metavar="N",
+        help=f"how many states a search looks at before it gives up (default: {_STATES})",
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print an array with one object for each scenario"
+    )
+    parser.add_argument("--write", type=Path, metavar="FILE", help="write the reports as a Markdown page")
+
+
+def execute(arguments: argparse.Namespace) -> Exit:
+    """Play, search, report; a room that can be solved and was not is a finding."""
+    for option in ("episodes", "states"):
+        if getattr(arguments, option) < 1:
+            raise UsageError(f"--{option}: got {getattr(arguments, option)}, expected at least 1")
+    if arguments.seed < 0:
+        raise UsageError(f"--seed: got {arguments.seed}, expected at least 0")
+    names = arguments.scenarios or [name for name in shipped_scenarios() if "oracle" in variants_of(name)]
+    reports = []
+    for name in names:
+        reports.append(play_oracle(name, arguments.episodes, arguments.seed, arguments.states))
+        if not arguments.json:
+            print("\n".join(summary(reports[-1])), flush=True)
+    if arguments.json:
+        print(json.dumps([as_object(report) for report in reports], indent=2))
+    if arguments.write is not None:
+        write_text(arguments.write, _page(reports, arguments.states))
+    return Exit.FINDINGS if any(report.found("solvable") for report in reports) else Exit.GOOD
+
+
+def summary(report: OracleReport) -> list[str]:
+    """A report in a few lines."""
+    rate, error = report.success_rate, report.success_se
+    lines = [
+        f"{report.scenario}: {report.solved:,} of {report.rooms:,} rooms solved, {rate:.2%} ± {error:.2%}, "
+        f"in {report.mean_length:.1f} steps; no policy succeeds in more than {report.ceiling:.2%}"
+    ]
+    for verdict, meaning in _MEANING.items():
+        if rooms := report.found(verdict):
+            proven = "" if all(room.exact for room in rooms) or verdict != "unsolvable" else _UNPROVEN
+            lines.append(f"  {len(rooms)} {meaning}{proven} (seed {report.seed}, index {_indices(rooms)})")
+    return lines
+
+
+def as_object(report: OracleReport) -> dict[str, Any]:
+    """A report for JSON."""
+    return {
+        **asdict(report),
+        "success_rate": report.success_rate,
+        "success_rate_se": report.success_se,
+        "ceiling": report.ceiling,
+    }
+
+
+def _page(reports: list[OracleReport], states: int) -> str:
+    rows = [
+        "# What the scripts solve\n",
+        "Each scenario's own script (its variant `oracle`) plays rooms of one seed; it knows what was drawn. A room",
+        "that it does not solve is searched: all that the agent can do and say is tried, breadth first, as far as",
+        f'{states:,} different states. `env.reset(seed=..., options={{"index": ...}})` opens such a room.\n',
+        "| scenario | rooms | solved | ceiling | unsolvable | solvable | undecided |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for report in reports:
+        counts = [str(len(report.found(verdict))) for verdict in _MEANING]
+        rows.append(
+            f"| `{report.scenario}` | {report.rooms:,} | {report.success_rate:.2%} ± {report.success_se:.2%} "
+            f"| {report.ceiling:.2%} | {' | '.join(counts)} |"
+        )
+    for report in reports:
+        rows += ["", f"## {report.scenario}, seed {report.seed}", ""]
+        if not report.unsolved:
+            rows.append("Every room is solved.")
+            continue
+        rows += [
+            "| index | the script's episode | room | states | shortest success |",
+            "|---|---|---|---|---|",
+        ]
+        rows += [_row(room) for room in report.unsolved]
+    return "\n".join(rows) + "\n"
+
+
+def _row(room: Room) -> str:
+    verdict = room.verdict if room.exact or room.verdict != "unsolvable" else room.verdict + _UNPROVEN
+    steps = "" if room.steps is None else f"{room.steps} steps"
+    return f"| {room.index} | {room.outcome} | {verdict} | {room.states:,} | {steps} |"
+
+
+def _indices(rooms: tuple[Room, ...]) -> str:
+    """The first of the rooms; the JSON has them all."""
+    shown = ", ".join(str(room.index) for room in rooms[:_ROOMS_SHOWN])
+    more = len(rooms) - _ROOMS_SHOWN
+    return shown + (f" and {more} more" if more > 0 else "")
