@@ -9,6 +9,7 @@ from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag
 from socialai_dsl.schema import PRIMITIVES, Scenario
 from socialai_dsl.schema.positions import DataPath, Positions
 from socialai_dsl.semantics import behaviour, checks, entities, sequences, setup, statuses, world
+from socialai_dsl.semantics.emptiness import check_placements
 from socialai_dsl.semantics.entities import AGENT, Prelude
 from socialai_dsl.semantics.findings import Findings, Scalar, surviving
 from socialai_dsl.semantics.inhabitants import entities_of
@@ -133,7 +134,7 @@ class _Run:
             checks.check_shadowed(plan, findings)
         names = [resolver.registers.read(f"{member}.name") for member in self._symbols.cast]
         words = words_in_order(scenario.grammar, names, spoken.lines(self._symbols.cast))
-        return Checked(
+        made = Checked(
             name=name,
             horizon=scenario.horizon,
             actions=tuple(action for action in PRIMITIVES if action in scenario.actions),
@@ -156,6 +157,8 @@ class _Run:
             require=required,
             egocentric=scenario.observe.directions == "egocentric",
         )
+        check_placements(made, findings)
+        return made
 
     def _spoken(self) -> _Spoken:
         """What everybody says, before what anybody hears."""

@@ -1,0 +1,277 @@
+"""Placements for which a room can have no free cell: certain ones, and those that the least favourable room lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Final
+
+from socialai_dsl.semantics import terms
+from socialai_dsl.semantics.build import walk
+from socialai_dsl.semantics.findings import Findings
+from socialai_dsl.semantics.terms import Checked, Const, Placing, Region, Term
+
+Cell = tuple[int, int]
+Size = tuple[int, int]
+
+_AROUND: Final = ((0, -1), (0, 1), (-1, 0), (1, 0))
+_TAKES_AWAY: Final = {"at": 1, "in_front_of": 1, "next_to": 4}
+"""How many cells at most `not here.TEST(x)` excludes for each x."""
+
+
+class _UnknownError(Exception):
+    """What decides this is only known in a drawn room."""
+
+
+def check_placements(checked: Checked, findings: Findings) -> None:
+    """Report S601: an error where no room of a size has a cell for something, a warning where some may have none."""
+    reported: set[int] = set()
+    for size in product(_sizes(checked.room.width), _sizes(checked.room.height)):
+        room = _Room(checked, size)
+        for number, placing in enumerate(room.placings):
+            if number in reported or placing.nowhere or placing.at is not None:
+                continue
+            most, least = room.cells_for(number)
+            if most == 0 or least <= 0:
+                reported.add(number)
+                _report(checked, findings, placing, size, [] if most == 0 else room.rivals(number))
+
+
+def _sizes(bounds: tuple[int, int]) -> range:
+    return range(bounds[0], bounds[1] + 1)
+
+
+def _report(
+    checked: Checked, findings: Findings, placing: Placing, size: Size, rivals: Sequence[int]
+) -> None:
+    """`rivals` may take its cells; without any it has none in the first place."""
+    name = _called(checked, placing.entity)
+    where = f"a room of {size[0]}x{size[1]}"
+    if not rivals:
+        message = f"`{name}` has no free cell in {where}"
+        findings.error("S601", message, placing.span, hint="widen its place, or the room")
+        return
+    message = f"`{name}` can be left without a free cell in {where}"
+    before = ", ".join(f"`{key}`" for key in dict.fromkeys(checked.entities[number].key for number in rivals))
+    hint = f"{before} may take all of its place; place it earlier (`order:`), or widen its place"
+    findings.warning("S601", message, placing.span, hint=hint)
+
+
+def _called(checked: Checked, number: int) -> str:
+    entity = checked.entities[number]
+    return entity.key if entity.index is None else f"{entity.key}[{entity.index}]"
+
+
+@dataclass(frozen=True)
+class _Room:
+    """The rooms of one size."""
+
+    checked: Checked
+    size: Size
+
+    @property
+    def placings(self) -> list[Placing]:
+        """What is put into the room, in order."""
+        return [item for item in self.checked.setup if isinstance(item, Placing)]
+
+    def cells_for(self, number: int) -> tuple[int, int]:
+        """The most cells that a placement can have, and the fewest it has in the least favourable room.
+
+        Where the fewest cannot be told, it is taken to be 1.
+        """
+        placing = self.placings[number]
+        try:
+            cells, least = self._region_cells(placing)
+            kept, excluded = self._conditions(placing.where, cells)
+        except _UnknownError:
+            return 1, 1
+        if cells is not None:
+            least = len(kept)
+        if least == 0:
+            return 0, 0
+        return len(kept) if cells is not None else least, least - excluded - len(self.rivals(number))
+
+    def rivals(self, number: int) -> list[int]:
+        """The entities that are put down before and may lie on a cell of this placement."""
+        placing = self.placings[number]
+        cells, _ = self._region_cells(placing)
+        kept = self._conditions(placing.where, cells)[0] if cells is not None else None
+        return [
+            other.entity
+            for other in self.placings[:number]
+            if other.entity != placing.entity and self._may_share(other, kept)
+        ]
+
+    # -- regions ---------------------------------------------------------------------------------------------------
+
+    def floor(self) -> set[Cell]:
+        """Cells inside the walls on which nothing is built."""
+        return self._inside(Region("anywhere")) - self._built()
+
+    def _inside(self, region: Region) -> set[Cell]:
+        """Cells inside the walls that a region covers which only the size decides."""
+        args = [self._number(arg) for arg in region.args]
+        cells = product(range(1, self.size[0] - 1), range(1, self.size[1] - 1))
+        return {cell for cell in cells if _lies_in(region.name, args, cell, self.size)}
+
+    def _built(self) -> set[Cell]:
+        return {cell for _, region, _ in self.checked.room.build for cell in self._inside(region)}
+
+    def _region_cells(self, placing: Placing) -> tuple[set[Cell] | None, int]:
+        """The cells of a place; None for a place around something that is drawn, with how many there are at least."""
+        around = [r for r in placing.regions if r.name in ("next_to", "in_front_of")]
+        if around:
+            return None, min(self._least_around(region) for region in around)
+        found: set[Cell] = set()
+        for region in placing.regions:
+            found |= self._fixed(region)
+        return found, len(found)
+
+    def _fixed(self, region: Region) -> set[Cell]:
+        """Cells of a region that only the size decides and on which nothing is built."""
+        return self._wall(region) if region.name == "wall" else self._inside(region) - self._built()
+
+    def _wall(self, region: Region) -> set[Cell]:
+        width, height = self.size
+        along = {"top": width, "bottom": width, "left": height, "right": height}
+        # Of a wall that is drawn, the shorter is looked at.
+        side = region.side or ("top" if width <= height else "left")
+        places = range(region.margin, along[side] - region.margin)
+        at = {"top": 0, "bottom": height - 1, "left": 0, "right": width - 1}[side]
+        return {(k, at) if side in ("top", "bottom") else (at, k) for k in places}
+
+    def _least_around(self, region: Region) -> int:
+        """How many floor cells there are at least next to, or in front of, something."""
+        if region.name == "in_front_of":
+            return 1
+        floor = self.floor()
+        target = region.args[0]
+        if not isinstance(target, Const):
+            raise _UnknownError
+        own = next((p for p in self.placings if p.entity == target.value), None)
+        if own is None or own.nowhere:
+            raise _UnknownError
+        homes = self._homes(own)
+        return min((sum((x + dx, y + dy) in floor for dx, dy in _AROUND) for x, y in homes), default=0)
+
+    def _homes(self, placing: Placing) -> set[Cell]:
+        """Where something can be at all."""
+        if placing.at is not None:
+            return {(self._number(placing.at[0]), self._number(placing.at[1]))}
+        if any(region.name in ("next_to", "in_front_of") for region in placing.regions):
+            return self.floor()
+        found: set[Cell] = set()
+        for region in placing.regions:
+            found |= self._fixed(region)
+        return self._conditions(placing.where, found)[0]
+
+    # -- conditions --------------------------------------------------------------------------------------------------
+
+    def _conditions(self, where: Term | None, cells: set[Cell] | None) -> tuple[set[Cell], int]:
+        """The cells that conditions on the cell alone leave, and how many the others take away at most."""
+        kept, excluded = set(cells or ()), 0
+        parts = where.args if isinstance(where, terms.Logic) and where.op == "and" else (where,)
+        for part in parts:
+            if part is None:
+                continue
+            if _of_the_cell(part):
+                kept = {cell for cell in kept if self._number(part, cell)}
+            else:
+                excluded += _taken_away(part)
+        return kept, excluded
+
+    def _may_share(self, other: Placing, cells: set[Cell] | None) -> bool:
+        """Whether something that was put down before may lie on one of these cells (None: any floor cell)."""
+        if other.nowhere:
+            return False
+        try:
+            homes = self._homes(other)
+        except _UnknownError:
+            return True
+        return bool(homes & (self.floor() if cells is None else cells))
+
+    def _number(self, term: Term, here: Cell = (0, 0)) -> int:
+        """The value of a term that reads only the size of the room and the cell."""
+        match term:
+            case Const():
+                return term.value
+            case terms.World(name="width"):
+                return self.size[0]
+            case terms.World(name="height"):
+                return self.size[1]
+            case terms.Here(name=name):
+                return here[0 if name == "x" else 1]
+            case terms.Operation(op=op, args=args):
+                return _OPERATIONS[op](*(self._number(arg, here) for arg in args))
+            case terms.Compare(op=op, left=left, right=right):
+                return _COMPARISONS[op](self._number(left, here), self._number(right, here))
+            case terms.Logic(op="and", args=args):
+                return all(self._number(arg, here) for arg in args)
+            case terms.Logic(args=args):
+                return any(self._number(arg, here) for arg in args)
+            case terms.Not(arg=arg):
+                return not self._number(arg, here)
+        raise _UnknownError
+
+
+def _lies_in(name: str, args: Sequence[int], cell: Cell, size: Size) -> bool:
+    (x, y), (width, height) = cell, size
+    match name:
+        case "left_half":
+            return x < width // 2
+        case "right_half":
+            return x > width // 2
+        case "top_half":
+            return y < height // 2
+        case "bottom_half":
+            return y > height // 2
+        case "column":
+            return x == args[0]
+        case "row":
+            return y == args[0]
+        case "rect":
+            return args[0] <= x <= args[2] and args[1] <= y <= args[3]
+    return True
+
+
+def _of_the_cell(term: Term) -> bool:
+    """Whether a condition reads only the cell and the size of the room."""
+    known = (Const, terms.World, terms.Here, terms.Operation, terms.Compare, terms.Logic, terms.Not)
+    return all(
+        isinstance(part, known)
+        and not (isinstance(part, terms.World) and part.name not in ("width", "height"))
+        for part in walk(term)
+    )
+
+
+def _taken_away(term: Term) -> int:
+    """How many cells a condition excludes at most."""
+    match term:
+        case terms.Not(arg=terms.Test(subject=None, name=name)) if name in _TAKES_AWAY:
+            return _TAKES_AWAY[name]
+        case terms.Not(
+            arg=terms.Quantified(op="any", items=items, condition=terms.Test(subject=None, name=name))
+        ) if name in _TAKES_AWAY:
+            return _TAKES_AWAY[name] * len(items)
+    raise _UnknownError
+
+
+_OPERATIONS: Final[dict[str, Callable[..., int]]] = {
+    "+": lambda a, b: a + b,
+    "-": lambda a, b: a - b,
+    "*": lambda a, b: a * b,
+    "//": lambda a, b: a // b if b else 0,
+    "%": lambda a, b: a % b if b else 0,
+    "min": min,
+    "max": max,
+    "abs": abs,
+    "neg": lambda a: -a,
+}
+
+_COMPARISONS: Final[dict[str, Callable[[int, int], bool]]] = {
+    "==": lambda a, b: a == b,
+    "!=": lambda a, b: a != b,
+    "<": lambda a, b: a < b,
+    "<=": lambda a, b: a <= b,
+}
