@@ -84,7 +84,7 @@ def _code(program: Program) -> list[str]:
             rows += ["", f"{program.labels[pc]}:"]
         text = f"{pc:5d}  {Op(op).name:<16}{names.operands(Op(op), pc, operands)}"
         place = f"{_short(span.file)}:{span.line}" if span else ""
-        rows.append(f"{text:<68}{place}".rstrip())
+        rows.append(f"{text:<66}  {place}".rstrip())
     return rows
 
 

@@ -10,8 +10,8 @@ from socialai_dsl.compiler.cells import LoopCell, coordinate, count_cells, one_c
 from socialai_dsl.compiler.classes import SILENCE, Classes
 from socialai_dsl.compiler.folding import TRUE, Facts, fold, substitute
 from socialai_dsl.compiler.registers import Registers, entity_register, state_names
-from socialai_dsl.compiler.selects import selected_condition, selected_value
-from socialai_dsl.program import Field, Op, Register
+from socialai_dsl.compiler.selects import among, asks, selected_condition, selected_value
+from socialai_dsl.program import CONSTANT, TEMPORARY, Field, Op, Register
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.terms import Checked, Const, Term
 
@@ -110,7 +110,11 @@ class Expressions:
                 for arg in term.args:
                     self.condition(arg, otherwise)
             case terms.Logic():
-                self._either(term.args, otherwise)
+                asked = asks(term)
+                if asked is not None:
+                    among(self, *asked, otherwise)
+                else:
+                    self._either(term.args, otherwise)
             case terms.Not():
                 self._negated(term.arg, otherwise)
             case terms.Compare():
@@ -205,7 +209,9 @@ class Expressions:
     def _sees(self, term: terms.Sees, otherwise: Label) -> None:
         """The op takes the direction from where it leaves its answer."""
         facing = term.facing or terms.FieldOf(terms.DIRECTION, term.viewer, "dir")
-        seen = self.into_temporary(Op.LOAD, self.value(facing))
+        seen = self.value(facing)
+        if not TEMPORARY <= seen < CONSTANT // 2:
+            seen = self.into_temporary(Op.LOAD, seen)
         target = self.value(term.target)
         self.block.emit(Op.SEES, seen, self.value(term.viewer), target)
         self.block.test(Op.IF_NE, seen, constant(0), otherwise)

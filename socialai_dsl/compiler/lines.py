@@ -90,13 +90,19 @@ class Lines:
         if not isinstance(utterance, Const):
             block.test(Op.IF_NE, said, constant(0), silent)
             said = to.into_temporary(Op.MAX, said, constant(1))
-        line = to.into_temporary(Op.ADD, said, constant(self._first_performed(speaker) - 1))
-        if speaker.number != 0 and speaker.name is not None and not isinstance(speaker.name, Const):
-            named = self._index(to, [speaker.name], 0)
-            block.emit(Op.MUL, named, named, constant(len(self.grammar)))
-            block.emit(Op.ADD, line, line, named)
+        line = self._line_performed(to, speaker, said)
         block.emit(Op.SAY, constant(speaker.number), line)
         block.bind(silent)
+
+    def _line_performed(self, to: Expressions, speaker: Entity, said: int) -> int:
+        """The operand of the line for a pair that is in an operand, counted from 1."""
+        name = speaker.name if speaker.number != 0 else None
+        if (before := self._first_performed(speaker) - 1) != 0:
+            said = to.into_temporary(Op.ADD, said, constant(before))
+        if name is not None and not isinstance(name, Const):
+            named = to.into_temporary(Op.MUL, self._index(to, [name], 0), constant(len(self.grammar)))
+            said = to.into_temporary(Op.ADD, said, named)
+        return said
 
     def _first_performed(self, speaker: Entity) -> int:
         """The line of the first pair; the others follow."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -55,7 +55,7 @@ def selected_condition(to: Expressions, term: Select, otherwise: Label) -> None:
     true = set[int]().union(
         *(numbers for value, numbers in switch.cases.items() if isinstance(value, Const) and value.value)
     )
-    _among(to, switch.read, true, otherwise)
+    among(to, switch.read, true, otherwise)
 
 
 def _branches(to: Expressions, term: Select, switch: _Switch | None, take: Callable[[Term], None]) -> None:
@@ -72,7 +72,7 @@ def _branches(to: Expressions, term: Select, switch: _Switch | None, take: Calla
         for value, numbers in switch.cases.items():
             if value != last:
                 branches.append(
-                    (lambda to_next, among=numbers: _among(to, switch.read, among, to_next), value)  # type: ignore[misc]
+                    (lambda to_next, taken=numbers: among(to, switch.read, taken, to_next), value)  # type: ignore[misc]
                 )
     for ask, value in branches:
         following = Label()
@@ -85,7 +85,7 @@ def _branches(to: Expressions, term: Select, switch: _Switch | None, take: Calla
 
 
 def _switch(term: Select) -> _Switch | None:
-    asked = [_asks(condition) for condition in term.conditions]
+    asked = [asks(condition) for condition in term.conditions]
     first = asked[0] if asked else None
     if first is None:
         return None
@@ -103,7 +103,7 @@ def _switch(term: Select) -> _Switch | None:
     return _Switch(read, cases)
 
 
-def _asks(condition: Term) -> tuple[Read, frozenset[int]] | None:
+def asks(condition: Term) -> tuple[Read, frozenset[int]] | None:
     """The register that a condition is about, and the numbers for which it holds."""
     match condition:
         case terms.Compare(op="==", left=Read() as read, right=Const(value=number)):
@@ -111,7 +111,7 @@ def _asks(condition: Term) -> tuple[Read, frozenset[int]] | None:
         case terms.Compare(op="==", left=Const(value=number), right=Read() as read):
             return read, frozenset((number,))
         case terms.Logic(op="or", args=args):
-            parts = [_asks(arg) for arg in args]
+            parts = [asks(arg) for arg in args]
             known = [part for part in parts if part is not None]
             if len(known) == len(parts) and len({read for read, _ in known}) == 1:
                 return known[0][0], frozenset[int]().union(*(numbers for _, numbers in known))
@@ -128,9 +128,10 @@ def _shift(switch: _Switch) -> int | None:
     return shifts.pop() if len(shifts) == 1 else None
 
 
-def _among(to: Expressions, read: Read, numbers: set[int], otherwise: Label) -> None:
+def among(to: Expressions, read: Read, numbers: Set[int], otherwise: Label) -> None:
     """Fall through if the register holds one of these numbers."""
     block, register, low, high = to.block, to.value(read), read.type.low, read.type.high
+    numbers = numbers & set(range(low, high + 1))
     others = set(range(low, high + 1)) - numbers
     if not numbers:
         block.skip(otherwise)
