@@ -2,9 +2,7 @@
 
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
-
-_OF_ANY: Final = "any"
+from typing import Any
 
 
 @cache
@@ -14,33 +12,43 @@ def _documents() -> dict[str, dict[str, Any]]:
 
     from socialai_dsl.loader import shipped_folder
 
-    read = {
-        path.stem: yaml.safe_load(path.read_text("utf-8")) for path in sorted(shipped_folder().glob("*.yaml"))
-    }
+    files = sorted(shipped_folder().glob("*.yaml"))
+    read = {path.stem: yaml.safe_load(path.read_text("utf-8")) for path in files}
     return {name: content for name, content in read.items() if isinstance(content, dict)}
 
 
 def shipped_scenarios() -> list[str]:
-    """Scenarios and suites, and the variants that say what they are about: those are scenarios of their own."""
-    return [name for name, content in _documents().items() if _stands_alone(content)]
+    """The scenarios of the paper, then other scenarios and suites, and variants that say what they are about."""
+    from socialai_dsl.envs.registration import IDS
+
+    documents = _documents()
+    of_the_paper = [name for name in IDS.values() if name in documents]
+    others = [name for name, content in documents.items() if _stands_alone(content)]
+    return list(dict.fromkeys([*of_the_paper, *others]))
 
 
 def variants_of(scenario: str) -> list[str]:
-    """What can follow a scenario's name after a `+`: its own variants, then those of any scenario."""
-    own = {
-        name.removeprefix(f"{scenario}_")
-        for name, content in _documents().items()
-        if name.startswith(f"{scenario}_")
-        and "variant" in content
-        and not _stands_alone(content)
-        and Path(str(content.get("of", ""))).stem == scenario
-    }
-    shared = {
-        name
-        for name, content in _documents().items()
-        if "variant" in content and content.get("of") == _OF_ANY and not _stands_alone(content)
-    }
-    return [*sorted(own), *sorted(shared - own)]
+    """What can follow a scenario's name after a `+`: variants of its own, then those of any scenario.
+
+    A variant of what the scenario is itself a variant of counts too, where it has none of that name.
+    """
+    documents, standing = _documents(), set(shipped_scenarios())
+    own: list[str] = []
+    base = scenario
+    while base in documents:
+        own += [
+            name.removeprefix(f"{base}_")
+            for name, content in documents.items()
+            if name.startswith(f"{base}_") and name not in standing and _base(content) == base
+        ]
+        base = _base(documents[base])
+    shared = [name for name, content in documents.items() if _base(content) == "any" and name not in standing]
+    return list(dict.fromkeys([*own, *shared]))
+
+
+def _base(content: dict[str, Any]) -> str:
+    """What a file is a variant of; empty for a scenario."""
+    return Path(str(content["of"])).stem if "variant" in content and "of" in content else ""
 
 
 def _stands_alone(content: dict[str, Any]) -> bool:
