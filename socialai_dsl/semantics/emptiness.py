@@ -97,10 +97,14 @@ class _Room:
         placing = self.placings[number]
         cells, _ = self._region_cells(placing)
         kept = self._conditions(placing.where, cells)[0] if cells is not None else None
+        # What a place lies around is not in it.
+        around = {arg.value for region in placing.regions for arg in region.args if isinstance(arg, Const)}
         return [
             other.entity
             for other in self.placings[:number]
-            if other.entity != placing.entity and self._may_share(other, kept)
+            if other.entity != placing.entity
+            and not (cells is None and other.entity in around)
+            and self._may_share(other, kept)
         ]
 
     # -- regions ---------------------------------------------------------------------------------------------------
