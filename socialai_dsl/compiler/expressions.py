@@ -219,9 +219,9 @@ class Expressions:
     # --- values ---
 
     def sited_value(self, sited: terms.Sited) -> int:
-        """A value with its own site and place in the source."""
+        """A value with its own site and place in the source, within its type."""
         self.site, self.block.span = sited.site, sited.span
-        return self.value(fold(sited.term, self.facts, self.classes))
+        return self.saturated(fold(sited.term, self.facts, self.classes))
 
     def value(self, term: Term) -> int:
         """Emit what computes the term; the operand it is in afterwards."""
@@ -267,6 +267,14 @@ class Expressions:
                 return self._loop(term.name).cell
             case _:
                 return self._truth_value(term)
+
+    def saturated(self, term: Term) -> int:
+        """The operand of a value that is cut to its type: of things that are gone, places and distances are odd."""
+        value = self.value(term)
+        if term.type.kind != "int" or isinstance(term, Const | terms.Read | terms.World):
+            return value
+        value = self.into_temporary(Op.MAX, value, constant(term.type.low))
+        return self.into_temporary(Op.MIN, value, constant(term.type.high))
 
     def into_temporary(self, op: Op, b: int, c: int = 0) -> int:
         """A fresh temporary with the result of an instruction."""

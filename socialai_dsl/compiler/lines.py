@@ -122,7 +122,7 @@ class Lines:
         result = constant(first)
         stride = 1
         for part in reversed(varying):
-            value = to.value(part)
+            value = to.saturated(part)
             scaled = block.temporary()
             block.emit(Op.SUB, scaled, value, constant(part.type.low))
             if stride != 1:

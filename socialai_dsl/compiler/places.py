@@ -5,6 +5,7 @@ from __future__ import annotations
 from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.cells import keep_each
 from socialai_dsl.compiler.expressions import Expressions
+from socialai_dsl.compiler.folding import mentions
 from socialai_dsl.program import Op, Register, Side
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.terms import Placing, Region, Term
@@ -27,8 +28,8 @@ class Places:
         cell = block.temporary(2)
         if placing.at is not None:
             to.site = placing.where_site
-            for target, coordinate in zip((cell, cell + 1), placing.at, strict=True):
-                block.emit(Op.LOAD, target, to.value(coordinate))
+            for i, coordinate in enumerate(placing.at):
+                self._coordinate(cell + i, coordinate, to.checked.room.canvas[i])
         elif placing.nowhere:
             for target in (cell, cell + 1):
                 block.emit(Op.LOAD, target, constant(-1))
@@ -43,6 +44,17 @@ class Places:
             block.release_boards(boards)
         block.emit(Op.PUT, constant(placing.entity), cell)
         block.release(mark)
+
+    def _coordinate(self, target: int, coordinate: Term, size: int) -> None:
+        """A coordinate, kept on the canvas where it comes from something that may be anywhere."""
+        block = self.to.block
+        block.emit(Op.LOAD, target, self.to.value(coordinate))
+        somewhere = any(
+            mentions(coordinate, kind) for kind in (terms.FieldOf, terms.Measure, terms.Quantified)
+        )
+        if somewhere or coordinate.type.low < -1 or coordinate.type.high >= size:
+            block.emit(Op.MAX, target, target, constant(-1))
+            block.emit(Op.MIN, target, target, constant(size - 1))
 
     def _union(self, regions: tuple[Region, ...]) -> int:
         first, *rest = [self._region(region) for region in regions]
