@@ -145,7 +145,10 @@ def _state_of_env(env: ScenarioEnv) -> dict[str, Any]:
 def _member(described: dict[str, Any]) -> dict[str, Any]:
     """A cast member; what does not vary (a fixed name) the engine does not hold."""
     kept = ("at", "color", "facing", "clock", "name", "state")
-    return {key: described[key] for key in kept if key in described} | {"gone": described.get("gone", False)}
+    gone = described.get("gone", False)
+    return {key: described[key] for key in kept if key in described and not (gone and key == "clock")} | {
+        "gone": gone
+    }
 
 
 def _flatten(node: Any, path: str = "") -> Iterator[tuple[str, Any]]:
@@ -163,7 +166,7 @@ def _state_of_reference(env: ScenarioEnv, reference: Reference) -> dict[str, Any
     for name, member in state["cast"].items():
         del member["kind_code"], member["was_poked"], member["once"]
         for key, path in (("name", "name"), ("clock", "clock"), ("state", "frame")):
-            if f"{name}.{path}" not in held:
+            if f"{name}.{path}" not in held or (key == "clock" and member["gone"]):
                 del member[key]
         if isinstance(member.get("state"), int):
             member["state"] = f"step{member['state']}"

@@ -133,7 +133,6 @@ class Reference:
         # Step 3: the agent's utterance is delivered; then a scripted agent's `then` is read.
         self.utter(action)
         runner.end(turn)
-        self.settling.all()
         # Step 4: NPCs in cast order.
         for npc in world.npcs:
             self.npc_turn(npc)
@@ -200,7 +199,6 @@ class Reference:
             bodies.act(self.world, npc, turn.activity.primitive(self.world, npc))
             self.settling.all()
             runner.end(turn)
-        self.settling.all()
         if turn.say is not None:
             speech.speak(self.world, npc, turn.say, turn.noun)
 
@@ -345,7 +343,7 @@ class Reference:
 def plain(value: Any) -> Any:
     """A value as data: entities by name, cells as lists."""
     if isinstance(value, Entity):
-        return value.key if value.sort != "object" else f"{value.key}[{value.index}]"
+        return value.key if value.sort != "object" or value.single else f"{value.key}[{value.index}]"
     if isinstance(value, tuple | list):
         return [plain(item) for item in value]
     return value

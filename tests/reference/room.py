@@ -133,7 +133,7 @@ class Setup:
                 for index in range(size or 1)
             ]
             for thing in things:
-                thing.one_way, thing.dark = group.one_way, group.dark
+                thing.one_way, thing.dark, thing.single = group.one_way, group.dark, size is None
             self.world.objects[name] = things[0] if size is None else things
         kinds = self.kinds()
         for name, member in self.members.items():
@@ -274,8 +274,8 @@ class Setup:
             cells = [cell for cell in cells if self.world.inside(cell) and not self.taken(cell)]
         else:
             written = leaves(f"{path}.place", holder.place) or [(f"{path}.place", "anywhere")]
-            site, source = written[entity.index % len(written)]
-            value = self.sources.expression(site, source)
+            _, source = written[entity.index % len(written)]
+            value = self.sources.expression(f"{site_of(entity)}.place", source)
             cells = [cell for cell in region(value, self.context(entity)) if not self.taken(cell)]
         if cells:
             entity.cell = cells[self.draw(f"{path}.cell", entity.index, len(cells))]
@@ -312,13 +312,14 @@ class Setup:
             entity.color = TYPES[entity.type].color
             return
         sources = leaves(f"{path}.color", written)
-        site, source = sources[entity.index % len(sources)]
+        _, source = sources[entity.index % len(sources)]
         if source == "random":
             entity.color = COLORS[self.draw(f"{path}.color", entity.index, len(COLORS))]
         elif source == "distinct":
             self.distinct_colors(path, as_list(self.world.objects[entity.key]))
         else:
-            found = evaluate(self.sources.expression(site, source), self.context(entity, it=entity))
+            value = self.sources.expression(f"{site_of(entity)}.color", source)
+            found = evaluate(value, self.context(entity, it=entity))
             # "Group attributes (`doors.color`) give one each."
             entity.color = found[entity.index % len(found)] if isinstance(found, list) else found
 
@@ -370,7 +371,7 @@ class Setup:
             thing.status = thing.initial = str(group.state)
         for word, source in (("pressed", group.pressed), ("opened", group.opened)):
             if source is not None and evaluate(
-                self.sources.expression(f"objects.{thing.key}.{word}", source), self.context(thing, it=thing)
+                self.sources.expression(f"{site_of(thing)}.{word}", source), self.context(thing, it=thing)
             ):
                 thing.status = thing.initial = "open" if word not in TYPES[thing.type].states else word
 
@@ -473,6 +474,13 @@ def group_size(group: Group) -> int | None:
     if group.count is not None:
         return group.count
     return len(group.at) if group.at and isinstance(group.at[0], tuple) else None
+
+
+def site_of(entity: Entity) -> str:
+    """Where what is written of an entity is drawn: each member of a group draws for itself."""
+    if entity.sort != "object":
+        return f"cast.{entity.key}"
+    return f"objects.{entity.key}" if entity.single else f"objects.{entity.key}[{entity.index}]"
 
 
 def leaves(path: str, source: Any) -> list[tuple[str, Any]]:

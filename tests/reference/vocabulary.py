@@ -102,6 +102,8 @@ class Vocabulary:
             slot = self.text_slot(part, member)
             if isinstance(part, str):
                 row.append([part])
+            elif isinstance(part, ast.Attribute) and self.is_text_slot(part):
+                row.append(self.slot_of_other(part))
             elif slot is not None:
                 row += self.pieces(slot, member)
             else:
@@ -117,6 +119,23 @@ class Vocabulary:
             return None
         path = f"cast.{member[0]}.with.{part.id}"
         return self.sources.text(path, self.version(member).with_[part.id]).tree
+
+    def is_text_slot(self, part: ast.Attribute) -> bool:
+        """Whether it names a text of another member: `teacher.formula`."""
+        name = self.scenario.player_of(part.subject.id) if isinstance(part.subject, ast.Name) else ""
+        frames = [self.frame(who) for who in self.who(name)] if name in self.members else []
+        return any(frame and frame.slots.get(part.name) in ("text", "utterance") for frame in frames)
+
+    def slot_of_other(self, part: ast.Attribute) -> list[str]:
+        """All that another member's text slot can read."""
+        assert isinstance(part.subject, ast.Name)
+        name = self.scenario.player_of(part.subject.id)
+        texts = []
+        for who in self.who(name):
+            slot = self.text_slot(ast.Name(part.name), who)
+            if slot is not None:
+                texts += self.values(slot, who)
+        return list(dict.fromkeys(texts))
 
     # -- the values an expression can have -----------------------------------------------------------------
 

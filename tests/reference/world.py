@@ -88,6 +88,7 @@ class Entity:
     type: str = ""
     status: str = ""
     initial: str = ""
+    single: bool = False  # not one of a group
     toggled_by: list[Entity] = field(default_factory=list)  # in this step
     one_way: bool = False
     dark: bool = False
