@@ -35,6 +35,8 @@ def reset_row(row: Row, pinned: bool) -> bool:
     """
     key = row.key[Key.KEY]
     required = row.program[Header.REQUIRE_PC]
+    if pinned and row.pins[Register.T] > 0:
+        required = ZERO  # a moment of an episode, whose room was accepted when it began
     for attempt in range(ATTEMPTS):
         row.key[Key.KEY] = rng.attempt_key(key, attempt)
         _draw_room(row, pinned)

@@ -165,9 +165,11 @@ def conclude(row: Row, frame: int, heard: int, chosen: bool) -> None:
 
 @inline
 def _follow(row: Row, frame: int, npc: int) -> None:
-    """One turn of one frame of an NPC."""
+    """One turn of one frame of an NPC; it ends at once if the NPC makes itself vanish before it moves."""
     heard = inbox_class(row, row.program[frame + FrameColumn.INBOX])
     chosen = notice(row, frame, heard)
+    if not is_present(row, npc):
+        return
     action = row.registers[Register.LAST_TURN]
     if not chosen:
         action = act(row, frame)

@@ -194,3 +194,17 @@ def test_a_pool_keeps_its_member() -> None:
     assert batch.state.registers[:, OWN].tolist() == [
         expected(i, 1000, (900, 0, 100)[member])[1] for i, member in enumerate(members)
     ]
+
+
+def test_a_moment_of_an_episode_is_not_asked_for_its_room() -> None:
+    """A layout with a time later than 0 is taken as it is: its room was accepted when the episode began."""
+    batch = batch_of(drawn(1000, 750))
+    pins = np.full((2, batch.state.registers.shape[1] + 1), PIN_NONE, np.int16)
+    pins[1, OWN] = 10
+    batch.ports.layout[:] = 1
+    pins[1, Register.T] = 3
+    batch.reset(pins)
+    assert batch.state.registers[0, [OWN, Register.T, Register.ATTEMPT]].tolist() == [10, 3, 0]
+    pins[1, Register.T] = 0
+    with pytest.raises(RuntimeError, match="program 0"):
+        batch.reset(pins)

@@ -215,6 +215,24 @@ def test_who_left_the_room_does_nothing() -> None:
     assert entity(batch, 0, *POSE) == [3, 2, 0], "it blocks nobody"
 
 
+def test_who_vanishes_before_it_moves_does_nothing_more_but_what_it_said_is_heard() -> None:
+    own = Assembly(at=((1, 1), (2, 2)), npcs=1).own
+    frame = FrameSpec(
+        1,
+        ([*noting(own, 1), *FORWARD],),
+        first=({-1: [(Op.SAY, constant(1), constant(0)), (Op.VANISH, constant(1))]},),
+        then=({-1: noting(own, 2)},),
+    )
+    room = Assembly(at=((1, 1), (2, 2)), npcs=1, frames=(frame,), lines=(("bye", (2,), 1),), earshot=(0, 9))
+    batch = batch_of(room.program())
+    play(batch, body(Body.NONE))
+    assert entity(batch, 1, Field.X, Field.GONE, Field.LAST) == [2, 1, Body.NONE]
+    assert batch.state.registers[0, [own, room.state_register(0) + 1]].tolist() == [0, 0]
+    assert batch.state.registers[0, Register.HEARD] == 1
+    play(batch, body(Body.NONE))
+    assert batch.state.registers[0, Register.HEARD] == 0
+
+
 def test_two_frames_of_one_npc_share_a_turn() -> None:
     own = Assembly(at=((1, 1), (2, 2)), npcs=1).own
     frames = (
