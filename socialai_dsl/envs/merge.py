@@ -99,6 +99,7 @@ def _parts(suite: ProgramSuite, outcomes: Sequence[str], playable: Playable) -> 
             templates=list(templates),
             nouns=list(nouns),
             tokens=[token[word] for word in program.vocabulary],
+            name=program.name,
         )
         for member, program, templates, nouns in zip(
             suite.members, suite.programs, suite.template_maps, suite.noun_maps, strict=True

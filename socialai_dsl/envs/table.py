@@ -27,7 +27,7 @@ from socialai_dsl.program import (
     Program,
     Register,
 )
-from socialai_dsl.program_suite import Playable, prefixed
+from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed
 
 _PROGRAM = int(Key.PROGRAM)  # members of an enumeration are slow indices
 
@@ -56,6 +56,8 @@ class Table:
         self.tokens = self.state.tokens
         self.fresh = True
         self._number_at = {offset: i for i, offset in enumerate(self.batch.offsets)}
+        # Of each pool: what the suite calls its members; None if it is a scenario that plays alone.
+        self._called = [p.members if isinstance(p, ProgramSuite) else None for p in different]
 
     # --- playing ---
 
@@ -125,8 +127,8 @@ class Table:
             if key not in known:
                 known[key] = len(pins)
                 row = np.full(width, PIN_NONE, np.int16)
-                programs = self.merged.pools[pool]
-                given = pins_of(self.programs[programs[place]], layouts[i], in_suite=len(programs) > 1)
+                program = self.programs[self.merged.pools[pool][place]]
+                given = pins_of(program, layouts[i], in_suite=self._called[pool] is not None)
                 row[: len(given)] = given
                 row[-1] = place
                 pins.append(row)
@@ -135,14 +137,14 @@ class Table:
 
     def _place_in_pool(self, layout: Any, pool: int, key: NDArray[np.uint64]) -> int:
         """Which program of its pool a row with a layout will play: the one that is named, else the one it draws."""
-        programs = self.merged.pools[pool]
-        if len(programs) == 1:
+        members = self._called[pool]
+        if members is None:
             return 0
         named = layout.get("member") if isinstance(layout, Mapping) else None
         if named is not None:
-            return pinned_member(named, [self.merged.members[number] for number in programs])
+            return pinned_member(named, members)
         seed, index, episode = (int(key[word]) for word in (Key.SEED, Key.INDEX, Key.EPISODE))
-        return below(draw(episode_key(seed, index, episode), site("member"), 0, 0), len(programs))
+        return below(draw(episode_key(seed, index, episode), site("member"), 0, 0), len(members))
 
     def scripted_actions(self) -> NDArray[np.int64]:
         """What the agents' frames would do now, int64 (E, 4); nothing changes."""
@@ -165,8 +167,9 @@ class Table:
 
     def member(self, row: int) -> str | None:
         """What the suite calls the scenario that a row plays in this episode; None if it plays no suite."""
-        alone = len(self.merged.pools[self.pool_of.item(row)]) == 1
-        return None if alone else self.merged.members[self.number(row)]
+        pool = self.pool_of.item(row)
+        members = self._called[pool]
+        return None if members is None else members[self.number(row) - self.merged.pools[pool][0]]
 
     def heard(self, row: int) -> list[str]:
         """Lines heard in the last step."""
