@@ -16,6 +16,7 @@ from socialai_dsl.cli import (
     play,
     run,
     schema,
+    sheets,
     show,
     validate,
 )
@@ -33,6 +34,7 @@ _COMMANDS: Final = {
     "bench": bench,
     "fidelity": fidelity,
     "oracles": oracles,
+    "sheets": sheets,
 }
 
 

@@ -46,6 +46,12 @@ def variants_of(scenario: str) -> list[str]:
     return list(dict.fromkeys([*own, *shared]))
 
 
+def base_of(scenario: str) -> str:
+    """What a shipped scenario is a variant of, if it does not say for itself what it is about; else nothing."""
+    content = _documents()[scenario]
+    return "" if "about" in content else _base(content)
+
+
 def _base(content: dict[str, Any]) -> str:
     """What a file is a variant of; empty for a scenario."""
     return Path(str(content["of"])).stem if "variant" in content and "of" in content else ""
@@ -55,3 +61,17 @@ def _stands_alone(content: dict[str, Any]) -> bool:
     if content.get("abstract"):
         return False
     return "scenario" in content or "suite" in content or ("variant" in content and "about" in content)
+
+
+def file_of(scenario: str, variant: str | None = None) -> Path:
+    """The file of a shipped scenario, or of a variant that `variants_of` names."""
+    from socialai_dsl.loader import shipped_folder
+
+    names = [scenario]
+    if variant is not None:
+        names, base = [], scenario
+        while base in _documents():
+            names.append(f"{base}_{variant}")
+            base = _base(_documents()[base])
+        names.append(variant)
+    return shipped_folder() / f"{next(name for name in names if name in _documents())}.yaml"

@@ -1,0 +1,172 @@
+"""This module is `socialai sheets`: a data sheet for each shipped scenario, written or checked."""
+
+import argparse
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.run_folder import read_json, write_json, write_text
+from socialai_dsl.cli.shipped import shipped_scenarios, variants_of
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from socialai_dsl.checking import Loaded
+
+SUMMARY: Final = "write the data sheets of the shipped scenarios, or check that they are up to date"
+
+MEASURED: Final = "measured.json"
+INDEX: Final = "README.md"
+_FOLDER: Final = Path("docs/scenarios")
+_EPISODES: Final = 20_000
+_ROOMS: Final = 5_000
+_STATES: Final = 300_000
+_LIKENESS: Final = 2.0
+"""How far pictures may differ on average, of 255: libraries draw edges a little differently."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this command."""
+    parser.add_argument(
+        "scenarios", nargs="*", metavar="SCENARIO", help="names of shipped scenarios (default: all)"
+    )
+    for option, text in (
+        (
+            "--measure",
+            f"play {_EPISODES} random episodes and {_ROOMS} rooms of the script and note the figures",
+        ),
+        ("--write", "write the sheets"),
+        ("--check", "say which sheets are missing or out of date"),
+    ):
+        parser.add_argument(
+            option,
+            nargs="?",
+            type=Path,
+            const=_FOLDER,
+            metavar="FOLDER",
+            help=f"{text} (default folder: {_FOLDER})",
+        )
+
+
+def execute(arguments: argparse.Namespace) -> Exit:
+    """Measure, then write, then check; without any of the three print the sheets."""
+    names = arguments.scenarios or shipped_scenarios()
+    if unknown := [name for name in names if name not in shipped_scenarios()]:
+        raise UsageError(f"{unknown[0]}: no shipped scenario; there are {', '.join(shipped_scenarios())}")
+    if arguments.measure is not None:
+        _measure(names, arguments.measure)
+    if arguments.write is not None:
+        _write(names, arguments.write)
+    if arguments.check is not None:
+        stale = stale_files(names, arguments.check)
+        for file in stale:
+            print(f"{file}: missing or out of date; run `socialai sheets --write`", file=sys.stderr)
+        return Exit.FINDINGS if stale else Exit.GOOD
+    if arguments.measure is None and arguments.write is None:
+        for text in _pages(names, _FOLDER).values():
+            print(text)
+    return Exit.GOOD
+
+
+def stale_files(names: list[str], folder: Path) -> list[Path]:
+    """The sheets, pictures and the list in a folder that are missing or would be written otherwise now."""
+    from socialai_dsl.cli.sheets_picture import picture
+
+    stale = [
+        folder / file
+        for file, text in _pages(names, folder).items()
+        if not (folder / file).is_file() or (folder / file).read_text(encoding="utf-8") != text
+    ]
+    stale += [
+        folder / f"{name}.png" for name in names if not _alike(folder / f"{name}.png", picture(_load(name)))
+    ]
+    return stale
+
+
+def _pages(names: list[str], folder: Path) -> dict[str, str]:
+    """Text of each sheet, and of the list of all sheets that are there, by the name of the file."""
+    from socialai_dsl.cli.sheets_page import index, page
+
+    measured = _measurements(folder)
+    texts = {f"{name}.md": page(name, _load(name), measured.get(name)) for name in names}
+    listed = [name for name in shipped_scenarios() if name in names or (folder / f"{name}.md").is_file()]
+    texts[INDEX] = index({name: (_load(name), measured.get(name)) for name in listed})
+    return texts
+
+
+def _write(names: list[str], folder: Path) -> None:
+    from PIL import Image
+
+    from socialai_dsl.cli.sheets_picture import picture
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for file, text in _pages(names, folder).items():
+        write_text(folder / file, text)
+    for name in names:
+        drawn = picture(_load(name))
+        if not _alike(folder / f"{name}.png", drawn):
+            Image.fromarray(drawn).save(folder / f"{name}.png", optimize=True)
+
+
+def _measure(names: list[str], folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        print(f"measuring {name}", file=sys.stderr, flush=True)
+        write_json(folder / MEASURED, dict(sorted({**_measurements(folder), name: measure(name)}.items())))
+
+
+def measure(name: str, episodes: int = _EPISODES, rooms: int = _ROOMS, seed: int = 0) -> dict[str, Any]:
+    """Figures of the random policy and, where there is one, of the scenario's own script."""
+    from socialai_dsl.cli.oracle_play import play_oracle
+    from socialai_dsl.cli.random_play import play_at_random
+
+    sample = play_at_random(name, episodes, seed)
+    figures: dict[str, Any] = {
+        "random": {
+            "episodes": sample.episodes,
+            "seed": seed,
+            "success_rate": sample.success_rate,
+            "success_rate_se": sample.success_se,
+            "mean_length": sample.mean_length,
+            "mean_reward": sample.mean_reward,
+        }
+    }
+    if "oracle" in variants_of(name):
+        report = play_oracle(name, rooms, seed, _STATES)
+        figures["oracle"] = {
+            "rooms": report.rooms,
+            "seed": seed,
+            "success_rate": report.success_rate,
+            "success_rate_se": report.success_se,
+            "mean_length": report.mean_length,
+            "ceiling": report.ceiling,
+            "unsolved": {
+                verdict: len(report.found(verdict)) for verdict in ("unsolvable", "solvable", "undecided")
+            },
+        }
+    return figures
+
+
+def _measurements(folder: Path) -> Mapping[str, Any]:
+    return read_json(folder / MEASURED) if (folder / MEASURED).is_file() else {}
+
+
+def _load(name: str) -> "Loaded":
+    import socialai_dsl
+
+    return socialai_dsl.load(name)
+
+
+def _alike(path: Path, drawn: "NDArray[np.uint8]") -> bool:
+    """Whether a file shows this picture."""
+    import numpy as np
+    from PIL import Image
+
+    if not path.is_file():
+        return False
+    with Image.open(path) as image:
+        shown = np.asarray(image.convert("RGB"))
+    return shown.shape == drawn.shape and float(np.abs(shown.astype(int) - drawn).mean()) < _LIKENESS

@@ -1,0 +1,292 @@
+"""This module writes the data sheet of a scenario: what its file says, in tables, and what was measured."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from socialai_dsl.cli.sheets_text import code, entries, flow, frame, items, rule, table
+
+if TYPE_CHECKING:
+    from socialai_dsl.checking import Loaded, LoadedScenario, LoadedSuite
+    from socialai_dsl.schema.behaviour import CastMember
+
+_GENERATED: Final = "<!-- Written by `socialai sheets`; change the scenario's file and run it again. -->"
+_FILES: Final = "../../scenarios"
+_DEFAULTS: Final = {"kind": "peer", "place": "anywhere", "facing": "random", "color": "random"}
+
+
+def page(name: str, loaded: "Loaded", measured: Mapping[str, Any] | None) -> str:
+    """The sheet of a shipped scenario or suite as Markdown.
+
+    Args:
+        name: as it is shipped.
+        loaded: the scenario.
+        measured: its entry among the measurements; None if there is none.
+    """
+    from socialai_dsl.checking import LoadedSuite
+
+    data = _data(loaded)
+    lines = [f"# {name}", "", _GENERATED, "", _about(name, data), ""]
+    lines += [f"![rooms of {name} at the start of an episode]({name}.png)", ""]
+    lines += [
+        "The arrow is the agent; what it sees is outlined. An NPC's dark triangle shows where it looks.",
+        "",
+    ]
+    lines += [*_facts(name, loaded, data), ""]
+    body = _suite(loaded) if isinstance(loaded, LoadedSuite) else _scenario(loaded, data)
+    for section in (*body, _variants(name), _measured(measured), _as_coded(name)):
+        if section:
+            lines += [*section, ""]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def index(rows: Mapping[str, tuple["Loaded", Mapping[str, Any] | None]]) -> str:
+    """The list of all sheets as Markdown: name -> scenario and measurements."""
+    cells = []
+    for name, (loaded, measured) in rows.items():
+        data = _data(loaded)
+        random, script = (measured or {}).get("random"), (measured or {}).get("oracle")
+        cells.append(
+            (
+                f"[{name}]({name}.md)",
+                _about(name, data),
+                _share(random),
+                _share(script),
+                f"{script['ceiling']:.2%}" if script else "",
+            )
+        )
+    head = ["# The shipped scenarios", "", _GENERATED, ""]
+    columns = ("scenario", "what it is about", "random policy", "own script", "ceiling")
+    foot = [
+        "",
+        "Success of the random policy and of each scenario's own script, which knows what was drawn; the ceiling",
+    ]
+    foot += [
+        "is the share of rooms that can be solved at all. [Fidelity](../fidelity.md) compares with the paper's code."
+    ]
+    return "\n".join([*head, *table(columns, cells), *foot]) + "\n"
+
+
+def _data(loaded: "Loaded") -> dict[str, Any]:
+    data = loaded.resolved.data
+    assert isinstance(data, dict), "internal: a file is a mapping"
+    return data
+
+
+# --- what all have
+
+
+def _about(name: str, data: Mapping[str, Any]) -> str:
+    """What a scenario says it is about; a variant that does not say it says what it changes."""
+    from socialai_dsl.cli.shipped import base_of
+
+    about, base = str(data.get("about", "")), base_of(name)
+    if not base:
+        return about
+    changes = _first_comment(_file_of(name))
+    return f"{changes[:1].upper()}{changes[1:]}. A variant of [{base}]({base}.md): {about}"
+
+
+def _facts(name: str, loaded: "Loaded", data: Mapping[str, Any]) -> list[str]:
+    from socialai_dsl.compilation import compile_loaded
+    from socialai_dsl.envs.registration import IDS
+    from socialai_dsl.program import Header
+    from socialai_dsl.program_suite import ProgramSuite
+
+    playable = compile_loaded(loaded)
+    programs = playable.programs if isinstance(playable, ProgramSuite) else (playable,)
+    sizes = [len(playable.actions) + 1, 2, len(playable.templates), len(playable.nouns)]
+    tokens = max(program.header(Header.TOKENS) for program in programs)
+    ids = [f"`SocialAI/{gym}-v1`" for gym, scenario in IDS.items() if scenario == name]
+    horizons = sorted({program.header(Header.HORIZON) for program in programs})
+    skills = data.get("skills") or []
+    rows = [
+        ("file", f"[`scenarios/{name}.yaml`]({_FILES}/{name}.yaml)"),
+        ("Gymnasium", ", ".join(ids)),
+        ("skills", ", ".join(skills if isinstance(skills, list) else [skills]).replace("_", " ")),
+        ("horizon", " or ".join(map(str, horizons)) + " steps"),
+        ("reward", "1 - 0.9 t / horizon for a success in step t, else 0"),
+        ("action", f"{sizes}: body, speak or not, template, noun"),
+        ("observation", f"image 7 x 7 x 4 and {tokens} tokens of {len(playable.vocabulary)} words"),
+        ("body actions", ", ".join([*playable.actions, "none"])),
+    ]
+    if not isinstance(playable, ProgramSuite):
+        rows.append(("earshot", code(data.get("earshot", "next_to"))))
+    rows.append(("observed", entries(data.get("observe") or {})))
+    return ["| | |", "|---|---|", *(f"| {key} | {value} |" for key, value in rows if value)]
+
+
+def _variants(name: str) -> list[str]:
+    from socialai_dsl.cli.shipped import variants_of
+
+    lines = [
+        f"* {code(f'{name}+{variant}')}: {_first_comment(_file_of(name, variant))}"
+        for variant in variants_of(name)
+    ]
+    return ["## Variants", "", *lines] if lines else []
+
+
+def _as_coded(name: str) -> list[str]:
+    """What the code of the paper does otherwise: the variant itself, since every line of it is one difference."""
+    from socialai_dsl.cli.shipped import variants_of
+
+    if "as_coded" not in variants_of(name):
+        return []
+    text = _file_of(name, "as_coded").read_text(encoding="utf-8").rstrip()
+    return ["## Paper and code", "", "The scenario follows the paper's text. Its code differs in this:", "",
+            "```yaml", text, "```"]  # fmt: skip
+
+
+def _file_of(name: str, variant: str | None = None) -> Path:
+    """The file of a shipped scenario, or of its variant: its own, or one of what it is itself a variant of."""
+    from socialai_dsl.cli.shipped import file_of
+
+    return file_of(name, variant)
+
+
+def _first_comment(path: Path) -> str:
+    first = path.read_text(encoding="utf-8").splitlines()[0]
+    return first.partition("#")[2].strip()
+
+
+def _measured(measured: Mapping[str, Any] | None) -> list[str]:
+    if measured is None:
+        return []
+    rows = []
+    if random := measured.get("random"):
+        length = f"{random['mean_length']:.2f} steps an episode"
+        rows.append(("random policy", _share(random), length, f"{random['episodes']:,} episodes"))
+    if script := measured.get("oracle"):
+        length = f"{script['mean_length']:.1f} steps a success"
+        rows.append(("own script", _share(script), length, f"{script['rooms']:,} rooms"))
+    lines = ["## Measured", "", *table(("who", "success", "length", "of"), rows)]
+    if script and (counts := {v: n for v, n in script["unsolved"].items() if n}):
+        found = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
+        lines += ["", f"Rooms that the script does not solve were searched: {found}. No policy succeeds in more than "
+                  f"{script['ceiling']:.2%} of these rooms."]  # fmt: skip
+    return lines
+
+
+def _share(figures: Mapping[str, Any] | None) -> str:
+    return f"{figures['success_rate']:.2%} ± {figures['success_rate_se']:.2%}" if figures else ""
+
+
+# --- suites
+
+
+def _suite(loaded: "LoadedSuite") -> Iterator[list[str]]:
+    data = _data(loaded)
+    members = [Path(str(member)).stem for member in data["members"]]
+    yield ["## Members", "", "Each episode plays one of them, all with the same probability.", "",
+           *(f"* [{member}]({member}.md)" for member in members)]  # fmt: skip
+    yield [
+        "## Grammar",
+        "",
+        f"{code(flow(data.get('grammar', 'union')))}; {code('actions: ' + flow(data.get('actions', 'union')))}",
+    ]
+    if splits := data.get("splits"):
+        yield ["## Splits", "", *items(splits)]
+    if notes := data.get("notes"):
+        yield ["## Notes", "", str(notes).strip()]
+
+
+# --- scenarios
+
+
+def _scenario(loaded: "LoadedScenario", data: Mapping[str, Any]) -> Iterator[list[str]]:
+    if notes := data.get("notes"):
+        yield ["## Notes", "", str(notes).strip()]
+    grammar = loaded.scenario.grammar
+    yield ["## What can be said", "", f"{len(grammar.templates)} templates with {len(grammar.nouns)} nouns:", "",
+           "* " + " · ".join(map(code, grammar.templates)), "* " + " · ".join(map(code, grammar.nouns))]  # fmt: skip
+    yield ["## Room", "", *items(data["room"])]
+    yield ["## Cast", "", *_cast(loaded, data)]
+    if objects := data.get("objects"):
+        yield [
+            "## Objects",
+            "",
+            *table(
+                ("what", "type", "where", "colour", "more"), map(_object, *zip(*objects.items(), strict=True))
+            ),
+        ]
+    for key, title in (
+        ("let", "Drawn once per episode"),
+        ("define", "Defined"),
+        ("memory", "Memory"),
+        ("params", "Parameters"),
+    ):
+        if data.get(key):
+            yield [f"## {title}", "", *items(data[key])]
+    frames = _frames(loaded, data)
+    if frames:
+        yield ["## Frames", "", *frames]
+    if rules := data.get("rules"):
+        yield [
+            "## Rules of the world",
+            "",
+            *(f"* {rule(one)}" for one in (rules if isinstance(rules, list) else [rules])),
+        ]
+    yield ["## Outcome", "", "The first that holds ends the episode:", "", *_outcomes(data)]
+
+
+def _cast(loaded: "LoadedScenario", data: Mapping[str, Any]) -> list[str]:
+    columns = ("who", "role", "kind", "name", "where", "facing", "colour", "view", "frame", "with")
+    rows, drawn = [], []
+    for key in data["cast"]:
+        alternatives = loaded.scenario.alternatives(key)
+        rows.append(_member(key, alternatives[0], key == "agent"))
+        if files := loaded.scenario.cast[key].one_of:
+            rows[-1] = (*rows[-1][:2], "one of the below", "", *rows[-1][4:9], "")
+            drawn += ["", f"{code(key)} is one of these, drawn for each episode:", ""]
+            drawn += table(
+                ("which", "kind", "name", "with"),
+                [
+                    (code(file.npc), str(one.kind or ""), str(one.name or ""), entries(one.with_))
+                    for file, one in zip(files, alternatives, strict=True)
+                ],
+            )
+    return [*table(columns, rows), *drawn]
+
+
+def _member(key: str, member: "CastMember", agent: bool) -> tuple[str, ...]:
+    where = f"[{', '.join(map(str, member.at))}]" if member.at else member.place or _DEFAULTS["place"]
+    return (
+        code(key),
+        member.role or "",
+        "" if agent else member.kind or _DEFAULTS["kind"],
+        "" if agent else code(member.name or key.capitalize()),
+        code(where),
+        code(member.facing or _DEFAULTS["facing"]),
+        "" if agent else code(member.color or _DEFAULTS["color"]),
+        str(member.view or ""),
+        code(member.frame or ""),
+        entries(member.with_),
+    )
+
+
+def _object(name: str, content: Mapping[str, Any]) -> tuple[str, ...]:
+    where = flow(content["at"]) if "at" in content else flow(content.get("place", "anywhere"))
+    count = f" ({content['count']})" if "count" in content else ""
+    more = entries(content, ("type", "count", "place", "at", "color"))
+    return code(name) + count, str(content["type"]), code(where), code(flow(content.get("color", ""))), more
+
+
+def _frames(loaded: "LoadedScenario", data: Mapping[str, Any]) -> list[str]:
+    """The frames of the file, then those of the files that a cast member is drawn from, each once."""
+    frames = dict(data.get("frames") or {})
+    for member in loaded.scenario.cast.values():
+        for file in member.one_of or ():
+            for name, content in file.frames.items():
+                frames.setdefault(name, content.model_dump(by_alias=True, exclude_unset=True, mode="json"))
+    lines: list[str] = []
+    for name, content in frames.items():
+        lines += [*frame(name, content), ""]
+    return lines[:-1]
+
+
+def _outcomes(data: Mapping[str, Any]) -> Iterator[str]:
+    outcomes = data["outcome"] if isinstance(data["outcome"], list) else [data["outcome"]]
+    for number, one in enumerate(outcomes, 1):
+        kind = "success" if "success" in one else "failure"
+        more = entries(one, ("success", "failure"))
+        yield f"{number}. {kind}: {code(one[kind])}" + (f" ({more})" if more else "")
