@@ -17,8 +17,7 @@ def causes(sources: Sources, rule: Any, path: str, context: Context, frame: str 
     """The effects of a rule in order: a verb, what it is done to, and the status that `become` names."""
     found = []
     for number, source in enumerate(rule.cause):
-        site = f"{path}.cause[{number}]" if len(rule.cause) > 1 else f"{path}.cause"
-        value = sources.expression(site, source, frame)
+        value = sources.expression(f"{path}.cause[{number}]", source, frame)
         found.append(cause(value.tree, replace(context, value=value)))
     return found
 

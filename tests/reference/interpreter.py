@@ -12,7 +12,7 @@ from tests.reference import bodies, chance, geometry, rules, speech
 from tests.reference.evaluate import Context, NothingFoundError, holds
 from tests.reference.frames import FrameRunner, Turn
 from tests.reference.picture import picture
-from tests.reference.room import Setup
+from tests.reference.room import Setup, sizes
 from tests.reference.script import script_of
 from tests.reference.settling import Settling
 from tests.reference.source import Sources
@@ -96,7 +96,11 @@ class Reference:
         self.world.always_audible = frozenset(n for n, m in setup.members.items() if m.audible == "always")
         self.settling = Settling(scenario, self.sources, self.world)
         self.settling.all()
-        self.canvas = scenario.room.canvas or (max(setup.sizes("width")), max(setup.sizes("height")))
+
+        def largest(side: str) -> int:
+            return max(sizes(scenario, self.sources, side))
+
+        self.canvas = scenario.room.canvas or (largest("width"), largest("height"))
         for member in self.world.cast.values():
             frame = self.sources.frame_of(member.frame)
             if frame is not None and frame.steps is not None:

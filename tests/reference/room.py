@@ -79,16 +79,9 @@ class Setup:
         """Width and height are drawn independently."""
         pinned = self.layout.get("room") or {}
         for side in ("width", "height"):
-            sizes = self.sizes(side)
-            chosen = sizes[self.draw(f"room.{side}", 0, len(sizes))]
+            options = sizes(self.scenario, self.sources, side)
+            chosen = options[self.draw(f"room.{side}", 0, len(options))]
             setattr(self.world, side, pinned.get(side) or chosen)
-
-    def sizes(self, side: str) -> list[int]:
-        """The possible widths or heights."""
-        room = self.scenario.room
-        source = getattr(room, side)
-        source = room.size if source is None else source
-        return as_list(evaluate(self.sources.expression(f"room.{side}", source), self.context()))
 
     def build(self) -> None:
         """Fixed things stand in place of floor."""
@@ -467,6 +460,13 @@ class Setup:
             path, source = f"{path}.start", source["start"]
         if name not in holder.registers:
             holder.registers[name] = evaluate(self.sources.expression(path, source, frame), context)
+
+
+def sizes(scenario: Script, sources: Sources, side: str) -> list[int]:
+    """The possible widths or heights of the room."""
+    source = getattr(scenario.room, side)
+    source = scenario.room.size if source is None else source
+    return as_list(evaluate(sources.expression(f"room.{side}", source), Context(World(0))))
 
 
 def group_size(group: Group) -> int | None:

@@ -46,8 +46,9 @@ class Vocabulary:
         for name in self.members:
             yield from self.names_of(name)
         for name in self.members:
-            for who in self.who(name):
-                for value in self.sayings(who):
+            # All that a member can be follows one frame: each of its lines with what any version puts in.
+            for value in self.sayings((name, 0)):
+                for who in self.who(name):
                     for piece in self.pieces(value.tree, who):
                         yield from piece
 
@@ -297,8 +298,11 @@ class Vocabulary:
 
     def group_size(self, group: Any) -> int:
         """How many members a group has at most."""
-        from tests.reference.room import group_size
+        from tests.reference.room import group_size, sizes
 
+        if isinstance(group, ast.Name) and group.id == "cells":
+            width, height = (max(sizes(self.scenario, self.sources, side)) for side in ("width", "height"))
+            return (width - 2) * (height - 2)
         if isinstance(group, ast.Name) and group.id in self.scenario.objects:
             return group_size(self.scenario.objects[group.id]) or 1
         if isinstance(group, ast.Name) and group.id == "colors":
