@@ -97,6 +97,17 @@ def test_page() -> None:
     assert {line.count("|") for line in rows} == {header.count("|")}
 
 
+def test_the_page_that_is_committed() -> None:
+    """It has every comparison, with the figures that are compared with, and none that differs."""
+    text = (Path(__file__).parents[3] / "docs" / "fidelity.md").read_text(encoding="utf-8")
+    rows = {line.split("`")[1]: line for line in text.splitlines() if line.startswith("| `")}
+    assert set(rows) == {name for name, _ in chosen([])}
+    for name, figures in chosen([]):
+        assert f"| `{name}` | {figures.successes / figures.episodes:.5f} ± " in rows[name]
+        assert f"| {figures.mean_length:.2f}" in rows[name]
+        assert rows[name].endswith("| agrees |"), name
+
+
 def test_the_command(monkeypatch: pytest.MonkeyPatch, capsys: Capture, tmp_path: Path) -> None:
     """A difference is found with the exit code, the page and the JSON."""
     figures = tmp_path / "figures.yaml"
