@@ -57,13 +57,12 @@ def index(rows: Mapping[str, tuple["Loaded", Mapping[str, Any] | None]]) -> str:
         )
     head = ["# The shipped scenarios", "", _GENERATED, ""]
     columns = ("scenario", "what it is about", "random policy", "own script", "ceiling")
-    foot = [
-        "",
-        "Success of the random policy and of each scenario's own script, which knows what was drawn; the ceiling",
-    ]
-    foot += [
-        "is the share of rooms that can be solved at all. [Fidelity](../fidelity.md) compares with the paper's code."
-    ]
+    foot = ["", "[Fidelity](../fidelity.md) compares them with the paper's code."]
+    if any(measured for _, measured in rows.values()):
+        foot[1:1] = [
+            "Success of the random policy and of each scenario's own script, which knows what was drawn; the ceiling is",
+            "the share of rooms that can be solved at all.",
+        ]
     return "\n".join([*head, *table(columns, cells), *foot]) + "\n"
 
 
