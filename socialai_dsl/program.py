@@ -45,7 +45,7 @@ CONSTANT = 1 << 20
 BOARDS = 8
 """Scratch boards (sets of cells) that reset code may use."""
 
-ENTITY_FIELDS = 8
+ENTITY_FIELDS = 10
 FIRST_ENTITY = 32
 CELL = 2048
 """Entity operands from here on are cells: `CELL + 32 * y + x`."""
@@ -110,7 +110,16 @@ class Header(IntEnum):
     REQUIRE_PC = (
         49  # run after a reset; it sets Register.ACCEPTED to 1 if the room is as required. 0: it always is
     )
-    END = 50
+    TICK_PC = 50  # run once a step after the agent has moved: what counts by itself (timers)
+    SLOPE = 51  # thousandths of the success reward that are lost by the horizon
+    EACH_STEP = 52  # millionths that are added to the reward of every step; may be negative
+    CLASS_SET_AT = (
+        53  # (CLASS_SETS, CLASS_SET_WORDS): bit k % 32 of word k // 32 says whether class k is in it
+    )
+    CLASS_SETS = 54
+    CLASS_SET_WORDS = 55
+    CHANNELS = 56  # of the picture: 4, or 6 with pointing and last act
+    END = 57
 
 
 class Flag(IntEnum):
@@ -122,6 +131,11 @@ class Flag(IntEnum):
     OWN_VOICE = 8
     SETTLE_ALWAYS = 16  # computed statuses depend on more than the statuses of objects
     EGOCENTRIC = 32  # the picture shows an NPC's direction as (direction - the agent's + 2) mod 4
+    OCCLUSION = 64  # what is not transparent hides what lies behind it, from the agent and from `SEES`
+    ROLLS = 128  # some type of object rolls
+    HEARD_BY = (
+        256  # an entry of an inbox has three registers: class, speaker, noun (-1 none); else only the class
+    )
 
 
 class Register(IntEnum):
@@ -150,6 +164,7 @@ class Register(IntEnum):
     ATTEMPT = (
         20  # how many rooms of this episode were not as required; part of the key of every draw at reset
     )
+    BONUS = 21  # per cent of the success reward that rules add to the reward of this step
 
 
 class Field(IntEnum):
@@ -161,8 +176,10 @@ class Field(IntEnum):
     COLOR = 3  # 0 red, 1 green, 2 blue, 3 purple, 4 yellow, 5 grey
     STATUS = 4  # of an object: index into its type's states; of an NPC: its status code in the picture
     GONE = 5  # 1: not in the room
-    POKED = 6  # NPC: 1 once it was poked in this episode
+    POKED = 6  # NPC: 1 once it was poked in this episode; object: 1 while it reacts to no toggle and no push
     LAST = 7  # Body of its last turn
+    POINTING = 8  # NPC: 0 not pointing, else 1 + direction; it lasts until it stops
+    INSIDE = 9  # object that may lie in another: number of that object
 
 
 class Body(IntEnum):
@@ -176,6 +193,8 @@ class Body(IntEnum):
     TOGGLE = 5
     DONE = 6
     NONE = 7
+    POINT = 8  # of NPCs only; the direction is in Field.POINTING
+    STOP_POINTING = 9
 
 
 class EntityColumn(IntEnum):
@@ -188,7 +207,8 @@ class EntityColumn(IntEnum):
     AUDIBLE = 4  # 1: heard even while NPCs are hidden
     IN_WALL = 5  # object: 1 if it lies in a wall (then "in front" is the cell one step into the room)
     VIEW = 6  # side of its view square
-    COLUMNS = 7
+    PUSHED_BY = 7  # who can push it: 0 anybody, 1 only what rolls
+    COLUMNS = 8
 
 
 class TypeColumn(IntEnum):
@@ -200,7 +220,11 @@ class TypeColumn(IntEnum):
     WALKABLE = 3
     TRANSPARENT = 4
     TOGGLED = 5  # status after a toggle (its own index if a toggle does nothing)
-    COLUMNS = 6
+    PUSHED = (
+        6  # status after a push: a body or something rolling tried to enter its cell (its own index: nothing)
+    )
+    ROLLS = 7  # 1: in this status it moves one cell a step in the direction of the push, until something is in its way
+    COLUMNS = 8
 
 
 class FrameColumn(IntEnum):
@@ -212,7 +236,8 @@ class FrameColumn(IntEnum):
     ROWS = 3  # first row in the state table
     STATES = 4  # number of states
     INBOX = 5  # first register of its inbox
-    COLUMNS = 6
+    PERCEIVE = 6  # code run at the start of its turn, before `first`: beliefs; 0 none
+    COLUMNS = 7
 
 
 class LineColumn(IntEnum):
@@ -221,7 +246,8 @@ class LineColumn(IntEnum):
     FIRST_TOKEN = 0
     TOKENS = 1
     CLASS = 2  # utterance class to NPCs that hear it, 1 if no rule waits for it
-    COLUMNS = 3
+    NOUN = 3  # the noun that a pattern with <noun> finds in it; -1 none
+    COLUMNS = 4
 
 
 class Op(IntEnum):
@@ -274,6 +300,7 @@ class Op(IntEnum):
     PICK_BIT = 36  # dst a = position of a uniformly drawn set bit of v(b), site c (literal); 0 if none
     SEES = 37  # dst a = 1 if e(c) would be in the view square of e(b) if that faced direction v(a), else 0
     CELL_OF = 38  # dst a = the cell of e(b); CELL - 1 if it is not in the room
+    CELL_BESIDE = 39  # dst a = the cell beside e(b) in direction v(c); CELL - 1 if that is off the canvas
     # Effects.
     SET_FIELD = 40  # field b (literal) of e(a) = v(c); X, Y, STATUS, GONE have ops of their own
     BECOME = 41  # status of e(a) = v(b); the cell is drawn anew
@@ -282,6 +309,9 @@ class Op(IntEnum):
     GOTO = 44  # frame a (literal) enters state b (literal), clock 0
     COUNT = 45  # counter a (literal) += 1
     END = 46  # the episode ends: outcome a (literal), b (literal) per cent of the reward
+    PLACE = 47  # e(a) is put on the cell of e(b), in the room; it may share the cell
+    REWARD = 48  # Register.BONUS += v(a)
+    END_GRADED = 49  # the episode ends: outcome a (literal), v(b) per cent of the reward, cut to 0..100
     # Activities: choose the body action of the entity on turn.
     BODY = 50  # action v(a)
     TURN_TO = (
@@ -289,6 +319,7 @@ class Op(IntEnum):
     )
     GO_TO = 52  # e(a) takes one step of a shortest path to the cell of e(b); site c for turning round
     GO_NEXT_TO = 53  # e(a) takes one step of a shortest path to a free cell next to e(b); site c
+    POINT = 54  # e(a) points in direction v(b)
     # Boards: sets of cells, numbered 0 to BOARDS - 1 (literals). They carry nothing from run to run; B_FREE and PUT
     # belong to reset code.
     B_FLOOR = 60  # board a = cells of plain floor
@@ -320,6 +351,9 @@ class Op(IntEnum):
     )
     # dst a, a + 1 (temporaries) = x, y of the cell of board b nearest to e(c), ties: the first; -1, -1 if none
     NEAREST_CELL = 78
+    # Who and what was heard: of the first entry of inbox b (literal) whose class is in class set c (literal).
+    HEARD_FROM = 79  # dst a = the speaker's number; -1 if there is none
+    HEARD_NOUN = 80  # dst a = the noun; -1 if there is none
 
 
 class Side(IntEnum):
@@ -336,6 +370,10 @@ CODES_OF_TYPES: Mapping[str, int] = {"empty": 1, "wall": 2, "npc": 11}
 COLORS = ("red", "green", "blue", "purple", "yellow", "grey")
 DIRECTIONS = ("right", "down", "left", "up")
 BODY_WORDS = ("left", "right", "forward", "pickup", "drop", "toggle", "done", "none")
+LAST_ACTS = {"forward": 0, "left": 1, "right": 2, "toggle": 3, "point": 4, "stop": 8, "none": 10}
+"""Last acts of an NPC in the sixth channel; `point` has the direction added, relative if the picture is egocentric."""
+NO_GESTURE = 255
+"""In the fifth and sixth channel: no NPC, or not pointing."""
 
 
 def pack_cell(code: int, color: int = 0, status: int = 0, orientation: int = 0) -> int:

@@ -81,11 +81,11 @@ class World:
 
 @dataclass(frozen=True, slots=True)
 class FieldOf:
-    """An attribute of an entity: x, y, dir, color, status, gone, poked."""
+    """An attribute of an entity: x, y, dir, color, status, gone, poked, pointing (0 not, else 1 + direction), inside."""
 
     type: Type
     entity: Term
-    name: Literal["x", "y", "dir", "color", "status", "gone", "poked"]
+    name: Literal["x", "y", "dir", "color", "status", "gone", "poked", "pointing", "inside"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,6 +253,40 @@ class Heard:
 
 
 @dataclass(frozen=True, slots=True)
+class Speaker:
+    """Who said what one of these patterns matches: of what the member has heard since its last turn, the first."""
+
+    type: Type
+    patterns: tuple[Pattern, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class HeardNoun:
+    """The noun in what one of these patterns matches: of what the member has heard since its last turn, the first."""
+
+    type: Type
+    patterns: tuple[Pattern, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SaidBy:
+    """An NPC has said in this step something that a pattern matches, at whatever distance; None: anything."""
+
+    entity: int
+    pattern: Pattern | None
+    type: Type = BOOL
+
+
+@dataclass(frozen=True, slots=True)
+class CellBeside:
+    """The cell beside something in a direction; of no place if that is off the canvas."""
+
+    type: Type
+    entity: Term
+    direction: Term
+
+
+@dataclass(frozen=True, slots=True)
 class InState:
     """The frame of a cast member is in the state of this name."""
 
@@ -300,6 +334,10 @@ Term = (
     | Chance
     | Select
     | CellOf
+    | CellBeside
+    | Speaker
+    | HeardNoun
+    | SaidBy
     | PokedNow
     | Said
     | Spoke
@@ -358,7 +396,10 @@ class Region:
 
 @dataclass(frozen=True, slots=True)
 class Placing:
-    """Where an entity is put: exactly one of `at` (x, y), `regions` (their union, filtered by `where`), or nowhere."""
+    """Where an entity is put: exactly one of `at` (x, y), `regions` (their union, filtered by `where`), `inside` (in
+    another object: on its cell, but out of the room until that is opened), or nowhere. With `overlap` cells that are
+    taken count as well.
+    """
 
     entity: int
     site: str
@@ -369,6 +410,8 @@ class Placing:
     where: Term | None = None
     where_site: str = ""
     nowhere: bool = False
+    inside: Term | None = None
+    overlap: bool = False
     when: Term | None = None
     """Done only if this holds: of several for one entity (`one_of`), one does."""
 
@@ -379,8 +422,8 @@ class Placing:
 @dataclass(frozen=True, slots=True)
 class Activity:
     """One body action a turn: stay, left, right, forward, toggle, face(x), turn_to(dir), turn(left|right), go_to(x),
-    go_next_to(x), use(x), enter(x), perform(seq), choose(...); `weights` go with the args of choose. The args of
-    perform are the elements of the sequence in turn, each as its move and its utterance.
+    go_next_to(x), use(x), enter(x), push(x, dir), point(dir), stop_pointing, flee(x), perform(seq), choose(...);
+    `weights` go with the args of choose. The args of perform are the elements of the sequence in turn, each as its move and its utterance.
     """
 
     name: Literal[
@@ -396,6 +439,10 @@ class Activity:
         "go_next_to",
         "use",
         "enter",
+        "push",
+        "point",
+        "stop_pointing",
+        "flee",
         "perform",
         "choose",
     ]
@@ -408,9 +455,14 @@ class Activity:
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """An effect on an object or NPC: open, close, lock, unlock, reset, vanish, become (status in `value`)."""
+    """An effect on an object or NPC: open, close, lock, unlock, reset (status, presence, place and content as at the
+    start of the episode), vanish, become (status in `value`), put (on the cell of `value`), move_into (the object
+    `value`), reveal (becomes opened).
+    """
 
-    name: Literal["open", "close", "lock", "unlock", "reset", "vanish", "become"]
+    name: Literal[
+        "open", "close", "lock", "unlock", "reset", "vanish", "become", "put", "move_into", "reveal"
+    ]
     entities: tuple[Term, ...]
     span: Span
     value: Term | None = None
@@ -435,6 +487,8 @@ class RulePlan:
     say: Line | None = None
     goto: str | None = None
     goto_now: str | None = None
+    reward: int = 0
+    """Per cent of the success reward that a rule of the world adds to the reward of the step."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -528,7 +582,13 @@ class ObjectType:
     toggled: dict[int, int] = field(hash=False)
     deadly: bool = False
     active: frozenset[int] = frozenset()
-    """Statuses in which it works on what it is linked to (`unlocks`)."""
+    """Statuses in which it works on what it is linked to (`unlocks`, `opens`)."""
+    pushed: dict[int, int] = field(default_factory=dict, hash=False)
+    """Status -> status after a push; those left out resist it."""
+    rolls: frozenset[int] = frozenset()
+    """Statuses in which it rolls; when something is in its way it takes the type's initial status."""
+    expired: dict[int, int] = field(default_factory=dict, hash=False)
+    """Active status -> the status it has when its timer has run out."""
     shown: dict[int, tuple[int, int]] = field(default_factory=dict, hash=False)
 
 
@@ -564,16 +624,26 @@ class Entity:
     kind_drawn: Term | None = None
     initial: Read | None = None
     unlocks: tuple[int, ...] = ()
+    opens: tuple[int, ...] = ()
+    """Objects that are open exactly while this one, or another that opens them, is in an active status."""
+    timer: int = 0
+    """Steps after which an active status expires; 0: never."""
+    exclusive: tuple[int, ...] = ()
+    """Objects of its group: while one of them is not in its initial status, the others react to nothing."""
+    pushed_by_rolling: bool = False
+    contains: tuple[int, ...] = ()
+    """What may lie inside: when this one is opened while something does, it is replaced by that."""
 
 
 @dataclass(frozen=True, slots=True)
 class OutcomePlan:
-    """One entry of `outcome`. `name` is its id, or success@LINE."""
+    """One entry of `outcome`. `name` is its id, or success@LINE; `graded` is a per cent that is computed at the end."""
 
     name: str
     success: bool
     percent: int
     condition: Sited
+    graded: Sited | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -584,6 +654,7 @@ class RoomPlan:
     height: tuple[int, int]
     canvas: tuple[int, int]
     build: tuple[tuple[ObjectType, Region, Span], ...] = ()
+    occlusion: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -597,6 +668,19 @@ class Computed:
     on: int
     off: int
     condition: Sited
+
+
+@dataclass(frozen=True, slots=True)
+class BeliefPlan:
+    """What a member takes for true: at the start of each of its turns the register takes `value` if `when` holds.
+
+    It starts, as a `Drawn` of the setup, with what is true when the episode begins.
+    """
+
+    member: str
+    path: str
+    value: Sited
+    when: Sited | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -625,6 +709,8 @@ class Checked:
         memories: what the agent did last. rules: rules of the world, all that hold fire, top to bottom.
         require: a room is drawn again while one of these is false.
         egocentric: the picture shows the directions of NPCs relative to the agent's.
+        beliefs: what members take for true. slope: thousandths of the success reward that are lost by the horizon.
+        each_step: millionths added to the reward of every step. channels: of the picture, 4 or 6.
     """
 
     name: str
@@ -648,6 +734,10 @@ class Checked:
     rules: tuple[RulePlan, ...] = ()
     require: tuple[Sited, ...] = ()
     egocentric: bool = False
+    beliefs: tuple[BeliefPlan, ...] = ()
+    slope: int = 900
+    each_step: int = 0
+    channels: int = 4
 
 
 TURN = Type("int", -1, 1, ("left", "none", "right"))
