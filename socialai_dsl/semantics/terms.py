@@ -81,7 +81,7 @@ class World:
 
 @dataclass(frozen=True, slots=True)
 class FieldOf:
-    """An attribute of an entity: x, y, dir, color, status, gone, poked, pointing (0 not, else 1 + direction), inside."""
+    """An attribute of an entity: x, y, dir, color, status, gone, poked, pointing (0, or 1 + direction), inside."""
 
     type: Type
     entity: Term
@@ -423,7 +423,8 @@ class Placing:
 class Activity:
     """One body action a turn: stay, left, right, forward, toggle, face(x), turn_to(dir), turn(left|right), go_to(x),
     go_next_to(x), use(x), enter(x), push(x, dir), point(dir), stop_pointing, flee(x), perform(seq), choose(...);
-    `weights` go with the args of choose. The args of perform are the elements of the sequence in turn, each as its move and its utterance.
+    `weights` go with the args of choose. The args of perform are the elements of the sequence in
+    turn, each as its move and its utterance.
     """
 
     name: Literal[
