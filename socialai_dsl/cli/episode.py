@@ -1,6 +1,6 @@
 """This module records one episode for people: a film with its dialogue, and a transcript."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from socialai_dsl.diagnostics import printable
-from socialai_dsl.envs.panel import DialogueLine, compose_frame
+from socialai_dsl.envs.panel import DialogueLine, Face, compose_frame
 from socialai_dsl.program_suite import Playable
 
 _STEP_MILLISECONDS: Final = 450
@@ -87,7 +87,12 @@ class Episode:
 
 
 def record(
-    env: Any, program: Playable, actions: Sequence[NDArray[np.int64]], title: str, reset: dict[str, Any]
+    env: Any,
+    program: Playable,
+    actions: Sequence[NDArray[np.int64]],
+    title: str,
+    reset: dict[str, Any],
+    meet: Callable[[], Sequence[Face]] = tuple,
 ) -> Episode:
     """Play one episode with given actions and record it.
 
@@ -95,13 +100,13 @@ def record(
         env: a single environment with render mode `rgb_array`.
         program: the scenario's, for the words of actions.
         actions: int64 (4,) each; the last one ends the episode.
-        title: first line of the transcript.
+        title: first line of the transcript; of a suite the member that is played is added.
         reset: arguments of `env.reset`.
     """
-    episode = Episode(title)
-    env.reset(**reset)
+    _, info = env.reset(**reset)
+    episode = Episode(f"{title}: {info['member']}" if "member" in info else title)
     dialogue: list[DialogueLine] = []
-    episode.frames.append(compose_frame(env.render(), dialogue, ["before the first step", ""]))
+    episode.frames.append(compose_frame(env.render(), dialogue, ["before the first step", ""], cast=cast))
     for t, action in enumerate(actions, start=1):
         _, reward, terminated, truncated, info = env.step(action)
         ended = bool(terminated or truncated)
@@ -113,7 +118,7 @@ def record(
         if ended:
             episode.outcome, episode.success = str(info["outcome"]), bool(info["success"])
         episode.frames.append(
-            compose_frame(env.render(), dialogue, _caption(episode, step, ended), now=step.t)
+            compose_frame(env.render(), dialogue, _caption(episode, step, ended), now=step.t, cast=cast)
         )
     return episode
 

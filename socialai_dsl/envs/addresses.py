@@ -10,6 +10,7 @@ from socialai_dsl.program import Program, RegisterName
 
 _ELEMENT: Final = re.compile(r"(let|memory)\.(\w+)\[(\d+)\]\.(move|utterance)")
 _FILLED: Final = re.compile(r"memory\.(\w+)\.filled")
+_FLEETING: Final = re.compile(r"prev\..*|memory\.\w+\.open")
 _OF_ENTITY: Final = {"name": "name", "clock": "clock", "frame": "state", "initial": "initial"}
 
 
@@ -32,7 +33,7 @@ class Addresses:
     Attributes:
         sequences: those of `let`. memories: by name, with `filled`, the number of elements each holds.
         one_of: cast member -> which file it is. owned: (entity, key) -> register, e.g. ("wizard", "state").
-        plain: all others by their key under `let`; what is worked out anew in every step is left out.
+        plain: all others by their key under `let`; what is worked out anew at the start of a step is left out.
     """
 
     def __init__(self, program: Program) -> None:
@@ -58,5 +59,5 @@ class Addresses:
             self.one_of[owner] = name
         elif owner in entities and rest in _OF_ENTITY:
             self.owned[owner, _OF_ENTITY[rest]] = name
-        elif not name.path.startswith("prev."):
+        elif not _FLEETING.fullmatch(name.path):
             self.plain[name.path.removeprefix("let.")] = name

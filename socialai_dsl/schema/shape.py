@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -78,6 +79,9 @@ _INDIFFERENT: Final = frozenset(
 )
 """Keys whose loss makes nothing else in the file wrong."""
 
+_PARAMETER: Final = re.compile(r"\$[A-Za-z_]\w*")
+"""A parameter that is a whole value; known ones have been put in before."""
+
 
 def _matters(path: DataPath) -> bool:
     return str(path[-1]) not in _INDIFFERENT
@@ -116,7 +120,10 @@ class _Report:
             by_path.setdefault((finding.path, finding.about_key), []).append(finding)
             if finding.kind == "extra_forbidden":
                 self._extra.setdefault(finding.path[:-1], []).append(str(finding.path[-1]))
-        for findings in by_path.values():
+        deeper = {finding.path[:i] for finding in found for i in range(len(finding.path))}
+        for (path, about_key), findings in by_path.items():
+            if path in deeper and isinstance(findings[0].value, dict) and not about_key:
+                continue  # a mapping was meant, and the findings in it say what is wrong with it
             self._add(findings)
 
     def _placed(self, error: Any) -> _Finding:
@@ -202,6 +209,8 @@ class _Report:
 
     def _wrong_value(self, findings: list[_Finding]) -> None:
         finding = findings[0]
+        if isinstance(finding.value, str) and _PARAMETER.fullmatch(finding.value):
+            return  # a parameter that does not exist, which has been said, or that a scenario will give
         span = self._places.value_span(finding.path)
         for finding in findings:
             if finding.kind in ("greater_than_equal", "less_than_equal", "greater_than", "less_than"):

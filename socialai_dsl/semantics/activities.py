@@ -160,6 +160,9 @@ def _new_status(
         return resolver.value(args[0], type_, scope)
     status = _STATUS_AFTER.get(name)
     if status is not None and status not in type_.words:
-        message = f"`{name}` cannot happen to it: it is {' or '.join(type_.words)}"
+        assert isinstance(node, ast.Attribute | ast.Call), "internal: an effect on nothing"
+        message = (
+            f"`{name}` cannot happen to `{quoted(node.subject or node)}`: it is {' or '.join(type_.words)}"
+        )
         raise resolver.fail("S204", message, node, scope, hint="`x.become(status)` sets a status")
     return None

@@ -175,7 +175,8 @@ def _check_names(scenario: Scenario, findings: Findings) -> None:
             message = f"`{name}` is a word of the language; call the {kind} something else"
             findings.error("S213", message, span)
         elif name in taken:
-            findings.error("S213", f"`{name}` is the name of a {taken[name]} already", span)
+            article = "an" if taken[name] == "object" else "a"
+            findings.error("S213", f"`{name}` is the name of {article} {taken[name]} already", span)
         taken.setdefault(name, kind)
     for path, frame in frames_of(scenario):
         _check_frame_names(path, frame, findings)
@@ -230,11 +231,11 @@ def played_frames(symbols: Symbols, findings: Findings) -> dict[str, PlayedFrame
     for name, alternatives in symbols.alternatives.items():
         found = [_played(symbols, findings, name, which) for which in range(len(alternatives))]
         frames = [frame for frame in found if frame is not None]
-        if len(frames) < len(found) and not (frames and symbols.scenario.cast[name].one_of):
+        named = [alternative for alternative in alternatives if alternative.frame is not None]
+        if not frames or len(frames) < len(named):
             continue
-        other = next(
-            (i for i, frame in enumerate(found) if frame is None or frame.model != frames[0].model), None
-        )
+        one, *others = ((i, frame.model if frame is not None else None) for i, frame in enumerate(found))
+        other = next((i for i, model in others if model != one[1]), None)
         if other is not None:
             _differ(symbols, findings, name, other)
         played[name] = frames[0]
@@ -243,7 +244,13 @@ def played_frames(symbols: Symbols, findings: Findings) -> dict[str, PlayedFrame
 
 def _differ(symbols: Symbols, findings: Findings, name: str, which: int) -> None:
     files = symbols.scenario.cast[name].one_of or ()
-    message = f"`{files[which].npc}` and `{files[0].npc}` follow different frames; what is drawn by `one_of` shares one"
+    frames = [symbols.alternatives[name][i].frame for i in (which, 0)]
+    called = [f"`{files[i].npc}`" for i in (which, 0)]
+    message = f"{called[0]} and {called[1]} follow different frames"
+    if None in frames:
+        one, other = (f"the frame `{frame}`" if frame is not None else "no frame" for frame in frames)
+        message = f"{called[0]} follows {one}, {called[1]} follows {other}"
+    message += "; what is drawn by `one_of` shares one"
     span = findings.places.value_span(("cast", name, "one_of", which, "npc"))
     hint = "let both extend a file with the frame, and put what differs into its slots"
     findings.error("S315", message, span, hint=hint)

@@ -10,7 +10,7 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import resolve_groups
 from socialai_dsl.semantics.build import arithmetic, number
-from socialai_dsl.semantics.findings import surviving
+from socialai_dsl.semantics.findings import FailedError, surviving
 from socialai_dsl.semantics.scope import Objects, Scope, reset_scope
 from socialai_dsl.semantics.terms import Compare, Const, Select, Term, Type
 from socialai_dsl.semantics.wording import quoted
@@ -79,6 +79,8 @@ def unlocker(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Ter
             found[lock] = key
     numbers = [who.value] if isinstance(who, Const) else range(who.type.low, who.type.high + 1)
     for lock in numbers:
+        if lock not in found and _some_failed(resolver):
+            raise FailedError  # perhaps it is what that one was to unlock
         if lock not in found:
             message = f"nothing unlocks `{_called(resolver, lock)}`"
             hint = "an object unlocks another with `unlocks:`"
@@ -97,6 +99,13 @@ def unlocker(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Ter
         tuple(Const(type_, key) for _, key in others),
         Const(type_, last[1]),
     )
+
+
+def _some_failed(resolver: Resolver) -> bool:
+    """Whether it is not known, after a mistake that has been reported, what something unlocks."""
+    symbols = resolver.symbols
+    linked = [name for name, group in symbols.scenario.objects.items() if group.unlocks is not None]
+    return any(symbols.objects[name].numbers[0] not in resolver.unlocks for name in linked)
 
 
 def _shifted(who: Term, shift: int, type_: Type) -> Term:

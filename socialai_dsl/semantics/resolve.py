@@ -170,6 +170,8 @@ class Resolver:
             if acts[0] is not None and acts[1] is not None:
                 alike = sequences.same(self, acts[0], acts[1], node, scope)
                 return alike if node.op == "==" else _negated(alike)
+            if acts[0] is not None or acts[1] is not None:
+                raise sequences.incomparable(self, node, acts[0] is not None, scope)
             if resolve_groups.is_group(self, node.right, scope):
                 member = ast.Member(node.left, node.right, node.op == "!=", at=node.at)
                 return self._membership(member, scope)

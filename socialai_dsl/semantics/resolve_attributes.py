@@ -47,7 +47,8 @@ def check_moment(resolver: Resolver, signature: Signature, node: ast.Expr, scope
         message = (
             f"`{signature.name}` speaks of a step, but this value is computed once, before the first step"
         )
-        raise resolver.fail("S204", message, node, scope, hint="a `define` is recomputed at every use")
+        hint = "a `define` is recomputed at every use" if "let" in scope.path else None
+        raise resolver.fail("S204", message, node, scope, hint=hint)
 
 
 def subject_of(

@@ -42,7 +42,7 @@ from socialai_dsl.semantics.terms import (
     Type,
     World,
 )
-from socialai_dsl.semantics.wording import usage, wrong_count
+from socialai_dsl.semantics.wording import quoted, usage, wrong_count
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
@@ -223,7 +223,8 @@ def _is_in_state(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
     if frame is None and resolver.symbols.cast[member].frame is not None:
         raise FailedError  # an unknown frame is reported where it is named
     if frame is None:
-        raise resolver.fail("S310", f"`{member}` follows no frame, so it has no states", node, scope)
+        called = quoted(node.subject) if node.subject is not None else member
+        raise resolver.fail("S310", f"`{called}` follows no frame, so it has no states", node, scope)
     states = list(frame.model.states or ())
     states += [step.state for step in frame.model.steps or () if step.state] + (
         [_FINISHED] if frame.model.steps else []

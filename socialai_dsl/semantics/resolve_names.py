@@ -36,6 +36,10 @@ if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
 
 _YES_AND_NO = ("yes", "no", "on", "off", "y", "n", "never", "always")
+_NOBODY_HERE = {
+    "self": "the member of the cast who follows a frame; here nobody does",
+    "it": "the object that a value belongs to; here there is none",
+}
 _VOCABULARIES = (COLOR, DIRECTION, ACTION, TURN, SIDE)
 
 
@@ -169,7 +173,8 @@ def _declared(resolver: Resolver, node: ast.Name, expected: Type | None, scope: 
 
 
 def _not_a_value(resolver: Resolver, kind: str, node: ast.Name, scope: Scope) -> FailedError:
-    message = f"`{node.id}` is a {kind}; it can only be compared with == or performed"
+    use = "compared with a sequence" if kind == "memory" else "performed, or compared with a memory"
+    message = f"`{node.id}` is a {kind}; it can only be {use}"
     return resolver.fail("S204", message, node, scope)
 
 
@@ -214,6 +219,8 @@ def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: S
         return resolver.fail(
             "S201", "`here` is the candidate cell; it means something only in a place", node, scope
         )
+    if word in _NOBODY_HERE:
+        raise resolver.fail("S201", f"`{word}` is {_NOBODY_HERE[word]}", node, scope)
     if word in ACTIVITIES or word in EFFECTS or word in PLACES:
         kind = "an activity" if word in ACTIVITIES else "an effect" if word in EFFECTS else "a place"
         return resolver.fail("S204", f"`{word}` is {kind}; here a value is expected", node, scope)

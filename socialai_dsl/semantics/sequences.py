@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema import Frame, Sequence
+from socialai_dsl.semantics import resolve_groups, resolve_names
 from socialai_dsl.semantics.build import all_of, number
 from socialai_dsl.semantics.findings import FailedError, surviving
 from socialai_dsl.semantics.scope import Draws, Scope, at_every_step, reset_scope
@@ -135,6 +136,8 @@ def _in_slot(resolver: Resolver, member: str, slot: str, looked_at: bool) -> Act
         path = symbols.with_path(member, slot, which)
         node = findings.expression(path, alternative.with_[slot])
         acts = acts_at(resolver, node, Scope(path, Draws(f"cast.{member}.with.{slot}"), member))
+        if acts is None and resolve_names.is_bare(resolver, node, Scope(path, Draws(""), member)):
+            resolver.value(node, None, Scope(path, Draws(""), member))
         if acts is None or acts.remembered:
             hint = "a sequence is drawn in `let`: {sequence: 3, moves: [left, right, forward]}"
             raise findings.fail("S204", f"`{quoted(node)}` is not a sequence", findings.at(path), hint=hint)
@@ -159,9 +162,20 @@ def same(resolver: Resolver, left: Acts, right: Acts, node: ast.Compare, scope: 
     return all_of([*full, *(Compare("==", a, b) for a, b in pairs)])
 
 
+def incomparable(resolver: Resolver, node: ast.Compare, left: bool, scope: Scope) -> FailedError:
+    """Only one side of a comparison, the left or the right one, is a sequence or memory; reports what is wrong."""
+    acts, other = (node.left, node.right) if left else (node.right, node.left)
+    if not resolve_groups.is_group(resolver, other, scope):
+        resolver.value(other, None, scope)  # if it has a mistake of its own, that is what is wrong
+    message = f"`{quoted(acts)}` is several acts in a row, `{quoted(other)}` is not"
+    return resolver.fail("S204", message, other, scope, hint="a memory is compared with a sequence")
+
+
 def performed(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[Term, ...]:
     """The elements of the sequence that `perform(...)` names."""
     acts = acts_at(resolver, node, scope)
+    if acts is None and resolve_names.is_bare(resolver, node, scope):
+        resolver.value(node, None, scope)  # a name that means nothing is what is wrong
     if acts is None or acts.remembered:
         message = f"`{quoted(node)}` is not a sequence"
         hint = "only what `let` draws as {sequence: ..., moves: ...} can be performed"

@@ -133,7 +133,8 @@ def _in_order(resolver: Resolver, found: dict[int, Computed]) -> Iterator[Comput
         if entity in path:
             names = [_called(resolver, one) for one in [*path[path.index(entity) :], entity]]
             message = " and ".join(f"`{a}` needs `{b}`" for a, b in pairwise(names))
-            resolver.findings.error("S208", f"the computed statuses {message}", found[entity].condition.span)
+            span = found[entity].condition.span
+            resolver.findings.error("S208", f"computed statuses in a circle: {message}", span)
             done.add(entity)
             return
         path.append(entity)

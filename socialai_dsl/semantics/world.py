@@ -24,6 +24,9 @@ def rules(resolver: Resolver) -> Iterator[RulePlan]:
 
 def _rule(resolver: Resolver, rule: WorldRule, path: DataPath) -> RulePlan:
     name = f"rules[{rule.id}]" if rule.id else dotted(path)
+    if not rule.cause:
+        span = resolver.findings.places.value_span(path)
+        resolver.findings.error("S105", "a rule of the world needs `cause`: what it changes", span)
     when: Sited | None = None
     with surviving():
         if rule.when is not None:
