@@ -29,7 +29,10 @@ class ObjectTypeModel(Model):
         walkable, transparent: statuses in which it can be entered, seen through.
         toggled: status -> the status that a toggle makes of it.
         deadly: entering it ends the episode.
-        active: statuses in which it works on what it is linked to (`unlocks`).
+        active: statuses in which it works on what it is linked to (`unlocks`, `opens`).
+        pushed: status -> the status that a push makes of it.
+        rolls: statuses in which it moves by itself, until something is in its way.
+        expired: active status -> the status it has when its timer has run out.
         shown: status -> what the status and orientation channels show.
         color: where a scenario gives none; default random.
     """
@@ -42,6 +45,9 @@ class ObjectTypeModel(Model):
     toggled: dict[Word, Word] = Field(default_factory=dict)
     deadly: bool = False
     active: Statuses = ()
+    pushed: dict[Word, Word] = Field(default_factory=dict)
+    rolls: Statuses = ()
+    expired: dict[Word, Word] = Field(default_factory=dict)
     shown: dict[Word, Channels] = Field(default_factory=dict)
     color: Word = "random"
 
@@ -58,6 +64,9 @@ class ObjectTypeModel(Model):
             toggled={number(before): number(after) for before, after in self.toggled.items()},
             deadly=self.deadly,
             active=frozenset(map(number, self.active)),
+            pushed={number(before): number(after) for before, after in self.pushed.items()},
+            rolls=frozenset(map(number, self.rolls)),
+            expired={number(before): number(after) for before, after in self.expired.items()},
             shown={number(status): channels for status, channels in self.shown.items()},
         )
 

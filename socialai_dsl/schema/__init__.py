@@ -1,10 +1,12 @@
 """What an author may write, as pydantic models: shape only, meaning is checked by `semantics`."""
 
 from socialai_dsl.schema.behaviour import (
+    Belief,
     CastMember,
     FirstRule,
     Frame,
     Npc,
+    Ranged,
     Role,
     Rule,
     State,
@@ -12,11 +14,12 @@ from socialai_dsl.schema.behaviour import (
     ThenRule,
     WorldRule,
 )
-from socialai_dsl.schema.scenario import PRIMITIVES, Memory, Outcome, Parameter, Scenario, Sequence
+from socialai_dsl.schema.scenario import PRIMITIVES, Memory, Outcome, Parameter, Reward, Scenario, Sequence
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
 
 __all__ = [
     "PRIMITIVES",
+    "Belief",
     "CastMember",
     "FirstRule",
     "Frame",
@@ -26,6 +29,8 @@ __all__ = [
     "Observe",
     "Outcome",
     "Parameter",
+    "Ranged",
+    "Reward",
     "Role",
     "Room",
     "Rule",

@@ -9,10 +9,12 @@ from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 
 from socialai_dsl.schema.behaviour import (
+    Belief,
     CastMember,
     FirstRule,
     Frame,
     Npc,
+    Ranged,
     Role,
     State,
     Step,
@@ -20,7 +22,7 @@ from socialai_dsl.schema.behaviour import (
     WorldRule,
 )
 from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.schema.scenario import Memory, Outcome, Parameter, Scenario, Sequence, SungWith
+from socialai_dsl.schema.scenario import Memory, Outcome, Parameter, Reward, Scenario, Sequence, SungWith
 from socialai_dsl.schema.suite import Split, Suite
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
 
@@ -38,6 +40,9 @@ CALLED: Final[dict[type, str]] = {
     Sequence: "a sequence",
     SungWith: "the utterance of a sequence",
     Memory: "a memory",
+    Ranged: "a register",
+    Belief: "a belief",
+    Reward: "`reward`",
     ObjectGroup: "an object",
     Room: "the room",
     Observe: "`observe`",

@@ -43,7 +43,11 @@ class WorldRule(Model):
     when: Expression | None = None
     chance: Probability | None = Field(None, description="drawn anew each step if everything else holds")
     once: bool = Field(False, description="once per episode")
+    set: dict[Word, Expression] = Field(default_factory=dict, description="registers of `state`")
     cause: Expressions = Field((), description="effects on objects and NPCs, in order")
+    reward: int = Field(
+        0, ge=-100, le=100, description="per cent of the success reward, added to the reward of the step"
+    )
 
 
 class ThenRule(Rule):
@@ -76,11 +80,20 @@ class Step(Effects):
     for_: Expression | None = Field(None, alias="for", description="number of steps, or `ever`")
 
 
+class Ranged(Model):
+    """A register with a range, in which it stays whatever it is set to."""
+
+    start: Expression
+    range: str = Field(description="a..b")
+
+
 class Frame(Model):
     """A pragmatic frame: a protocol of interaction with slots for what varies."""
 
     slots: dict[Word, SlotType] = Field(default_factory=dict)
-    let: dict[Word, Expression] = Field(default_factory=dict, description="registers, one copy per NPC")
+    let: dict[Word, Expression | Ranged] = Field(
+        default_factory=dict, description="registers, one copy per NPC"
+    )
     define: dict[str, Expression] = Field(default_factory=dict, description="recomputed at every use")
     start: Word | None = Field(None, description="the first state; default the first written")
     states: dict[Word, State] | None = None
@@ -94,6 +107,13 @@ class Role(Model):
     at: Annotated[tuple[Expression, ...], BeforeValidator(_as_tuple)] | None = None
     facing: Expression | None = Field(None, description="a direction, random, or toward(x); default random")
     frame: Word | None = Field(None, description="the frame an NPC in this role follows")
+
+
+class Belief(Model):
+    """What a member of the cast takes for true: what it saw last."""
+
+    of: Expression = Field(description="what it is about, such as toy.inside")
+    when: Expression | None = Field(None, description="when it is looked at; default always")
 
 
 class CastMember(Model):
@@ -115,6 +135,7 @@ class CastMember(Model):
     earshot: Expression | None = Field(None, description="how far its voice carries")
     frame: Word | None = Field(None, description="the frame it follows; default none: it stays")
     with_: dict[Word, Expression] = Field(default_factory=dict, alias="with", description="fills the slots")
+    beliefs: dict[Word, Belief] = Field(default_factory=dict, description="what it takes for true")
     audible: Literal["always"] | None = Field(None, description="heard even while NPCs are hidden")
     kind_code: int | None = Field(None, ge=0, le=255, description="status code in the image")
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field
 
 from socialai_dsl.schema.base import Expression, Model, Word, _as_tuple
-from socialai_dsl.schema.behaviour import CastMember, Frame, Probability, Role, WorldRule
+from socialai_dsl.schema.behaviour import CastMember, Frame, Probability, Ranged, Role, WorldRule
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
 
 Primitive = Literal["left", "right", "forward", "pickup", "drop", "toggle", "done"]
@@ -20,8 +20,17 @@ class Outcome(Model):
 
     success: Expression | None = None
     failure: Expression | None = None
-    reward: int = Field(100, ge=0, le=100, description="per cent of the success reward")
+    reward: Expression = Field(100, description="per cent of the success reward; computed when it ends")
     id: Word | None = None
+
+
+class Reward(Model):
+    """What is earned: linear(s) is 1 - s t / horizon at success; `each_step` is added to every reward."""
+
+    success: str = Field("linear(0.9)", description="linear(s), the part s that is lost by the horizon")
+    each_step: Annotated[float, BeforeValidator(lambda v: float(v) if type(v) is int else v)] = Field(
+        0.0, ge=-1, le=1, description="added to the reward of every step"
+    )
 
 
 class SungWith(Model):
@@ -81,6 +90,12 @@ class Scenario(Model):
         default_factory=dict, description="drawn or computed once per episode"
     )
     define: dict[str, Expression] = Field(default_factory=dict, description="recomputed at every use")
+    state: dict[Word, Expression | Ranged] = Field(
+        default_factory=dict, description="registers of the world, set by rules and by any frame"
+    )
+    tables: dict[Word, dict[str, Expression] | str] = Field(
+        default_factory=dict, description="name: {key: value}, or permuted(table): name(key) looks a value up"
+    )
     memory: dict[Word, Memory] = Field(default_factory=dict, description="what the agent did last")
     frames: dict[Word, Frame] = Field(default_factory=dict)
     roles: dict[Word, Role] = Field(default_factory=dict, description="parts that members of the cast play")
@@ -90,6 +105,7 @@ class Scenario(Model):
         (), description="rules about the world, read once a step; each that holds takes effect"
     )
     outcome: Annotated[tuple[Outcome, ...], BeforeValidator(_as_tuple)] = Field(min_length=1)
+    reward: Reward = Reward()
     observe: Observe = Observe()
     require: Annotated[tuple[Expression, ...], BeforeValidator(_as_tuple)] = Field(
         (), description="conditions on the drawn room, which is drawn again while one is false"

@@ -22,6 +22,7 @@ class Room(Model):
         description="fixed things in place of floor, as {type: place}",
         examples=[[{"lava": "column(W // 2)"}]],
     )
+    occlusion: bool = Field(False, description="what is not transparent hides what lies behind it")
     canvas: Annotated[tuple[int, int], BeforeValidator(_as_tuple)] | None = Field(
         None, description="[width, height] of the grid the room lies on; default the largest room"
     )
@@ -48,9 +49,25 @@ class ObjectGroup(Model):
     tagged: Expression | None = Field(None, description="computed: it is tagged while this holds")
     one_way: bool = Field(False, description="a toggle only leads away from the initial status, never back")
     dark: bool = Field(False, description="the agent sees no difference between its statuses")
+    inside: str | None = Field(None, description="the object it lies in, unseen until that is opened")
+    exclusive: bool = Field(
+        False, description="of a group: once one of them is used, the others react to nothing"
+    )
+    overlap: bool = Field(False, description="it may be put on a cell that is taken")
+    timer: int | None = Field(
+        None, ge=1, le=10_000, description="steps after which its active status expires"
+    )
+    opens: str | None = Field(
+        None, description="what is open while this is active: one object, or a group in the same order"
+    )
+    pushed_by: Word | None = Field(None, description="the only type of object that can push it")
     unlocks: str | None = Field(
         None, description="what is unlocked while this is pressed: one object, or a group in the same order"
     )
+
+
+Channel = Literal["type", "color", "status", "orientation", "pointing", "last_act"]
+CHANNELS: tuple[Channel, ...] = ("type", "color", "status", "orientation", "pointing", "last_act")
 
 
 class Observe(Model):
@@ -60,6 +77,9 @@ class Observe(Model):
     image: Literal["end", "before_npcs"] = Field("end", description="when in the step the picture is taken")
     names: Literal["shown", "hidden"] = Field("shown", description="speaker names in what is heard")
     own_voice: bool = Field(False, description="whether the agent hears itself")
+    channels: Annotated[tuple[Channel, ...], BeforeValidator(_as_tuple)] = Field(
+        CHANNELS[:4], description="of the image: the first four, or all six"
+    )
     directions: Literal["absolute", "egocentric"] = Field(
         "absolute",
         description="how the image shows the directions of NPCs; egocentric: as seen from the agent",
