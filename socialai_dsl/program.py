@@ -237,7 +237,8 @@ class FrameColumn(IntEnum):
     STATES = 4  # number of states
     INBOX = 5  # first register of its inbox
     PERCEIVE = 6  # code run at the start of its turn, before `first`: beliefs; 0 none
-    COLUMNS = 7
+    DEFERRED = 7  # code run after the body action where a rule of `first` has chosen it: the rest of that rule; 0 none
+    COLUMNS = 8
 
 
 class LineColumn(IntEnum):
