@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
-from socialai_dsl.semantics.build import all_of, any_of, one_of
+from socialai_dsl.semantics.build import all_of, one_of
 from socialai_dsl.semantics.terms import Compare, Const, Select, Term, Type
 from socialai_dsl.semantics.wording import spoken
 
@@ -70,33 +70,34 @@ def _cases(resolver: Resolver, member: str, terms: Sequence[Term], type_: Type) 
 
 def _text(resolver: Resolver, member: str, terms: Sequence[Term]) -> Term:
     """Texts have words of their own, so the result has the words of all."""
+    which = resolver.registers.read(register_of(member))
+    return text_of(
+        [(Compare("==", which, Const(which.type, number)), term) for number, term in enumerate(terms)]
+    )
+
+
+def text_of(cases: Sequence[tuple[Term, Term]]) -> Term:
+    """The text beside the condition that holds (one does), of one type that has the words of all."""
     words: dict[str, None] = {}
-    for term in terms:
+    for _, term in cases:
         values = [term.value] if isinstance(term, Const) else range(term.type.low, term.type.high + 1)
         words |= {spoken(term.type, value): None for value in values}
     type_ = Type("text", 0, len(words) - 1, tuple(words))
     if len(words) == 1:
         return Const(type_, 0)
-    if all(isinstance(term, Const) for term in terms):
-        known = [
-            Const(type_, type_.words.index(spoken(t.type, t.value))) for t in terms if isinstance(t, Const)
-        ]
-        return _cases(resolver, member, known, type_)
-    conditions = {word: any_of(_says(resolver, member, terms, word)) for word in words}
-    first, *others = type_.words
-    return Select(
-        type_,
-        tuple(conditions[word] for word in others),
-        tuple(Const(type_, type_.words.index(word)) for word in others),
-        Const(type_, type_.words.index(first)),
-    )
+    if len(cases) == 1:
+        return cases[0][1]
+    choices = [case for condition, term in cases for case in _words_of(condition, term, type_)]
+    default = Counter(value for _, value in choices).most_common(1)[0][0]
+    kept = [(condition, value) for condition, value in choices if value != default]
+    return Select(type_, tuple(c for c, _ in kept), tuple(v for _, v in kept), default)
 
 
-def _says(resolver: Resolver, member: str, terms: Sequence[Term], word: str) -> Iterable[Term]:
-    for term, numbers in by_value(terms).items():
-        chosen = drawn(resolver, member, numbers)
-        for value in range(term.type.low, term.type.high + 1):
-            if spoken(term.type, value) != word or (isinstance(term, Const) and value != term.value):
-                continue
-            equal = None if isinstance(term, Const) else Compare("==", term, Const(term.type, value))
-            yield all_of(condition for condition in (chosen, equal) if condition is not None)
+def _words_of(condition: Term, term: Term, type_: Type) -> Iterator[tuple[Term, Const]]:
+    """Each word that a text can be, with the condition that it is."""
+    if isinstance(term, Const):
+        yield condition, Const(type_, type_.words.index(spoken(term.type, term.value)))
+        return
+    for value in range(term.type.low, term.type.high + 1):
+        equal = Compare("==", term, Const(term.type, value))
+        yield all_of([condition, equal]), Const(type_, type_.words.index(spoken(term.type, value)))

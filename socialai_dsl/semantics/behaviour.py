@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
@@ -13,6 +13,7 @@ from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.activities import activity, effect
 from socialai_dsl.semantics.build import all_of, any_of
 from socialai_dsl.semantics.findings import FailedError, dotted, surviving
+from socialai_dsl.semantics.hearing import bound
 from socialai_dsl.semantics.scope import Draws, PlayedFrame, Scope
 from socialai_dsl.semantics.terms import (
     BOOL,
@@ -36,6 +37,10 @@ if TYPE_CHECKING:
 
 _INT = Type("int", 0, 0)
 _FOR_EVER = -1
+
+ANYTHING = "any"
+"""`hears: any` is whatever anybody says."""
+
 _ENDLESS = frozenset({"face", "stay", "choose"})
 """Activities that never end by themselves."""
 
@@ -68,7 +73,8 @@ def lines_of(resolver: Resolver, played: PlayedFrame) -> Spoken:
     for path, address, entry in entries(played):
         if entry.say is not None:
             with surviving():
-                scope = _scope(played, (*path, "say"), f"{address}.say")
+                hearing = isinstance(entry, Rule) and bool(entry.hears)
+                scope = replace(_scope(played, (*path, "say"), f"{address}.say"), hearing=hearing)
                 spoken.lines[path] = resolver.utterances.line((*path, "say"), entry.say, scope)
     return spoken
 
@@ -89,6 +95,15 @@ def plan(resolver: Resolver, played: PlayedFrame, spoken: Spoken) -> FramePlan:
     return FramePlan(played.member, played.name, played.number, span, start, states, steps)
 
 
+def assigned(resolver: Resolver, register: str, raw: object, path: DataPath, scope: Scope) -> Sited:
+    """The value that a register is set to; it makes room for it."""
+    known = resolver.registers.read(register)
+    expected = _INT if known.type.kind == "int" and not known.type.words else known.type
+    term = resolver.written(path, raw, expected, scope)  # type: ignore[arg-type]
+    resolver.registers.widen(register, term.type)
+    return Sited(term, scope.draws.site, resolver.findings.at(path))
+
+
 @dataclass(frozen=True)
 class _Planner:
     """Makes the plans of one frame as one member plays it."""
@@ -97,6 +112,10 @@ class _Planner:
     played: PlayedFrame
     spoken: Spoken
     addresses: dict[DataPath, str]
+    hearing: bool = False
+
+    def _scope(self, path: DataPath, address: str) -> Scope:
+        return replace(_scope(self.played, path, address), hearing=self.hearing)
 
     def state(self, name: str, state: State) -> StatePlan:
         path = (*self.played.path, "states", name)
@@ -110,23 +129,24 @@ class _Planner:
         plans = []
         for i, rule in enumerate(rules):
             with surviving():
-                plans.append(self._rule(rule, (*path, i), f"{state}.{path[-1]}[{i}]"))
+                planner = replace(self, hearing=bool(rule.hears))
+                plans.append(planner._rule(rule, (*path, i), f"{state}.{path[-1]}[{i}]"))
         return tuple(plans)
 
     def _rule(self, rule: ThenRule, path: DataPath, place: str) -> RulePlan:
         address = self.addresses[path]
-        hears, heard = self._hears(rule, path, address)
+        patterns, heard = self._hears(rule, path, address)
         when = self._condition((*path, "when"), rule.when, address)
         if heard is not None:
             term = heard if when is None else all_of([heard, when.term])
             span = self.resolver.findings.at((*path, "hears"))
             when = Sited(term, f"{self.played.member}/{address}.when", when.span if when else span)
         do = rule.do if isinstance(rule, FirstRule) else None
-        return RulePlan(
+        plan = RulePlan(
             name=rule.id or f"{self.played.member}.{self.played.name}.{place}",
             site=f"{self.played.member}/{address}",
             span=self.resolver.findings.places.value_span(path),
-            hears=hears,
+            hears=patterns if heard is None else (),
             when=when,
             after=rule.after or 0,
             chance=rule.chance,
@@ -138,28 +158,31 @@ class _Planner:
             goto=self._target(rule.goto, (*path, "goto")),
             goto_now=self._target(rule.goto_now, (*path, "goto_now")),
         )
+        return bound(plan, patterns)
 
     def _hears(self, rule: Rule, path: DataPath, address: str) -> tuple[tuple[Pattern, ...], Term | None]:
-        """The patterns of `hears:`; if values in them have to be compared, a condition instead."""
-        if not rule.hears:
-            return (), None
+        """The patterns of `hears:`; if values in them have to be compared, a condition as well."""
         found: list[tuple[Pattern, Term | None]] = []
         resolver = self.resolver
         single = not self.resolver.findings.is_list((*path, "hears"))
         for i, raw in enumerate(rule.hears):
             place: DataPath = (*path, "hears") if single else (*path, "hears", i)
+            if raw == ANYTHING:
+                found.append((resolver.utterances.anything(), None))
+                continue
             with surviving():
                 text = resolver.findings.text(place, raw)
                 scope = _scope(self.played, place, f"{address}.hears")
                 found += resolver.utterances.patterns(text, scope, resolver.findings.at(place), True)
+        patterns = tuple(pattern for pattern, _ in found)
         if all(condition is None for _, condition in found):
-            return tuple(pattern for pattern, _ in found), None
-        return (), any_of(all_of([Heard((p,)), *([c] if c is not None else [])]) for p, c in found)
+            return patterns, None
+        return patterns, any_of(all_of([Heard((p,)), *([c] if c is not None else [])]) for p, c in found)
 
     def _condition(self, path: DataPath, raw: object, address: str) -> Sited | None:
         if raw is None:
             return None
-        scope = _scope(self.played, path, f"{address}.{path[-1]}")
+        scope = self._scope(path, f"{address}.{path[-1]}")
         with surviving():
             term = self.resolver.written(path, raw, BOOL, scope)  # type: ignore[arg-type]
             return Sited(term, scope.draws.site, self.resolver.findings.at(path))
@@ -168,7 +191,7 @@ class _Planner:
     def _activity(self, path: DataPath, raw: str | None, address: str) -> Activity | None:
         """The activity; None if it means nothing, which has been reported."""
         with surviving():
-            return activity(self.resolver, path, raw, _scope(self.played, path, f"{address}.do"))
+            return activity(self.resolver, path, raw, self._scope(path, f"{address}.do"))
         return None
 
     def _staying(self, path: DataPath) -> Activity:
@@ -179,30 +202,27 @@ class _Planner:
         for name, raw in entry.set.items():
             place = (*path, "set", name)
             with surviving():
-                made.append(
-                    (f"{self.played.member}.{name}", self._set(name, raw, place, f"{address}.set.{name}"))
-                )
+                register = self._register(name, place)
+                scope = self._scope(place, f"{address}.set.{name}")
+                made.append((register, assigned(self.resolver, register, raw, place, scope)))
         return tuple(made)
 
-    def _set(self, name: str, raw: object, path: DataPath, address: str) -> Sited:
-        resolver, frame = self.resolver, self.played.model
-        if name not in frame.let:
-            raise self._no_register(name, path)
-        register = resolver.registers.read(self.played.register(name))
-        scope = _scope(self.played, path, address)
-        expected = _INT if register.type.kind == "int" and not register.type.words else register.type
-        term = resolver.written(path, raw, expected, scope)  # type: ignore[arg-type]
-        resolver.registers.widen(self.played.register(name), term.type)
-        return Sited(term, scope.draws.site, resolver.findings.at(path))
+    def _register(self, name: str, path: DataPath) -> str:
+        """The register of the frame, or of the world, that an effect sets."""
+        if name in self.played.model.let:
+            return self.played.register(name)
+        if name in self.resolver.symbols.scenario.state:
+            return f"state.{name}"
+        raise self._no_register(name, path)
 
     def _no_register(self, name: str, path: DataPath) -> FailedError:
         findings, symbols = self.resolver.findings, self.resolver.symbols
         span = findings.places.key_span(path)
         if name in symbols.scenario.let or name in self.played.model.slots:
             what = "is a slot" if name in self.played.model.slots else "is drawn once per episode"
-            cure = "only what the frame declares in its own `let` can be set"
+            cure = "only what the frame declares in its own `let`, or the scenario in `state`, can be set"
             return findings.fail("S305", f"`{name}` {what} and cannot be set", span, hint=cure)
-        near = did_you_mean(name, self.played.model.let)
+        near = did_you_mean(name, [*self.played.model.let, *symbols.scenario.state])
         hint = None if near else f"declare it: `let: {{{name}: 0}}` in the frame"
         return findings.fail(
             "S305", f"`{name}` is not declared in this frame's `let`", span, suggestion=near, hint=hint
@@ -215,7 +235,7 @@ class _Planner:
             place: DataPath = (*path, "cause") if single else (*path, "cause", i)
             with surviving():
                 made.append(
-                    effect(self.resolver, place, raw, _scope(self.played, place, f"{address}.cause[{i}]"))
+                    effect(self.resolver, place, raw, self._scope(place, f"{address}.cause[{i}]"))
                 )
         return tuple(made)
 

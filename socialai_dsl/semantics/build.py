@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import fields, is_dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 from socialai_dsl.semantics.terms import BOOL, Compare, Const, Logic, ObjectType, Operation, Term, Type
@@ -106,6 +106,20 @@ def _range(op: str, *types: Type) -> Type:
     else:
         results = [_compute(op, x, y) for x in (a.low, a.high) for y in (b.low, b.high)]
     return integer(min(results), max(results))
+
+
+def changed(value: Any, change: Callable[[Term], Term | None]) -> Any:
+    """A copy of a term, plan or tuple with every term replaced for which `change` gives another."""
+    if isinstance(value, tuple):
+        return tuple(changed(part, change) for part in value)
+    if isinstance(value, Term):
+        other = change(value)
+        if other is not None:
+            return other
+    elif not is_dataclass(value) or isinstance(value, Type | ObjectType | type):
+        return value
+    parts = {field.name: getattr(value, field.name) for field in fields(value)}
+    return replace(value, **{name: changed(part, change) for name, part in parts.items()})
 
 
 def walk(term: Any) -> Iterator[Term]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag
 from socialai_dsl.schema import PRIMITIVES, Scenario
+from socialai_dsl.schema.base import Expression
 from socialai_dsl.schema.positions import DataPath, Positions
 from socialai_dsl.semantics import behaviour, checks, entities, sequences, setup, statuses, world
 from socialai_dsl.semantics.emptiness import check_placements
@@ -18,7 +20,7 @@ from socialai_dsl.semantics.resolve import Resolver
 from socialai_dsl.semantics.room import room_plan, room_sizes
 from socialai_dsl.semantics.scope import PlayedFrame, at_every_step, reset_scope
 from socialai_dsl.semantics.sequences import performs
-from socialai_dsl.semantics.terms import BOOL, Checked, FramePlan, Line, OutcomePlan, Sited, Type
+from socialai_dsl.semantics.terms import BOOL, Checked, Const, FramePlan, Line, OutcomePlan, Sited, Type
 from socialai_dsl.semantics.utterances import MAX_TEXTS, number_of_texts, texts_of
 from socialai_dsl.semantics.vocabulary import words_in_order
 
@@ -156,6 +158,8 @@ class _Run:
             rules=rules,
             require=required,
             egocentric=scenario.observe.directions == "egocentric",
+            slope=self._slope(),
+            each_step=round(scenario.reward.each_step * 1_000_000),
         )
         check_placements(made, findings)
         return made
@@ -219,9 +223,30 @@ class _Run:
                 term = self.resolver.written((*path, kind), raw, BOOL, at_every_step(scope))
                 line = findings.places.key_span((*path, kind)).line
                 condition = Sited(term, scope.draws.site, span)
-                yield OutcomePlan(
-                    outcome.id or f"{kind}@{line}", kind == "success", outcome.reward, condition
-                )
+                percent, graded = self._reward(outcome.reward, (*path, "reward"))
+                name = outcome.id or f"{kind}@{line}"
+                yield OutcomePlan(name, kind == "success", percent, condition, graded)
+
+    def _reward(self, raw: Expression, path: DataPath) -> tuple[int, Sited | None]:
+        """Per cent of the success reward, or what computes it."""
+        scope = at_every_step(reset_scope(path))
+        term = self.resolver.written(path, raw, Type("int", 0, 0), scope)
+        span = self._findings.at(path)
+        if not isinstance(term, Const):
+            return 100, Sited(term, scope.draws.site, span)
+        if not 0 <= term.value <= 100:
+            raise self._findings.fail("S106", f"`{term.value}` is not a per cent of the success reward", span)
+        return term.value, None
+
+    def _slope(self) -> int:
+        """Thousandths of the success reward that are lost by the horizon: `linear(0.9)`."""
+        raw = self._scenario.reward.success
+        found = re.fullmatch(r"\s*linear\(\s*(0(?:\.\d{1,3})?|1(?:\.0{1,3})?)\s*\)\s*", raw)
+        if found is None:
+            message = f"`{raw}` is not a reward; write linear(s), where s from 0 to 1 is lost by the horizon"
+            self._findings.error("S204", message, self._findings.at(("reward", "success")))
+            return 900
+        return round(float(found.group(1)) * 1000)
 
     def report_growth(self, path: str) -> None:
         """A register whose range has no end."""

@@ -8,7 +8,9 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
-from socialai_dsl.schema import Frame, ObjectGroup, Scenario, Sequence
+from socialai_dsl.grammar import ast
+from socialai_dsl.schema import Frame, ObjectGroup, Ranged, Scenario, Sequence
+from socialai_dsl.schema.base import Expression
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import sequences
 from socialai_dsl.semantics.alternatives import register_of, select
@@ -218,6 +220,10 @@ def _names(scenario: Scenario) -> Iterator[tuple[str, DataPath, str]]:
         yield "`define`", ("define", key), (parse_define(key) or (key, ()))[0]
     for name in scenario.memory:
         yield "memory", ("memory", name), name
+    for name in scenario.state:
+        yield "`state`", ("state", name), name
+    for name in scenario.tables:
+        yield "table", ("tables", name), name
     for name in scenario.roles:
         yield "role", ("roles", name), name
 
@@ -357,6 +363,9 @@ def declare_registers(resolver: Resolver) -> None:
             sequences.declare(resolver, name, raw)
         else:
             registers.declare(Declaration(f"let.{name}", name, path, raw, reset_scope(path)))
+    for name, start in symbols.scenario.state.items():
+        path = ("state", name)
+        _declare_register(resolver, f"state.{name}", name, path, start, reset_scope(path))
     for name in symbols.cast:
         declare_name(resolver, name)
     for played in resolver.frames.values():
@@ -418,8 +427,42 @@ def declare_frame(resolver: Resolver, played: PlayedFrame) -> None:
         path = (*played.path, "let", name)
         site = f"{played.member}/{dotted((*played.address, 'let', name))}"
         framed = Scope(path, Draws(site), played.member, played, at_reset=True)
-        register = played.register(name)
-        resolver.registers.declare(Declaration(register, name, path, raw, framed, imagined=played.looked_at))
+        _declare_register(resolver, played.register(name), name, path, raw, framed, imagined=played.looked_at)
+
+
+def _declare_register(
+    resolver: Resolver,
+    register: str,
+    name: str,
+    path: DataPath,
+    raw: Expression | Ranged,
+    scope: Scope,
+    imagined: bool = False,
+) -> None:
+    """A register with its start value, and its range if that is given."""
+    if not isinstance(raw, Ranged):
+        resolver.registers.declare(Declaration(register, name, path, raw, scope, imagined=imagined))
+        return
+    given: Type | None = None
+    with surviving():
+        given = _range(resolver, (*path, "range"), raw.range)
+    start = (*path, "start")
+    scope = scope.at(start, scope.draws.site)
+    resolver.registers.declare(
+        Declaration(register, name, start, raw.start, scope, range=given, imagined=imagined)
+    )
+
+
+def _range(resolver: Resolver, path: DataPath, raw: str) -> Type:
+    """`a..b` as a type."""
+    node = resolver.findings.expression(path, raw)
+    if isinstance(node, ast.Interval):
+        scope = reset_scope(path)
+        low, high = (resolver.value(end, Type("int", 0, 0), scope) for end in (node.low, node.high))
+        if isinstance(low, Const) and isinstance(high, Const) and low.value <= high.value:
+            return Type("int", low.value, high.value)
+    message = "a range is written a..b, from the least to the greatest number"
+    raise resolver.findings.fail("S204", message, resolver.findings.at(path))
 
 
 def _declare_slot(resolver: Resolver, member: str, slot: str, kind: str) -> None:

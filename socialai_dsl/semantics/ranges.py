@@ -87,4 +87,5 @@ def _setters(scenario: Scenario) -> int:
         for rule in (*state.first, *state.then)
     ]
     steps = [step for frame in scenario.frames.values() for step in frame.steps or ()]
-    return sum(bool(entry.set) for entry in (*rules, *steps))
+    own = sum(bool(entry.set) for entry in (*rules, *steps))
+    return own + sum(bool(rule.set) for rule in scenario.rules)

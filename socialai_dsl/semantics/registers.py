@@ -28,6 +28,7 @@ class Declaration:
         source, raw: the expression and where it stands. scope: what its names mean.
         others: what stands in its place in the other files of a `one_of` whose first file `source` is in.
         expected: its type, if its declaration says it.
+        range: the numbers it keeps to, if its declaration says them.
         constant: a known value needs no register.
         imagined: it is only looked at, and never drawn.
     """
@@ -38,6 +39,7 @@ class Declaration:
     raw: Scalar
     scope: Scope
     expected: Type | None = None
+    range: Type | None = None
     constant: bool = False
     imagined: bool = False
     others: tuple[tuple[DataPath, Scalar], ...] = ()
@@ -143,8 +145,8 @@ class Registers:
         self.words[declaration.path] = expected
 
     def widen(self, path: str, type_: Type) -> None:
-        """Make room in a register for the values it is set to."""
-        if type_.kind == "int" and not type_.words:
+        """Make room in a register for the values it is set to; one with a range of its own keeps to it."""
+        if self._declared[path].range is None and type_.kind == "int" and not type_.words:
             own = self.ranges.get(path) or self._drawn[path].value.term.type
             self.ranges[path] = _union(own, type_)
 
@@ -160,13 +162,30 @@ class Registers:
         if declaration.constant and isinstance(term, Const):
             self._terms[path] = term
             return
-        widened = term.type
+        widened = self._within_range(declaration, term)
         if path in self._given_ranges and widened.kind == "int" and not widened.words:
             widened = _union(widened, self._given_ranges[path])
         findings = self._resolver.findings
         sited = Sited(term, declaration.scope.draws.site, findings.at(declaration.source))
         self._terms[path] = Read(widened, path)
         self._drawn[path] = Drawn(path, widened, sited)
+
+    def _within_range(self, declaration: Declaration, term: Term) -> Type:
+        """The type of the register; its start must lie in the range that is given."""
+        given = declaration.range
+        if given is None:
+            return term.type
+        findings = self._resolver.findings
+        if term.type.kind != "int" or term.type.words:
+            message = f"`{declaration.label}` has a range, so it must start with a number"
+            raise findings.fail("S204", message, findings.at(declaration.source))
+        if not given.low <= term.type.low <= term.type.high <= given.high:
+            bounds = f"{term.type.low}..{term.type.high}" if term.type.size > 1 else f"{term.type.low}"
+            message = (
+                f"`{declaration.label}` starts with {bounds}, outside of its range {given.low}..{given.high}"
+            )
+            raise findings.fail("S106", message, findings.at(declaration.source))
+        return given
 
     def _written(self, declaration: Declaration, expected: Type | None) -> Term:
         """The value of a declaration: what its expression says, or what that of the file says which was drawn."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import links, resolve_groups, resolve_names
+from socialai_dsl.semantics.alternatives import text_of
 from socialai_dsl.semantics.build import arithmetic, number
 from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.scope import Scope
@@ -24,6 +25,7 @@ from socialai_dsl.semantics.terms import (
     FieldOf,
     Here,
     PokedNow,
+    SaidBy,
     Spoke,
     Term,
     Type,
@@ -88,6 +90,17 @@ def somewhere(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
     return term if term.type.kind == "cell" else resolver.fit(term, ENTITY, node, scope)
 
 
+def member_named(
+    resolver: Resolver, node: ast.Call | ast.Attribute | ast.Name, scope: Scope
+) -> str | None:
+    """The NPC that stands before the dot; None if it is somebody or something else."""
+    subject = None if isinstance(node, ast.Name) else node.subject
+    if not isinstance(subject, ast.Name) or subject.id in scope.variables:
+        return None
+    member = resolver.symbols.roles.get(subject.id, subject.id)
+    return member if member in resolver.symbols.cast and member != "agent" else None
+
+
 def must_be_agent(resolver: Resolver, node: ast.Call | ast.Attribute | ast.Name, scope: Scope) -> None:
     """Report what is known of the agent only, asked of somebody else."""
     subject = None if isinstance(node, ast.Name) else node.subject
@@ -115,6 +128,9 @@ def without_arguments(
     check_moment(resolver, signature, node, scope)
     if signature.subject == "agent":
         assert isinstance(node, ast.Call | ast.Attribute | ast.Name), "internal: an attribute has a name"
+        speaker = member_named(resolver, node, scope)
+        if name == "spoke" and speaker is not None:
+            return SaidBy(resolver.symbols.numbers[speaker], None)
         must_be_agent(resolver, node, scope)
         return _of_the_agent(resolver, name)
     who = subject_of(resolver, subject, signature, node, scope)
@@ -191,10 +207,13 @@ def _attribute(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: 
 
 
 def _name(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
-    member = resolver.symbols.member_of(who.value) if isinstance(who, Const) else None
-    if member is None:
+    numbers = [who.value] if isinstance(who, Const) else range(who.type.low, who.type.high + 1)
+    members = [resolver.symbols.member_of(number) for number in numbers]
+    names = [resolver.registers.read(f"{member}.name") for member in members if member is not None]
+    if len(names) < len(members):
         raise resolver.fail("S204", "only a member of the cast has a name", node, scope)
-    return resolver.registers.read(f"{member}.name")
+    cases = [(Compare("==", who, Const(who.type, number)), name) for number, name in zip(numbers, names, strict=True)]
+    return text_of(cases)
 
 
 def _kind(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:

@@ -12,6 +12,7 @@ from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.resolve_attributes import (
     ENTITY,
     check_moment,
+    member_named,
     must_be_agent,
     somewhere,
     subject_of,
@@ -73,6 +74,8 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
     check_moment(resolver, signature, node, scope)
     argument = node.args[0]
     match node.name:
+        case "said" if (speaker := member_named(resolver, node, scope)) is not None:
+            return resolver.utterances.said_by(speaker, argument, scope)
         case "said":
             must_be_agent(resolver, node, scope)
             return resolver.utterances.said(argument, scope)

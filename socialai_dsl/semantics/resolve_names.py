@@ -11,7 +11,7 @@ from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema import Sequence
 from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.semantics import resolve_attributes
+from socialai_dsl.semantics import hearing, resolve_attributes
 from socialai_dsl.semantics.alternatives import by_value, drawn
 from socialai_dsl.semantics.build import FALSE, all_of, any_of
 from socialai_dsl.semantics.findings import FailedError
@@ -148,6 +148,8 @@ def _declared(resolver: Resolver, node: ast.Name, expected: Type | None, scope: 
     symbols, word = resolver.symbols, node.id
     if word in symbols.scenario.memory or isinstance(symbols.scenario.let.get(word), Sequence):
         raise _not_a_value(resolver, "memory" if word in symbols.scenario.memory else "sequence", node, scope)
+    if word in symbols.scenario.state:
+        return resolver.registers.read(f"state.{word}", expected, resolver.findings.node(scope.path, node))
     if word in symbols.scenario.let:
         return resolver.registers.read(f"let.{word}", expected, resolver.findings.node(scope.path, node))
     if word in symbols.defines:
@@ -189,7 +191,9 @@ def _language(resolver: Resolver, node: ast.Name, scope: Scope) -> Term | None:
         case "H":
             return _size("height", symbols.height)
         case "noun" if scope.frame is not None and not scope.at_reset:
-            return World(symbols.nouns, "noun")
+            return hearing.noun(resolver, scope)
+        case "speaker" if scope.frame is not None and not scope.at_reset:
+            return hearing.speaker(resolver, node, scope)
     return None
 
 
@@ -272,6 +276,8 @@ def _register_of(resolver: Resolver, node: ast.Name, scope: Scope) -> str | None
     frame = scope.frame
     if frame is not None and frame.register(node.id) in resolver.registers:
         return frame.register(node.id)
+    if node.id in resolver.symbols.scenario.state:
+        return f"state.{node.id}"
     return f"let.{node.id}" if node.id in resolver.symbols.scenario.let else None
 
 

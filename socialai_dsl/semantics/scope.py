@@ -128,6 +128,8 @@ class Symbols:
         found = dict.fromkeys(self.scenario.let, "let")
         found |= dict.fromkeys(self.defines, "define")
         found |= dict.fromkeys(self.scenario.memory, "memory")
+        found |= dict.fromkeys(self.scenario.state, "state")
+        found |= dict.fromkeys(self.scenario.tables, "tables")
         found |= dict.fromkeys(self.scenario.roles, "roles")
         found |= {name: "object" if o.single else "objects" for name, o in self.objects.items()}
         return found | dict.fromkeys(self.cast, "cast")
@@ -200,6 +202,7 @@ class Scope:
         at_reset: computed once, before the first step.
         here: it is the `where` of a place, so `here` means the candidate cell.
         it: the entity whose attribute is being computed.
+        hearing: it belongs to a rule with `hears`, so there is a `speaker`.
         within: names of the definitions it stands in, to find circles. nested: how many quantifiers it stands in.
     """
 
@@ -211,6 +214,7 @@ class Scope:
     at_reset: bool = False
     here: bool = False
     it: Const | None = None
+    hearing: bool = False
     outer: Draws | None = None
     within: tuple[str, ...] = ()
     nested: int = 0

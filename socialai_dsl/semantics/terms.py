@@ -227,6 +227,8 @@ class Pattern:
     text: str
     said_by_npcs: frozenset[str] = frozenset()
     """Plain texts of NPCs (without speaker) that match as well."""
+    nouns: tuple[tuple[str, int], ...] = ()
+    """Of a pattern with <noun>: the noun that it finds in each of those texts."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,18 @@ from socialai_dsl.semantics.alternatives import by_value, drawn, select
 from socialai_dsl.semantics.build import all_of, any_of
 from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.scope import Draws, Scope
-from socialai_dsl.semantics.terms import Compare, Const, Heard, Line, Pattern, Read, Said, Term, Type
+from socialai_dsl.semantics.terms import (
+    Compare,
+    Const,
+    Heard,
+    Line,
+    Pattern,
+    Read,
+    Said,
+    SaidBy,
+    Term,
+    Type,
+)
 from socialai_dsl.semantics.wording import described, quoted, spoken
 from socialai_dsl.source import Span
 
@@ -138,12 +149,12 @@ class Utterances:
         for choice in product(*(self._choices(part) for part in parts)):
             said = "".join(word for word, _ in choice)
             pairs = self._match(said)
-            by_npcs = frozenset(
-                t for t in self._resolver.npc_texts if from_npcs and normal(t) == normal(said)
-            )
+            nouns = self._said_by_npcs(said) if from_npcs else {}
             conditions = [*drawn, *(condition for _, condition in choice if condition is not None)]
-            if pairs or by_npcs:
-                found.append((Pattern(pairs, said, by_npcs), all_of(conditions) if conditions else None))
+            if pairs or nouns:
+                found_nouns = tuple((t, noun) for t, noun in nouns.items() if noun is not None)
+                pattern = Pattern(pairs, said, frozenset(nouns), found_nouns)
+                found.append((pattern, all_of(conditions) if conditions else None))
             else:
                 unsayable.append((said, next((word for word, c in choice if c is not None), "")))
         if unsayable:
@@ -187,6 +198,18 @@ class Utterances:
             pair for n in nouns for pair in self._pairs.get(normal(said.replace("<noun>", n)), ())
         )
 
+    def _said_by_npcs(self, said: str) -> dict[str, int | None]:
+        """The texts of NPCs that fit, each with the noun that stands for `<noun>`."""
+        if "<noun>" not in said:
+            return {text: None for text in self._resolver.npc_texts if normal(text) == normal(said)}
+        wanted = {normal(said.replace("<noun>", str(noun))): i for i, noun in enumerate(self._grammar.nouns)}
+        return {text: wanted[normal(text)] for text in self._resolver.npc_texts if normal(text) in wanted}
+
+    def anything(self) -> Pattern:
+        """Whatever anybody can say."""
+        pairs = frozenset(pair for found in self._pairs.values() for pair in found)
+        return Pattern(pairs, "any", frozenset(self._resolver.npc_texts))
+
     def _report_unsayable(
         self,
         unsayable: list[tuple[str, str]],
@@ -217,6 +240,15 @@ class Utterances:
         """Every utterance as text."""
         for t, n in product(range(len(self._grammar.templates)), range(len(self._grammar.nouns))):
             yield self._grammar.utterance(t, n)
+
+    def said_by(self, member: str, node: ast.Expr, scope: Scope) -> Term:
+        """Whether an NPC said one of the texts at `node` in this step."""
+        span = self._resolver.findings.node(scope.path, node)
+        return any_of(
+            all_of([SaidBy(self._resolver.symbols.numbers[member], pattern), *_given(drawn), *_given(given)])
+            for text, drawn in self._texts(node, scope)
+            for pattern, given in self.patterns(text, scope, span, True)
+        )
 
     # -- lines -----------------------------------------------------------------------------------------------
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.schema import WorldRule
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.activities import effect
+from socialai_dsl.semantics.behaviour import assigned
 from socialai_dsl.semantics.findings import dotted, surviving
 from socialai_dsl.semantics.scope import Scope, at_every_step, reset_scope
 from socialai_dsl.semantics.terms import BOOL, Effect, RulePlan, Sited
@@ -40,8 +42,26 @@ def _rule(resolver: Resolver, rule: WorldRule, path: DataPath) -> RulePlan:
         when=when,
         chance=rule.chance,
         once=rule.once,
+        sets=tuple(_sets(resolver, rule, (*path, "set"), name)),
+        reward=rule.reward,
         causes=tuple(_effects(resolver, rule, (*path, "cause"), name)),
     )
+
+
+def _sets(resolver: Resolver, rule: WorldRule, path: DataPath, name: str) -> Iterator[tuple[str, Sited]]:
+    """The registers of the world that a rule sets."""
+    known = resolver.symbols.scenario.state
+    for word, raw in rule.set.items():
+        place = (*path, word)
+        with surviving():
+            if word not in known:
+                near = did_you_mean(word, known)
+                hint = None if near else f"declare it: `state: {{{word}: 0}}`"
+                span = resolver.findings.places.key_span(place)
+                message = f"`{word}` is not declared in `state`"
+                raise resolver.findings.fail("S305", message, span, suggestion=near, hint=hint)
+            register = f"state.{word}"
+            yield register, assigned(resolver, register, raw, place, _scope(place, f"{name}.set.{word}"))
 
 
 def _scope(path: DataPath, site: str) -> Scope:
