@@ -234,9 +234,7 @@ class _Planner:
         for i, raw in enumerate(entry.cause):
             place: DataPath = (*path, "cause") if single else (*path, "cause", i)
             with surviving():
-                made.append(
-                    effect(self.resolver, place, raw, self._scope(place, f"{address}.cause[{i}]"))
-                )
+                made.append(effect(self.resolver, place, raw, self._scope(place, f"{address}.cause[{i}]")))
         return tuple(made)
 
     def _target(self, target: str | None, path: DataPath) -> str | None:

@@ -18,7 +18,9 @@ def speaker(resolver: Resolver, node: ast.Name, scope: Scope) -> Term:
     """`speaker` in a rule; which patterns it is about is filled in once they are known (`bound`)."""
     if not scope.hearing:
         message = "`speaker` is who said what a rule `hears`; there is nothing heard here"
-        raise resolver.fail("S211", message, node, scope, hint="add `hears:` to the rule; `hears: any` is anything")
+        raise resolver.fail(
+            "S211", message, node, scope, hint="add `hears:` to the rule; `hears: any` is anything"
+        )
     return Speaker(Type("entity", 0, len(resolver.symbols.numbers) - 1), ())
 
 

@@ -90,9 +90,7 @@ def somewhere(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
     return term if term.type.kind == "cell" else resolver.fit(term, ENTITY, node, scope)
 
 
-def member_named(
-    resolver: Resolver, node: ast.Call | ast.Attribute | ast.Name, scope: Scope
-) -> str | None:
+def member_named(resolver: Resolver, node: ast.Call | ast.Attribute | ast.Name, scope: Scope) -> str | None:
     """The NPC that stands before the dot; None if it is somebody or something else."""
     subject = None if isinstance(node, ast.Name) else node.subject
     if not isinstance(subject, ast.Name) or subject.id in scope.variables:
@@ -212,7 +210,10 @@ def _name(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
     names = [resolver.registers.read(f"{member}.name") for member in members if member is not None]
     if len(names) < len(members):
         raise resolver.fail("S204", "only a member of the cast has a name", node, scope)
-    cases = [(Compare("==", who, Const(who.type, number)), name) for number, name in zip(numbers, names, strict=True)]
+    cases = [
+        (Compare("==", who, Const(who.type, number)), name)
+        for number, name in zip(numbers, names, strict=True)
+    ]
     return text_of(cases)
 
 
