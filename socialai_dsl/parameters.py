@@ -68,6 +68,8 @@ def _labelled(
     name: str, default: Data, choices: dict[str, Data], resolved: Resolved, bag: DiagnosticBag
 ) -> Data:
     """The value that the default, a label, stands for."""
+    if default in choices.values():
+        return default
     if str(default) not in choices:
         near = did_you_mean(str(default), choices)
         span = resolved.value_span(("params", name, "default"))

@@ -47,15 +47,17 @@ class Key(IntEnum):
     KEY = 3  # of the episode, made of the three
     DIGEST = 4  # of the lines heard since the last reset
     PROGRAM = 5  # offset of the program in `words`
-    POOL = 6  # programs to draw from: first entry of `choices`, number of entries << 32
-    WORDS = 7
+    POOL = 6  # programs to play: first entry of `choices`, number of entries << 32, 1 << 63 if one after another
+    ACT = 7  # of an episode in acts: which of them is played
+    SPOILED = 8  # of an episode in acts: 1 if one of those before was no success
+    WORDS = 9
 
 
 class Link(IntEnum):
     """Words that follow a program in a batch.
 
     After them: for each action, template and noun of the batch the program's own (-1 if it has none), then for each
-    outcome of the program the batch's.
+    outcome of the program the batch's, then whether each is a success.
     """
 
     NUMBER = 0  # of the program in the batch
@@ -66,7 +68,8 @@ class Link(IntEnum):
     ACTIONS = 5  # choices of the batch's action space
     TEMPLATES = 6
     NOUNS = 7
-    END = 8
+    GESTURES = 8  # 1 if pictures of the batch have channels 5 and 6
+    END = 9
 
 
 class Book(IntEnum):
@@ -75,30 +78,34 @@ class Book(IntEnum):
     WORDS = 0
     VIEWS = 1
     CHOICES = 2
-    REGISTERS = 3
-    BOARDS = 4
-    KEYS = 5
-    TOKENS = 6
-    IMAGE = 7
-    ACTIONS = 8
-    PINS = 9
-    LAYOUT = 10
-    CHOSEN = 11
-    REWARD = 12
-    TERMINATED = 13
-    TRUNCATED = 14
-    OUTCOME = 15
-    FINAL_IMAGE = 16
-    FINAL_TOKENS = 17
-    COUNTERS = 18
-    SCRATCH = 19
-    SETS = 20
-    SPARE_REGISTERS = 21
-    SPARE_BOARDS = 22
-    SPARE_COUNTERS = 23
-    IMAGE_IDS = 24
-    REFUSED = 25
-    SIZES = 26
+    WEIGHTS = 3
+    REGISTERS = 4
+    BOARDS = 5
+    KEYS = 6
+    TOKENS = 7
+    IMAGE = 8
+    EXTRA = 9
+    ACTIONS = 10
+    PINS = 11
+    LAYOUT = 12
+    CHOSEN = 13
+    REWARD = 14
+    TERMINATED = 15
+    TRUNCATED = 16
+    OUTCOME = 17
+    FINAL_IMAGE = 18
+    FINAL_TOKENS = 19
+    FINAL_EXTRA = 20
+    SPOILED = 21
+    COUNTERS = 22
+    SCRATCH = 23
+    SETS = 24
+    SPARE_REGISTERS = 25
+    SPARE_BOARDS = 26
+    SPARE_COUNTERS = 27
+    IMAGE_IDS = 28
+    REFUSED = 29
+    SIZES = 30
 
 
 class Size(IntEnum):
@@ -108,7 +115,8 @@ class Size(IntEnum):
     BOARD = 1
     TOKENS = 2
     COUNTERS = 3
-    END = 4
+    EXTRA = 4
+    END = 5
 
 
 class State(NamedTuple):
@@ -123,6 +131,9 @@ class State(NamedTuple):
     image: NDArray[
         np.uint32
     ]  # (E, 49) packed cells, from the agent's left to its right, each from far to near
+    extra: NDArray[
+        np.uint16
+    ]  # (E, 49) fifth channel | sixth << 8 of these cells; (E, 0) if no program of the batch shows them
 
 
 class Tables(NamedTuple):
@@ -132,7 +143,8 @@ class Tables(NamedTuple):
     views: NDArray[
         np.uint16
     ]  # (poses, 49) cell of the board for each cell of the picture, by (y, x, direction)
-    choices: NDArray[np.int64]  # offsets of programs
+    choices: NDArray[np.int64]  # offsets of programs, one pool behind the other
+    weights: NDArray[np.int64]  # of each choice and those before it in its pool, below 2**32; never decreasing
 
 
 class Ports(NamedTuple):
@@ -148,6 +160,10 @@ class Ports(NamedTuple):
     outcome: NDArray[np.int16]  # (E,) of the episode that ended in this step, else -1
     final_image: NDArray[np.uint32]  # (E, 49) last picture of an episode that was reset in the same step
     final_tokens: NDArray[np.int16]  # (E, L)
+    final_extra: NDArray[np.uint16]  # (E, 49) or (E, 0)
+    spoiled: NDArray[
+        np.bool_
+    ]  # (E,) the episode that ended in this step had other acts, and not all were a success
     counters: NDArray[np.int64]  # (threads, counters of all programs)
     scratch: NDArray[np.int64]  # (threads, TEMPORARIES)
     sets: NDArray[np.uint32]  # (threads, SCRATCH_BOARDS * MAX_SIDE)
@@ -176,7 +192,7 @@ class Row(NamedTuple):
     views: NDArray[np.uint16]
 
 
-def empty_state(rows: int, registers: int, board: int, tokens: int, view: int) -> State:
+def empty_state(rows: int, registers: int, board: int, tokens: int, view: int, gestures: bool) -> State:
     """A state of zeros; every row must be reset before it is used."""
     return State(
         registers=np.zeros((rows, registers), np.int16),
@@ -184,6 +200,7 @@ def empty_state(rows: int, registers: int, board: int, tokens: int, view: int) -
         keys=np.zeros((rows, Key.WORDS), np.uint64),
         tokens=np.zeros((rows, tokens), np.int16),
         image=np.zeros((rows, view * view), np.uint32),
+        extra=np.zeros((rows, view * view if gestures else 0), np.uint16),
     )
 
 
@@ -201,6 +218,8 @@ def empty_ports(state: State, counters: int, threads: int) -> Ports:
         outcome=np.full(rows, -1, np.int16),
         final_image=np.zeros_like(state.image),
         final_tokens=np.zeros_like(state.tokens),
+        final_extra=np.zeros_like(state.extra),
+        spoiled=np.zeros(rows, np.bool_),
         counters=np.zeros((threads, counters), np.int64),
         scratch=np.zeros((threads, TEMPORARIES), np.int64),
         sets=np.zeros((threads, SCRATCH_BOARDS * MAX_SIDE), np.uint32),
@@ -209,7 +228,10 @@ def empty_ports(state: State, counters: int, threads: int) -> Ports:
         spare_counters=np.zeros((threads, counters), np.int64),
         image_ids=np.zeros(rows, np.uint64),
         refused=np.zeros(rows, np.bool_),
-        sizes=np.array([registers, state.boards.shape[1], state.tokens.shape[1], counters], np.int64),
+        sizes=np.array(
+            [registers, state.boards.shape[1], state.tokens.shape[1], counters, state.extra.shape[1]],
+            np.int64,
+        ),
     )
 
 

@@ -31,7 +31,7 @@ class Rule(Effects):
     id: Word | None = Field(None, description="names the rule in coverage, traces and patches")
     hears: Texts = Field((), description="an utterance, or a list of alternatives")
     when: Expression | None = None
-    after: int | None = Field(None, ge=0, description="holds from this turn in the state on")
+    after: Expression | None = Field(None, description="holds from this turn in the state on")
     chance: Probability | None = Field(None, description="drawn anew each turn if everything else holds")
     once: bool = Field(False, description="once per episode and NPC")
 

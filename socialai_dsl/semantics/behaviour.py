@@ -18,12 +18,14 @@ from socialai_dsl.semantics.scope import Draws, PlayedFrame, Scope
 from socialai_dsl.semantics.terms import (
     BOOL,
     Activity,
+    Compare,
     Const,
     Effect,
     FramePlan,
     Heard,
     Line,
     Pattern,
+    Read,
     RulePlan,
     Sited,
     StatePlan,
@@ -41,7 +43,7 @@ _FOR_EVER = -1
 ANYTHING = "any"
 """`hears: any` is whatever anybody says."""
 
-_ENDLESS = frozenset({"face", "stay", "choose"})
+_ENDLESS = frozenset({"face", "stay", "choose", "flee", "follow", "wander"})
 """Activities that never end by themselves."""
 
 
@@ -141,6 +143,7 @@ class _Planner:
             term = heard if when is None else all_of([heard, when.term])
             span = self.resolver.findings.at((*path, "hears"))
             when = Sited(term, f"{self.played.member}/{address}.when", when.span if when else span)
+        after, when = self._after(rule, path, when, address)
         do = rule.do if isinstance(rule, FirstRule) else None
         plan = RulePlan(
             name=rule.id or f"{self.played.member}.{self.played.name}.{place}",
@@ -148,7 +151,7 @@ class _Planner:
             span=self.resolver.findings.places.value_span(path),
             hears=patterns if heard is None else (),
             when=when,
-            after=rule.after or 0,
+            after=after,
             chance=rule.chance,
             once=rule.once,
             do=self._activity((*path, "do"), do, address) if do is not None else None,
@@ -178,6 +181,27 @@ class _Planner:
         if all(condition is None for _, condition in found):
             return patterns, None
         return patterns, any_of(all_of([Heard((p,)), *([c] if c is not None else [])]) for p, c in found)
+
+    def _after(
+        self, rule: Rule, path: DataPath, when: Sited | None, address: str
+    ) -> tuple[int, Sited | None]:
+        """From which turn on a rule holds; a number that is drawn becomes a condition on the clock."""
+        place = (*path, "after")
+        if rule.after is None:
+            return 0, when
+        resolver = self.resolver
+        term: Term = Const(_INT, 0)
+        with surviving():
+            term = resolver.written(place, rule.after, _INT, self._scope(place, f"{address}.after"))
+        if isinstance(term, Const):
+            if term.value < 0:
+                resolver.findings.error("S106", "`after` is a number of turns", resolver.findings.at(place))
+            return max(0, term.value), when
+        clock = Read(Type("int", 0, resolver.symbols.scenario.horizon), f"{self.played.member}.clock")
+        late = Compare("<=", term, clock)
+        if when is None:
+            return 0, Sited(late, f"{self.played.member}/{address}.after", resolver.findings.at(place))
+        return 0, Sited(all_of([late, when.term]), when.site, when.span)
 
     def _condition(self, path: DataPath, raw: object, address: str) -> Sited | None:
         if raw is None:
@@ -252,7 +276,8 @@ class _Planner:
         address = self.addresses[path]
         doing = self._activity((*path, "do"), step.do, address)
         duration = self._duration((*path, "for"), step.for_)
-        endless = doing is not None and doing.name in _ENDLESS
+        head = (step.do or "").partition("(")[0].strip()
+        endless = doing is not None and (doing.name in _ENDLESS or head in _ENDLESS)
         if step.do is not None and step.until is None and step.for_ is None and endless:
             findings = self.resolver.findings
             message = f"`{step.do}` never ends by itself: add `until:` or `for:`"

@@ -95,6 +95,14 @@ def _regions(resolver: Resolver, node: ast.Expr, spot: Spot, scope: Scope) -> tu
 def region(resolver: Resolver, node: ast.Expr, scope: Scope, spot: Spot | None = None) -> tuple[Region, ...]:
     """The regions that one place word stands for."""
     name, args = _head(resolver, node, scope)
+    define = resolver.symbols.defines.get(name)
+    if define is not None and not args and not define.parameters:
+        if name in scope.within:
+            raise resolver.fail("S208", f"`{name}` needs itself", node, scope)
+        body = resolver.findings.expression(define.path, define.raw)
+        inner = replace(scope, path=define.path, within=(*scope.within, name))
+        options = body.options if isinstance(body, ast.Alternatives) else (body,)
+        return tuple(r for option in options for r in region(resolver, option, inner, spot))
     match name:
         case "anywhere" | "left_half" | "right_half" | "top_half" | "bottom_half":
             _takes(resolver, node, args, 0, scope)

@@ -144,6 +144,11 @@ class Registers:
             )
         self.words[declaration.path] = expected
 
+    def is_set(self, path: str) -> bool:
+        """Whether a register is one that rules can set: of a frame's `let`, or of `state`."""
+        source = self._declared[path].source if path in self._declared else ()
+        return source[:1] == ("state",) or ("frames" in source and "let" in source)
+
     def widen(self, path: str, type_: Type) -> None:
         """Make room in a register for the values it is set to; one with a range of its own keeps to it."""
         if self._declared[path].range is None and type_.kind == "int" and not type_.words:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.semantics import links, resolve_calls, resolve_groups, resolve_names, sequences
+from socialai_dsl.semantics import links, resolve_calls, resolve_groups, resolve_names, sequences, tables
 from socialai_dsl.semantics.build import all_of, any_of, arithmetic, between, number, one_of
-from socialai_dsl.semantics.findings import FailedError, Findings, Scalar
+from socialai_dsl.semantics.findings import FailedError, Findings, Scalar, surviving
 from socialai_dsl.semantics.registers import Registers
 from socialai_dsl.semantics.scope import PlayedFrame, Scope, Symbols
 from socialai_dsl.semantics.terms import (
@@ -20,6 +21,7 @@ from socialai_dsl.semantics.terms import (
     Const,
     Not,
     Operation,
+    Select,
     Term,
     Type,
 )
@@ -60,6 +62,18 @@ class Resolver:
         self.registers = Registers(self, words, ranges)
         self.utterances = Utterances(self, symbols.scenario.grammar)
         self.npc_texts: dict[str, None] = {}
+        self._tables: dict[str, tuple[tuple[str, ...], tuple[Term, ...]] | None] = {}
+
+    def table(self, name: str) -> tuple[tuple[str, ...], tuple[Term, ...]]:
+        """Keys and values of a table; raises FailedError once what is wrong with it has been reported."""
+        if name not in self._tables:
+            self._tables[name] = None
+            with surviving():
+                self._tables[name] = tables.resolved(self, name)
+        found = self._tables[name]
+        if found is None:
+            raise FailedError
+        return found
 
     @cached_property
     def unlocks(self) -> Mapping[int, tuple[int, ...]]:
@@ -137,6 +151,10 @@ class Resolver:
             word = spoken(term.type, term.value)
             if word in expected.words:
                 return Const(expected, expected.low + expected.words.index(word))
+        if expected.kind == "int" and not expected.words and term.type.kind == "noun":
+            value = _number_of(term)
+            if value is not None:
+                return value
         message = f"`{quoted(node)}` is {described(term.type)}, but {described(expected)} is expected here"
         hint = None
         if expected.kind == "bool" and term.type.kind == "text":
@@ -293,6 +311,22 @@ def _turned(op: str, direction: Term, turn: Term) -> Term:
     if isinstance(direction, Const) and isinstance(change, Const):
         return Const(DIRECTION, (direction.value + change.value) % 4)
     return Operation(DIRECTION, "turn", (direction, change))
+
+
+def _number_of(noun: Term) -> Term | None:
+    """A noun as the number that it is; None if some noun is none."""
+    words = noun.type.words
+    if not all(word.lstrip("-").isdigit() for word in words):
+        return None
+    values = [int(word) for word in words]
+    type_ = Type("int", min(values), max(values))
+    if isinstance(noun, Const):
+        return number(values[noun.value])
+    if values == list(range(values[0], values[0] + len(values))):
+        place = replace(noun, type=Type("int", 0, len(words) - 1))
+        return arithmetic("+", place, number(values[0])) if values[0] else place
+    cases = [Compare("==", noun, Const(noun.type, i)) for i in range(len(values) - 1)]
+    return Select(type_, tuple(cases), tuple(Const(type_, v) for v in values[:-1]), Const(type_, values[-1]))
 
 
 def _same_kind(actual: Type, expected: Type) -> bool:

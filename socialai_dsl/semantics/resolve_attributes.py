@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics import links, resolve_groups, resolve_names
+from socialai_dsl.semantics import contents, links, resolve_groups, resolve_names
 from socialai_dsl.semantics.alternatives import text_of
-from socialai_dsl.semantics.build import arithmetic, number
+from socialai_dsl.semantics.build import all_of, any_of, arithmetic, number
 from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.scope import Scope
 from socialai_dsl.semantics.signatures import VALUE_SYNONYMS, VALUES, Signature
@@ -28,6 +28,7 @@ from socialai_dsl.semantics.terms import (
     SaidBy,
     Spoke,
     Term,
+    Test,
     Type,
     World,
 )
@@ -41,6 +42,17 @@ ENTITY = Type("entity", 0, 0)
 
 OF_CELLS = frozenset({"in_line", "unobstructed", "distance", "dir_to", "x", "y"})
 """What a cell that is no candidate for a placement can be asked as well."""
+
+
+_POINTING = Type("int", 0, 4)
+
+
+def toggled_by(who: Const, what: Term) -> Term:
+    """Whether the agent toggled at something in this step, or an NPC did so in its last turn."""
+    if who.value == 0:
+        return PokedNow(what)
+    toggle = Const(ACTION, ACTION.words.index("toggle"))
+    return all_of([Compare("==", FieldOf(ACTION, who, "last"), toggle), Test("faces", who, what)])
 
 
 def check_moment(resolver: Resolver, signature: Signature, node: ast.Expr, scope: Scope) -> None:
@@ -69,6 +81,8 @@ def subject_of(
             raise resolver.fail(
                 "S201", "`here` is the candidate cell; it means something only in a place", subject, scope
             )
+        if signature.name in OF_CELLS and not signature.cell:
+            return Here(CELL, "cell")
         if not signature.cell:
             raise resolver.fail("S211", f"a cell cannot be asked for `{signature.name}`", node, scope)
         return None
@@ -136,7 +150,7 @@ def without_arguments(
         return _cell_coordinate(resolver, name)
     if name == "unlocked_by":
         return links.unlocker(resolver, who, node, scope)
-    if signature.subject == "object":
+    if signature.subject == "object" and name not in ("inside", "toggled"):
         return _status(resolver, name, who, node, scope)
     return _attribute(resolver, name, who, node, scope)
 
@@ -198,6 +212,13 @@ def _attribute(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: 
             return _index(resolver, who, node, scope)
         case "cell":
             return CellOf(CELL, who)
+        case "pointing":
+            return Compare("!=", FieldOf(_POINTING, who, "pointing"), Const(_POINTING, 0))
+        case "inside":
+            return contents.container(resolver, who, node, scope)
+        case "toggled":
+            everybody = range(len(resolver.symbols.numbers))
+            return any_of(toggled_by(resolve_names.entity(number), who) for number in everybody)
         case "kind":
             return _kind(resolver, who, node, scope)
     assert name == "name", f"internal: no meaning for the attribute `{name}`"

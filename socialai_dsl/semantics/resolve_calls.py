@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics import resolve_groups, resolve_names
-from socialai_dsl.semantics.build import arithmetic, one_of, walk
+from socialai_dsl.semantics import resolve_groups, resolve_names, tables
+from socialai_dsl.semantics.build import all_of, any_of, arithmetic, number, one_of, walk
 from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.resolve_attributes import (
     ENTITY,
@@ -16,6 +18,7 @@ from socialai_dsl.semantics.resolve_attributes import (
     must_be_agent,
     somewhere,
     subject_of,
+    toggled_by,
     without_arguments,
 )
 from socialai_dsl.semantics.scope import Scope
@@ -33,9 +36,11 @@ from socialai_dsl.semantics.terms import (
     DIRECTION,
     Compare,
     Const,
+    FieldOf,
     Heard,
     InState,
     Measure,
+    Operation,
     Sees,
     Sited,
     Term,
@@ -63,6 +68,8 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
     if defined is not None:
         define, arguments = defined
         return resolve_names.expanded(resolver, define, arguments, node, expected, scope)
+    if node.subject is None and node.name in resolver.symbols.scenario.tables:
+        return tables.looked_up(resolver, node, scope)
     signature = VALUES.get(node.name)
     if signature is None:
         raise _unknown(resolver, node, scope)
@@ -90,6 +97,9 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
     subject = subject_of(resolver, node.subject, signature, node, scope)
     if node.name in _RELATIONS:
         return _relation(resolver, node.name, subject, argument, scope)
+    if node.name in ("joint_attention", "points_at", "toggled_by"):
+        assert subject is not None, "internal: a cell attends to nothing"
+        return _attention(resolver, node.name, subject, node, scope)
     if node.name in ("sees", "would_see"):
         assert subject is not None, "internal: a cell sees nothing"
         return _sees(resolver, subject, node, scope)
@@ -155,6 +165,11 @@ def _function(resolver: Resolver, node: ast.Call, expected: Type | None, scope: 
             usage = "d in doors to agent" if node.name == "nearest" else "d in doors where ..."
             raise resolver.fail("S211", f"write `{node.name}({usage})`", node, scope)
         return resolve_groups.pick(resolver, node, expected, scope)
+    if node.name == "opposite":
+        way = resolver.value(node.args[0], DIRECTION, scope)
+        if isinstance(way, Const):
+            return Const(DIRECTION, (way.value + 2) % 4)
+        return Operation(DIRECTION, "turn", (way, number(2)))
     if node.name == "prev":
         return _before(resolver, node, expected, scope)
     whole = Type("int", 0, 0)
@@ -195,6 +210,42 @@ def _relation(resolver: Resolver, name: str, subject: Term | None, argument: ast
         else somewhere(resolver, argument, scope)
     )
     return Test(cast(Any, name), subject, other)
+
+
+def _attention(resolver: Resolver, name: str, subject: Term, node: ast.Call, scope: Scope) -> Term:
+    """What two look at, what somebody points at, who toggled at something."""
+    first, *rest = node.args
+    if name == "toggled_by":
+        who = resolver.value(first, ENTITY, scope)
+        if not isinstance(who, Const) or resolver.symbols.member_of(who.value) is None:
+            raise resolver.fail("S211", "`toggled_by` takes a member of the cast", first, scope)
+        return toggled_by(who, subject)
+    if name == "points_at":
+        return _each(resolver, first, scope, lambda other: _points_at(subject, other))
+    other = resolver.value(first, ENTITY, scope)
+
+    def both_look(what: Term) -> Term:
+        return all_of([Test("looks_at", subject, what), Test("looks_at", other, what)])
+
+    if rest:
+        return _each(resolver, rest[0], scope, both_look)
+    numbers = range(len(resolver.symbols.numbers), resolver.symbols.entities)
+    return any_of(both_look(resolve_names.entity(number)) for number in numbers)
+
+
+def _points_at(subject: Term, other: Term) -> Term:
+    ways = Type("int", 0, 4)
+    way = arithmetic(
+        "+", replace(Measure(DIRECTION, "dir_to", (subject, other)), type=Type("int", 0, 3)), number(1)
+    )
+    return all_of([Compare("==", FieldOf(ways, subject, "pointing"), way), Test("in_line", subject, other)])
+
+
+def _each(resolver: Resolver, node: ast.Expr, scope: Scope, relation: Callable[[Term], Term]) -> Term:
+    """A relation to something, or to any of a group."""
+    if resolve_groups.is_group(resolver, node, scope):
+        return resolve_groups.any_member(resolver, node, scope, relation)
+    return relation(somewhere(resolver, node, scope))
 
 
 def _sees(resolver: Resolver, viewer: Term, node: ast.Call, scope: Scope) -> Term:

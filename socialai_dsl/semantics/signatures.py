@@ -65,8 +65,9 @@ def _value(
     *,
     momentary: bool = False,
     cell: bool = False,
+    optional: int = 0,
 ) -> Signature:
-    return Signature(name, subject, takes, gives, "value", doc, momentary, cell)
+    return Signature(name, subject, takes, gives, "value", doc, momentary, cell, optional)
 
 
 SIGNATURES: Final[tuple[Signature, ...]] = (
@@ -76,6 +77,10 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     _value("in_front_of", "entity", ("entities",), "condition", "on the cell before x", cell=True),
     _value("faces", "entity", ("entities",), "condition", "x is on the cell ahead"),
     _value("faces_toward", "entity", ("entities",), "condition", "turned to where face(x) would end"),
+    _value("joint_attention", "member", ("entity", "entities"), "condition", "both look at x, or at the same object",
+           optional=1),
+    _value("points_at", "member", ("entities",), "condition", "it points, and x lies straight that way"),
+    _value("toggled_by", "object", ("entity",), "condition", "this one toggled at it in this step", momentary=True),
     _value("eye_contact", "entity", ("entities",), "condition", "same row or column, each turned to the other"),
     _value("in_line", "entity", ("entities",), "condition", "same row or same column"),
     _value("can_reach", "entity", ("entities",), "condition", "a free path to x, or next to x, exists now"),
@@ -103,6 +108,9 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     _value("kind", "entity", (), "text", "its kind, or the object's type"),
     _value("index", "entity", (), "number", "its place in its group, from 0"),
     _value("cell", "entity", (), "cell", "the cell it is on"),
+    _value("inside", "object", (), "object", "what it lies in, or lay in last"),
+    _value("pointing", "member", (), "condition", "it points somewhere", momentary=True),
+    _value("toggled", "object", (), "condition", "somebody toggled at it in this step", momentary=True),
     _value("unlocked_by", "object", (), "object", "what unlocks it"),
     # measures
     _value("distance", "entity", ("entity",), "number", "Manhattan distance"),
@@ -111,6 +119,7 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     _value("min", "none", ("int", "int"), "number", "the smaller"),
     _value("max", "none", ("int", "int"), "number", "the larger"),
     _value("abs", "none", ("int",), "number", "without its sign"),
+    _value("opposite", "none", ("direction",), "direction", "the direction turned round"),
     _value("prev", "none", ("any",), "the same", "prev(e): e as it was when the step began", momentary=True),
     _value("any", "none", ("group",), "condition", "any(x in group where ...): one of them does"),
     _value("all", "none", ("group",), "condition", "all(x in group where ...): each of them does"),
@@ -143,6 +152,11 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     Signature("go_next_to", "none", ("entity",), "activity", "activity", "walk to a cell next to x"),
     Signature("use", "none", ("entity",), "activity", "activity", "go next to x, face it, toggle it"),
     Signature("enter", "none", ("entity",), "activity", "activity", "open x if it is closed, then go in"),
+    Signature("push", "none", ("entity", "direction"), "activity", "activity", "go behind x and push it that way"),
+    Signature("point", "none", ("entity",), "activity", "activity", "point the way x lies"),
+    Signature("stop_pointing", "none", (), "activity", "activity", "take the arm down"),
+    Signature("follow", "none", ("entity",), "activity", "activity", "walk next to x, again and again"),
+    Signature("flee", "none", ("entity",), "activity", "activity", "turn away from x and walk"),
     Signature("perform", "none", ("sequence",), "activity", "activity", "one act of a sequence a turn, words included"),
     Signature("choose", "none", ("actions",), "activity", "activity", "one at random: choose(a | b | 2 * c)"),
     Signature("wander", "none", (), "activity", "activity", "choose(forward | left | right)"),
@@ -153,6 +167,9 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     Signature("unlock", "object", (), "effect", "effect", "closed, if it was locked"),
     Signature("reset", "object", (), "effect", "effect", "back to its initial status"),
     Signature("vanish", "entity", (), "effect", "effect", "leaves the room; it is `gone`"),
+    Signature("reveal", "object", (), "effect", "effect", "becomes opened"),
+    Signature("put", "entity", ("entity",), "effect", "effect", "put(x): comes to the cell of x"),
+    Signature("move_into", "object", ("entity",), "effect", "effect", "move_into(x): lies in x from now on, unseen"),
     Signature("become", "object", ("status",), "effect", "effect", "takes this status"),
 )  # fmt: skip
 
@@ -174,15 +191,17 @@ SYNONYMS: Final = {
 VALUE_SYNONYMS: Final = {
     "near": "next_to", "close_to": "next_to", "beside": "next_to", "adjacent": "next_to", "adjacent_to": "next_to",
     "by": "next_to", "reaches": "at", "on": "at", "in_cell": "at", "looking_at": "looks_at", "can_see": "sees",
-    "see": "sees", "previous": "prev", "before": "prev",
+    "see": "sees", "previous": "prev", "before": "prev", "pressed_by": "toggled_by", "used_by": "toggled_by",
+    "content": "inside",
     "says": "said", "say": "said", "hears": "heard", "colour": "color", "direction": "facing", "dir": "facing",
     "type": "kind", "disappeared": "gone", "vanished": "gone", "does": "did", "in_state": "is", "state": "is",
-    "number": "index", "toggled": "poked", "dist": "distance", "distance_to": "distance",
+    "number": "index", "dist": "distance", "distance_to": "distance",
 }  # fmt: skip
 """What authors write for a condition or value -> what it is called here."""
 
 WORDS: Final = frozenset(
     [s.name for s in SIGNATURES if s.name not in ("name", "kind", "index", "cell")]
+    + ["speaker", "objects", "believes", "permuted"]
     + ["here", "it", "self", "t", "W", "H", "cells", "colors", "nouns", "toward", "random", "distinct", "ever"]
     + ["finished"]
     + ["red", "green", "blue", "purple", "yellow", "grey", "up", "down", "pickup", "drop", "done", "none"]

@@ -81,19 +81,21 @@ class World:
 
 @dataclass(frozen=True, slots=True)
 class FieldOf:
-    """An attribute of an entity: x, y, dir, color, status, gone, poked, pointing (0, or 1 + direction), inside."""
+    """An attribute of an entity: x, y, dir, color, status, gone, poked, last (its last body action), pointing (0, or
+    1 + direction), inside (the object it lies in).
+    """
 
     type: Type
     entity: Term
-    name: Literal["x", "y", "dir", "color", "status", "gone", "poked", "pointing", "inside"]
+    name: Literal["x", "y", "dir", "color", "status", "gone", "poked", "last", "pointing", "inside"]
 
 
 @dataclass(frozen=True, slots=True)
 class Here:
-    """A coordinate of the candidate cell, in the `where` of a place."""
+    """A coordinate of the candidate cell in the `where` of a place, or that cell."""
 
     type: Type
-    name: Literal["x", "y"]
+    name: Literal["x", "y", "cell"]
 
 
 @dataclass(frozen=True, slots=True)

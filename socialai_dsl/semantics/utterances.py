@@ -224,7 +224,8 @@ class Utterances:
         if value is not None and some:
             name = f"`{value.path.rsplit('.', 1)[-1]}`" if isinstance(value, Read) else "the value in it"
             message = f'{name} can be {word}, but "{said}" cannot be said with this grammar'
-            report = findings.error if isinstance(value, Read) else findings.warning
+            drawn_once = isinstance(value, Read) and not self._resolver.registers.is_set(value.path)
+            report = findings.error if drawn_once else findings.warning
             report("S402", message, span, hint="add what is missing to the nouns, or narrow what is drawn")
             return
         near = did_you_mean(said, [*self.all_texts(), *(self._resolver.npc_texts if from_npcs else ())])

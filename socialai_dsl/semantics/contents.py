@@ -1,0 +1,83 @@
+"""Objects that lie in other objects: what contains what."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from socialai_dsl.grammar import ast
+from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics.findings import surviving
+from socialai_dsl.semantics.scope import Objects, Scope, object_scope
+from socialai_dsl.semantics.terms import FieldOf, Term, Type
+from socialai_dsl.semantics.wording import quoted
+
+if TYPE_CHECKING:
+    from socialai_dsl.semantics.resolve import Resolver
+
+_ENTITY = Type("entity", 0, 0)
+
+
+def holders(resolver: Resolver) -> tuple[int, int] | None:
+    """Least and greatest number of the objects that can hold others; None if there are none."""
+    numbers = [
+        number
+        for objects in resolver.symbols.objects.values()
+        if "opened" in objects.type.states
+        for number in objects.numbers
+    ]
+    return (min(numbers), max(numbers)) if numbers else None
+
+
+def inside_of(resolver: Resolver, objects: Objects, index: int, path: DataPath, raw: str) -> Term:
+    """The object that another lies in at first."""
+    scope = object_scope(objects, index, path, "inside", at_reset=True)
+    node = resolver.findings.expression(path, raw)
+    holder = resolver.value(node, _ENTITY, scope)
+    check_holder(resolver, holder, node, scope)
+    return holder
+
+
+def check_holder(resolver: Resolver, holder: Term, node: ast.Expr, scope: Scope) -> None:
+    """Report what cannot hold anything."""
+    for number in range(holder.type.low, holder.type.high + 1):
+        objects = resolver.symbols.object_of(number)
+        if objects is None or "opened" not in objects.type.states:
+            able = [name for name, type_ in resolver.symbols.types.items() if "opened" in type_.states]
+            message = f"nothing can lie in `{quoted(node)}`"
+            raise resolver.fail(
+                "S204", message, node, scope, hint="what can hold something: " + ", ".join(able)
+            )
+
+
+def container(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
+    """`x.inside`: what something lies in."""
+    known = holders(resolver)
+    for number in range(who.type.low, who.type.high + 1):
+        objects = resolver.symbols.object_of(number)
+        if objects is None or known is None or not can_lie_inside(resolver, objects):
+            message = f"`{quoted(node)}`: it never lies inside anything"
+            hint = "an object is put into another with `inside:`, or by the effect `x.move_into(box)`"
+            raise resolver.fail("S204", message, node, scope, hint=hint)
+    assert known is not None, "internal: looked at above"
+    return FieldOf(Type("entity", *known), who, "inside")
+
+
+def can_lie_inside(resolver: Resolver, objects: Objects) -> bool:
+    """Whether objects of this name ever lie in others."""
+    return resolver.symbols.scenario.objects[objects.name].inside is not None
+
+
+def contained(resolver: Resolver) -> dict[int, tuple[int, ...]]:
+    """Object that can hold others -> what may ever lie in it."""
+    contents = tuple(
+        number
+        for objects in resolver.symbols.objects.values()
+        if can_lie_inside(resolver, objects)
+        for number in objects.numbers
+    )
+    found: dict[int, tuple[int, ...]] = {}
+    for objects in resolver.symbols.objects.values():
+        if contents and "opened" in objects.type.states:
+            with surviving():
+                found |= {number: tuple(c for c in contents if c != number) for number in objects.numbers}
+    return found

@@ -1,0 +1,129 @@
+"""Tables: values looked up by a key, as written or permuted at reset."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.grammar import ast
+from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics.build import all_of
+from socialai_dsl.semantics.scope import Scope, reset_scope
+from socialai_dsl.semantics.terms import Compare, Const, Quantified, Read, Select, Sited, Term, Type, Variable
+from socialai_dsl.semantics.wording import spoken
+
+if TYPE_CHECKING:
+    from socialai_dsl.semantics.resolve import Resolver
+
+_PERMUTED = "permuted"
+_ANY_TEXT = Type("text", 0, -1)
+
+
+def looked_up(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
+    """`dar(exit.color)`: the value beside the key that the argument is."""
+    name = node.name
+    keys, values = resolver.table(name)
+    if len(node.args) != 1:
+        raise resolver.fail("S211", f"`{name}` is a table: it takes one key", node, scope)
+    key = resolver.value(node.args[0], None, scope)
+    known = [key.value] if isinstance(key, Const) else range(key.type.low, key.type.high + 1)
+    cases: list[tuple[Term, Term]] = []
+    for value in known:
+        word = spoken(key.type, value)
+        if word not in keys:
+            message = f"the table `{name}` has no `{word}`"
+            near = did_you_mean(word, keys)
+            hint = None if near else "it has " + ", ".join(keys)
+            raise resolver.fail("S402", message, node, scope, suggestion=near, hint=hint)
+        if isinstance(key, Const):
+            return values[keys.index(word)]
+        cases.append((Compare("==", key, Const(key.type, value)), values[keys.index(word)]))
+    *others, (_, default) = cases
+    return Select(default.type, tuple(c for c, _ in others), tuple(v for _, v in others), default)
+
+
+def resolved(resolver: Resolver, name: str) -> tuple[tuple[str, ...], tuple[Term, ...]]:
+    """Keys and values of a table."""
+    written = resolver.symbols.scenario.tables[name]
+    path: DataPath = ("tables", name)
+    if isinstance(written, str):
+        return _permuted(resolver, name, written, path)
+    if not written:
+        raise resolver.findings.fail("S106", "a table has at least one key", resolver.findings.at(path))
+    words = [_word(resolver, (*path, key), raw) for key, raw in written.items()]
+    return tuple(written), _as_values(words)
+
+
+def _word(resolver: Resolver, path: DataPath, raw: object) -> str:
+    """What a value of a table is called: a word, a number, a text."""
+    if isinstance(raw, str):
+        text = raw.strip()
+        if all(part.isalnum() for part in text.replace("-", " ").replace("'", " ").split()):
+            return text
+    term = resolver.written(path, raw, _ANY_TEXT if isinstance(raw, str) else None, reset_scope(path))  # type: ignore[arg-type]
+    if not isinstance(term, Const):
+        raise resolver.findings.fail(
+            "S204", "a value of a table is known beforehand", resolver.findings.at(path)
+        )
+    return spoken(term.type, term.value)
+
+
+def _as_values(words: Sequence[str]) -> tuple[Term, ...]:
+    """The words as values of one type: numbers if all are, else texts."""
+    if all(word.lstrip("-").isdigit() for word in words):
+        numbers = [int(word) for word in words]
+        type_ = Type("int", min(numbers), max(numbers))
+        return tuple(Const(type_, value) for value in numbers)
+    kinds = tuple(dict.fromkeys(words))
+    type_ = Type("text", 0, len(kinds) - 1, kinds)
+    return tuple(Const(type_, kinds.index(word)) for word in words)
+
+
+def _permuted(
+    resolver: Resolver, name: str, raw: str, path: DataPath
+) -> tuple[tuple[str, ...], tuple[Term, ...]]:
+    """`permuted(other)`: the keys of another table with its values in an order that is drawn at reset."""
+    node = resolver.findings.expression(path, raw)
+    match node:
+        case ast.Call(name=word, args=(ast.Name(id=other),), subject=None) if word == _PERMUTED:
+            pass
+        case _:
+            message = "a table is written out, or permuted(another table)"
+            raise resolver.findings.fail("S204", message, resolver.findings.at(path))
+    known = resolver.symbols.scenario.tables
+    if other not in known or isinstance(known[other], str):
+        near = did_you_mean(other, [key for key, value in known.items() if not isinstance(value, str)])
+        message = f"`{other}` is not a table that is written out"
+        raise resolver.findings.fail(
+            "S201", message, resolver.findings.node(path, node.args[0]), suggestion=near
+        )
+    keys, values = resolver.table(other)
+    order = permutation(resolver, f"tables.{name}", len(keys), path)
+    type_ = values[0].type
+    return keys, tuple(
+        Select(
+            type_,
+            tuple(Compare("==", place, Const(place.type, i)) for i in range(len(values) - 1)),
+            values[:-1],
+            values[-1],
+        )
+        for place in order
+    )
+
+
+def permutation(resolver: Resolver, register: str, count: int, path: DataPath) -> tuple[Read, ...]:
+    """The numbers from 0 in an order that is drawn at reset, all orders alike: one register for each place."""
+    type_ = Type("int", 0, count - 1)
+    items = tuple(Const(type_, value) for value in range(count))
+    order: list[Read] = []
+    for k in range(count):
+        each = Variable(type_, "each")
+        free = all_of(Compare("!=", each, before) for before in order) if order else None
+        site = f"{register}[{k}]"
+        drawn = Quantified(type_, "pick", "each", items, free)
+        if site in resolver.registers:
+            order.append(Read(type_, site))
+        else:
+            order.append(resolver.registers.put(site, Sited(drawn, site, resolver.findings.at(path))))
+    return tuple(order)
