@@ -28,6 +28,10 @@ on batch size, threads, or on what anybody else drew.
 * `step` is t when the value is computed; 0 at reset.
 * A room that is not as required is drawn again: every draw of the next attempt, but that of a suite's member, takes
   `attempt_key(key, attempt)` in place of the episode's key until the reset is over. Attempt 0 has the key itself.
+* Act k of an episode in acts (`draw: in_sequence`) has `act_key(key, k)` in place of the episode's key. Act 0 has the
+  key itself, and no member is drawn.
+* A suite's member is drawn at site `member`, number 0: `choose(u, weights)`, by default with weight 1 for each, which
+  is `below(u, n)`.
 * A choice among n things takes the `below(u, n)`-th of them: members of a group by index, alternatives as written,
   colours by code, cells row by row, numbers ascending. `distinct` colours are drawn one after another, each among those
   not yet taken, in order of code.
@@ -35,6 +39,7 @@ on batch size, threads, or on what anybody else drew.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from hashlib import blake2b
 
 MASK = (1 << 64) - 1
@@ -64,6 +69,12 @@ def attempt_key(key: int, attempt: int) -> int:
     return mix(key + ((1 << 63) | attempt) * GOLDEN) if attempt else key
 
 
+def act_key(key: int, act: int) -> int:
+    """The key of an act of an episode in acts."""
+    # Neither a draw nor an attempt, of which there are few, has this word.
+    return mix(key + ((1 << 63) | (1 << 32) | act) * GOLDEN) if act else key
+
+
 def site(path: str) -> int:
     """The 31-bit number of a place in the resolved scenario."""
     return int.from_bytes(blake2b(path.encode(), digest_size=4).digest(), "big") >> 1
@@ -78,6 +89,16 @@ def draw(key: int, place: int, step: int, number: int) -> int:
 def below(bits: int, n: int) -> int:
     """A number from 0 to n - 1 (n < 2**32), by multiply and shift."""
     return ((bits >> 32) * n) >> 32
+
+
+def choose(bits: int, weights: Sequence[int]) -> int:
+    """A number from 0 to len(weights) - 1, each as likely as it weighs; the weights add up to 1 to 2**32 - 1."""
+    left = below(bits, sum(weights))
+    for number, weight in enumerate(weights):
+        if left < weight:
+            return number
+        left -= weight
+    raise ValueError("choose: got weights that add up to nothing; expected a positive sum")
 
 
 def holds_with_chance(bits: int, chance: float) -> bool:

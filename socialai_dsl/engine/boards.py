@@ -91,15 +91,17 @@ def npc_look(row: Row, entity: int) -> int:
 
 
 @inline
-def draw_object(row: Row, entity: int, cell: int, x: int, y: int) -> None:
-    """Let the cell show this object and be solid as it is."""
-    row.board[cell] = object_look(row, entity)
-    _set_solid(row, x, y, row.program[type_row(row, entity) + TypeColumn.WALKABLE] == 0)
+def is_in_the_way(row: Row, entity: int) -> bool:
+    """Whether nobody can enter the cell of this object as it is now."""
+    return row.program[type_row(row, entity) + TypeColumn.WALKABLE] == 0
 
 
 @outline
 def draw_cell(row: Row, x: int, y: int) -> None:
-    """Draw one cell anew: the room, over it the lowest object there, over it the lowest NPC if NPCs are shown."""
+    """Draw one cell anew: the room, over it the last object there, over it the lowest NPC if NPCs are shown.
+
+    One object that is in the way is enough, wherever it lies.
+    """
     stay_outline()
     width = row.program[Header.CANVAS_WIDTH]
     height = row.program[Header.CANVAS_HEIGHT]
@@ -108,12 +110,15 @@ def draw_cell(row: Row, x: int, y: int) -> None:
     cell = y * width + x
     table = room_table(row)
     row.board[cell] = row.program[table + cell]
-    _set_solid(row, x, y, (row.program[table + width * height + 1 + y] >> x) & 1 == 1)
     npcs = row.program[Header.NPCS]
+    solid = (row.program[table + width * height + 1 + y] >> x) & 1
+    furnished = 0
     for entity in range(npcs + 1, row.program[Header.ENTITIES]):
         if is_at(row, entity, x, y):
-            draw_object(row, entity, cell, x, y)
-            break
+            row.board[cell] = object_look(row, entity)
+            solid = (solid & furnished) | np.int64(is_in_the_way(row, entity))
+            furnished = 1
+    _set_solid(row, x, y, solid == 1)
     if npcs_are_hidden(row):
         return
     for entity in range(1, npcs + 1):
@@ -134,11 +139,17 @@ def draw_all(row: Row) -> None:
     """Draw every entity into the bare room; gives what `draw_cell` gives for each cell."""
     width = row.program[Header.CANVAS_WIDTH]
     npcs = row.program[Header.NPCS]
-    for entity in range(row.program[Header.ENTITIES] - 1, npcs, -1):
+    entities = row.program[Header.ENTITIES]
+    for entity in range(npcs + 1, entities):
         if is_present(row, entity):
             x = field(row, entity, Field.X)
             y = field(row, entity, Field.Y)
-            draw_object(row, entity, y * width + x, x, y)
+            row.board[y * width + x] = object_look(row, entity)
+            _set_solid(row, x, y, np.bool_(False))
+    # What lies under something else may be in the way all the same.
+    for entity in range(npcs + 1, entities):
+        if is_present(row, entity) and is_in_the_way(row, entity):
+            _set_solid(row, field(row, entity, Field.X), field(row, entity, Field.Y), np.bool_(True))
     if npcs_are_hidden(row):
         return
     for entity in range(npcs, 0, -1):

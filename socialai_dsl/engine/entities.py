@@ -56,8 +56,8 @@ def npc_at(row: Row, x: int, y: int) -> int:
 
 @inline
 def object_at(row: Row, x: int, y: int) -> int:
-    """The lowest object in this cell, 0 if there is none."""
-    for entity in range(row.program[Header.NPCS] + 1, row.program[Header.ENTITIES]):
+    """The object that lies on top in this cell, which is the last one there; 0 if there is none."""
+    for entity in range(row.program[Header.ENTITIES] - 1, row.program[Header.NPCS], -1):
         if is_at(row, entity, x, y):
             return entity
     return 0

@@ -6,11 +6,14 @@ from socialai_dsl.engine.bits import count_bits, lowest_bit, nth_bit
 from socialai_dsl.engine.boards import copy_room, room_table
 from socialai_dsl.engine.entities import field, front_x, front_y, is_present, set_field
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.operands import draw_below, value
+from socialai_dsl.engine.operands import assign, draw_below, value
 from socialai_dsl.engine.sets import add_cell, clear, count_cells, fill_next_to, get_line, set_line
+from socialai_dsl.engine.speech import first_heard
 from socialai_dsl.engine.state import NO_CELL, NOTHING, OCCUPIED, ONE, ZERO, Row
 from socialai_dsl.engine.whereabouts import is_somewhere, x_of, y_of
 from socialai_dsl.program import TEMPORARY, Field, Header, Op, Register, Side
+
+_NOUN = np.int64(2)
 
 
 @outline
@@ -29,6 +32,9 @@ def place(row: Row, op: int, a: int, b: int, c: int) -> None:
         _write_cell(row, a, next_cell(row, b, NOTHING, ZERO))
     elif op == Op.NEAREST_CELL:
         _write_cell(row, a, _nearest_cell(row, b, value(row, c)))
+    elif op >= Op.HEARD_FROM:
+        part = ONE if op == Op.HEARD_FROM else _NOUN
+        assign(row, a, first_heard(row, b, c, part))
     elif op == Op.B_FLOOR or op == Op.B_RECT:
         _fill_floor(row, a)
         if op == Op.B_RECT:

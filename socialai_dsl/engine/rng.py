@@ -16,6 +16,7 @@ _U31 = np.uint64(31)
 _U32 = np.uint64(32)
 _U48 = np.uint64(48)
 _TOP = np.uint64(1 << 63)
+_ACT = np.uint64(1 << 32)
 
 
 @inline
@@ -40,6 +41,14 @@ def attempt_key(key: np.uint64, attempt: int) -> np.uint64:
     if attempt == 0:
         return key
     return mix(key + (_TOP | np.uint64(attempt)) * GOLDEN)
+
+
+@inline
+def act_key(key: np.uint64, act: int) -> np.uint64:
+    """The key of an act; see `draws.act_key`."""
+    if act == 0:
+        return key
+    return mix(key + (_TOP | _ACT | np.uint64(act)) * GOLDEN)
 
 
 @inline

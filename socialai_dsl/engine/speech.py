@@ -5,7 +5,7 @@ from socialai_dsl.engine.entities import column, distance, is_present
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.rng import fold
 from socialai_dsl.engine.state import AGENT, NOTHING, Key, Row
-from socialai_dsl.program import EntityColumn, FrameColumn, Header, LineColumn, Register
+from socialai_dsl.program import EntityColumn, Flag, FrameColumn, Header, LineColumn, Register
 
 
 @inline
@@ -85,18 +85,29 @@ def within_earshot(row: Row, speaker: int, hearer: int) -> bool:
 
 
 @inline
-def put_into_inbox(row: Row, inbox: int, utterance: int) -> None:
-    """Add an utterance class to an inbox, unless it is full."""
+def entry_size(row: Row) -> int:
+    """Registers of an entry of an inbox: the class, and where somebody asks for them the speaker and the noun."""
+    return 3 if row.program[Header.FLAGS] & Flag.HEARD_BY else 1
+
+
+@inline
+def put_into_inbox(row: Row, inbox: int, utterance: int, speaker: int, noun: int) -> None:
+    """Add what was said to an inbox, unless it is full."""
     count = row.registers[inbox]
     if count < row.program[Header.INBOX_SIZE]:
-        row.registers[inbox + 1 + count] = utterance
+        size = entry_size(row)
+        place = inbox + 1 + size * count
+        row.registers[place] = utterance
+        if size > 1:
+            row.registers[place + 1] = speaker
+            row.registers[place + 2] = noun
         row.registers[inbox] = count + 1
 
 
 @inline
 def empty_inbox(row: Row, inbox: int) -> None:
     """Forget what was heard."""
-    for i in range(1, row.registers[inbox] + 1):
+    for i in range(1, entry_size(row) * row.registers[inbox] + 1):
         row.registers[inbox + i] = 0
     row.registers[inbox] = 0
 
@@ -108,8 +119,9 @@ def inbox_class(row: Row, inbox: int) -> int:
     if count == 0:
         return 0
     first = row.registers[inbox + 1]
-    for i in range(2, count + 1):
-        if row.registers[inbox + i] != first:
+    size = entry_size(row)
+    for i in range(1, count):
+        if row.registers[inbox + 1 + size * i] != first:
             return row.program[Header.CLASSES]
     return first
 
@@ -118,20 +130,33 @@ def inbox_class(row: Row, inbox: int) -> int:
 def is_in_inbox(row: Row, utterance: int, inbox: int) -> bool:
     """Whether an utterance of this class was heard."""
     found = False
-    for i in range(1, row.registers[inbox] + 1):
-        found |= row.registers[inbox + i] == utterance
+    size = entry_size(row)
+    for i in range(row.registers[inbox]):
+        found |= row.registers[inbox + 1 + size * i] == utterance
     return found
 
 
 @inline
-def deliver(row: Row, speaker: int, utterance: int) -> None:
-    """Put an utterance class into the inbox of everybody else with a frame who is within earshot."""
+def first_heard(row: Row, inbox: int, classes: int, part: int) -> int:
+    """The speaker (part 1) or noun (part 2) of the first entry whose class is in a set of classes; -1 if none is."""
+    known = row.program[Header.CLASS_SET_AT] + row.program[Header.CLASS_SET_WORDS] * classes
+    for i in range(row.registers[inbox]):
+        place = inbox + 1 + 3 * i
+        utterance = row.registers[place]
+        if (row.program[known + (utterance >> 5)] >> (utterance & 31)) & 1 == 1:
+            return row.registers[place + part]
+    return NOTHING
+
+
+@inline
+def deliver(row: Row, speaker: int, utterance: int, noun: int) -> None:
+    """Put what was said into the inbox of everybody else with a frame who is within earshot."""
     table = row.program[Header.FRAME_AT]
     last = NOTHING
     for _ in range(row.program[Header.FRAMES]):
         entity = row.program[table + FrameColumn.ENTITY]
         if entity not in (last, speaker) and is_present(row, entity) and within_earshot(row, speaker, entity):
-            put_into_inbox(row, row.program[table + FrameColumn.INBOX], utterance)
+            put_into_inbox(row, row.program[table + FrameColumn.INBOX], utterance, speaker, noun)
         last = entity
         table += FrameColumn.COLUMNS
 
@@ -145,4 +170,4 @@ def speak(row: Row, speaker: int, line: int) -> None:
         hear(row, line)
     utterance = _line(row, line, LineColumn.CLASS)
     if utterance > 1:
-        deliver(row, speaker, utterance)
+        deliver(row, speaker, utterance, _line(row, line, LineColumn.NOUN))

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from socialai_dsl.engine.entities import field, is_present
+from socialai_dsl.engine.entities import field, is_present, step_x, step_y
 from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.state import NO_CELL, NOTHING, Row
-from socialai_dsl.program import CELL, Field
+from socialai_dsl.program import CELL, Field, Header
 
 _FIRST_CELL = np.int64(CELL)
 
@@ -52,6 +52,17 @@ def cell_of(row: Row, thing: int) -> int:
     if not is_somewhere(row, thing):
         return NO_CELL
     return _FIRST_CELL + 32 * y_of(row, thing) + x_of(row, thing)
+
+
+@inline
+def cell_beside(row: Row, thing: int, direction: int) -> int:
+    """The cell beside it in this direction, as an operand; `NO_CELL` if that is off the canvas."""
+    x = x_of(row, thing) + step_x(direction & 3)
+    y = y_of(row, thing) + step_y(direction & 3)
+    on_canvas = 0 <= x < row.program[Header.CANVAS_WIDTH] and 0 <= y < row.program[Header.CANVAS_HEIGHT]
+    if not (on_canvas and is_somewhere(row, thing)):
+        return NO_CELL
+    return _FIRST_CELL + 32 * y + x
 
 
 @inline

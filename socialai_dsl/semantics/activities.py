@@ -8,19 +8,30 @@ from typing import TYPE_CHECKING, Any, cast
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.semantics import resolve_groups
+from socialai_dsl.semantics import contents, resolve_groups
 from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.resolve_attributes import ENTITY, somewhere, status_of
 from socialai_dsl.semantics.scope import Scope
 from socialai_dsl.semantics.sequences import performed
 from socialai_dsl.semantics.signatures import ACTIVITIES, EFFECTS, SYNONYMS
-from socialai_dsl.semantics.terms import ACTION, DIRECTION, TURN, Activity, Const, Effect, FieldOf, Term
+from socialai_dsl.semantics.terms import (
+    ACTION,
+    DIRECTION,
+    TURN,
+    Activity,
+    Const,
+    Effect,
+    FieldOf,
+    Measure,
+    Term,
+    Type,
+)
 from socialai_dsl.semantics.wording import quoted, wrong_count
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
 
-_STATUS_AFTER = {"open": "open", "close": "closed", "lock": "locked", "unlock": "locked"}
+_STATUS_AFTER = {"reveal": "opened", "open": "open", "close": "closed", "lock": "locked", "unlock": "locked"}
 """The status that an object must be able to have for an effect to make sense."""
 
 _TO_CELLS = frozenset({"go_to", "go_next_to", "face"})
@@ -49,9 +60,34 @@ def activity(resolver: Resolver, path: DataPath, raw: str | None, scope: Scope) 
         return _choice(resolver, path, args[0], scope)
     if name == "perform":
         return Activity("perform", performed(resolver, args[0], scope), site, span)
+    if name in ("push", "point", "follow"):
+        return _at_something(resolver, name, args, Activity("stay", (), site, span), scope)
     expected = {"direction": DIRECTION, "turn": TURN}.get(signature.takes[0], ENTITY) if args else None
     terms = tuple(_argument(resolver, name, arg, expected, scope) for arg in args)
     return Activity(cast(Any, name), terms, site, span)
+
+
+def _at_something(
+    resolver: Resolver, name: str, args: tuple[ast.Expr, ...], written: Activity, scope: Scope
+) -> Activity:
+    """push(x, direction); point(x), which is the direction in which x lies; follow(x), walking next to it for ever."""
+    if name == "follow":
+        return replace(written, name="go_next_to", args=(_argument(resolver, name, args[0], ENTITY, scope),))
+    if name == "point":
+        assert scope.member is not None, "internal: an activity is somebody's"
+        own = resolver.symbols.numbers[scope.member]
+        way = Measure(
+            DIRECTION, "dir_to", (Const(Type("entity", own, own), own), somewhere(resolver, args[0], scope))
+        )
+        return replace(written, name="point", args=(way,))
+    what = _argument(resolver, name, args[0], ENTITY, scope)
+    for number in range(what.type.low, what.type.high + 1):
+        objects = resolver.symbols.object_of(number)
+        if objects is None or not objects.type.pushed:
+            message = f"`{quoted(args[0])}` cannot be pushed"
+            able = [key for key, type_ in resolver.symbols.types.items() if type_.pushed]
+            raise resolver.fail("S204", message, args[0], scope, hint="what can be: " + ", ".join(able))
+    return replace(written, name="push", args=(what, resolver.value(args[1], DIRECTION, scope)))
 
 
 def _head(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[str, tuple[ast.Expr, ...]]:
@@ -134,15 +170,42 @@ def effect(resolver: Resolver, path: DataPath, raw: object, scope: Scope) -> Eff
         raise resolver.fail("S211", wrong_count(signature, len(args)), node, scope)
     entities = _entities(resolver, subject, scope)
     value = None
-    if signature.subject == "object":
+    if name in ("put", "move_into"):
+        value = _target(resolver, name, subject, entities, args[0], scope)
+    elif name == "reset":
+        _check_objects(resolver, subject, entities, scope)
+    elif signature.subject == "object":
         value = _new_status(resolver, name, entities, args, node, scope)
     return Effect(cast(Any, name), entities, resolver.findings.at(path), value, scope.draws.site)
 
 
 def _entities(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[Term, ...]:
+    """What an effect is about: one thing, a group, or all `objects`."""
+    if isinstance(node, ast.Name) and node.id == "objects":
+        first, last = len(resolver.symbols.numbers), resolver.symbols.entities
+        return tuple(Const(Type("entity", number, number), number) for number in range(first, last))
     if resolve_groups.is_group(resolver, node, scope):
         return tuple(resolve_groups.group(resolver, node, None, scope).items)
     return (resolver.value(node, ENTITY, scope),)
+
+
+def _target(
+    resolver: Resolver, name: str, subject: ast.Expr, entities: tuple[Term, ...], node: ast.Expr, scope: Scope
+) -> Term:
+    """Where something is put: a cell or what is on it; an object that can hold it."""
+    if name == "put":
+        return somewhere(resolver, node, scope)
+    holder = resolver.value(node, ENTITY, scope)
+    contents.check_holder(resolver, holder, node, scope)
+    for entity in entities:
+        contents.container(resolver, entity, subject, scope)
+    return holder
+
+
+def _check_objects(resolver: Resolver, node: ast.Expr, entities: tuple[Term, ...], scope: Scope) -> None:
+    """The agent cannot be put back to where it started."""
+    if any(entity.type.low == 0 for entity in entities):
+        raise resolver.fail("S211", "only objects and NPCs can be reset", node, scope)
 
 
 def _new_status(

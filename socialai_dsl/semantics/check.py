@@ -10,7 +10,8 @@ from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag
 from socialai_dsl.schema import PRIMITIVES, Scenario
 from socialai_dsl.schema.base import Expression
 from socialai_dsl.schema.positions import DataPath, Positions
-from socialai_dsl.semantics import behaviour, checks, entities, sequences, setup, statuses, world
+from socialai_dsl.schema.world import CHANNELS
+from socialai_dsl.semantics import behaviour, beliefs, checks, entities, sequences, setup, statuses, world
 from socialai_dsl.semantics.emptiness import check_placements
 from socialai_dsl.semantics.entities import AGENT, Prelude
 from socialai_dsl.semantics.findings import Findings, Scalar, surviving
@@ -127,6 +128,7 @@ class _Run:
         computed, rules = statuses.computed(resolver), tuple(world.rules(resolver))
         remembered, required = tuple(sequences.memories(resolver)), tuple(world.requirements(resolver))
         inhabitants = tuple(entities_of(resolver, placed))
+        believed = tuple(beliefs.beliefs(resolver))
         drawn = resolver.registers.drawn()
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)
         room = room_plan(resolver)
@@ -159,6 +161,8 @@ class _Run:
             require=required,
             egocentric=scenario.observe.directions == "egocentric",
             slope=self._slope(),
+            beliefs=tuple(believed),
+            channels=self._channels(),
             each_step=round(scenario.reward.each_step * 1_000_000),
         )
         check_placements(made, findings)
@@ -237,6 +241,16 @@ class _Run:
         if not 0 <= term.value <= 100:
             raise self._findings.fail("S106", f"`{term.value}` is not a per cent of the success reward", span)
         return term.value, None
+
+    def _channels(self) -> int:
+        """How many channels the picture has: the first four, or all."""
+        given = self._scenario.observe.channels
+        if given not in (CHANNELS[:4], CHANNELS):
+            message = (
+                "`channels` are " + ", ".join(CHANNELS[:4]) + ", and perhaps " + " and ".join(CHANNELS[4:])
+            )
+            self._findings.error("S106", message, self._findings.places.key_span(("observe", "channels")))
+        return 4 if given == CHANNELS[:4] else 6
 
     def _slope(self) -> int:
         """Thousandths of the success reward that are lost by the horizon: `linear(0.9)`."""

@@ -30,12 +30,17 @@ def check_placements(checked: Checked, findings: Findings) -> None:
     for size in product(_sizes(checked.room.width), _sizes(checked.room.height)):
         room = _Room(checked, size)
         for number, placing in enumerate(room.placings):
-            if number in reported or placing.nowhere or placing.at is not None:
+            if number in reported or _is_sure(placing):
                 continue
             most, least = room.cells_for(number)
             if most == 0 or least <= 0:
                 reported.add(number)
                 _report(checked, findings, placing, size, [] if most == 0 else room.rivals(number))
+
+
+def _is_sure(placing: Placing) -> bool:
+    """Whether nothing can be in its way."""
+    return placing.nowhere or placing.at is not None or placing.inside is not None
 
 
 def _sizes(bounds: tuple[int, int]) -> range:
@@ -95,6 +100,8 @@ class _Room:
     def rivals(self, number: int) -> list[int]:
         """The entities that are put down before and may lie on a cell of this placement."""
         placing = self.placings[number]
+        if placing.overlap:
+            return []
         cells, _ = self._region_cells(placing)
         kept = self._conditions(placing.where, cells)[0] if cells is not None else None
         # What a place lies around is not in it.
@@ -187,7 +194,7 @@ class _Room:
 
     def _may_share(self, other: Placing, cells: set[Cell] | None) -> bool:
         """Whether something that was put down before may lie on one of these cells (None: any floor cell)."""
-        if other.nowhere:
+        if other.nowhere or other.inside is not None:
             return False
         try:
             homes = self._homes(other)

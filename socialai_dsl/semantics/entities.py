@@ -12,7 +12,7 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.schema import Frame, ObjectGroup, Ranged, Scenario, Sequence
 from socialai_dsl.schema.base import Expression
 from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.semantics import sequences
+from socialai_dsl.semantics import beliefs, sequences
 from socialai_dsl.semantics.alternatives import register_of, select
 from socialai_dsl.semantics.findings import Findings, dotted, surviving
 from socialai_dsl.semantics.registers import Declaration
@@ -366,6 +366,7 @@ def declare_registers(resolver: Resolver) -> None:
     for name, start in symbols.scenario.state.items():
         path = ("state", name)
         _declare_register(resolver, f"state.{name}", name, path, start, reset_scope(path))
+    beliefs.declare(resolver)
     for name in symbols.cast:
         declare_name(resolver, name)
     for played in resolver.frames.values():

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.schema import CastMember
 from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics import contents
 from socialai_dsl.semantics.alternatives import select
 from socialai_dsl.semantics.build import number as number_of
 from socialai_dsl.semantics.entities import AGENT
@@ -92,6 +94,9 @@ def _objects(
     placings: Mapping[int, Sequence[Placing]],
     statuses: Mapping[int, int | Read],
 ) -> Iterator[Entity]:
+    described = resolver.symbols.scenario.objects[objects.name]
+    holding, rolled = contents.contained(resolver), _pushed_by_rolling(resolver, objects)
+    _check_timer(resolver, objects)
     for index, number in enumerate(objects.numbers):
         status = statuses.get(number, objects.type.initial)
         yield Entity(
@@ -104,8 +109,41 @@ def _objects(
             status=status if isinstance(status, int) else objects.type.initial,
             initial=None if isinstance(status, int) else status,
             unlocks=resolver.unlocks.get(number, ()),
+            opens=resolver.opens.get(number, ()),
+            timer=described.timer or 0,
+            exclusive=tuple(objects.numbers) if described.exclusive else (),
+            pushed_by_rolling=rolled,
+            contains=holding.get(number, ()),
             in_wall=_in_wall(resolver, placings.get(number, ())),
         )
+
+
+def _pushed_by_rolling(resolver: Resolver, objects: Objects) -> bool:
+    """Whether only something that rolls can push an object: `pushed_by: marble`."""
+    pusher = resolver.symbols.scenario.objects[objects.name].pushed_by
+    if pusher is None:
+        return False
+    path: DataPath = ("objects", objects.name, "pushed_by")
+    findings, types = resolver.findings, resolver.symbols.types
+    span = findings.at(path, 0, len(pusher))
+    if not objects.type.pushed:
+        findings.error("S204", f"a {objects.type.name} cannot be pushed", findings.places.key_span(path))
+    elif pusher not in types or not types[pusher].rolls:
+        rolling = [name for name, type_ in types.items() if type_.rolls]
+        message = f"`{pusher}` does not roll, so it pushes nothing"
+        near = did_you_mean(pusher, rolling)
+        hint = None if near else "what rolls: " + ", ".join(rolling)
+        findings.error("S204", message, span, suggestion=near, hint=hint)
+    return True
+
+
+def _check_timer(resolver: Resolver, objects: Objects) -> None:
+    described = resolver.symbols.scenario.objects[objects.name]
+    if described.timer is not None and not objects.type.expired:
+        able = [name for name, type_ in resolver.symbols.types.items() if type_.expired]
+        span = resolver.findings.places.key_span(("objects", objects.name, "timer"))
+        message = f"nothing of a {objects.type.name} runs out after some time"
+        resolver.findings.error("S204", message, span, hint="a timer is for: " + ", ".join(able))
 
 
 def _voice(resolver: Resolver, name: str, member: CastMember) -> tuple[int, int]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from socialai_dsl.grammar import ast
@@ -19,32 +19,55 @@ if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
 
 
+@dataclass(frozen=True)
+class _Kind:
+    """A kind of link: its key, and the statuses that what it works on must be able to have."""
+
+    key: str
+    verb: str
+    needs: frozenset[str]
+    lack: str
+
+
+_UNLOCKS = _Kind("unlocks", "unlock", frozenset({"locked", "closed"}), "has no lock")
+_OPENS = _Kind("opens", "open", frozenset({"open", "closed"}), "cannot be opened")
+
+
 def unlocked(resolver: Resolver) -> dict[int, tuple[int, ...]]:
     """Object -> the objects it unlocks; reports what is no lock, or has nothing to do with one."""
+    return _all_links(resolver, _UNLOCKS)
+
+
+def opened(resolver: Resolver) -> dict[int, tuple[int, ...]]:
+    """Object -> the objects that are open while it is active; reports what cannot be."""
+    return _all_links(resolver, _OPENS)
+
+
+def _all_links(resolver: Resolver, kind: _Kind) -> dict[int, tuple[int, ...]]:
     found: dict[int, tuple[int, ...]] = {}
     for objects in resolver.symbols.objects.values():
         with surviving():
-            found |= _links_of(resolver, objects)
+            found |= _links_of(resolver, objects, kind)
     return found
 
 
-def _links_of(resolver: Resolver, objects: Objects) -> dict[int, tuple[int, ...]]:
-    raw = resolver.symbols.scenario.objects[objects.name].unlocks
+def _links_of(resolver: Resolver, objects: Objects, kind: _Kind) -> dict[int, tuple[int, ...]]:
+    raw = getattr(resolver.symbols.scenario.objects[objects.name], kind.key)
     if raw is None:
         return {}
-    path: DataPath = ("objects", objects.name, "unlocks")
+    path: DataPath = ("objects", objects.name, kind.key)
     findings, scope = resolver.findings, reset_scope(path)
     node = findings.expression(path, raw)
     if not objects.type.active:
-        message = f"a {objects.type.name} cannot unlock anything"
+        message = f"a {objects.type.name} cannot {kind.verb} anything"
         able = [name for name, type_ in resolver.symbols.types.items() if type_.active]
         raise resolver.fail("S204", message, node, scope, hint="what can: " + ", ".join(able))
     targets = list(_objects_at(resolver, node, scope))
     for target in targets:
         type_ = resolver.symbols.object_of(target)
         assert type_ is not None, "internal: a target is an object"
-        if not {"locked", "closed"} <= set(type_.type.states):
-            message = f"a {type_.type.name} has no lock: it is {' or '.join(type_.type.states)}"
+        if not kind.needs <= set(type_.type.states):
+            message = f"a {type_.type.name} {kind.lack}: it is {' or '.join(type_.type.states)}"
             raise resolver.fail("S204", message, node, scope)
     numbers = list(objects.numbers)
     if len(numbers) == len(targets):

@@ -80,6 +80,11 @@ class Resolver:
         """Object -> the objects it unlocks."""
         return links.unlocked(self)
 
+    @cached_property
+    def opens(self) -> Mapping[int, tuple[int, ...]]:
+        """Object -> the objects that are open while it is active."""
+        return links.opened(self)
+
     def written(self, path: DataPath, raw: Scalar, expected: Type | None, scope: Scope) -> Term:
         """The value of the expression that is written at `path`; raises FailedError once it has been reported."""
         if isinstance(raw, str) and expected is not None and expected.kind in ("text", "noun"):

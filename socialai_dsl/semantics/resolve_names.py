@@ -11,7 +11,7 @@ from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema import Sequence
 from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.semantics import hearing, resolve_attributes
+from socialai_dsl.semantics import beliefs, hearing, resolve_attributes
 from socialai_dsl.semantics.alternatives import by_value, drawn
 from socialai_dsl.semantics.build import FALSE, all_of, any_of
 from socialai_dsl.semantics.findings import FailedError
@@ -314,6 +314,8 @@ def is_wordy(resolver: Resolver, node: ast.Expr, scope: Scope) -> bool:
 
 def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
     """`subject.name`."""
+    if isinstance(node.subject, ast.Attribute) and node.subject.name == "believes":
+        return beliefs.believed(resolver, node.subject, node, scope)
     if isinstance(node.subject, ast.Name):
         owner = node.subject.id
         if owner == "here" and node.name in ("x", "y") and scope.here:

@@ -84,7 +84,7 @@ def room_plan(resolver: Resolver) -> RoomPlan:
     if canvas[0] * canvas[1] > MAX_CELLS:
         message = f"a canvas has at most {MAX_CELLS} cells, this one {canvas[0] * canvas[1]}"
         findings.error("S106", message, findings.places.key_span(("room",)))
-    return RoomPlan(symbols.width, symbols.height, canvas, tuple(_built(resolver)))
+    return RoomPlan(symbols.width, symbols.height, canvas, tuple(_built(resolver)), room.occlusion)
 
 
 def _built(resolver: Resolver) -> Iterator[tuple[ObjectType, Region, Span]]:

@@ -11,7 +11,7 @@ from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema import CastMember, ObjectGroup
 from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.semantics import places, resolve_groups
+from socialai_dsl.semantics import contents, places, resolve_groups, tables
 from socialai_dsl.semantics.alternatives import by_value, drawn
 from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.findings import FailedError, surviving
@@ -19,8 +19,11 @@ from socialai_dsl.semantics.scope import Objects, Scope, object_scope, reset_sco
 from socialai_dsl.semantics.terms import (
     COLOR,
     DIRECTION,
+    CellBeside,
     CellOf,
     Coloring,
+    Compare,
+    Const,
     Drawn,
     Facing,
     FieldOf,
@@ -28,6 +31,7 @@ from socialai_dsl.semantics.terms import (
     Placing,
     Read,
     Sees,
+    Select,
     Setup,
     Sited,
     Term,
@@ -93,6 +97,9 @@ def _object_placings(resolver: Resolver, objects: Objects) -> Iterator[Placing]:
     group = resolver.symbols.scenario.objects[objects.name]
     base: DataPath = ("objects", objects.name)
     count = len(objects.numbers)
+    if group.inside is not None:
+        yield from _inside(resolver, objects, group)
+        return
     if group.at is not None:
         if group.place is not None:
             _both_places(resolver, (*base, "at"))
@@ -112,7 +119,23 @@ def _object_placings(resolver: Resolver, objects: Objects) -> Iterator[Placing]:
         path = (*base, "place") if single else (*base, "place", i)
         raw = listed[0 if single else i]
         scope = object_scope(objects, i, path, "place", at_reset=True)
-        yield places.place(resolver, _spot(objects, i, path, count), str(raw), scope)
+        placing = places.place(resolver, _spot(objects, i, path, count), str(raw), scope)
+        yield replace(placing, overlap=group.overlap)
+
+
+def _inside(resolver: Resolver, objects: Objects, group: ObjectGroup) -> Iterator[Placing]:
+    """Things that lie in others at first."""
+    base: DataPath = ("objects", objects.name)
+    for key in ("place", "at"):
+        if getattr(group, key) is not None:
+            span = resolver.findings.places.key_span((*base, key))
+            raise resolver.findings.fail("S107", f"only one of `inside` and `{key}` can be given", span)
+    path = (*base, "inside")
+    for i in range(len(objects.numbers)):
+        spot = _spot(objects, i, path, len(objects.numbers))
+        holder = contents.inside_of(resolver, objects, i, path, str(group.inside))
+        span = resolver.findings.at(path)
+        yield Placing(spot.entity, spot.site, spot.number, span, inside=holder)
 
 
 def _spot(objects: Objects, index: int, path: DataPath, count: int) -> places.Spot:
@@ -179,10 +202,13 @@ def _object_colors(resolver: Resolver, objects: Objects, group: ObjectGroup) -> 
 def _of_group(
     resolver: Resolver, path: DataPath, raw: object, index: int, count: int, scope: Scope
 ) -> Sited | None:
-    """`color: doors.color` gives each member the colour of its counterpart."""
+    """`color: doors.color` gives each member the colour of its counterpart; `permuted(doors.color)` that of another."""
     if not isinstance(raw, str):
         return None
     node = resolver.findings.expression(path, raw)
+    match node:
+        case ast.Call(name="permuted", args=(ast.Attribute(name="color") as colors,), subject=None):
+            return _permuted(resolver, path, colors, index, count, scope)
     if not isinstance(node, ast.Attribute) or not resolve_groups.is_group(resolver, node.subject, scope):
         return None
     others = resolve_groups.group(resolver, node.subject, None, scope)
@@ -190,6 +216,21 @@ def _of_group(
         message = f"`{quoted(node)}` gives {len(others.items)} values for {count}"
         raise resolver.fail("S106", message, node, scope)
     return Sited(FieldOf(COLOR, others.items[index], "color"), scope.draws.site, resolver.findings.at(path))
+
+
+def _permuted(
+    resolver: Resolver, path: DataPath, node: ast.Attribute, index: int, count: int, scope: Scope
+) -> Sited:
+    """The colour of one of a group, another one for each, in an order that is drawn."""
+    others = resolve_groups.group(resolver, node.subject, None, scope)
+    if len(others.items) != count:
+        message = f"`{quoted(node)}` gives {len(others.items)} values for {count}"
+        raise resolver.fail("S106", message, node, scope)
+    place = tables.permutation(resolver, f"{path[0]}.{path[1]}.order", count, path)[index]
+    colors = tuple(FieldOf(COLOR, other, "color") for other in others.items)
+    cases = tuple(Compare("==", place, Const(place.type, i)) for i in range(count - 1))
+    value = Select(COLOR, cases, colors[:-1], colors[-1])
+    return Sited(value, scope.draws.site, resolver.findings.at(path))
 
 
 def facings(resolver: Resolver) -> Iterator[Facing]:
@@ -324,6 +365,8 @@ def needs(item: Setup) -> list[str]:
                 found |= {f"cell {n}": None for n in _numbers(term)}
                 if region.name == "in_front_of":
                     found |= {f"facing {n}": None for n in _numbers(term)}
+    if isinstance(item, Placing) and item.inside is not None:
+        found |= {f"cell {n}": None for n in _numbers(item.inside)}
     for term in walk(item):
         found |= dict.fromkeys(_needs(term))
     return list(found)
@@ -334,7 +377,7 @@ def _needs(term: Term) -> Iterator[str]:
         case Read(path=path):
             yield path
         case FieldOf(entity=entity, name=name):
-            kind = {"x": "cell", "y": "cell", "dir": "facing", "color": "color"}.get(name)
+            kind = {"x": "cell", "y": "cell", "inside": "cell", "dir": "facing", "color": "color"}.get(name)
             yield from (f"{kind} {n}" for n in _numbers(entity) if kind)
         case Test(name=name, subject=subject, object=other):
             entities = [*_numbers(other), *(_numbers(subject) if subject is not None else ())]
@@ -347,7 +390,7 @@ def _needs(term: Term) -> Iterator[str]:
             yield from (f"cell {n}" for one in (viewer, target) for n in _numbers(one))
             if facing is None:
                 yield from (f"facing {n}" for n in _numbers(viewer))
-        case CellOf(entity=entity):
+        case CellOf(entity=entity) | CellBeside(entity=entity):
             yield from (f"cell {n}" for n in _numbers(entity))
 
 

@@ -165,7 +165,7 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     Signature("close", "object", (), "effect", "effect", "becomes closed"),
     Signature("lock", "object", (), "effect", "effect", "becomes locked"),
     Signature("unlock", "object", (), "effect", "effect", "closed, if it was locked"),
-    Signature("reset", "object", (), "effect", "effect", "back to its initial status"),
+    Signature("reset", "entity", (), "effect", "effect", "status, place and content as when the episode began"),
     Signature("vanish", "entity", (), "effect", "effect", "leaves the room; it is `gone`"),
     Signature("reveal", "object", (), "effect", "effect", "becomes opened"),
     Signature("put", "entity", ("entity",), "effect", "effect", "put(x): comes to the cell of x"),

@@ -1,0 +1,71 @@
+"""Beliefs: what a member of the cast takes for true, because it saw it last."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.grammar import ast
+from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics.findings import surviving
+from socialai_dsl.semantics.registers import Declaration
+from socialai_dsl.semantics.scope import Scope, at_every_step, reset_scope
+from socialai_dsl.semantics.terms import BOOL, BeliefPlan, Sited, Term
+
+if TYPE_CHECKING:
+    from socialai_dsl.semantics.resolve import Resolver
+
+
+def register_of(member: str, key: str) -> str:
+    """The register that holds a belief."""
+    return f"{member}.believes.{key}"
+
+
+def declare(resolver: Resolver) -> None:
+    """Make every belief known; it starts with what is true when the episode begins."""
+    for name, member in resolver.symbols.cast.items():
+        for key, belief in member.beliefs.items():
+            path = _path(resolver, name, key, "of")
+            register = register_of(name, key)
+            scope = reset_scope(path, f"cast.{name}.beliefs.{key}", name)
+            resolver.registers.declare(Declaration(register, key, path, belief.of, scope))
+
+
+def _path(resolver: Resolver, member: str, key: str, part: str) -> DataPath:
+    return (*resolver.symbols.member_path(member, "beliefs"), key, part)
+
+
+def beliefs(resolver: Resolver) -> Iterator[BeliefPlan]:
+    """What members note at the start of their turns."""
+    for name, member in resolver.symbols.cast.items():
+        for key, belief in member.beliefs.items():
+            with surviving():
+                register = register_of(name, key)
+                of, when = _path(resolver, name, key, "of"), _path(resolver, name, key, "when")
+                start = resolver.registers.read(register)
+                scope = at_every_step(reset_scope(of, f"cast.{name}.beliefs.{key}", name))
+                value = resolver.written(of, belief.of, start.type, scope)
+                condition: Sited | None = None
+                if belief.when is not None:
+                    asked = at_every_step(reset_scope(when, f"cast.{name}.beliefs.{key}.when", name))
+                    term = resolver.written(when, belief.when, BOOL, asked)
+                    condition = Sited(term, asked.draws.site, resolver.findings.at(when))
+                noted = Sited(value, scope.draws.site, resolver.findings.at(of))
+                yield BeliefPlan(name, register, noted, condition)
+
+
+def believed(resolver: Resolver, owner: ast.Attribute, node: ast.Attribute, scope: Scope) -> Term:
+    """`sally.believes.toy_in`."""
+    subject = owner.subject
+    member = subject.id if isinstance(subject, ast.Name) else ""
+    member = scope.member if member == "self" and scope.member else resolver.symbols.roles.get(member, member)
+    if member not in resolver.symbols.cast:
+        raise resolver.fail("S211", "only a member of the cast believes something", owner, scope)
+    known = resolver.symbols.cast[member].beliefs
+    if node.name not in known:
+        near = did_you_mean(node.name, known)
+        hint = None if near else f"declare it: `beliefs: {{{node.name}: {{of: ..., when: sees(...)}}}}`"
+        message = f"`{member}` has no belief `{node.name}`"
+        raise resolver.fail("S201", message, node, scope, suggestion=near, hint=hint)
+    return resolver.registers.read(register_of(member, node.name))
