@@ -145,9 +145,16 @@ def _unknown_attribute(
             "S205", f"nothing here has a `{name}`; write `{usage(VALUES[synonym])}`", node, scope
         )
     known = [s.name for s in VALUES.values() if not s.takes and s.subject != "none"]
-    near = did_you_mean(name, [*known, *sorted(statuses)])
+    near = did_you_mean(name, [*known, *sorted(statuses), *_of_frame(resolver, node)])
     near = near or did_you_mean(name, [s.name for s in VALUES.values() if s.subject != "none"])
     return resolver.fail("S205", f"nothing here has a `{name}`", node, scope, suggestion=near)
+
+
+def _of_frame(resolver: Resolver, node: ast.Expr) -> list[str]:
+    """The registers and slots of the member of the cast that is named before the dot."""
+    subject = node.subject if isinstance(node, ast.Attribute) else None
+    played = resolver.frames.get(subject.id) if isinstance(subject, ast.Name) else None
+    return [*played.model.slots, *played.model.let] if played is not None else []
 
 
 def _of_the_agent(resolver: Resolver, name: str) -> Term:
