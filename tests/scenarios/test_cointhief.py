@@ -62,37 +62,40 @@ def believed(room: dict[str, Any]) -> list[bool]:
     ]
 
 
-DRAWN = list(rooms("cointhief+as_coded", 4000))
+@pytest.fixture(scope="module")
+def drawn() -> list[dict[str, Any]]:
+    """Many rooms; room k is that of seed k."""
+    return list(rooms("cointhief+as_coded", 4000))
 
 
 class TestRooms:
-    def test_the_thief_is_beside_the_agent_and_faces_it(self) -> None:
-        for room in DRAWN:
+    def test_the_thief_is_beside_the_agent_and_faces_it(self, drawn: list[dict[str, Any]]) -> None:
+        for room in drawn:
             assert room["room"] == {"width": 8, "height": 8}
             assert beside(room["thief"]["at"], room["thief"]["facing"]) == tuple(room["agent"]["at"])
 
-    def test_six_yellow_coins_on_cells_of_their_own(self) -> None:
-        for room in DRAWN:
+    def test_six_yellow_coins_on_cells_of_their_own(self, drawn: list[dict[str, Any]]) -> None:
+        for room in drawn:
             cells = {tuple(coin["at"]) for coin in room["coins"]}
             assert len(cells) == 6
             assert cells <= interior(room["room"]) - {tuple(room["agent"]["at"]), tuple(room["thief"]["at"])}
             assert {coin["color"] for coin in room["coins"]} == {"yellow"}
 
-    def test_the_agent_comes_first_then_the_thief_evenly_around_it(self) -> None:
+    def test_the_agent_comes_first_then_the_thief_evenly_around_it(self, drawn: list[dict[str, Any]]) -> None:
         cells = interior({"width": 8, "height": 8})
-        check_shares((tuple(room["agent"]["at"]) for room in DRAWN), evenly(cells))
-        inner = [room for room in DRAWN if set(room["agent"]["at"]).isdisjoint({1, 6})]
+        check_shares((tuple(room["agent"]["at"]) for room in drawn), evenly(cells))
+        inner = [room for room in drawn if set(room["agent"]["at"]).isdisjoint({1, 6})]
         check_shares((room["thief"]["facing"] for room in inner), evenly(WAYS))
-        corner = [room for room in DRAWN if room["agent"]["at"] == [1, 1]]
+        corner = [room for room in drawn if room["agent"]["at"] == [1, 1]]
         check_shares((tuple(room["thief"]["at"]) for room in corner), evenly([(1, 2), (2, 1)]))
 
-    def test_the_side_is_even(self) -> None:
-        check_shares((room["let"]["glance"] for room in DRAWN), evenly(("left", "right")))
+    def test_the_side_is_even(self, drawn: list[dict[str, Any]]) -> None:
+        check_shares((room["let"]["glance"] for room in drawn), evenly(("left", "right")))
 
 
 class TestWantedNumber:
-    def test_it_counts_the_coins_in_either_view(self) -> None:
-        for room in DRAWN:
+    def test_it_counts_the_coins_in_either_view(self, drawn: list[dict[str, Any]]) -> None:
+        for room in drawn:
             assert room["let"]["wanted"] == sum(believed(room))
 
     def test_by_hand(self) -> None:
@@ -135,8 +138,8 @@ class TestTheThief:
                 pictures.append(code[3])
         return ways, pictures
 
-    def test_it_glances_to_its_side_and_back(self) -> None:
-        for seed, room in enumerate(DRAWN[:200]):
+    def test_it_glances_to_its_side_and_back(self, drawn: list[dict[str, Any]]) -> None:
+        for seed, room in enumerate(drawn[:200]):
             home, side = glance_of(room)
             ways, pictures = self.glances("cointhief+as_coded", None, seed)
             assert ways == [side, home] * 4
@@ -187,8 +190,8 @@ class TestOutcome:
         episode = Episode(name, free)
         assert episode.acts(None, "forward").ended == "failure"
 
-    def test_as_coded_a_forward_move_with_the_right_number_pays(self) -> None:
-        for seed, room in enumerate(DRAWN[:300]):
+    def test_as_coded_a_forward_move_with_the_right_number_pays(self, drawn: list[dict[str, Any]]) -> None:
+        for seed, room in enumerate(drawn[:300]):
             right = f"Here is {sum(believed(room))}"
             wrong = f"Here is {(sum(believed(room)) + 1) % 7}"
             assert Episode("cointhief+as_coded", seed=seed).act("forward", right).ended == "success"
@@ -237,9 +240,9 @@ class TestTags:
             episode.act()
             assert [coin["state"] == "tagged" for coin in episode.now()["coins"]] == counted
 
-    def test_tags_change_nothing_else(self) -> None:
+    def test_tags_change_nothing_else(self, drawn: list[dict[str, Any]]) -> None:
         tagged = rooms("cointhief+tags+as_coded", 200)
-        for plain, other in zip(DRAWN, tagged, strict=False):
+        for plain, other in zip(drawn, tagged, strict=False):
             for coin in other["coins"]:
                 coin["state"] = "plain"
             assert other == plain

@@ -207,24 +207,28 @@ def test_the_hidden_dancer_is_neither_seen_nor_heard_but_can_be_matched() -> Non
     assert repeated(episode, *DANCE)[-1] == pytest.approx(0.595)
 
 
+@pytest.fixture(scope="module")
+def drawn() -> list[dict[str, Any]]:
+    """Many rooms."""
+    return list(rooms("dance+as_coded", 4000))
+
+
 class TestDraws:
     """What a reset draws, over many rooms."""
 
-    drawn = list(rooms("dance+as_coded", 4000))
-
-    def test_moves_and_sentences(self) -> None:
-        items = [item for room in self.drawn for item in room["let"]["dance"]]
-        assert len(items) == 3 * len(self.drawn)
+    def test_moves_and_sentences(self, drawn: list[dict[str, Any]]) -> None:
+        items = [item for room in drawn for item in room["let"]["dance"]]
+        assert len(items) == 3 * len(drawn)
         check_shares((move for move, _ in items), evenly(("left", "right", "forward")))
         check_shares((said for _, said in items), {None: 0.5} | dict.fromkeys(SENTENCES, 0.125))
 
-    def test_items_are_independent(self) -> None:
-        pairs = (tuple(item[0] for item in room["let"]["dance"]) for room in self.drawn)
+    def test_items_are_independent(self, drawn: list[dict[str, Any]]) -> None:
+        pairs = (tuple(item[0] for item in room["let"]["dance"]) for room in drawn)
         check_shares(pairs, evenly(product(("left", "right", "forward"), repeat=3)))
-        silent = (tuple(item[1] is None for item in room["let"]["dance"]) for room in self.drawn)
+        silent = (tuple(item[1] is None for item in room["let"]["dance"]) for room in drawn)
         check_shares(silent, evenly(product((False, True), repeat=3)))
 
-    def test_the_agent_is_anywhere_else(self) -> None:
-        small = [room for room in self.drawn if room["room"] == {"width": 5, "height": 5}]
+    def test_the_agent_is_anywhere_else(self, drawn: list[dict[str, Any]]) -> None:
+        small = [room for room in drawn if room["room"] == {"width": 5, "height": 5}]
         cells = interior({"width": 5, "height": 5}) - {(1, 2)}
         check_shares((tuple(room["agent"]["at"]) for room in small), evenly(cells))
