@@ -90,9 +90,11 @@ class Expressions:
     # --- conditions ---
 
     def sited_condition(self, sited: terms.Sited, otherwise: Label) -> None:
-        """A condition with its own site and place in the source."""
+        """A condition with its own site and place in the source. It is false if something in it finds nothing."""
         self.site, self.block.span = sited.site, sited.span
+        failed, self.failed = self.failed, otherwise
         self.condition(fold(sited.term, self.facts, self.classes), otherwise)
+        self.failed = failed
 
     def condition(self, term: Term, otherwise: Label) -> None:
         """Fall through if `term` holds, else skip to `otherwise`."""

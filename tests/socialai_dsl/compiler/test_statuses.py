@@ -128,9 +128,14 @@ def test_a_link_is_a_level() -> None:
     assert door(env) == "locked"
 
 
+def test_a_switch_that_is_gone_unlocks_nothing() -> None:
+    env = start(linked(DOOR), {"door": {"state": "locked"}, "switches": [{"state": "pressed", "gone": True}]})
+    assert door(env) == "locked"
+
+
 def test_without_links_there_is_no_code() -> None:
     assert compiled(workbench()).header(Header.LINKS_PC) == 0
-    assert code(compiled(linked(DOOR)), "links") == ["IF_EQ", "IF_EQ", "BECOME", "HALT"]
+    assert code(compiled(linked(DOOR)), "links") == ["IF_EQ", "IF_EQ", "IF_EQ", "BECOME", "HALT"]
 
 
 # --- computed statuses ---
