@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -137,8 +137,3 @@ def evenly(values: Iterable[Any]) -> dict[Any, float]:
     """The same probability for each value."""
     listed = list(values)
     return {value: 1 / len(listed) for value in listed}
-
-
-def first_that(holds: Callable[[dict[str, Any]], bool], name: str, number: int = 500) -> int:
-    """The first seed whose room is as wished."""
-    return next(seed for seed, room in enumerate(rooms(name, number)) if holds(room))
