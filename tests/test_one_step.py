@@ -276,6 +276,18 @@ def test_2_3_what_a_link_unlocked_stays_so(play: Folder) -> None:
     assert (run.status("switch"), run.status("door")) == ("idle", "closed")
 
 
+def test_2_4_a_switch_that_has_vanished_unlocks_nothing(play: Folder) -> None:
+    run = play("""
+        objects:
+          switch: {type: switch, at: [2, 1], unlocks: door, pressed: true}
+          door: {type: door, at: [5, 0]}
+        rules:
+          - {when: t == 1, cause: [door.lock]}
+          - {when: t == 2, cause: [switch.vanish, door.lock]}
+    """)
+    assert [run.step().status("door") for _ in range(2)] == ["closed", "locked"]
+
+
 COMPUTED = """
     objects:
       switch: {type: switch, at: [2, 1]}
@@ -283,30 +295,30 @@ COMPUTED = """
 """
 
 
-def test_2_4_a_computed_status_holds_while_its_condition_does(play: Folder) -> None:
+def test_2_5_a_computed_status_holds_while_its_condition_does(play: Folder) -> None:
     run = play(COMPUTED)
     assert run.status("door") == "open"
     assert run.step("toggle").status("door") == "locked"
 
 
-def test_2_5_what_was_locked_becomes_closed(play: Folder) -> None:
+def test_2_6_what_was_locked_becomes_closed(play: Folder) -> None:
     run = play(COMPUTED).step("toggle").step("toggle")
     assert run.status("door") == "closed"
 
 
-def test_2_6_any_other_status_is_left_alone(play: Folder) -> None:
+def test_2_7_any_other_status_is_left_alone(play: Folder) -> None:
     run = play(COMPUTED).step("right")
     assert run.facing("agent") == "down"
     assert [run.step("toggle").status("door") for _ in range(3)] == ["closed", "open", "closed"]
 
 
-def test_2_7_tagged_is_computed_likewise(play: Folder) -> None:
+def test_2_8_tagged_is_computed_likewise(play: Folder) -> None:
     run = play("objects: {ball: {type: ball, at: [3, 3], tagged: agent.in_line(it)}}")
     assert run.status("ball") == "plain"
     assert [run.step("forward").status("ball") for _ in range(3)] == ["plain", "tagged", "plain"]
 
 
-def test_2_8_a_computed_status_is_settled_after_those_it_reads(play: Folder) -> None:
+def test_2_9_a_computed_status_is_settled_after_those_it_reads(play: Folder) -> None:
     run = play("""
         objects:
           third: {type: door, at: [3, 0], locked: second.locked}
@@ -316,7 +328,7 @@ def test_2_8_a_computed_status_is_settled_after_those_it_reads(play: Folder) -> 
     assert (run.status("second"), run.status("third")) == ("locked", "locked")
 
 
-def test_2_9_computed_statuses_read_what_links_did(play: Folder) -> None:
+def test_2_10_computed_statuses_read_what_links_did(play: Folder) -> None:
     run = play("""
         objects:
           computed: {type: door, at: [3, 0], locked: linked.locked}
@@ -328,7 +340,7 @@ def test_2_9_computed_statuses_read_what_links_did(play: Folder) -> None:
     assert (run.status("linked"), run.status("computed")) == ("closed", "closed")
 
 
-def test_2_10_a_reset_ends_with_settling(play: Folder) -> None:
+def test_2_11_a_reset_ends_with_settling(play: Folder) -> None:
     run = play("""
         objects:
           switch: {type: switch, at: [2, 1], unlocks: linked, pressed: true}
@@ -669,30 +681,73 @@ def test_4_17_goto_now_reads_the_new_then_at_once(play: Folder) -> None:
     assert run.value("ann.fired_at") == 1
 
 
-@pytest.mark.parametrize(
-    "found",
-    ["pick(d in doors where {})", "first(d in doors where {})", "nearest(d in doors where {} to self)"],
-)
-def test_4_18_a_rule_that_finds_nothing_does_not_fire(play: Folder, found: str) -> None:
-    door = found.format("d.locked")
+CHOICES = [
+    "pick(d in doors where d.locked)",
+    "first(d in doors where d.locked)",
+    "nearest(d in doors where d.locked to self)",
+]
+
+
+@pytest.mark.parametrize("choice", CHOICES)
+def test_4_18_a_condition_is_false_where_nothing_is_found(play: Folder, choice: str) -> None:
     run = play(f"""
         objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]]}}}}
         frames:
           look:
-            let: {{a: 0, b: 0}}
+            let: {{a: 0, b: 0, c: 0}}
             states:
               s:
                 then:
-                  - set: {{a: 1}}
-                    cause: ["{door}.open"]
-                  - set: {{b: 1}}
+                  - when: at({choice})
+                    set: {{a: 1}}
+                  - when: not at({choice})
+                    set: {{b: 1}}
+                  - set: {{c: 1}}
         cast: {{ann: {{at: [5, 5], frame: look}}}}
     """).step()
-    assert (run.value("ann.a"), run.value("ann.b")) == (0, 1)
+    assert [run.value(f"ann.{name}") for name in "abc"] == [0, 0, 1]
+
+
+@pytest.mark.parametrize("choice", CHOICES)
+@pytest.mark.parametrize("effect", ['cause: ["{}.open"]', "say: I see <{}.color>", 'set: {{x0: "{}.x"}}'])
+def test_4_19_a_rule_does_not_fire_where_nothing_is_found(play: Folder, choice: str, effect: str) -> None:
+    text = """
+        objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]], state: {}}}}}
+        frames:
+          look:
+            let: {{x0: 0, b: 0}}
+            states:
+              s:
+                then:
+                  - goto: gone_on
+                    {}
+                  - set: {{b: 1}}
+              gone_on: {{}}
+        cast: {{ann: {{at: [5, 5], frame: look}}}}
+    """
+    run = play(text.format("closed", effect.format(choice))).step()
+    assert (run.state["ann"]["state"], run.value("ann.b"), run.info["utterance"]) == ("s", 1, "NA")
     assert [door["state"] for door in run.state["doors"]] == ["closed", "closed"]
+    run = play(text.format("locked", effect.format(choice))).step()
+    assert (run.state["ann"]["state"], run.value("ann.b")) == ("gone_on", 0)
 
 
-def test_4_19_once_is_once_in_an_episode(play: Folder) -> None:
+@pytest.mark.parametrize("choice", CHOICES)
+def test_4_20_an_activity_is_staying_where_nothing_is_found(play: Folder, choice: str) -> None:
+    run = play(f"""
+        objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]]}}}}
+        frames:
+          look:
+            steps:
+              - do: go_next_to({choice})
+              - {{do: left}}
+        cast: {{ann: {{at: [5, 5], facing: right, frame: look}}}}
+    """).step()
+    assert (run.at("ann"), run.facing("ann")) == ([5, 5], "right")
+    assert run.step().facing("ann") == "up"
+
+
+def test_4_21_once_is_once_in_an_episode(play: Folder) -> None:
     run = play("""
         frames:
           talk:
@@ -711,7 +766,7 @@ def test_4_19_once_is_once_in_an_episode(play: Folder) -> None:
     assert run.step().info["utterance"] == "Ann: First."
 
 
-def test_4_20_a_step_acts_when_it_ends_after_the_body(play: Folder) -> None:
+def test_4_22_a_step_acts_when_it_ends_after_the_body(play: Folder) -> None:
     run = play("""
         objects: {door: {type: door, at: [5, 0]}}
         frames:
@@ -727,7 +782,7 @@ def test_4_20_a_step_acts_when_it_ends_after_the_body(play: Folder) -> None:
     assert run.value("ann.ended_at") == 4
 
 
-def test_4_21_the_next_entry_begins_with_the_next_turn(play: Folder) -> None:
+def test_4_23_the_next_entry_begins_with_the_next_turn(play: Folder) -> None:
     run = play("""
         frames: {go: {steps: [{do: left}, {do: forward}]}}
         cast: {ann: {at: [3, 5], facing: right, frame: go}}
@@ -736,7 +791,7 @@ def test_4_21_the_next_entry_begins_with_the_next_turn(play: Folder) -> None:
     assert run.step().at("ann") == [3, 4]
 
 
-def test_4_22_an_entry_without_activity_stays_for_one_turn(play: Folder) -> None:
+def test_4_24_an_entry_without_activity_stays_for_one_turn(play: Folder) -> None:
     run = play("""
         frames: {go: {steps: [{say: Now.}, {do: left}]}}
         cast: {ann: {at: [3, 5], facing: right, frame: go}}
@@ -746,7 +801,7 @@ def test_4_22_an_entry_without_activity_stays_for_one_turn(play: Folder) -> None
 
 
 @pytest.mark.parametrize("goal", ["go_next_to(door)", "go_to(self.cell)", "enter(inside)"])
-def test_4_23_what_is_fulfilled_before_it_begins_takes_no_turn(play: Folder, goal: str) -> None:
+def test_4_25_what_is_fulfilled_before_it_begins_takes_no_turn(play: Folder, goal: str) -> None:
     text = """
         objects: {{door: {{type: door, at: [3, 6]}}, inside: {{type: door, at: [3, 5], state: open}}}}
         frames: {{go: {{steps: [{{do: {goal}{effect}}}, {{do: left}}]}}}}
@@ -765,7 +820,7 @@ DANCE = """
 TURNS = {"let": {"dance": [["left", "Say hello"], ["right", None], ["forward", "Say bye"]]}}
 
 
-def test_4_24_perform_does_and_says_the_kth_element(play: Folder) -> None:
+def test_4_26_perform_does_and_says_the_kth_element(play: Folder) -> None:
     run = play(DANCE.format(frame="{steps: [{do: perform(dance)}]}", facing="right"), TURNS)
     seen = [(run.step().at("ann"), run.facing("ann"), run.info["utterance"]) for _ in range(3)]
     assert seen == [
@@ -775,14 +830,14 @@ def test_4_24_perform_does_and_says_the_kth_element(play: Folder) -> None:
     ]
 
 
-def test_4_25_a_blocked_move_counts(play: Folder) -> None:
+def test_4_27_a_blocked_move_counts(play: Folder) -> None:
     blocked = {"let": {"dance": [["forward", None], ["forward", "Say bye"], ["left", None]]}}
     run = play(DANCE.format(frame="{steps: [{do: perform(dance)}]}", facing="down"), blocked)
     seen = [(run.step().at("ann"), run.facing("ann"), run.info["utterance"]) for _ in range(3)]
     assert seen == [([3, 5], "down", "NA"), ([3, 5], "down", "Ann: Say bye"), ([3, 5], "right", "NA")]
 
 
-def test_4_26_after_its_last_element_perform_is_finished(play: Folder) -> None:
+def test_4_28_after_its_last_element_perform_is_finished(play: Folder) -> None:
     run = play(
         DANCE.format(frame="{steps: [{do: perform(dance)}, {do: left}]}", facing="right"), TURNS
     ).steps(3)
@@ -794,7 +849,7 @@ def test_4_26_after_its_last_element_perform_is_finished(play: Folder) -> None:
 
 
 @pytest.mark.parametrize(("facing", "heard"), [("left", "Ann: Say hello"), ("right", "NA")])
-def test_4_27_a_line_is_heard_where_the_turn_ends(play: Folder, facing: str, heard: str) -> None:
+def test_4_29_a_line_is_heard_where_the_turn_ends(play: Folder, facing: str, heard: str) -> None:
     start = {"left": 3, "right": 2}[facing]
     run = play(f"""
         earshot: next_to
@@ -804,7 +859,7 @@ def test_4_27_a_line_is_heard_where_the_turn_ends(play: Folder, facing: str, hea
     assert run.info["utterance"] == heard
 
 
-def test_4_28_one_utterance_a_turn(play: Folder) -> None:
+def test_4_30_one_utterance_a_turn(play: Folder) -> None:
     run = play("""
         frames: {talk: {states: {s: {first: [{say: Early.}], then: [{say: Late.}]}}}}
         cast: {ann: {at: [5, 5], frame: talk}}
@@ -827,19 +882,19 @@ def _listening(play: Folder, cast: str) -> Play:
     """)
 
 
-def test_4_29_an_npc_hears_those_before_it_in_this_step(play: Folder) -> None:
+def test_4_31_an_npc_hears_those_before_it_in_this_step(play: Folder) -> None:
     run = _listening(play, "ann: {at: [5, 5], frame: talk}, bob: {at: [4, 5], frame: ear}").steps(2)
     assert run.value("bob.heard_at") == 1
     run = _listening(play, "bob: {at: [4, 5], frame: ear}").step().step(None, "Say hello")
     assert run.value("bob.heard_at") == 2
 
 
-def test_4_30_an_npc_hears_those_after_it_a_step_later(play: Folder) -> None:
+def test_4_32_an_npc_hears_those_after_it_a_step_later(play: Folder) -> None:
     run = _listening(play, "bob: {at: [4, 5], frame: ear}, ann: {at: [5, 5], frame: talk}").steps(3)
     assert run.value("bob.heard_at") == 2
 
 
-def test_4_31_nobody_hears_himself(play: Folder) -> None:
+def test_4_33_nobody_hears_himself(play: Folder) -> None:
     run = (
         play("""
         frames:
@@ -857,7 +912,7 @@ def test_4_31_nobody_hears_himself(play: Folder) -> None:
 
 
 @pytest.mark.parametrize(("order", "first"), [(("hello", "bye"), "hello"), (("bye", "hello"), "bye")])
-def test_4_32_the_first_matching_rule_fires(play: Folder, order: tuple[str, str], first: str) -> None:
+def test_4_34_the_first_matching_rule_fires(play: Folder, order: tuple[str, str], first: str) -> None:
     rules = ", ".join(f"{{hears: Say {word}, say: It was {word}.}}" for word in order)
     run = play(f"""
         frames:
@@ -868,7 +923,7 @@ def test_4_32_the_first_matching_rule_fires(play: Folder, order: tuple[str, str]
     assert run.info["utterance"].splitlines()[-1] == f"Bob: It was {first}."
 
 
-def test_4_33_what_was_heard_is_forgotten_at_the_end_of_the_turn(play: Folder) -> None:
+def test_4_35_what_was_heard_is_forgotten_at_the_end_of_the_turn(play: Folder) -> None:
     run = (
         play("""
         frames:
@@ -884,7 +939,7 @@ def test_4_33_what_was_heard_is_forgotten_at_the_end_of_the_turn(play: Folder) -
 
 
 @pytest.mark.parametrize("text", ["Say hello", "say HELLO", "Say hello.", "Say hello!", "SAY hello?"])
-def test_4_34_case_and_the_final_mark_do_not_matter(play: Folder, text: str) -> None:
+def test_4_36_case_and_the_final_mark_do_not_matter(play: Folder, text: str) -> None:
     run = play(f"""
         frames:
           talk: {{states: {{s: {{then: [{{say: "{text}"}}]}}}}}}
@@ -894,7 +949,7 @@ def test_4_34_case_and_the_final_mark_do_not_matter(play: Folder, text: str) -> 
     assert run.value("bob.heard_at") == 1
 
 
-def test_4_35_hidden_npcs_act_but_only_the_audible_are_heard(play: Folder) -> None:
+def test_4_37_hidden_npcs_act_but_only_the_audible_are_heard(play: Folder) -> None:
     run = play("""
         observe: {npcs: hidden}
         frames: {talk: {states: {s: {do: forward, then: [{say: Hi.}]}}}}
@@ -906,7 +961,7 @@ def test_4_35_hidden_npcs_act_but_only_the_audible_are_heard(play: Folder) -> No
     assert run.info["utterance"] == "Bob: Hi."
 
 
-def test_4_36_on_one_cell_is_neither_next_to_nor_eye_contact(play: Folder) -> None:
+def test_4_38_on_one_cell_is_neither_next_to_nor_eye_contact(play: Folder) -> None:
     run = play("""
         observe: {npcs: hidden}
         frames:
