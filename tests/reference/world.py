@@ -212,11 +212,6 @@ class World:
         """The object in a cell."""
         return next((thing for thing in self.things() if thing.cell == cell), None)
 
-    def body_at(self, cell: Cell) -> Entity | None:
-        """The NPC in a cell, else the agent."""
-        bodies = [*self.npcs, self.agent]
-        return next((body for body in bodies if body.cell == cell), None)
-
     def _holds(self, cell: Cell, quality: str) -> bool:
         if not self.inside(cell):
             return False
