@@ -69,6 +69,20 @@ class Episode:
         """What is heard in each of several steps."""
         return [self.act(body).heard for body in bodies]
 
+    def face(self, direction: str) -> None:
+        """Turns until it looks in a direction."""
+        ways = list(FORWARD)
+        while (facing := self.now()["agent"]["facing"]) != direction:
+            self.act("left" if (ways.index(direction) - ways.index(facing)) % 4 == 3 else "right")
+
+    def go_to(self, cell: Cell, avoid: Iterable[Iterable[int]] = ()) -> None:
+        """Walks within the walls by a shortest way, around the cells to avoid."""
+        while (at := tuple(self.now()["agent"]["at"])) != cell:
+            free = interior(self.now()["room"]) - {tuple(one) for one in avoid}
+            way = next(way for way in FORWARD if beside(at, way) in _nearer(at, cell, free))
+            self.face(way)
+            self.act("forward")
+
     def now(self) -> dict[str, Any]:
         """The state in the scenario's own names."""
         return self.env.describe()
@@ -137,3 +151,13 @@ def evenly(values: Iterable[Any]) -> dict[Any, float]:
     """The same probability for each value."""
     listed = list(values)
     return {value: 1 / len(listed) for value in listed}
+
+
+def _nearer(start: Cell, goal: Cell, free: set[Cell]) -> set[Cell]:
+    """The neighbours of a cell from which a shortest way over free cells leads to the goal."""
+    edge, reached = {goal}, {goal}
+    while not (near := {beside(start, way) for way in FORWARD} & edge):
+        edge = {beside(cell, way) for cell in edge for way in FORWARD} & free - reached
+        assert edge, f"no way from {start} to {goal}"
+        reached |= edge
+    return near
