@@ -85,6 +85,17 @@ def test_readme_scenario_can_be_won(reader: Path) -> None:
     assert info["success"]
 
 
+def test_readme_names_every_scenario_that_ships() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    shipped = {path.stem for path in (ROOT / "scenarios").glob("*.yaml")}
+    parts = {name for name in shipped if name.rsplit("_", 1)[-1] in ("oracle", "coded")}
+    alone = shipped - parts - {"as_coded", "unsocial"}
+    named = set(re.findall(r"`([\w?=]+)`", text))
+    assert alone - named == set()
+    for name in ("unsocial", "as_coded", "oracle"):
+        assert f"`+{name}`" in text
+
+
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_links_lead_somewhere(path: Path) -> None:
     for target in LINK.findall(path.read_text(encoding="utf-8")):
