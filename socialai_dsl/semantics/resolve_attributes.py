@@ -29,7 +29,7 @@ from socialai_dsl.semantics.terms import (
     Type,
     World,
 )
-from socialai_dsl.semantics.wording import described, quoted, usage
+from socialai_dsl.semantics.wording import quoted, usage
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
@@ -250,11 +250,11 @@ def status_of(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Fi
     found = [resolver.symbols.object_of(n) for n in range(who.type.low, who.type.high + 1)]
     types = {objects.type.name: objects.type for objects in found if objects is not None}
     if None in found or len(types) != 1:
-        message = (
-            f"{described(who.type)} of different types has no common status"
-            if types
-            else "only objects have a status"
-        )
-        raise resolver.fail("S204", message, node, scope)
+        several = [*types, *(["member of the cast"] if None in found else [])]
+        message = f"this may be a {' or a '.join(several)}, which have no status in common"
+        hint: str | None = "name objects of one type, which stand next to each other in `objects`"
+        if not types:
+            message, hint = "only objects have a status", None
+        raise resolver.fail("S204", message, node, scope, hint=hint)
     (type_,) = types.values()
     return FieldOf(Type("status", 0, len(type_.states) - 1, type_.states), who, "status")

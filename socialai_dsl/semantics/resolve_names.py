@@ -162,7 +162,7 @@ def _declared(resolver: Resolver, node: ast.Name, expected: Type | None, scope: 
             return entity(objects.numbers[0])
         raise resolver.fail(
             "S204", f"`{word}` is a group of {len(objects.numbers)}, here one of them is needed", node, scope,
-            hint=f"`pick({word})` draws one, `any(x in {word} where ...)` asks for any",
+            hint=f"`pick({word})` draws one, `any(d in {word} where ...)` asks for any",
         )  # fmt: skip
     return None
 
