@@ -155,9 +155,11 @@ class Table:
 
     def scripted_actions(self) -> NDArray[np.int64]:
         """What the agents' frames would do now, int64 (E, 4); nothing changes."""
-        if not all(program.header(Header.FLAGS) & Flag.AGENT_FRAME for program in self.programs):
+        free = [p.name for p in self.programs if not p.header(Header.FLAGS) & Flag.AGENT_FRAME]
+        if free:
+            names = ", ".join(dict.fromkeys(free))
             raise ValueError(
-                "the agent of this scenario follows no frame; play its variant +oracle, if it has one"
+                f"the agent of {names} follows no frame; play the variant +oracle, if there is one"
             )
         self.batch.script()
         return self.batch.ports.actions.copy()

@@ -52,7 +52,7 @@ def test_the_scripts_of_a_suite(capsys: Capture) -> None:
     assert result["eval"]["success_rate"] > 0.9
     assert all(member["success_rate"] > 0.5 for member in result["eval"]["members"].values())
     assert run_main(["pair.yaml", "--agent", "oracle"]) == 2
-    assert "the agent of this scenario follows no frame" in capsys.readouterr().err
+    assert "the agent of errands follows no frame" in capsys.readouterr().err
 
 
 def test_a_person_plays_members(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -88,3 +88,11 @@ def test_bench(capsys: Capture) -> None:
     assert main(["bench", "pair.yaml", *quick]) == 0
     rows = json.loads(capsys.readouterr().out)["rows"]
     assert [row["what"] for row in rows[:2]] == ["pair.yaml", "pair.yaml"]
+
+
+def test_a_room_that_cannot_be_is_the_authors_affair(capsys: Capture) -> None:
+    for agent in ("ppo", "random"):
+        assert run_main(["impossible.yaml", "--agent", agent]) == 1
+        said = capsys.readouterr().err
+        assert said.startswith("socialai-run: impossible: none of 64 rooms was as `require` asks")
+        assert "bug" not in said
