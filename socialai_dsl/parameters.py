@@ -42,15 +42,13 @@ def substitute(resolved: Resolved, bag: DiagnosticBag) -> Substituted:
 
 
 def _values(resolved: Resolved, bag: DiagnosticBag) -> dict[str, Value]:
-    assert isinstance(resolved.data, dict), "internal: a file is a mapping"
-    declared = resolved.data.get("params")
-    declared = declared if isinstance(declared, dict) else {}
+    declared = _declared(resolved)
     values: dict[str, Value] = {}
     for name, declaration in declared.items():
         default = declaration.get("default") if isinstance(declaration, dict) else declaration
         choices = declaration.get("values") if isinstance(declaration, dict) else None
-        if isinstance(choices, dict):
-            default = _labelled(name, default, choices, resolved, bag)
+        if default is not None and choices is not None:
+            default = _chosen(name, default, choices, resolved, bag)
         if name in resolved.params:
             default = _given(name, default, choices, resolved, bag)
         if isinstance(default, int | bool | float | str):
@@ -64,17 +62,24 @@ def _values(resolved: Resolved, bag: DiagnosticBag) -> dict[str, Value]:
     return values
 
 
-def _labelled(
-    name: str, default: Data, choices: dict[str, Data], resolved: Resolved, bag: DiagnosticBag
-) -> Data:
-    """The value that the default, a label, stands for."""
-    if default in choices.values():
+def _declared(resolved: Resolved) -> dict[str, Data]:
+    assert isinstance(resolved.data, dict), "internal: a file is a mapping"
+    declared = resolved.data.get("params")
+    return declared if isinstance(declared, dict) else {}
+
+
+def _chosen(name: str, default: Data, choices: Data, resolved: Resolved, bag: DiagnosticBag) -> Data:
+    """The value that the default is, or, where values have labels, stands for."""
+    if isinstance(choices, dict) and default in choices.values():
         return default
-    if str(default) not in choices:
-        near = did_you_mean(str(default), choices)
+    labels = list(map(str, choices)) if isinstance(choices, dict | list) else [str(default)]
+    if str(default) not in labels:
+        near = did_you_mean(str(default), labels)
         span = resolved.value_span(("params", name, "default"))
-        bag.error("S206", f"the default of `{name}` is none of its values", span, suggestion=near)
-    return choices.get(str(default), default)
+        hint = None if near else "one of " + ", ".join(labels)
+        message = f"the default of `{name}` is none of its values"
+        bag.error("S206", message, span, suggestion=near, hint=hint)
+    return choices.get(str(default), default) if isinstance(choices, dict) else default
 
 
 def _given(name: str, default: Data, choices: Data, resolved: Resolved, bag: DiagnosticBag) -> Data:
@@ -115,6 +120,7 @@ class _Substitution:
 
     def __init__(self, values: Mapping[str, Value], resolved: Resolved, bag: DiagnosticBag) -> None:
         self._values = values
+        self._declared = _declared(resolved)
         self._resolved = resolved
         self._bag = bag
         self.paths: list[DataPath] = []
@@ -129,6 +135,8 @@ class _Substitution:
         if match is None:
             return part
         name = match.group(1)
+        if name not in self._values and name in self._declared:
+            return part  # it has no default, which is reported where it is declared
         if name not in self._values:
             near = did_you_mean(name, self._values)
             span = self._resolved.locate(path, 0, len(name) + 1)

@@ -31,7 +31,21 @@ class Pair:
     def of(cls, loaded: LoadedScenario, program: Program | None = None) -> Pair:
         """A pair for a loaded scenario; `program` replaces what the compiler makes of it."""
         program = program or compile_scenario(loaded.checked)
-        return cls(ScenarioEnv(program), Reference(loaded.resolved), "agent" in _frames(loaded))
+        pair = cls(ScenarioEnv(program), Reference(loaded.resolved), "agent" in _frames(loaded))
+        pair._compare_words()
+        return pair
+
+    def _compare_words(self) -> None:
+        """The two number the words alike, and keep as many."""
+        mine, yours = self.env.program, self.reference.vocabulary
+        # 0 pads and 1 is unknown.
+        if list(mine.vocabulary[2:]) != list(yours.ids):
+            raise Disagreement(
+                f"{mine.name}: the vocabulary is {mine.vocabulary}, expected {list(yours.ids)}"
+            )
+        kept = self.env.observation_space["tokens"].shape
+        if kept != (yours.length,):
+            raise Disagreement(f"{mine.name}: {kept} tokens are kept, expected {yours.length}")
 
     def play(self, seed: int, episode: int, rng: np.random.Generator) -> int:
         """One episode with actions drawn from `rng`; the number of steps. Raises Disagreement."""
@@ -127,10 +141,7 @@ def _state_of_env(env: ScenarioEnv) -> dict[str, Any]:
     for entity in program.entities:
         if entity.role == "object":
             group = state[entity.key] if entity.index is not None else [state[entity.key]]
-            common["objects"][entity.key] = [
-                {"at": o["at"], "color": o["color"], "state": o["state"], "gone": o.get("gone", False)}
-                for o in group
-            ]
+            common["objects"][entity.key] = [_object(o) for o in group]
         else:
             common["cast"][entity.key] = _member(state[entity.key])
     for name, value in state["let"].items():
@@ -140,6 +151,13 @@ def _state_of_env(env: ScenarioEnv) -> dict[str, Any]:
         elif owner in common["cast"] and not register.startswith("fired."):
             common["cast"][owner].setdefault("registers", {})[register] = value
     return dict(_flatten(common))
+
+
+def _object(described: dict[str, Any]) -> dict[str, Any]:
+    """An object; the status of one that is gone means nothing."""
+    gone = described.get("gone", False)
+    kept = ("at", "color") if gone else ("at", "color", "state")
+    return {key: described[key] for key in kept} | {"gone": gone}
 
 
 def _member(described: dict[str, Any]) -> dict[str, Any]:
@@ -177,6 +195,7 @@ def _state_of_reference(env: ScenarioEnv, reference: Reference) -> dict[str, Any
         if not member["registers"]:
             del member["registers"]
     sequences = {path.removeprefix("let.").partition("[")[0] for path in held if "[0].move" in path}
+    state["objects"] = {name: [_object(o) for o in group] for name, group in state["objects"].items()}
     state["let"] = {k: v for k, v in state["let"].items() if f"let.{k}" in held or k in sequences}
     return dict(_flatten(state))
 

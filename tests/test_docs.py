@@ -3,16 +3,29 @@
 import contextlib
 import io
 import re
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
 import socialai_dsl
 from socialai_dsl import frontend
+from socialai_dsl.cli import main
+from socialai_dsl.library import GrammarLibrary, ObjectLibrary, ObjectTypeModel, prelude, shared_grammars
+from socialai_dsl.program import COLORS, DIRECTIONS
+from socialai_dsl.schema import PRIMITIVES
+from socialai_dsl.schema.annotations import CALLED, keys_of
+from socialai_dsl.schema.behaviour import SlotType
+from socialai_dsl.semantics.signatures import SIGNATURES, WORDS
+from tests.tiny import Folder
 
 ROOT = Path(__file__).parents[1]
+PAGES = sorted((ROOT / "docs").glob("*.md"))
 DOCUMENTS = [ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CHANGELOG.md")]
+DOCUMENTS += sorted((ROOT / "docs").rglob("*.md"))
+REFERENCE = (ROOT / "docs" / "language.md").read_text(encoding="utf-8")
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\((?!https?://|#)([^)\s]+)\)")
@@ -72,10 +85,124 @@ def test_readme_scenario_can_be_won(reader: Path) -> None:
     assert info["success"]
 
 
-@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+def test_readme_names_every_scenario_that_ships() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    shipped = {path.stem for path in (ROOT / "scenarios").glob("*.yaml")}
+    parts = {name for name in shipped if name.rsplit("_", 1)[-1] in ("oracle", "coded")}
+    alone = shipped - parts - {"as_coded", "unsocial"}
+    named = set(re.findall(r"`([\w?=]+)`", text))
+    assert alone - named == set()
+    for name in ("unsocial", "as_coded", "oracle"):
+        assert f"`+{name}`" in text
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_links_lead_somewhere(path: Path) -> None:
     for target in LINK.findall(path.read_text(encoding="utf-8")):
-        assert (ROOT / target.split("#")[0]).exists(), f"{path.name} links to {target}, which is not there"
+        file, _, heading = target.partition("#")
+        there = path.parent / file if file else path
+        assert there.exists(), f"{path.name} links to {target}, which is not there"
+        if heading:
+            assert heading in headings(there), f"{path.name} links to {target}, which has no such heading"
+
+
+def headings(path: Path) -> set[str]:
+    """What the headings of a page are called in links."""
+    lines = re.findall(r"^#+ (.+)$", path.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", line.lower()).replace(" ", "-") for line in lines}
+
+
+KINDS = ("scenario", "npc", "variant", "suite", "library")
+
+
+def kind(text: str) -> str | None:
+    """What a block of YAML is; None for a part of a scenario."""
+    first = text.split(":", 1)[0]
+    return first if first in KINDS else None
+
+
+@pytest.mark.parametrize(
+    "text",
+    [text for page in PAGES for text in blocks(page, "yaml") if kind(text)],
+    ids=lambda text: text.split("\n", 1)[0],
+)
+def test_files_in_the_pages_have_no_findings(text: str, tmp_path: Path) -> None:
+    result = frontend.check(str(Folder(tmp_path).save("shown", text)))
+    assert [str(diagnostic) for diagnostic in result.diagnostics] == []
+
+
+@pytest.mark.parametrize(
+    "text", [text for text in blocks(ROOT / "docs" / "language.md", "yaml") if not kind(text)]
+)
+def test_parts_in_the_reference_are_sound(text: str, tmp_path: Path) -> None:
+    """Each in a room with an agent and nothing else."""
+    path = Folder(tmp_path).write("shown", text)
+    assert [str(diagnostic) for diagnostic in frontend.check(str(path)).diagnostics] == []
+    env = socialai_dsl.make(str(path))
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_python_in_the_pages_runs(page: Path, reader: Path) -> None:
+    for number, example in enumerate(blocks(page, "python")):
+        exec(compile(example, f"{page.name}, example {number + 1}", "exec"), {})
+
+
+def commands(path: Path) -> Iterator[list[str]]:
+    """The commands of the package that a document shows."""
+    for text in blocks(path, "console"):
+        for line in text.replace("\\\n", " ").splitlines():
+            words = shlex.split(line.removeprefix("$ "), comments=True)
+            if line.startswith("$ ") and words[0].startswith("socialai"):
+                yield words
+
+
+def test_commands_in_the_documents_are_understood(
+    reader: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`validate` is run; of what would train for minutes only the options are looked at."""
+    shown = [words for path in DOCUMENTS for words in commands(path)]
+    assert len(shown) >= 3
+    for program, *words in shown:
+        if program == "socialai" and words[0] == "validate":
+            assert main.main(words) == 0, words
+            continue
+        helped = words if program == "socialai" else ["run", *words]
+        with pytest.raises(SystemExit) as left:
+            main.main([*helped, "--help"])
+        assert left.value.code == 0, words
+    capsys.readouterr()
+
+
+# -- the reference is complete ------------------------------------------------------------------------------------
+
+
+def mentioned() -> set[str]:
+    """Every word that stands in code in the reference."""
+    code = re.findall(r"`([^`\n]+)`", re.sub(r"```.*?```", "", REFERENCE, flags=re.DOTALL))
+    return {word for text in code for word in re.findall(r"[A-Za-z_]\w*", text)}
+
+
+@pytest.mark.parametrize("name", sorted({signature.name for signature in SIGNATURES}))
+def test_the_reference_has_every_instruction(name: str) -> None:
+    assert name in mentioned()
+
+
+MODELS = [*CALLED, ObjectLibrary, ObjectTypeModel, GrammarLibrary]
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: model.__name__)
+def test_the_reference_has_every_key(model: type) -> None:
+    assert [key for key in keys_of(model) if key not in mentioned()] == []
+
+
+def test_the_reference_has_every_word() -> None:
+    """Words without a key or an instruction of their own: those of expressions, of types, and what is built in."""
+    written = set(re.findall(r"[A-Za-z_]\w*", REFERENCE))
+    vocabularies = [*PRIMITIVES, *COLORS, *DIRECTIONS, *get_args(SlotType), *shared_grammars()]
+    types = [*prelude().types, *(state for type_ in prelude().types.values() for state in type_.states)]
+    assert {*WORDS, *vocabularies, *types} - written == set()
 
 
 def test_architecture_names_files_that_exist() -> None:

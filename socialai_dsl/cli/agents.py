@@ -1,6 +1,7 @@
 """This module trains, loads and evaluates agents for the commands, by way of the trainer."""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Final, Literal
 
@@ -172,6 +173,7 @@ def evaluate_agent(
     number = int(result.success.argmax())
     actions = policy.actions_of(number, int(result.lengths[number]))
     figures = _figures(result)
+    figures |= _by_member(program, result.outcomes)
     if agent == "oracle":
         # A room that the script does not solve is worth looking at: it can be played again by its number.
         figures["unsolved"] = (~result.success).nonzero()[0].tolist()
@@ -231,7 +233,7 @@ def _evaluate_human(scenario: str, program: "Playable", episodes: int) -> tuple[
     finally:
         env.close()
     count, rate = len(played), sum(p.success for p in played) / len(played)
-    figures = {
+    figures: dict[str, Any] = {
         "episodes": count,
         "success_rate": rate,
         "success_rate_se": math.sqrt(rate * (1 - rate) / count),
@@ -239,6 +241,7 @@ def _evaluate_human(scenario: str, program: "Playable", episodes: int) -> tuple[
         "mean_return": sum(p.reward for p in played) / count,
         "outcomes": {name: sum(p.outcome == name for p in played) / count for name in program.outcomes},
     }
+    figures |= _by_member(program, figures["outcomes"])
     number = next((i for i, p in enumerate(played) if p.success), 0)
     return figures, _record(scenario, program, number, played[number].actions, "agent human")
 
@@ -277,7 +280,7 @@ def _record(
     env = socialai_dsl.make(scenario, render_mode="rgb_array")
     title = f"{scenario}, test episode {number}, {label}"
     try:
-        return record(env, program, actions, title, {"options": {"test_episode": number}})
+        return record(env, program, actions, title, {"options": {"test_episode": number}}, env.cast)
     finally:
         env.close()
 
@@ -291,3 +294,19 @@ def _figures(result: "EvalResult") -> dict[str, Any]:
         "mean_return": result.mean_return,
         "outcomes": result.outcomes,
     }
+
+
+def _by_member(program: "Playable", shares: Mapping[str, float]) -> dict[str, Any]:
+    """Of a suite: how often each member was played, and how often with success; nothing for a scenario."""
+    from socialai_dsl.program_suite import ProgramSuite, prefixed
+
+    if not isinstance(program, ProgramSuite):
+        return {}
+    successes = {outcome.name for outcome in program.outcome_table if outcome.success}
+    members = {}
+    for member, own in zip(program.members, program.programs, strict=True):
+        names = {prefixed(member, name) for name in own.outcomes}
+        share = sum(shares[name] for name in names)
+        won = sum(shares[name] for name in names & successes)
+        members[member] = {"share": share, "success_rate": won / share if share else None}
+    return {"members": members}

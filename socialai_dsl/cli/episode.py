@@ -102,8 +102,10 @@ def record(
         actions: int64 (4,) each; the last one ends the episode.
         title: first line of the transcript; of a suite the member that is played is added.
         reset: arguments of `env.reset`.
+        meet: says who is in the room; asked after the reset.
     """
     _, info = env.reset(**reset)
+    cast = meet()
     episode = Episode(f"{title}: {info['member']}" if "member" in info else title)
     dialogue: list[DialogueLine] = []
     episode.frames.append(compose_frame(env.render(), dialogue, ["before the first step", ""], cast=cast))

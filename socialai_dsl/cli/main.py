@@ -22,6 +22,7 @@ from socialai_dsl.cli import (
 )
 from socialai_dsl.cli.errors import Exit, RunFailed, UsageError, is_usage
 from socialai_dsl.diagnostics import ScenarioError, render_text
+from socialai_dsl.engine.errors import RoomError
 
 _COMMANDS: Final = {
     "run": run,
@@ -95,7 +96,7 @@ def _explain(program: str, error: Exception) -> Exit:
     if isinstance(error, ScenarioError):
         print(render_text(error.diagnostics, error.sources, color=sys.stderr.isatty()), file=sys.stderr)
         return Exit.USAGE if is_usage(error.diagnostics) else Exit.FINDINGS
-    if isinstance(error, UsageError | RunFailed):
+    if isinstance(error, UsageError | RunFailed | RoomError):
         print(f"{program}: {error}", file=sys.stderr)
         return Exit.USAGE if isinstance(error, UsageError) else Exit.FINDINGS
     if isinstance(error, OSError):

@@ -97,10 +97,17 @@ def play_episode(
         if info["utterance"] != "NA":
             for line in info["utterance"].splitlines():
                 print(f"  {printable(line)}")
-    played.success, played.outcome = bool(info["success"]), str(info["outcome"])
+    played.success, played.outcome = bool(info["success"]), outcome_name(info)
     verdict = "success" if played.success else "no success"
     print(f"\n{verdict} ({played.outcome}) after {len(played.actions)} steps, reward {played.reward:.3f}")
     return played
+
+
+def outcome_name(info: dict[str, Any]) -> str:
+    """How an episode ended, as it is called among all ways to end (`Playable.outcomes`)."""
+    from socialai_dsl.program_suite import prefixed
+
+    return prefixed(info["member"], info["outcome"]) if "member" in info else str(info["outcome"])
 
 
 def _ask_action(env: Any, program: "Playable", ask: Callable[[str], str]) -> "NDArray[np.int64]":

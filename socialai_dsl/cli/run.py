@@ -224,6 +224,11 @@ def _table(result: dict[str, Any], folder: Path) -> str:
     rows = [
         ("success", f"{rate:.1%} ± {error:.1%} (standard error) of {evaluation['episodes']} test episodes")
     ]
+    rows += [
+        (f"  {member}", f"{played['success_rate']:.1%} of the {played['share']:.1%} that played it")
+        for member, played in evaluation.get("members", {}).items()
+        if played["share"] > 0
+    ]
     rows += [(f"  {name}", f"{share:.1%}") for name, share in evaluation["outcomes"].items() if share > 0]
     rows += [
         ("mean length", f"{evaluation['mean_length']:.1f} steps"),

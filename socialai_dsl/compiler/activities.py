@@ -22,9 +22,21 @@ class Activities:
         self.turn = to.sites.row(f"cast.{checked.entities[entity].key}.turn")
 
     def emit(self, activity: Activity) -> None:
-        """Choose the body action; `stay` chooses none."""
+        """Choose the body action; `stay` chooses none, and so does an activity whose argument finds nothing."""
         to, block = self.to, self.to.block
         to.site, block.span = activity.site, activity.span
+        nothing, done = Label(), Label()
+        to.failed = nothing
+        self._emit(activity)
+        to.failed = None
+        if nothing.uses:
+            block.skip(done)
+            block.bind(nothing)
+            block.emit(Op.BODY, constant(Body.NONE))
+            block.bind(done)
+
+    def _emit(self, activity: Activity) -> None:
+        to, block = self.to, self.to.block
         own = constant(self.entity)
         match activity.name:
             case "stay":
@@ -141,14 +153,18 @@ class Activities:
             block.bind(following)
         block.bind(done)
 
-    def unless_finished(self, activity: Activity, otherwise: Label) -> None:
-        """Fall through if the activity is finished, else skip; what has no end of its own lasts one step."""
+    def unless_finished(self, activity: Activity, otherwise: Label, nothing: Label) -> None:
+        """Fall through if the activity is finished, else skip; what has no end of its own lasts one step.
+
+        If its argument finds nothing, on to `nothing`.
+        """
         to, block = self.to, self.to.block
         if activity.name not in (*GOING, "use", "perform"):
             return
         to.site, block.span = activity.site, activity.span
         own = constant(self.entity)
         mark = block.taken
+        to.failed = nothing
         if activity.name == "perform":
             block.test(Op.IF_LE, constant(len(_elements(activity))), self.clock, otherwise)
         elif activity.name == "use":
@@ -159,6 +175,7 @@ class Activities:
         else:
             op = Op.IF_NEXT_TO if activity.name == "go_next_to" else Op.IF_SAME_CELL
             block.test(op, own, to.value(activity.args[0]), otherwise)
+        to.failed = None
         block.release(mark)
 
 

@@ -209,7 +209,7 @@ class _FrameCompiler:
         entry = k
         while entry < len(self.frame.steps) and self._skippable(self.frame.steps[entry]):
             stop = Label()
-            self._activities(to).unless_finished(self.frame.steps[entry].activity, stop)
+            self._activities(to).unless_finished(self.frame.steps[entry].activity, stop, stop)
             leave = Label()
             block.skip(leave)
             block.bind(stop)
@@ -243,7 +243,7 @@ class _FrameCompiler:
             block.halt()
             return
         elif step.duration is None:
-            self._activities(to).unless_finished(step.activity, running)
+            self._activities(to).unless_finished(step.activity, running, ended)
         block.bind(ended)
         self._effects(to, step, running)
         block.emit(Op.GOTO, self.number, self._next(k))

@@ -9,6 +9,7 @@ from socialai_dsl.compiler.assembler import Block, Label, Sites, constant
 from socialai_dsl.compiler.cells import LoopCell, coordinate, count_cells, one_cell
 from socialai_dsl.compiler.classes import SILENCE, Classes
 from socialai_dsl.compiler.folding import TRUE, Facts, fold, substitute
+from socialai_dsl.compiler.quantifiers import count_things, first_thing, nearest_thing, picked_thing
 from socialai_dsl.compiler.registers import Registers, entity_register, state_names
 from socialai_dsl.compiler.selects import among, asks, selected_condition, selected_value
 from socialai_dsl.program import CONSTANT, TEMPORARY, Field, Op, Register
@@ -90,9 +91,11 @@ class Expressions:
     # --- conditions ---
 
     def sited_condition(self, sited: terms.Sited, otherwise: Label) -> None:
-        """A condition with its own site and place in the source."""
+        """A condition with its own site and place in the source. It is false if something in it finds nothing."""
         self.site, self.block.span = sited.site, sited.span
+        failed, self.failed = self.failed, otherwise
         self.condition(fold(sited.term, self.facts, self.classes), otherwise)
+        self.failed = failed
 
     def condition(self, term: Term, otherwise: Label) -> None:
         """Fall through if `term` holds, else skip to `otherwise`."""
@@ -256,13 +259,13 @@ class Expressions:
             case terms.Quantified(op="first" | "pick" | "nearest", cells=True):
                 return one_cell(self, term)
             case terms.Quantified(op="pick"):
-                return self._pick(term)
+                return picked_thing(self, term)
             case terms.Quantified(op="first"):
-                return self._chosen(term, Op.LOWEST_BIT)
+                return first_thing(self, term)
             case terms.Quantified(op="count"):
-                return self.into_temporary(Op.COUNT_BITS, self._mask(term))
+                return count_things(self, term)
             case terms.Quantified(op="nearest"):
-                return self._nearest(term)
+                return nearest_thing(self, term)
             case terms.Variable():
                 return self._loop(term.name).cell
             case _:
@@ -305,65 +308,6 @@ class Expressions:
         self.block.bind(false)
         return result
 
-    # --- quantifiers ---
-
-    def _mask(self, term: terms.Quantified) -> int:
-        """A temporary whose bit i says whether item i holds."""
-        assert len(term.items) <= 62, "internal: a quantifier over more than 62 things"
-        mask = self.block.temporary()
-        self.block.emit(Op.LOAD, mask, constant(0))
-        for i, item in enumerate(term.items):
-            following = Label()
-            self.condition(self.instance(term, item), following)
-            self.block.emit(Op.SET_BIT, mask, constant(i))
-            self.block.bind(following)
-        return mask
-
     def instance(self, term: terms.Quantified, item: Const) -> Term:
         """The condition of a quantifier for one of its items."""
         return fold(substitute(term.condition or TRUE, term.variable, item), self.facts, self.classes)
-
-    def _pick(self, term: terms.Quantified) -> int:
-        site = self.sites.row(term.site or self.site, term.ordinal)
-        if term.condition is not None:
-            return self._chosen(term, Op.PICK_BIT, site)
-        return self._item(term.items, self.into_temporary(Op.DRAW, constant(len(term.items)), site))
-
-    def _chosen(self, term: terms.Quantified, op: Op, site: int = 0) -> int:
-        mask = self._mask(term)
-        if self.failed is not None:
-            self.block.test(Op.IF_NE, mask, constant(0), self.failed)
-        return self._item(term.items, self.into_temporary(op, mask, site))
-
-    def _item(self, items: tuple[Const, ...], position: int) -> int:
-        """The item at a position that is in a temporary."""
-        values = [item.value for item in items]
-        if values == list(range(values[0], values[0] + len(values))):
-            return self.into_temporary(Op.ADD, position, constant(values[0])) if values[0] else position
-        result = self.into_temporary(Op.LOAD, constant(values[0]))
-        for i, value in enumerate(values[1:], 1):
-            following = Label()
-            self.block.test(Op.IF_EQ, position, constant(i), following)
-            self.block.emit(Op.LOAD, result, constant(value))
-            self.block.bind(following)
-        return result
-
-    def _nearest(self, term: terms.Quantified) -> int:
-        assert term.to is not None
-        block = self.block
-        result = self.into_temporary(Op.LOAD, constant(term.items[0].value))
-        least = self.into_temporary(Op.LOAD, constant(4096))
-        to = self.value(term.to)
-        for item in term.items:
-            following = Label()
-            mark = block.taken
-            self.condition(self.instance(term, item), following)
-            distance = self.into_temporary(Op.DISTANCE, constant(item.value), to)
-            block.test(Op.IF_LT, distance, least, following)
-            block.emit(Op.LOAD, least, distance)
-            block.emit(Op.LOAD, result, constant(item.value))
-            block.bind(following)
-            block.release(mark)
-        if self.failed is not None:
-            block.test(Op.IF_LT, least, constant(4096), self.failed)
-        return result

@@ -42,7 +42,10 @@ def selected_value(to: Expressions, term: Select) -> int:
         to.block.emit(Op.LOAD, result, to.value(value))
         to.block.release(mark)
 
-    _branches(to, term, switch, take)
+    if switch is not None and all(isinstance(value, Const | Read) for value in switch.cases):
+        _overwrite(to, switch, take)
+    else:
+        _branches(to, term, switch, take)
     return result
 
 
@@ -58,6 +61,22 @@ def selected_condition(to: Expressions, term: Select, otherwise: Label) -> None:
     among(to, switch.read, true, otherwise)
 
 
+def _overwrite(to: Expressions, switch: _Switch, take: Callable[[Term], None]) -> None:
+    """The commonest value, then each other one in its cases."""
+    commonest = _commonest(switch)
+    take(commonest)
+    for value, numbers in switch.cases.items():
+        if value != commonest:
+            following = Label()
+            among(to, switch.read, numbers, following)
+            take(value)
+            to.block.bind(following)
+
+
+def _commonest(switch: _Switch) -> Term:
+    return max(switch.cases, key=lambda value: len(switch.cases[value]))
+
+
 def _branches(to: Expressions, term: Select, switch: _Switch | None, take: Callable[[Term], None]) -> None:
     """Test one condition after the other; what needs most words to ask for comes last and is not asked for."""
     block = to.block
@@ -68,7 +87,7 @@ def _branches(to: Expressions, term: Select, switch: _Switch | None, take: Calla
         for condition, value in zip(term.conditions, term.values, strict=True):
             branches.append((lambda to_next, asked=condition: to.condition(asked, to_next), value))  # type: ignore[misc]
     else:
-        last = max(switch.cases, key=lambda value: len(switch.cases[value]))
+        last = _commonest(switch)
         for value, numbers in switch.cases.items():
             if value != last:
                 branches.append(

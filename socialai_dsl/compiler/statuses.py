@@ -11,7 +11,7 @@ from socialai_dsl.semantics.terms import Checked, Computed, Entity
 
 
 def links(to: Expressions) -> None:
-    """While a switch is in an active status, what it unlocks is not locked."""
+    """While a switch is in the room and in an active status, what it unlocks is not locked."""
     for switch in to.checked.entities:
         targets = [to.checked.entities[number] for number in switch.unlocks]
         lockable = [target for target in targets if target.type and "locked" in target.type.states]
@@ -21,6 +21,7 @@ def links(to: Expressions) -> None:
         following = Label()
         status = entity_register(switch.number, Field.STATUS)
         to.one_of(Op.IF_EQ, status, switch.type.active, following)
+        to.block.test(Op.IF_EQ, entity_register(switch.number, Field.GONE), constant(0), following)
         for target in lockable:
             _unlock(to, target)
         to.block.bind(following)

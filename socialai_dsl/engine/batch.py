@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.engine.errors import RoomError
 from socialai_dsl.engine.kernel import BAD_ACTION, Task, prepare, serve
 from socialai_dsl.engine.picture import view_table
 from socialai_dsl.engine.pointers import make_book
@@ -112,7 +113,7 @@ class Batch:
         """Step all rows with `ports.actions`; how many episodes ended, or BAD_ACTION and nothing happened.
 
         Raises:
-            RuntimeError: all rows were stepped, but one that was reset found no room as its scenario requires; it
+            RoomError: all rows were stepped, but one that was reset found no room as its scenario requires; it
                 is in the last room that was drawn, and play may go on.
         """
         if self._executor is not None and not self.actions_fit():
@@ -127,7 +128,7 @@ class Batch:
         """Start the episodes that the keys of the rows `ports.chosen` name, from their layouts (`ports.layout`).
 
         Raises:
-            RuntimeError: as `step` does.
+            RoomError: as `step` does.
         """
         if pins is not None or len(self.ports.pins) > 1:
             registers = self.state.registers.shape[1]
@@ -169,7 +170,7 @@ class Batch:
         row = int(np.flatnonzero(self.ports.refused)[0])
         self.ports.refused[:] = False
         key = self.state.keys[row]
-        raise RuntimeError(
+        raise RoomError(
             f"{self._names[int(self.program_numbers()[row])]}: none of {ATTEMPTS} rooms was as `require` asks, in row "
             f"{row} (seed {key[Key.SEED]}, index {key[Key.INDEX]}, episode {key[Key.EPISODE]})"
         )

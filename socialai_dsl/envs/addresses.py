@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Final
 
 from socialai_dsl.program import Program, RegisterName
@@ -25,6 +26,12 @@ class Acts:
     def length(self) -> int:
         """How many elements it has."""
         return len(self.moves)
+
+
+@lru_cache(maxsize=256)
+def addresses_of(program: Program) -> Addresses:
+    """The registers of a program by their place in a layout."""
+    return Addresses(program)
 
 
 class Addresses:

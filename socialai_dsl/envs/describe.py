@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.envs.addresses import Acts, Addresses
+from socialai_dsl.envs.addresses import Acts, Addresses, addresses_of
 from socialai_dsl.envs.values import shown, utterance_text
 from socialai_dsl.program import (
     BODY_WORDS,
@@ -33,7 +33,7 @@ def describe(program: Program, registers: Row) -> dict[str, Any]:
     holds, oldest first), `last` (what the agent did in the last step), `heard` (lines since the reset), and `pending`:
     for NPCs, what was said near them since their last turn, as utterance classes.
     """
-    addresses = Addresses(program)
+    addresses = addresses_of(program)
     state: dict[str, Any] = {
         "t": int(registers[Register.T]),
         "room": {"width": int(registers[Register.WIDTH]), "height": int(registers[Register.HEIGHT])},

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.engine.state import PIN_NONE
-from socialai_dsl.envs.addresses import Acts, Addresses
+from socialai_dsl.envs.addresses import Acts, addresses_of
 from socialai_dsl.envs.values import cell_pair, meant, read, utterance_number, whole_number, word
 from socialai_dsl.program import (
     BODY_WORDS,
@@ -62,7 +62,7 @@ class _Layout:
     def __init__(self, program: Program, in_suite: bool) -> None:
         self.program = program
         self.row = np.full(program.header(Header.REGISTERS), PIN_NONE, np.int16)
-        self.addresses = Addresses(program)
+        self.addresses = addresses_of(program)
         self.others = ("member", *_OTHER_KEYS) if in_suite else _OTHER_KEYS
         self.groups: dict[str, list[int]] = {}
         for number, entity in enumerate(program.entities):

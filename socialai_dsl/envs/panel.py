@@ -19,6 +19,8 @@ _TEXT_SIZE: Final = 14
 _CAPTION_SIZE: Final = 13
 _MARGIN: Final = 12
 _LINE_HEIGHT: Final = 19
+_FACE_SIZE: Final = 26
+_MOST_FACES: Final = 6
 
 _Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 
@@ -41,6 +43,19 @@ class DialogueLine:
     def own(self) -> bool:
         """Whether the agent said it."""
         return self.speaker == "You"
+
+
+@dataclass(frozen=True, eq=False)
+class Face:
+    """One of those whom the agent may meet.
+
+    Attributes:
+        label: what the viewer is told about it.
+        look: how it is drawn, uint8 (S, S, 3).
+    """
+
+    label: str
+    look: NDArray[np.uint8]
 
 
 def draw_dialogue(
@@ -79,8 +94,9 @@ def compose_frame(
     caption: Sequence[str],
     now: int | None = None,
     size: tuple[int, int] = (640, 360),
+    cast: Sequence[Face] = (),
 ) -> NDArray[np.uint8]:
-    """Set the room on the left, the dialogue on the right and the caption below it.
+    """Set the room on the left, the dialogue on the right with the cast above and the caption below it.
 
     Args:
         grid: uint8 (H, W, 3), a picture of the room; scaled down if it is too large, never up.
@@ -88,6 +104,7 @@ def compose_frame(
         caption: short lines such as the step, the action and the reward; the first stands out.
         now: the step whose lines are highlighted.
         size: width and height of the result.
+        cast: who is in the room; of many the first are shown.
 
     Returns:
         uint8 (height, width, 3).
@@ -103,15 +120,36 @@ def compose_frame(
     left = side + 2 * _MARGIN
     panel = width - left - _MARGIN
     foot = _MARGIN + len(caption) * (_CAPTION_SIZE + 6)
-    dialogue = draw_dialogue(lines, panel, height - 2 * _MARGIN - foot, now)
-    frame.paste(Image.fromarray(dialogue), (left, _MARGIN))
     draw = ImageDraw.Draw(frame)
+    top = _MARGIN + _draw_cast(frame, draw, cast[:_MOST_FACES], (left, _MARGIN), panel)
+    dialogue = draw_dialogue(lines, panel, height - _MARGIN - top - foot, now)
+    frame.paste(Image.fromarray(dialogue), (left, top))
     y = height - foot
     for row, text in enumerate(caption):
         fill = INK if row == 0 else _MUTED
         draw.text((left, y), _shorten(text, panel, _CAPTION_SIZE), font=_font(_CAPTION_SIZE), fill=fill)
         y += _CAPTION_SIZE + 6
     return np.asarray(frame, dtype=np.uint8).copy()
+
+
+def _draw_cast(
+    frame: Image.Image,
+    draw: ImageDraw.ImageDraw,
+    cast: Sequence[Face],
+    corner: tuple[int, int],
+    width: int,
+) -> int:
+    """Draw faces with their labels in two columns; the height that took."""
+    column = width // 2
+    for number, face in enumerate(cast):
+        x = corner[0] + number % 2 * column
+        y = corner[1] + number // 2 * (_FACE_SIZE + 4)
+        look = Image.fromarray(face.look).resize((_FACE_SIZE, _FACE_SIZE), Image.Resampling.LANCZOS)
+        frame.paste(look, (x, y))
+        text = _shorten(face.label, column - _FACE_SIZE - 8, _CAPTION_SIZE)
+        draw.text((x + _FACE_SIZE + 5, y + 5), text, font=_font(_CAPTION_SIZE), fill=INK)
+    rows = -(-len(cast) // 2)
+    return rows * (_FACE_SIZE + 4) + (4 if rows else 0)
 
 
 def _draw_line(

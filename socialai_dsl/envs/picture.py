@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.envs.panel import Face
 from socialai_dsl.envs.render import draw_ansi, draw_grid
 from socialai_dsl.envs.table import Table
-from socialai_dsl.envs.tiles import Code
+from socialai_dsl.envs.tiles import NPC, Code, draw_tile
 from socialai_dsl.program import (
     ENTITY_FIELDS,
     FIRST_ENTITY,
@@ -22,6 +23,8 @@ from socialai_dsl.program import (
     TypeColumn,
 )
 
+_DOWN = 1
+
 
 def frame(table: Table, row: int, mode: str, tile: int = 32) -> Any:
     """uint8 (H * tile, W * tile, 3) for rgb_array, a text for ansi."""
@@ -31,6 +34,27 @@ def frame(table: Table, row: int, mode: str, tile: int = 32) -> Any:
         return draw_ansi(codes[:height, :width], agent)
     seen = _seen(table, row, agent)[:height, :width]
     return draw_grid(codes[:height, :width], agent, seen, tile, _under_npcs(table, row))
+
+
+def cast_of(table: Table, row: int, tile: int = 32) -> list[Face]:
+    """The NPCs that the agent can see in a row: what the scenario calls them, with a name that was drawn.
+
+    All look down; those that have left are shown as well.
+    """
+    program, registers = table.program(row), table.state.registers[row]
+    if program.header(Header.FLAGS) & Flag.NPCS_HIDDEN:
+        return []
+    described = table.describe(row)
+    faces = []
+    for number, entity in enumerate(program.entities):
+        if entity.role != "npc":
+            continue
+        fields = registers[FIRST_ENTITY + ENTITY_FIELDS * number :]
+        code = (NPC, int(fields[Field.COLOR]), int(fields[Field.STATUS]), _DOWN)
+        member = described[entity.key] if entity.index is None else described[entity.key][entity.index]
+        name = f": {member['name']}" if "name" in member else ""
+        faces.append(Face(f"{entity}{name}", draw_tile(code, None, False, tile)))
+    return faces
 
 
 def _under_npcs(table: Table, row: int) -> dict[tuple[int, int], Code]:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from socialai_dsl.engine.kernel import BAD_ACTION, Task
 from socialai_dsl.engine.step import TRUNCATED
 from socialai_dsl.envs.actions import encode_action
-from socialai_dsl.envs.picture import frame
+from socialai_dsl.envs.panel import Face
+from socialai_dsl.envs.picture import cast_of, frame
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Register
 from socialai_dsl.program_suite import Playable, ProgramSuite
@@ -160,6 +161,10 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         heard = "\n".join(self._table.heard(0))
         print(f"{text}\n{heard}\n")
         return None
+
+    def cast(self) -> list[Face]:
+        """The NPCs of this episode that the agent can see, each with a label and a picture of its face."""
+        return cast_of(self._table, 0)
 
     def close(self) -> None:
         """Nothing is held open but memory."""

@@ -35,6 +35,12 @@ _PROGRAM = int(Key.PROGRAM)  # members of an enumeration are slow indices
 _MULTIPLIERS = np.array([mix(k * GOLDEN) | 1 for k in range(1, 65)], np.uint64)
 
 
+def _numbers_of_texts(lines: Sequence[str]) -> NDArray[np.uint64]:
+    """A number for the text of each line, uint64 (lines,): several lines may say the same."""
+    first = {text: number for number, text in reversed(list(enumerate(lines)))}
+    return np.array([first[text] for text in lines], np.uint64)
+
+
 class Table:
     """Rows of environments: row i plays `playables[i modulo their number]`, of a suite one member each episode.
 
@@ -56,6 +62,7 @@ class Table:
         self.tokens = self.state.tokens
         self.fresh = True
         self._number_at = {offset: i for i, offset in enumerate(self.batch.offsets)}
+        self._texts = [_numbers_of_texts(program.lines) for program in self.programs]
         # Of each pool: what the suite calls its members; None if it is a scenario that plays alone.
         self._called = [p.members if isinstance(p, ProgramSuite) else None for p in different]
 
@@ -148,9 +155,11 @@ class Table:
 
     def scripted_actions(self) -> NDArray[np.int64]:
         """What the agents' frames would do now, int64 (E, 4); nothing changes."""
-        if not all(program.header(Header.FLAGS) & Flag.AGENT_FRAME for program in self.programs):
+        free = [p.name for p in self.programs if not p.header(Header.FLAGS) & Flag.AGENT_FRAME]
+        if free:
+            names = ", ".join(dict.fromkeys(free))
             raise ValueError(
-                "the agent of this scenario follows no frame; play its variant +oracle, if it has one"
+                f"the agent of {names} follows no frame; play the variant +oracle, if there is one"
             )
         self.batch.script()
         return self.batch.ports.actions.copy()
@@ -213,7 +222,7 @@ class Table:
             heard = registers[:, Register.HEARD]
             for k in range(program.header(Header.HEARD_SIZE)):
                 rows = np.flatnonzero((played == number) & (heard > k))
-                lines = registers[rows, first + k].astype(np.uint64) + np.uint64(1)
+                lines = self._texts[number][registers[rows, first + k]] + np.uint64(1)
                 ids[rows] = (ids[rows] + lines + np.uint64(number << 32)) * np.uint64(_MULTIPLIERS[k])
         return ids.view(np.int64)
 

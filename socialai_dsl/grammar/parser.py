@@ -232,7 +232,7 @@ def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
     if text.startswith("||", offset - 1):
         return _wrong_symbol(text, offset - 1)
     if token.type == "WHERE":
-        return ParseProblem("S210", "`where` belongs in a place or inside pick(x in group where ...)", offset)
+        return ParseProblem("S210", "`where` belongs in a place or inside pick(d in group where ...)", offset)
     if token.type == "RPAR":
         return ParseProblem("S202", "something is missing before this bracket", offset)
     hint = None

@@ -26,7 +26,7 @@ from socialai_dsl.semantics.terms import (
     Term,
     Type,
 )
-from socialai_dsl.semantics.wording import quoted, wrong_count
+from socialai_dsl.semantics.wording import described, quoted, wrong_count
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
@@ -119,11 +119,27 @@ def _unknown(
 def _argument(resolver: Resolver, name: str, node: ast.Expr, expected: Any, scope: Scope) -> Term:
     if expected is ENTITY and resolve_groups.is_group(resolver, node, scope):
         group = quoted(node)
-        hint = f"`{name}(nearest(x in {group} to self))`, or draw one in `let` with `pick({group})`"
+        hint = f"`{name}(nearest(d in {group} to self))`, or draw one in `let` with `pick({group})`"
         raise resolver.fail("S204", f"`{group}` is a group: say which of them", node, scope, hint=hint)
     if name in _TO_CELLS:
         return somewhere(resolver, node, scope)
-    return resolver.value(node, expected, scope)
+    term = resolver.value(node, expected, scope)
+    if name == "enter":
+        _check_entrance(resolver, term, node, scope)
+    return term
+
+
+def _check_entrance(resolver: Resolver, term: Term, node: ast.Expr, scope: Scope) -> None:
+    """Only objects of one type that can be walked on can be entered."""
+    if term.type.low < len(resolver.symbols.numbers):
+        raise resolver.fail(
+            "S204", f"`{quoted(node)}` is no object; only objects can be entered", node, scope
+        )
+    status_of(resolver, term, node, scope)
+    objects = resolver.symbols.object_of(term.type.low)
+    assert objects is not None, "internal: what has a status is an object"
+    if not objects.type.walkable:
+        raise resolver.fail("S204", f"a {objects.type.name} can never be entered", node, scope)
 
 
 def _choice(resolver: Resolver, path: DataPath, node: ast.Expr, scope: Scope) -> Activity:
@@ -184,9 +200,13 @@ def _entities(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[Term, .
     if isinstance(node, ast.Name) and node.id == "objects":
         first, last = len(resolver.symbols.numbers), resolver.symbols.entities
         return tuple(Const(Type("entity", number, number), number) for number in range(first, last))
-    if resolve_groups.is_group(resolver, node, scope):
-        return tuple(resolve_groups.group(resolver, node, None, scope).items)
-    return (resolver.value(node, ENTITY, scope),)
+    if not resolve_groups.is_group(resolver, node, scope):
+        return (resolver.value(node, ENTITY, scope),)
+    members = resolve_groups.group(resolver, node, None, scope)
+    if members.type.kind != "entity":
+        message = f"`{quoted(node)}` is {described(members.type)}, but {described(ENTITY)} is expected here"
+        raise resolver.fail("S204", message, node, scope)
+    return tuple(members.items)
 
 
 def _target(

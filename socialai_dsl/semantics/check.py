@@ -202,8 +202,11 @@ class _Run:
                 )
 
     def _look_at(self, frame: PlayedFrame) -> None:
+        remembered = self.resolver.registers.remembered
+        asked = len(remembered)
         entities.declare_frame(self.resolver, frame)
         behaviour.plan(self.resolver, frame, behaviour.lines_of(self.resolver, frame))
+        del remembered[asked:]  # what only this frame asks about the step before is asked by nobody
 
     def _outcomes(self) -> Iterator[OutcomePlan]:
         findings = self._findings

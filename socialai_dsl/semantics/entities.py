@@ -272,7 +272,8 @@ def _played(symbols: Symbols, findings: Findings, name: str, which: int) -> Play
     followed = symbols.frame_of(name, which)
     if followed is None:
         path = symbols.member_path(name, "frame", which)
-        near = did_you_mean(member.frame, symbols.scenario.frames)
+        files = symbols.scenario.cast[name].one_of
+        near = did_you_mean(member.frame, [*symbols.scenario.frames, *(files[which].frames if files else ())])
         span = findings.at(path, 0, len(member.frame))
         findings.error("S201", f"unknown frame `{member.frame}`", span, suggestion=near)
         return None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -62,7 +61,7 @@ def _links_of(resolver: Resolver, objects: Objects, kind: _Kind) -> dict[int, tu
         message = f"a {objects.type.name} cannot {kind.verb} anything"
         able = [name for name, type_ in resolver.symbols.types.items() if type_.active]
         raise resolver.fail("S204", message, node, scope, hint="what can: " + ", ".join(able))
-    targets = list(_objects_at(resolver, node, scope))
+    targets = _objects_at(resolver, node, scope)
     for target in targets:
         type_ = resolver.symbols.object_of(target)
         assert type_ is not None, "internal: a target is an object"
@@ -79,16 +78,17 @@ def _links_of(resolver: Resolver, objects: Objects, kind: _Kind) -> dict[int, tu
     raise resolver.fail("S106", message, node, scope, hint=hint)
 
 
-def _objects_at(resolver: Resolver, node: ast.Expr, scope: Scope) -> Iterator[int]:
+def _objects_at(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[int]:
     if resolve_groups.is_group(resolver, node, scope):
-        terms: tuple[Term, ...] = resolve_groups.group(resolver, node, None, scope).items
+        members = resolve_groups.group(resolver, node, None, scope)
+        terms: tuple[Term, ...] = members.items if members.type.kind == "entity" else ()
     else:
         terms = (resolver.value(node, Type("entity", 0, 0), scope),)
-    for term in terms:
-        if not isinstance(term, Const) or resolver.symbols.object_of(term.value) is None:
-            message = f"`{quoted(node)}` is not an object of the room"
-            raise resolver.fail("S204", message, node, scope, hint="name an object, or a group of them")
-        yield term.value
+    known = [term.value for term in terms if isinstance(term, Const)]
+    if not known or len(known) < len(terms) or any(resolver.symbols.object_of(n) is None for n in known):
+        message = f"`{quoted(node)}` is not an object of the room"
+        raise resolver.fail("S204", message, node, scope, hint="name an object, or a group of them")
+    return known
 
 
 def unlocker(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:

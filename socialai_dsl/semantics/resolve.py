@@ -139,7 +139,7 @@ class Resolver:
                 )  # fmt: skip
             case ast.Placed():
                 raise self.fail(
-                    "S210", "`where` belongs in a place or inside pick(x in group where ...)", node, scope
+                    "S210", "`where` belongs in a place or inside pick(d in group where ...)", node, scope
                 )
             case _:
                 raise AssertionError(f"internal: no meaning for {type(node).__name__}")

@@ -32,7 +32,7 @@ from socialai_dsl.semantics.terms import (
     Type,
     World,
 )
-from socialai_dsl.semantics.wording import described, quoted, usage
+from socialai_dsl.semantics.wording import quoted, usage
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
@@ -173,9 +173,16 @@ def _unknown_attribute(
             "S205", f"nothing here has a `{name}`; write `{usage(VALUES[synonym])}`", node, scope
         )
     known = [s.name for s in VALUES.values() if not s.takes and s.subject != "none"]
-    near = did_you_mean(name, [*known, *sorted(statuses)])
+    near = did_you_mean(name, [*known, *sorted(statuses), *_of_frame(resolver, node)])
     near = near or did_you_mean(name, [s.name for s in VALUES.values() if s.subject != "none"])
     return resolver.fail("S205", f"nothing here has a `{name}`", node, scope, suggestion=near)
+
+
+def _of_frame(resolver: Resolver, node: ast.Expr) -> list[str]:
+    """The registers and slots of the member of the cast that is named before the dot."""
+    subject = node.subject if isinstance(node, ast.Attribute) else None
+    played = resolver.frames.get(subject.id) if isinstance(subject, ast.Name) else None
+    return [*played.model.slots, *played.model.let] if played is not None else []
 
 
 def _of_the_agent(resolver: Resolver, name: str) -> Term:
@@ -284,11 +291,11 @@ def status_of(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Fi
     found = [resolver.symbols.object_of(n) for n in range(who.type.low, who.type.high + 1)]
     types = {objects.type.name: objects.type for objects in found if objects is not None}
     if None in found or len(types) != 1:
-        message = (
-            f"{described(who.type)} of different types has no common status"
-            if types
-            else "only objects have a status"
-        )
-        raise resolver.fail("S204", message, node, scope)
+        several = [*types, *(["member of the cast"] if None in found else [])]
+        message = f"this may be a {' or a '.join(several)}, which have no status in common"
+        hint: str | None = "name objects of one type, which stand next to each other in `objects`"
+        if not types:
+            message, hint = "only objects have a status", None
+        raise resolver.fail("S204", message, node, scope, hint=hint)
     (type_,) = types.values()
     return FieldOf(Type("status", 0, len(type_.states) - 1, type_.states), who, "status")

@@ -155,12 +155,7 @@ def _declared(resolver: Resolver, node: ast.Name, expected: Type | None, scope: 
     if word in symbols.defines:
         return expanded(resolver, symbols.defines[word], {}, node, expected, scope)
     if word in symbols.scenario.roles:
-        if word not in symbols.roles:
-            message = f"nobody plays the role `{word}`"
-            raise resolver.fail(
-                "S201", message, node, scope, hint=f"add `role: {word}` to a member of the cast"
-            )
-        word = symbols.roles[word]
+        word = _player(resolver, word)
     if word in symbols.numbers:
         return entity(symbols.numbers[word])
     if word in symbols.objects:
@@ -169,9 +164,23 @@ def _declared(resolver: Resolver, node: ast.Name, expected: Type | None, scope: 
             return entity(objects.numbers[0])
         raise resolver.fail(
             "S204", f"`{word}` is a group of {len(objects.numbers)}, here one of them is needed", node, scope,
-            hint=f"`pick({word})` draws one, `any(x in {word} where ...)` asks for any",
+            hint=f"`pick({word})` draws one, `any(d in {word} where ...)` asks for any",
         )  # fmt: skip
     return None
+
+
+def _player(resolver: Resolver, role: str) -> str:
+    """Who plays a role that is spoken of."""
+    symbols = resolver.symbols
+    if role in symbols.roles:
+        return symbols.roles[role]
+    given = [member.role for member in symbols.scenario.cast.values() if member.role is not None]
+    if not set(given) <= symbols.scenario.roles.keys() or len(set(given)) < len(given):
+        raise FailedError  # a role that is given wrongly, which has been reported, may be this one
+    # Said once, where the role is declared: it may be spoken of in many places.
+    span = resolver.findings.places.key_span(("roles", role))
+    hint = f"add `role: {role}` to a member of the cast"
+    raise resolver.findings.fail("S201", f"nobody plays the role `{role}`", span, hint=hint)
 
 
 def _not_a_value(resolver: Resolver, kind: str, node: ast.Name, scope: Scope) -> FailedError:
@@ -248,6 +257,7 @@ def suggestion(
     """The name that was probably meant, and where it is declared."""
     declared = resolver.symbols.declared()
     candidates = [*scope.variables, *declared, *(expected.words if expected else ())]
+    candidates += ["it"] * (scope.it is not None) + ["self"] * (scope.member is not None)
     if scope.frame is not None:
         frame = scope.frame
         candidates += [*frame.model.slots, *frame.model.let, *frame.defines]

@@ -212,7 +212,10 @@ def _of_group(
     if not isinstance(node, ast.Attribute) or not resolve_groups.is_group(resolver, node.subject, scope):
         return None
     others = resolve_groups.group(resolver, node.subject, None, scope)
-    if len(others.items) != count or node.name != "color":
+    if node.name != "color":
+        message = f"`{node.name}` gives no colours; write `{quoted(node.subject)}.color`"
+        raise resolver.fail("S205", message, node, scope)
+    if len(others.items) != count:
         message = f"`{quoted(node)}` gives {len(others.items)} values for {count}"
         raise resolver.fail("S106", message, node, scope)
     return Sited(FieldOf(COLOR, others.items[index], "color"), scope.draws.site, resolver.findings.at(path))

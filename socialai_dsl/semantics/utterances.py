@@ -88,7 +88,9 @@ class Utterances:
                 texts.append((option, None))
             else:
                 message = f'`{quoted(option)}` is not a text; what is said is quoted: "Open sesame"'
-                raise resolver.fail("S211", message, option, scope)
+                slots = scope.frame.texts if scope.frame is not None else ()
+                near = did_you_mean(option.id, slots) if isinstance(option, ast.Name) else None
+                raise resolver.fail("S211", message, option, scope, suggestion=near)
         return texts
 
     def _slot(self, node: ast.Expr, scope: Scope) -> list[_Filling] | None:

@@ -48,9 +48,9 @@ def can_enter(world: World, body: Entity, cell: Cell) -> bool:
 
 def toggle(world: World, user: Entity, cell: Cell) -> None:
     """An NPC in the cell is poked; else the object there changes as its type says."""
-    body = world.body_at(cell)
-    if body is not None:
-        body.poked = body.was_poked = True
+    npc = next((npc for npc in world.npcs if npc.cell == cell), None)
+    if npc is not None:
+        npc.poked = npc.was_poked = True
         return
     thing = world.object_at(cell)
     if thing is not None:

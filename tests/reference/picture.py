@@ -41,7 +41,7 @@ def shown(world: World, cell: Cell, canvas: tuple[int, int]) -> tuple[int, int, 
         return type_.code, COLORS.index(str(thing.color)), status, tag
     ground = world.terrain.get(cell)
     if ground is not None:
-        return TYPES[ground].code, COLORS.index(TYPES[ground].color), 0, 0
+        return TYPES[ground].code, COLORS.index(str(TYPES[ground].color)), 0, 0
     return WALL if world.on_border(cell) else EMPTY
 
 

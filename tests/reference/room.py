@@ -299,11 +299,11 @@ class Setup:
         if entity.sort == "object":
             path, written = f"objects.{entity.key}", self.scenario.objects[entity.key].color
         else:
-            path, written = f"cast.{entity.key}", self.members[entity.key].color
-            written = "random" if written is None else written
-        if written is None:
+            path, written = f"cast.{entity.key}", self.members[entity.key].color or "random"
+        if written is None and TYPES[entity.type].color is not None:
             entity.color = TYPES[entity.type].color
             return
+        written = "random" if written is None else written
         sources = leaves(f"{path}.color", written)
         _, source = sources[entity.index % len(sources)]
         if source == "random":

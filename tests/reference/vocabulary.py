@@ -317,7 +317,7 @@ class Vocabulary:
             max(self.longest_line(who) for who in self.who(name)) for name in self.members if name != "agent"
         )
         if self.scenario.observe.own_voice:
-            per_step += self.longest_utterance() + max(len(words(name)) for name in self.names_of("agent"))
+            per_step += self.longest_utterance() + self.longest_name("agent")
         bound = self.scenario.horizon * per_step
         return min(LONGEST, max(8, (bound + 7) // 8 * 8))
 
@@ -329,8 +329,13 @@ class Vocabulary:
         ]
         if self.performs(member):
             lengths.append(self.longest_utterance())
-        name = max(len(words(name)) for name in self.names_of(member[0]))
-        return name + max(lengths) if lengths else 0
+        return self.longest_name(member[0]) + max(lengths) if lengths else 0
+
+    def longest_name(self, name: str) -> int:
+        """The words before a member's lines; none where names are hidden."""
+        if self.scenario.observe.names == "hidden":
+            return 0
+        return max(len(words(text)) for text in self.names_of(name))
 
     def longest_utterance(self) -> int:
         """The words of the longest utterance of the grammar."""

@@ -20,7 +20,7 @@ class ObjectType:
     code: int
     states: tuple[str, ...]
     initial: str
-    color: str = "grey"
+    color: str | None = None  # where a scenario gives none; else it is drawn
     walkable: tuple[str, ...] = ()
     transparent: tuple[str, ...] = ()
     toggled: dict[str, str] = field(default_factory=dict)
@@ -29,9 +29,9 @@ class ObjectType:
 
 
 TYPES = {
-    "wall": ObjectType(2, ("solid",), "solid"),
-    "floor": ObjectType(3, ("plain",), "plain", walkable=("plain",), transparent=("plain",)),
-    "fence": ObjectType(18, ("solid",), "solid", transparent=("solid",)),
+    "wall": ObjectType(2, ("solid",), "solid", "grey"),
+    "floor": ObjectType(3, ("plain",), "plain", "grey", walkable=("plain",), transparent=("plain",)),
+    "fence": ObjectType(18, ("solid",), "solid", "grey", transparent=("solid",)),
     "lava": ObjectType(9, ("hot",), "hot", "red", ("hot",), ("hot",), deadly=True),
     "platform": ObjectType(17, ("empty",), "empty", "purple", transparent=("empty",)),
     "ball": ObjectType(6, ("plain", "tagged"), "plain", transparent=("plain", "tagged")),
@@ -211,11 +211,6 @@ class World:
     def object_at(self, cell: Cell) -> Entity | None:
         """The object in a cell."""
         return next((thing for thing in self.things() if thing.cell == cell), None)
-
-    def body_at(self, cell: Cell) -> Entity | None:
-        """The NPC in a cell, else the agent."""
-        bodies = [*self.npcs, self.agent]
-        return next((body for body in bodies if body.cell == cell), None)
 
     def _holds(self, cell: Cell, quality: str) -> bool:
         if not self.inside(cell):

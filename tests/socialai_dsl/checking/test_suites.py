@@ -10,6 +10,8 @@ import pytest
 from socialai_dsl.checking import LoadedSuite
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import check, load
+from socialai_dsl.loader import read_document
+from socialai_dsl.source import Source
 
 FOLDER = Path(__file__).parents[2] / "data" / "suites"
 
@@ -169,3 +171,28 @@ def test_what_a_script_says_must_be_sayable_too() -> None:
     assert written(text + f"grammar: {said}\n") == [
         '3:1: S401 `errands+oracle` needs "Open 2", which the grammar of this suite cannot say'
     ]
+
+
+def test_the_example_of_the_documentation_is_the_shipped_suite() -> None:
+    root = Path(__file__).parents[3]
+    text = (root / "docs" / "suites.md").read_text().partition("```yaml\n")[2].partition("```")[0]
+    shown = read_document(Source("docs/suites.md", text)).data
+    shipped = read_document(root / "scenarios" / "social_env.yaml").data
+    assert isinstance(shown, dict)
+    assert isinstance(shipped, dict)
+    assert shown == {key: value for key, value in shipped.items() if key != "skills"}
+
+
+@pytest.mark.parametrize(
+    "split", ["", "?split=test", "+as_coded", "+as_coded?split=test", "+unsocial", "+oracle"]
+)
+def test_the_suite_of_the_paper(split: str) -> None:
+    loaded = suite(f"social_env{split}")
+    assert loaded.warnings == ()
+    coded = ("dance", "cointhief", "talkitout", "showme", "diverse_exit", "help")
+    paper = ("talkitout", "dance", "cointhief", "diverse_exit", "showme", "help")
+    names = [name.replace("help_as_helper", "help") for name in loaded.member_names]
+    assert tuple(names) == (coded if "as_coded" in split else paper)
+    assert ("help_as_helper" in loaded.member_names) == ("test" in split)
+    sizes = (15, 45) if "as_coded" in split else (7, 26)
+    assert (len(loaded.space.templates), len(loaded.space.nouns)) == sizes

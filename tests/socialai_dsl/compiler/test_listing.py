@@ -1,10 +1,34 @@
 """The listing of a shipped scenario, compared with a golden file: a change of the compiler shows as a diff."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import socialai_dsl as sd
+from socialai_dsl.program import Header
+from socialai_dsl.semantics.terms import (
+    CELL,
+    DIRECTION,
+    CellOf,
+    Const,
+    Quantified,
+    RulePlan,
+    Sees,
+    Sited,
+)
+from socialai_dsl.semantics.terms import Test as Relation
+from tests.socialai_dsl.compiler.workbench import (
+    BOX,
+    GUIDE,
+    HERE,
+    SPAN,
+    cell,
+    compiled,
+    entity,
+    listed,
+    workbench,
+)
 
 GOLDENS = Path(__file__).parents[2] / "listings"
 
@@ -27,3 +51,25 @@ def test_every_instruction_of_a_rule_says_where_it_comes_from() -> None:
     spans = [span for span in program.source_map[first_rule:] if span is not None]
     assert {span.file.rsplit("/", 1)[-1] for span in spans} == {"talkitout.yaml"}
     assert len(spans) > 0.7 * len(program.source_map[first_rule:])
+
+
+def test_cells_sets_and_entries_are_readable() -> None:
+    nearest = Quantified(
+        CELL, "nearest", "c", (), Relation("next_to", HERE, entity(BOX)), cell(5, 1), cells=True
+    )
+    seen = Sees(entity(GUIDE), CellOf(CELL, nearest), Const(DIRECTION, 2))
+    rule = RulePlan("law", "rules[0]", SPAN, when=Sited(seen, "rules[0].when", SPAN))
+    program = compiled(replace(workbench(), rules=(rule,)))
+    start = program.header(Header.RULES_PC)
+    assert f"rules at {start}" in program.listing().splitlines()[3]
+    shown = [" ".join(line.split()[1:-1]) for line in listed(program, "rules")]
+    assert shown[1:8] == [
+        "B_FLOOR 0",
+        f"EACH_CELL 0, %1, -> {start + 6}",
+        f"IF_NEXT_TO %3, box, -> {start + 5}",
+        f"SKIP -> {start + 6}",
+        "DROP_CELL",
+        "END_EACH",
+        "NEAREST_CELL %1, 0, (5, 1)",
+    ]
+    assert shown[-4:-2] == ["SEES %0, guide, %3", f"IF_NE %0, #0, -> {start + 16}"]

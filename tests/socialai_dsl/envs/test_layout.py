@@ -48,8 +48,10 @@ def differences(one: ScenarioEnv, other: ScenarioEnv) -> list[str]:
     """Registers that decide how the episode goes on and are not equal."""
     program = one._table.program(0)
     first, second = (env._table.state.registers[0] for env in (one, other))
-    heard, fleeting = program.header(Header.HEARD), set(map(int, FLEETING))
-    fleeting |= set(range(heard, heard + program.header(Header.HEARD_SIZE)))
+    fleeting = set(map(int, FLEETING))
+    # Lines of one text have several numbers, and `describe` tells texts.
+    for start, size in ((Header.HEARD, Header.HEARD_SIZE), (Header.LOG, Header.LOG_SIZE)):
+        fleeting |= set(range(program.header(start), program.header(start) + program.header(size)))
     fleeting |= {
         name.register
         for name in program.registers
@@ -231,3 +233,15 @@ def test_what_does_not_fit_is_named(name: str, layout: Any, message: str) -> Non
     env = sd.make(name)
     with pytest.raises(ValueError, match=message):
         env.reset(seed=0, options={"layout": layout})
+
+
+def test_the_example_of_the_documentation() -> None:
+    text = (Path(__file__).parents[3] / "docs" / "layouts.md").read_text()
+    example = text.partition("```python\n")[2].partition("```")[0]
+    names: dict[str, Any] = {}
+    exec(compile(example, "docs/layouts.md", "exec"), names)
+    state = names["env"].describe()
+    assert state["room"] == {"width": 6, "height": 7}
+    assert state["honest"]["name"] == "John"
+    assert state["doors"][2]["state"] == "open"
+    assert state["let"]["exit"] == "doors[0]"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from socialai_dsl.envs.panel import DialogueLine, compose_frame, draw_dialogue
+from socialai_dsl.envs.panel import DialogueLine, Face, compose_frame, draw_dialogue
 
 LINES = [DialogueLine(t, "You" if t % 2 else "Ann", f"utterance number {t}") for t in range(1, 60)]
 
@@ -44,3 +44,22 @@ def test_a_long_line_is_wrapped_and_a_long_word_is_cut() -> None:
 
 def test_silence_is_said() -> None:
     assert (draw_dialogue([], 240, 60) < 255).any()
+
+
+def test_the_cast_is_shown_above_the_dialogue() -> None:
+    green = np.full((32, 32, 3), (10, 200, 10), np.uint8)
+    room = np.zeros((64, 64, 3), np.uint8)
+
+    def shown(count: int) -> np.ndarray:
+        faces = [Face(f"guide {number}", green) for number in range(count)]
+        return compose_frame(room, LINES, ["step 3"], now=3, cast=faces)
+
+    def faces(frame: np.ndarray) -> np.ndarray:
+        return (frame == (10, 200, 10)).all(axis=2)
+
+    assert not faces(shown(0)).any()
+    one, two, three = (faces(shown(count)).sum() for count in (1, 2, 3))
+    assert (two, three) == (2 * one, 3 * one)
+    assert faces(shown(20)).sum() == 6 * one, "of many the first"
+    below = [np.nonzero(faces(shown(count)))[0].max() for count in (2, 3)]
+    assert below[0] < below[1], "two in a row"

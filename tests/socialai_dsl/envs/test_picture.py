@@ -49,3 +49,23 @@ def test_a_room_without_such_an_npc_is_drawn_as_seen(leaving: ScenarioEnv) -> No
     assert drawn.shape == (160, 160, 3)
     door = draw_tile((tiles.DOOR, 1, 0, 0), None, True, 32)
     assert np.array_equal(drawn[64:96, 128:160][4:-4, 4:-4], door[4:-4, 4:-4])
+
+
+def test_the_cast_has_labels_and_faces(leaving: ScenarioEnv) -> None:
+    (ann,) = leaving.cast()
+    assert ann.label == "ann"
+    assert np.array_equal(ann.look, draw_tile((tiles.NPC, 4, 0, 1), None, False, 32))
+
+
+def test_drawn_names_are_told_and_hidden_npcs_are_not_shown() -> None:
+    env = make("talkitout")
+    env.reset(seed=1)
+    described = env.describe()
+    assert [face.label for face in env.cast()] == [
+        "wizard",
+        f"honest: {described['honest']['name']}",
+        f"liar: {described['liar']['name']}",
+    ]
+    hidden = make("talkitout+unsocial")
+    hidden.reset(seed=1)
+    assert hidden.cast() == []

@@ -185,6 +185,19 @@ def test_ids_tell_utterances_histories_and_pictures_apart() -> None:
         assert (ids["utterance"] == 0).tolist() == silent
 
 
+def test_equal_texts_have_one_number_whoever_says_them() -> None:
+    envs = sd.make_vec("talkitout", 2)
+    room: dict[str, Any] = {"room": {"width": 8, "height": 8}, "agent": {"at": [2, 2]}}
+    honest = {"honest": {"at": [2, 3], "name": "John"}, "liar": {"at": [6, 6], "name": "Jack"}}
+    liar = {"honest": {"at": [6, 6], "name": "Jack"}, "liar": {"at": [2, 3], "name": "John"}}
+    away = {"wizard": {"at": [6, 1]}}
+    envs.reset(seed=0, options={"layout": [{**room, **honest, **away}, {**room, **liar, **away}]})
+    envs.step(np.array([[7, 1, 3, 3]] * 2))
+    assert envs.utterances() == ["John: I am fine."] * 2
+    first, second = envs.utterance_ids()
+    assert first == second != 0
+
+
 def test_counters_count_outcomes_rules_and_episodes() -> None:
     envs = sd.make_vec("talkitout_no_liar+oracle", 30, autoreset_mode="SameStep")
     envs.reset(seed=0)

@@ -1,0 +1,127 @@
+"""Choices among things to code: one condition after the other, collected in a set of bits."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from socialai_dsl.compiler.assembler import Label, constant
+from socialai_dsl.program import Op
+from socialai_dsl.semantics import terms
+from socialai_dsl.semantics.terms import Const
+
+_SET = 32
+"""How many things a set of bits can tell apart."""
+
+if TYPE_CHECKING:
+    from socialai_dsl.compiler.expressions import Expressions
+
+
+def count_things(to: Expressions, term: terms.Quantified) -> int:
+    """A temporary with the number of things that the condition holds for."""
+    if len(term.items) > _SET:
+        return _count_one_by_one(to, term)
+    return to.into_temporary(Op.COUNT_BITS, _mask(to, term))
+
+
+def first_thing(to: Expressions, term: terms.Quantified) -> int:
+    """The operand of the first thing that the condition holds for."""
+    if len(term.items) > _SET:
+        return _nth(to, term, to.into_temporary(Op.LOAD, constant(0)))
+    return _chosen(to, term, Op.LOWEST_BIT)
+
+
+def _mask(to: Expressions, term: terms.Quantified) -> int:
+    """A temporary whose bit i says whether item i holds."""
+    mask = to.block.temporary()
+    to.block.emit(Op.LOAD, mask, constant(0))
+    for i, item in enumerate(term.items):
+        following = Label()
+        to.condition(to.instance(term, item), following)
+        to.block.emit(Op.SET_BIT, mask, constant(i))
+        to.block.bind(following)
+    return mask
+
+
+def picked_thing(to: Expressions, term: terms.Quantified) -> int:
+    """The operand of a drawn thing among those that the condition holds for."""
+    site = to.sites.row(term.site or to.site, term.ordinal)
+    if term.condition is not None and len(term.items) > _SET:
+        choices = to.into_temporary(Op.MAX, _count_one_by_one(to, term), constant(1))
+        return _nth(to, term, to.into_temporary(Op.DRAW, choices, site))
+    if term.condition is not None:
+        return _chosen(to, term, Op.PICK_BIT, site)
+    return _item(to, term.items, to.into_temporary(Op.DRAW, constant(len(term.items)), site))
+
+
+def _chosen(to: Expressions, term: terms.Quantified, op: Op, site: int = 0) -> int:
+    mask = _mask(to, term)
+    if to.failed is not None:
+        to.block.test(Op.IF_NE, mask, constant(0), to.failed)
+    return _item(to, term.items, to.into_temporary(op, mask, site))
+
+
+def _count_one_by_one(to: Expressions, term: terms.Quantified) -> int:
+    total = to.into_temporary(Op.LOAD, constant(0))
+    for item in term.items:
+        following = Label()
+        to.condition(to.instance(term, item), following)
+        to.block.emit(Op.ADD, total, total, constant(1))
+        to.block.bind(following)
+    return total
+
+
+def _nth(to: Expressions, term: terms.Quantified, left: int) -> int:
+    """The thing that comes after `left` others that the condition holds for as well; none: as for small groups."""
+    block = to.block
+    result = to.into_temporary(Op.LOAD, constant(term.items[0].value))
+    done = Label()
+    for item in term.items:
+        following, found = Label(), Label()
+        to.condition(to.instance(term, item), following)
+        block.test(Op.IF_NE, left, constant(0), found)
+        block.emit(Op.SUB, left, left, constant(1))
+        block.skip(following)
+        block.bind(found)
+        block.emit(Op.LOAD, result, constant(item.value))
+        block.skip(done)
+        block.bind(following)
+    if to.failed is not None:
+        block.skip(to.failed)
+    block.bind(done)
+    return result
+
+
+def _item(to: Expressions, items: tuple[Const, ...], position: int) -> int:
+    """The item at a position that is in a temporary."""
+    values = [item.value for item in items]
+    if values == list(range(values[0], values[0] + len(values))):
+        return to.into_temporary(Op.ADD, position, constant(values[0])) if values[0] else position
+    result = to.into_temporary(Op.LOAD, constant(values[0]))
+    for i, value in enumerate(values[1:], 1):
+        following = Label()
+        to.block.test(Op.IF_EQ, position, constant(i), following)
+        to.block.emit(Op.LOAD, result, constant(value))
+        to.block.bind(following)
+    return result
+
+
+def nearest_thing(to: Expressions, term: terms.Quantified) -> int:
+    """The operand of the nearest thing that the condition holds for."""
+    assert term.to is not None
+    block = to.block
+    result = to.into_temporary(Op.LOAD, constant(term.items[0].value))
+    least = to.into_temporary(Op.LOAD, constant(4096))
+    goal = to.value(term.to)
+    for item in term.items:
+        following = Label()
+        mark = block.taken
+        to.condition(to.instance(term, item), following)
+        distance = to.into_temporary(Op.DISTANCE, constant(item.value), goal)
+        block.test(Op.IF_LT, distance, least, following)
+        block.emit(Op.LOAD, least, distance)
+        block.emit(Op.LOAD, result, constant(item.value))
+        block.bind(following)
+        block.release(mark)
+    if to.failed is not None:
+        block.test(Op.IF_LT, least, constant(4096), to.failed)
+    return result

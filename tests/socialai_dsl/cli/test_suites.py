@@ -1,0 +1,98 @@
+"""Suites on the command line: checked, shown, played, trained on and evaluated like scenarios."""
+
+import json
+import shutil
+from io import StringIO
+from pathlib import Path
+
+import pytest
+
+from socialai_dsl.cli.main import main, run_main
+
+Capture = pytest.CaptureFixture[str]
+DATA = Path(__file__).parents[2] / "data" / "suites"
+QUICK = ["--frames", "1500", "--envs", "32", "--eval-episodes", "40", "--device", "cpu"]
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the suites."""
+    shutil.copytree(DATA, tmp_path / "suites")
+    monkeypatch.chdir(tmp_path / "suites")
+    return tmp_path
+
+
+def test_a_run_and_what_it_says_of_each_member(capsys: Capture) -> None:
+    assert run_main(["pair.yaml", *QUICK, "--out", "run"]) == 0
+    printed = capsys.readouterr().out
+    assert "talkitout: failure@" in printed
+    result = json.loads(Path("run/result.json").read_text())
+    members = result["eval"]["members"]
+    assert list(members) == ["talkitout", "errands"]
+    assert sum(member["share"] for member in members.values()) == pytest.approx(1)
+    assert sum(m["share"] * m["success_rate"] for m in members.values()) == pytest.approx(
+        result["eval"]["success_rate"]
+    )
+    assert Path("run/transcript.txt").read_text().split("\n")[0].rpartition(": ")[2] in members
+    last = json.loads(Path("run/metrics.jsonl").read_text().splitlines()[-1])
+    assert "errands: sold" in last["outcomes"]
+    assert "errands: baker.trade.waiting.then[0]" in last["rules"]
+    assert (Path("run") / "learning_curve.png").stat().st_size > 0
+
+    assert run_main(["--resume", "run", "--frames", "3000"]) == 0
+    capsys.readouterr()
+    assert main(["evaluate", "run", "--on", "pair.yaml?split=test", "--episodes", "20", "--json"]) == 0
+    (evaluated,) = json.loads(capsys.readouterr().out)
+    assert list(evaluated["eval"]["members"]) == ["talkitout", "errands_open"]
+
+
+def test_the_scripts_of_a_suite(capsys: Capture) -> None:
+    assert run_main(["social_env", "--agent", "oracle", "--eval-episodes", "60", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["eval"]["success_rate"] > 0.9
+    assert all(member["success_rate"] > 0.5 for member in result["eval"]["members"].values())
+    assert run_main(["pair.yaml", "--agent", "oracle"]) == 2
+    assert "the agent of errands follows no frame" in capsys.readouterr().err
+
+
+def test_a_person_plays_members(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin", StringIO("done\n" * 12 + "quit\n"))
+    assert run_main(["pair.yaml?split=test", "--agent", "human", "--eval-episodes", "8", "--out", "run"]) == 0
+    result = json.loads(Path("run/result.json").read_text())
+    assert sum(result["eval"]["outcomes"].values()) == pytest.approx(1)
+    assert sum(member["share"] for member in result["eval"]["members"].values()) == pytest.approx(1)
+
+
+def test_show(capsys: Capture) -> None:
+    assert main(["show", "pair+loud"]) == 0
+    assert "grammar: concat" in capsys.readouterr().out
+    assert main(["show", "pair", "--program"]) == 0
+    listing = capsys.readouterr().out
+    assert "=== talkitout ===" in listing
+    assert "=== errands ===" in listing
+    assert main(["show", "pair+loud", "--origin"]) == 0
+    assert 'pair_loud.yaml:3:16: grammar = "concat"' in capsys.readouterr().out
+
+
+def test_validate(capsys: Capture) -> None:
+    assert main(["validate", "."]) == 0
+    assert "0 errors" in capsys.readouterr().out
+    text = Path("errands.yaml").read_text()
+    Path("errands.yaml").write_text(text.replace("baker.is(gone)", "baker.is(gon)"))
+    assert main(["validate", "pair.yaml"]) == 1
+    assert "errands.yaml:31:24: S310" in capsys.readouterr().out
+
+
+def test_bench(capsys: Capture) -> None:
+    quick = ["--batch", "8", "--mix", "walk", "--repeat", "1", "--seconds", "0.01", "--json"]
+    assert main(["bench", "pair.yaml", *quick]) == 0
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    assert [row["what"] for row in rows[:2]] == ["pair.yaml", "pair.yaml"]
+
+
+def test_a_room_that_cannot_be_is_the_authors_affair(capsys: Capture) -> None:
+    for agent in ("ppo", "random"):
+        assert run_main(["impossible.yaml", "--agent", agent]) == 1
+        said = capsys.readouterr().err
+        assert said.startswith("socialai-run: impossible: none of 64 rooms was as `require` asks")
+        assert "bug" not in said

@@ -1,0 +1,308 @@
+"""What the verifier proves about cells, boards, loops and the code at each entry: mutants of a small program."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from socialai_dsl.compiler.verifier import InvalidProgramError, verify
+from socialai_dsl.program import (
+    CELL,
+    CONSTANT,
+    ENTITY_FIELDS,
+    FIRST_ENTITY,
+    TEMPORARY,
+    EntityColumn,
+    Field,
+    Header,
+    Op,
+    Program,
+    Register,
+)
+from socialai_dsl.semantics.terms import Compare, Type
+from tests.socialai_dsl.compiler.workbench import DIE, GUIDE, compiled, number, sited, with_let, workbench
+
+Code = Sequence[tuple[int, ...]]
+RESET, RULES, REQUIRE = Header.RESET_PC, Header.RULES_PC, Header.REQUIRE_PC
+
+
+def const(value: int) -> int:
+    return CONSTANT + value
+
+
+def temp(index: int) -> int:
+    return TEMPORARY + index
+
+
+def cell(x: int, y: int) -> int:
+    return const(CELL + 32 * y + x)
+
+
+@pytest.fixture(scope="module")
+def program() -> Program:
+    """A program with code at three entries, each replaced by a test."""
+    checked = with_let(workbench(), "let.n", number(0), Type("int", 0, 5))
+    never = sited(Compare("==", DIE, number(9)), "require[0]")
+    return compiled(replace(checked, require=(never,)))
+
+
+def with_code(program: Program, entry: Header, code: Code) -> Program:
+    """The program with this code, and its HALT, behind all other code."""
+    h = program.header
+    rows = [[*row, *[0] * (4 - len(row))] for row in (*code, (Op.HALT,))]
+    words = program.words.tolist()
+    at, count = h(Header.CODE_AT), h(Header.INSTRUCTIONS)
+    flat = [word for row in rows for word in row]
+    end = at + 4 * count
+    words[end:end] = flat
+    for word in Header:
+        if word.name.endswith("_AT") and h(word) >= end:
+            words[word] += len(flat)
+    words[Header.SIZE] = len(words)
+    words[Header.INSTRUCTIONS] += len(rows)
+    words[entry] = count
+    return replace(
+        program,
+        words=np.array(words, np.int32),
+        source_map=(*program.source_map, *[None] * len(rows)),
+    )
+
+
+def n(program: Program) -> int:
+    """The register of `let.n`, a number from 0 to 5."""
+    return next(name.register for name in program.registers if name.path == "let.n")
+
+
+FILL = (Op.B_FLOOR, 0)
+EACH = (Op.EACH_CELL, 0, temp(0))
+
+SOUND: dict[str, tuple[Header, Code]] = {
+    "tests of cells": (
+        RULES,
+        [(Op.IF_NEXT_TO, cell(6, 6), const(0), 0), (Op.IF_REACHES, const(0), cell(0, 0), 0)],
+    ),
+    "no cell at all": (RULES, [(Op.IF_SAME_CELL, const(CELL - 1), const(0), 0)]),
+    "a cell of an entity": (
+        RULES,
+        [(Op.CELL_OF, temp(0), const(1)), (Op.DISTANCE, temp(1), temp(0), const(2))],
+    ),
+    "a coordinate": (RULES, [(Op.FIELD, temp(0), cell(1, 2), Field.Y)]),
+    "a view": (RULES, [(Op.LOAD, temp(0), const(3)), (Op.SEES, temp(0), const(0), cell(2, 2))]),
+    "a loop in a rule": (
+        RULES,
+        [FILL, (*EACH, 2), (Op.IF_LE, temp(0), temp(2), 0), (Op.DROP_CELL,), (Op.END_EACH,)],
+    ),
+    "a cell of a loop": (RULES, [FILL, (*EACH, 1), (Op.IF_SAME_CELL, temp(2), const(0), 0), (Op.END_EACH,)]),
+    "sets of cells in a rule": (
+        RULES,
+        [
+            FILL,
+            (Op.B_COPY, 1, 0),
+            (Op.B_NEXT_TO, 2, cell(1, 1)),
+            (Op.B_AND, 1, 2),
+            (Op.B_COUNT, temp(0), 1),
+            (Op.FIRST_CELL, temp(1), 1),
+            (Op.NEAREST_CELL, temp(3), 1, const(0)),
+            (Op.PICK_CELL, temp(5), 1, 0),
+        ],
+    ),
+    "a number from before a loop": (
+        RULES,
+        [
+            FILL,
+            (Op.LOAD, temp(5), const(0)),
+            (*EACH, 1),
+            (Op.ADD, temp(5), temp(5), const(1)),
+            (Op.END_EACH,),
+            (Op.IF_EQ, temp(5), const(3), 0),
+        ],
+    ),
+    "acceptance": (REQUIRE, [(Op.LOAD, Register.ACCEPTED, const(1))]),
+}
+
+REFUSED: dict[str, tuple[Header, Code]] = {
+    "an entity or a cell": (
+        RULES,
+        [
+            (Op.LOAD, temp(0), const(2)),
+            (Op.IF_EQ, temp(0), const(2), 1),
+            (Op.LOAD, temp(0), cell(1, 1)),
+            (Op.IF_NEXT_TO, temp(0), const(0), 0),
+        ],
+    ),
+    "a cell below the canvas": (RULES, [(Op.IF_NEXT_TO, cell(0, 7), const(0), 0)]),
+    "a cell beside the last": (RULES, [(Op.IF_NEXT_TO, cell(7, 6), const(0), 0)]),
+    "a number between entities and cells": (RULES, [(Op.IF_NEXT_TO, const(CELL - 2), const(0), 0)]),
+    "looking at an entity that does not exist": (RULES, [(Op.IF_LOOKS_AT, const(0), const(7), 0)]),
+    "nothing between entities that do not exist": (RULES, [(Op.IF_UNOBSTRUCTED, const(-1), const(0), 0)]),
+    "the cell of no entity": (RULES, [(Op.CELL_OF, temp(0), const(7))]),
+    "a cell in a register of something else": (RULES, [(Op.CELL_OF, "n", const(0))]),
+    "a cell that sees": (RULES, [(Op.LOAD, temp(0), const(0)), (Op.SEES, temp(0), cell(1, 1), const(0))]),
+    "a view in no direction": (RULES, [(Op.LOAD, temp(0), const(4)), (Op.SEES, temp(0), const(0), const(1))]),
+    "a view in a direction that was never written": (RULES, [(Op.SEES, temp(0), const(0), const(1))]),
+    "a view that turns a register": (RULES, [(Op.SEES, Register.ACCEPTED, const(0), const(1))]),
+    "a cell that says something": (RULES, [(Op.SAY, cell(1, 1), const(0))]),
+    "a cell that vanishes": (RULES, [(Op.VANISH, cell(1, 1))]),
+    "a cell with a status": (RULES, [(Op.BECOME, cell(1, 1), const(0))]),
+    "a cell that walks": (RULES, [(Op.GO_TO, cell(1, 1), const(0), 0)]),
+    "the colour of a cell as a status": (
+        RULES,
+        [(Op.FIELD, temp(0), cell(1, 1), 0), (Op.BECOME, const(3), temp(0))],
+    ),
+    "a set of cells that was never filled": (RULES, [(Op.B_COUNT, temp(0), 0)]),
+    "a set of cells that was filled on one way only": (
+        RULES,
+        [(Op.IF_EQ, const(0), const(1), 1), FILL, (Op.B_COUNT, temp(0), 0)],
+    ),
+    "a copy of nothing": (RULES, [(Op.B_COPY, 0, 1)]),
+    "a set of cells that only a loop fills": (
+        RULES,
+        [FILL, (*EACH, 1), (Op.B_FLOOR, 1), (Op.END_EACH,), (Op.B_COUNT, temp(5), 1)],
+    ),
+    "a set of cells that does not exist": (RULES, [(Op.B_FLOOR, 8)]),
+    "a count in a register": (RULES, [FILL, (Op.B_COUNT, "n", 0)]),
+    "a cell in one temporary": (RULES, [FILL, (Op.FIRST_CELL, temp(63), 0)]),
+    "the cell nearest to nobody": (RULES, [FILL, (Op.NEAREST_CELL, temp(0), 0, const(9))]),
+    "a pick without a site": (RULES, [FILL, (Op.PICK_CELL, temp(0), 0, 999)]),
+    "free cells in a rule": (RULES, [FILL, (Op.B_FREE, 0)]),
+    "a placement in a rule": (RULES, [FILL, (Op.FIRST_CELL, temp(0), 0), (Op.PUT, const(1), temp(0))]),
+    "a new room in a rule": (RULES, [(Op.MAKE_ROOM, const(7), const(7))]),
+    "a loop over nothing": (RULES, [(*EACH, 1), (Op.DROP_CELL,), (Op.END_EACH,)]),
+    "a loop without an end": (RULES, [FILL, (*EACH, 1), (Op.DROP_CELL,), (Op.SKIP, 0, 0, 0)]),
+    "a loop in a loop": (
+        RULES,
+        [FILL, (*EACH, 3), (Op.EACH_CELL, 0, temp(3), 1), (Op.DROP_CELL,), (Op.END_EACH,), (Op.END_EACH,)],
+    ),
+    "a loop with room for two coordinates": (
+        RULES,
+        [FILL, (Op.EACH_CELL, 0, temp(62), 1), (Op.DROP_CELL,), (Op.END_EACH,)],
+    ),
+    "a way out of a loop": (
+        RULES,
+        [
+            FILL,
+            (*EACH, 2),
+            (Op.IF_EQ, const(0), const(1), 2),
+            (Op.DROP_CELL,),
+            (Op.END_EACH,),
+            (Op.IF_EQ, const(0), const(0), 0),
+        ],
+    ),
+    "a way into a loop": (
+        RULES,
+        [
+            FILL,
+            (Op.IF_EQ, const(0), const(1), 2),
+            (*EACH, 2),
+            (Op.DROP_CELL,),
+            (Op.DROP_CELL,),
+            (Op.END_EACH,),
+        ],
+    ),
+    "an end in a loop": (RULES, [FILL, (*EACH, 1), (Op.HALT,), (Op.END_EACH,)]),
+    "a cell dropped outside of a loop": (RULES, [FILL, (Op.DROP_CELL,)]),
+    "an end of no loop": (RULES, [FILL, (Op.END_EACH,)]),
+    "an entity that grows in a loop": (
+        RULES,
+        [
+            FILL,
+            (Op.LOAD, temp(5), const(0)),
+            (*EACH, 2),
+            (Op.IF_NEXT_TO, temp(5), const(0), 0),
+            (Op.ADD, temp(5), temp(5), const(1)),
+            (Op.END_EACH,),
+        ],
+    ),
+    "an entity that grew in a loop": (
+        RULES,
+        [
+            FILL,
+            (Op.LOAD, temp(5), const(0)),
+            (*EACH, 1),
+            (Op.ADD, temp(5), temp(5), const(1)),
+            (Op.END_EACH,),
+            (Op.IF_NEXT_TO, temp(5), const(0), 0),
+        ],
+    ),
+    "a set of bits that grows in a loop": (
+        RULES,
+        [FILL, (Op.LOAD, temp(5), const(0)), (*EACH, 1), (Op.SET_BIT, temp(5), temp(0)), (Op.END_EACH,)],
+    ),
+    "a value that only a loop writes": (
+        RULES,
+        [FILL, (*EACH, 1), (Op.LOAD, temp(5), const(0)), (Op.END_EACH,), (Op.IF_EQ, temp(5), const(0), 0)],
+    ),
+    "a value from the round before": (
+        RULES,
+        [FILL, (*EACH, 2), (Op.IF_EQ, temp(5), const(0), 0), (Op.LOAD, temp(5), const(0)), (Op.END_EACH,)],
+    ),
+    "the cell of a loop behind it": (
+        RULES,
+        [FILL, (*EACH, 1), (Op.DROP_CELL,), (Op.END_EACH,), (Op.IF_NEXT_TO, temp(2), const(0), 0)],
+    ),
+    "acceptance by a rule": (RULES, [(Op.LOAD, Register.ACCEPTED, const(1))]),
+    "acceptance by the reset": (RESET, [(Op.LOAD, Register.ACCEPTED, const(1))]),
+    "a number written while a room is judged": (REQUIRE, [(Op.LOAD, "n", const(1))]),
+    "time written by a rule": (RULES, [(Op.LOAD, Register.T, const(1))]),
+    "a place written by a rule": (RULES, [(Op.LOAD, FIRST_ENTITY + Field.X, const(1))]),
+    "a direction written by a rule": (RULES, [(Op.LOAD, FIRST_ENTITY + Field.DIR, const(1))]),
+    "a place written by the reset": (RESET, [(Op.LOAD, FIRST_ENTITY + Field.X, const(1))]),
+    "an inbox written by a rule": (RULES, [(Op.LOAD, "inbox", const(1))]),
+    "a kind that is too great": (
+        RESET,
+        [(Op.LOAD, FIRST_ENTITY + ENTITY_FIELDS * GUIDE + Field.STATUS, const(200))],
+    ),
+    "the width before there is a room": (
+        RESET,
+        [FILL, (Op.LOAD, temp(0), Register.WIDTH), (Op.LOAD, temp(1), const(0)), (Op.PUT, const(1), temp(0))],
+    ),
+}
+
+
+def filled_in(program: Program, code: Code) -> Code:
+    """The code with the numbers of registers that are called by name."""
+    registers = {"n": n(program), "inbox": program.header(Header.INBOX)}
+    return [tuple(registers.get(word, word) for word in row) for row in code]  # type: ignore[call-overload]
+
+
+@pytest.mark.parametrize("name", SOUND)
+def test_sound_code_is_accepted(name: str, program: Program) -> None:
+    entry, code = SOUND[name]
+    verify(with_code(program, entry, filled_in(program, code)))
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_unsound_code_is_refused(name: str, program: Program) -> None:
+    entry, code = REFUSED[name]
+    with pytest.raises(InvalidProgramError, match="refused: at "):
+        verify(with_code(program, entry, filled_in(program, code)))
+
+
+TABLES: dict[str, Callable[[Program], tuple[int, int]]] = {
+    "an NPC with a status code beyond the picture": lambda p: (
+        p.header(Header.ENTITY_AT) + EntityColumn.COLUMNS * GUIDE + EntityColumn.KIND,
+        256,
+    ),
+    "a view without an extent": lambda p: (p.header(Header.ENTITY_AT) + EntityColumn.VIEW, 0),
+    "code for links outside of the table": lambda p: (Header.LINKS_PC, 5000),
+    "code before steps outside of the table": lambda p: (Header.BEFORE_PC, -1),
+    "code for required rooms outside of the table": lambda p: (Header.REQUIRE_PC, 5000),
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_unsound_tables_are_refused(name: str, program: Program) -> None:
+    at, value = TABLES[name](program)
+    words = program.words.copy()
+    words[at] = value
+    with pytest.raises(InvalidProgramError, match="refused"):
+        verify(replace(program, words=words))
+
+
+def test_a_register_has_one_name(program: Program) -> None:
+    twice = (*program.registers, replace(program.registers[0], path="let.alias"))
+    with pytest.raises(InvalidProgramError, match="two names"):
+        verify(replace(program, registers=twice))

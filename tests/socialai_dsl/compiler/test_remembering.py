@@ -1,0 +1,238 @@
+"""What was before (`prev`), what the agent did last, and the rules of the world that ask for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from socialai_dsl.program import Header
+from socialai_dsl.semantics.terms import (
+    ACTION,
+    CELL,
+    CellOf,
+    Chance,
+    Checked,
+    Compare,
+    Const,
+    Drawn,
+    Effect,
+    FieldOf,
+    Logic,
+    MemoryPlan,
+    Operation,
+    Quantified,
+    Read,
+    RulePlan,
+    Term,
+    Type,
+    World,
+)
+from tests.socialai_dsl.compiler.workbench import (
+    AGENT,
+    BOX,
+    DIE,
+    DOOR,
+    ENTITY,
+    SPAN,
+    code,
+    compiled,
+    entity,
+    number,
+    sited,
+    start,
+    step,
+    with_let,
+    workbench,
+)
+
+UTTERANCE = Type("utterance", 0, 4, ("", "Go up", "Go down", "Look up", "Look down"))
+X = FieldOf(Type("int", 0, 6), entity(AGENT), "x")
+TIME = World(Type("int", 0, 20), "t")
+COUNTER = Read(Type("int", 0, 5), "let.n")
+
+
+def counting(*rules: RulePlan) -> Checked:
+    """The scenario with a number `let.n` from 0 to 5 and rules of the world."""
+    return replace(with_let(workbench(), "let.n", Const(COUNTER.type, 0)), rules=rules)
+
+
+def rule(name: str, when: Term | None = None, add: Term | None = None, **more: Any) -> RulePlan:
+    """A rule that adds to the counter."""
+    total = Operation(Type("int", -20, 20), "+", (COUNTER, add or number(1)))
+    sets = (("let.n", sited(total, f"rules.{name}.set")),)
+    return RulePlan(name, f"rules.{name}", SPAN, when=sited(when, name) if when else None, sets=sets, **more)
+
+
+def played(checked: Checked, *actions: str, seed: int = 0) -> list[int]:
+    """The counter after each step."""
+    env = start(checked, {"agent": {"at": [1, 4]}}, seed)
+    seen = []
+    for action in actions:
+        step(env, action)
+        seen.append(env.describe()["let"]["n"])
+    return seen
+
+
+# --- rules of the world ---
+
+
+def test_every_rule_that_holds_fires_top_to_bottom() -> None:
+    late = Compare("<=", number(2), TIME)
+    checked = counting(
+        rule("a", late), rule("b", late, add=number(2)), rule("c", Compare("==", COUNTER, number(4)))
+    )
+    assert played(checked, "left", "left", "left") == [0, 3, 5], "and registers saturate"
+
+
+def test_rules_are_counted_by_name_behind_those_of_frames() -> None:
+    program = compiled(counting(rule("first"), rule("second", Compare("==", TIME, number(2)))))
+    assert program.rules == ("first", "second")
+    env = start(counting(rule("first"), rule("second", Compare("==", TIME, number(2)))))
+    for _ in range(3):
+        step(env)
+    assert env.counters()["rules"] == {"first": 3, "second": 1}
+
+
+def test_once_is_once_an_episode() -> None:
+    checked = counting(rule("single", once=True))
+    assert played(checked, "left", "left", "left") == [1, 1, 1]
+    assert any(name.path == "world.fired.single" for name in compiled(checked).registers)
+
+
+def test_chance_of_a_rule_and_in_a_condition() -> None:
+    often = counting(rule("maybe", chance=0.5))
+    assert 0 < sum(played(often, "left", seed=seed)[0] for seed in range(40)) < 40
+    asked = counting(rule("maybe", Chance(0.5, 0, "")))
+    assert 0 < sum(played(asked, "left", seed=seed)[0] for seed in range(40)) < 40
+    assert played(counting(rule("never", Chance(0.0))), "left") == [0]
+    assert played(counting(rule("ever", Chance(1.0))), "left") == [1]
+
+
+def test_two_chances_of_one_value_are_two_draws() -> None:
+    both = Logic("and", (Chance(0.5, 0), Compare("==", Chance(0.5, 1), Const(ACTION, 0))))
+    fired = sum(played(counting(rule("maybe", both)), "left", seed=seed)[0] for seed in range(60))
+    assert fired > 0
+
+
+def test_effects_in_order() -> None:
+    causes = (Effect("vanish", (entity(BOX),), SPAN), Effect("open", (entity(DOOR),), SPAN))
+    env = start(replace(workbench(), rules=(RulePlan("law", "rules[0]", SPAN, causes=causes),)))
+    step(env)
+    state = env.describe()
+    assert state["box"]["gone"] is True
+    assert state["door"]["state"] == "open"
+
+
+def test_a_rule_without_a_thing_to_pick_does_not_fire() -> None:
+    none = Quantified(ENTITY, "pick", "e", (entity(DOOR), entity(BOX)), Compare("==", DIE, number(9)))
+    law = rule("law", causes=(Effect("vanish", (none,), SPAN),))
+    assert played(counting(law), "left") == [0]
+
+
+# --- prev ---
+
+
+def remembering(term: Term, type_: Type, condition: Term) -> Checked:
+    item = Drawn("prev.0", type_, sited(term, "prev.0"))
+    return replace(counting(rule("law", condition)), remembered=(item,))
+
+
+def test_prev_is_the_value_that_the_last_step_left() -> None:
+    moved = Compare("!=", X, Read(X.type, "prev.0"))
+    checked = remembering(X, X.type, moved)
+    env = start(checked, {"agent": {"at": [1, 4], "facing": "right"}})
+    seen = []
+    for action in ("forward", "left", "right", "forward"):
+        step(env, action)
+        seen.append(env.describe()["let"]["n"])
+    assert seen == [1, 1, 1, 2]
+
+
+def test_prev_of_what_the_agent_did() -> None:
+    action = World(ACTION, "action")
+    twice = Compare("==", action, Read(ACTION, "prev.0"))
+    assert played(remembering(action, ACTION, twice), "left", "left", "right", "right", "left") == [
+        0,
+        1,
+        1,
+        2,
+        2,
+    ]
+
+
+def test_prev_of_a_cell() -> None:
+    stayed = Compare("==", CellOf(CELL, entity(AGENT)), Read(CELL, "prev.0"))
+    checked = remembering(CellOf(CELL, entity(AGENT)), CELL, stayed)
+    env = start(checked, {"agent": {"at": [1, 4], "facing": "right"}})
+    for action in ("forward", "left", "forward"):
+        step(env, action)
+    assert env.describe()["let"]["n"] == 1
+
+
+def test_a_value_without_zero_starts_with_its_least() -> None:
+    late = Type("int", 3, 9)
+    checked = remembering(number(5), late, Compare("==", Read(late, "prev.0"), number(5)))
+    assert [line for line in code(compiled(checked), "reset") if line == "IF_UNPINNED"]
+    assert played(checked, "left", "left") == [1, 2]
+
+
+# --- memories ---
+
+
+def acting(open_: Term | None = None, length: int = 2) -> Checked:
+    plan = MemoryPlan("memory.acts", length, UTTERANCE, sited(open_, "memory.acts") if open_ else None)
+    return replace(workbench(), memories=(plan,))
+
+
+def test_the_newest_act_pushes_the_oldest_out() -> None:
+    env = start(acting())
+    seen = []
+    for word, pair in (("left", None), ("right", 3), ("none", 0)):
+        step(env, word, pair)
+        seen.append(env.describe()["memory"]["acts"])
+    assert seen == [
+        [["left", None]],
+        [["left", None], ["right", "Look down"]],
+        [["right", "Look down"], ["none", "Go up"]],
+    ]
+
+
+def test_a_shut_memory_keeps_what_it_holds() -> None:
+    """What counts is how things were when the step began."""
+    env = start(acting(Compare("==", FieldOf(Type("direction", 0, 3), entity(AGENT), "dir"), number(0))))
+    for word in ("left", "forward", "right", "forward"):
+        step(env, word)
+    assert env.describe()["memory"]["acts"] == [["left", None], ["forward", None]]
+
+
+def test_how_many_acts_are_held() -> None:
+    filled = Read(Type("int", 0, 2), "memory.acts.filled")
+    full = RulePlan("full", "rules[0]", SPAN, when=sited(Compare("==", filled, number(2)), "full"))
+    env = start(replace(acting(), rules=(full,)))
+    for _ in range(4):
+        step(env, "left")
+    assert env.counters()["rules"]["full"] == 3, "memories take in the act before the rules look"
+
+
+def test_registers_of_a_memory() -> None:
+    paths = [name.path for name in compiled(acting(Compare("==", DIE, number(1)))).registers]
+    assert [path for path in paths if path.startswith("memory.")] == [
+        "memory.acts[0].move",
+        "memory.acts[0].utterance",
+        "memory.acts[1].move",
+        "memory.acts[1].utterance",
+        "memory.acts.filled",
+        "memory.acts.open",
+    ]
+    always = [name.path for name in compiled(acting()).registers]
+    assert "memory.acts.open" not in always
+
+
+def test_what_is_not_needed_costs_nothing() -> None:
+    program = compiled(workbench())
+    assert [program.header(word) for word in (Header.BEFORE_PC, Header.RULES_PC, Header.SETTLE_PC)] == [
+        0,
+        0,
+        0,
+    ]
+    assert code(compiled(acting(length=1)), "rules") == ["LOAD", "LOAD", "ADD", "MIN", "HALT"]

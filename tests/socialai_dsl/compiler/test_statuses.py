@@ -1,0 +1,297 @@
+"""Links and computed statuses: what follows from what, when it is worked out, and what a layout may say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from socialai_dsl.compiler.changes import Changes, When
+from socialai_dsl.program import Flag, Header
+from socialai_dsl.semantics.terms import (
+    BOOL,
+    CELL,
+    COLOR,
+    DIRECTION,
+    CellOf,
+    Chance,
+    Checked,
+    Compare,
+    Computed,
+    Const,
+    Effect,
+    FieldOf,
+    Logic,
+    Measure,
+    Not,
+    PokedNow,
+    Quantified,
+    Read,
+    RulePlan,
+    Sees,
+    Select,
+    Spoke,
+    Term,
+    Type,
+    Variable,
+    World,
+)
+from socialai_dsl.semantics.terms import (
+    Test as Relation,
+)
+from tests.socialai_dsl.compiler.workbench import (
+    AGENT,
+    BOX,
+    DIE,
+    DOOR,
+    ENTITY,
+    GUIDE,
+    HERE,
+    NUMBER,
+    OTHER_SWITCH,
+    SPAN,
+    STATUE,
+    SWITCH,
+    activity,
+    cell,
+    code,
+    compiled,
+    entity,
+    listed,
+    number,
+    sited,
+    start,
+    state,
+    step,
+    with_guide,
+    workbench,
+)
+
+OPEN, CLOSED, LOCKED = 0, 1, 2
+STATUS = Type("status", 0, 2)
+
+
+def status(thing: int, value: int) -> Compare:
+    return Compare("==", FieldOf(STATUS, entity(thing), "status"), Const(STATUS, value))
+
+
+def computed(*conditions: Term) -> Checked:
+    """The door is locked while each of the conditions holds (one after the other)."""
+    items = tuple(
+        Computed(DOOR, LOCKED, CLOSED, sited(condition, "objects.door.locked")) for condition in conditions
+    )
+    return replace(workbench(), computed=items)
+
+
+def linked(*targets: int) -> Checked:
+    entities = tuple(replace(e, unlocks=targets) if e.number == SWITCH else e for e in workbench().entities)
+    return replace(workbench(), entities=entities)
+
+
+def law(*effects: Effect, when: Term | None = None, once: bool = False) -> RulePlan:
+    return RulePlan("law", "rules[0]", SPAN, when=sited(when) if when else None, causes=effects, once=once)
+
+
+def become(thing: int, value: int) -> Effect:
+    return Effect("become", (entity(thing),), SPAN, Const(STATUS, value))
+
+
+def door(env: Any) -> str:
+    return env.describe()["door"]["state"]
+
+
+def settles_always(checked: Checked) -> bool:
+    return bool(compiled(checked).header(Header.FLAGS) & Flag.SETTLE_ALWAYS)
+
+
+# --- links ---
+
+
+def test_a_pressed_switch_unlocks_what_is_locked_and_nothing_else() -> None:
+    for before, after in (("locked", "closed"), ("open", "open"), ("closed", "closed")):
+        env = start(linked(DOOR, BOX), {"door": {"state": before}, "switches": [{"state": "pressed"}]})
+        assert door(env) == after
+        env = start(linked(DOOR, BOX), {"door": {"state": before}})
+        assert door(env) == before
+
+
+def test_a_link_is_a_level() -> None:
+    """What a pressed switch unlocks cannot be locked; once it is idle again it can."""
+    pressed = {"switches": [{"state": "pressed"}]}
+    env = start(replace(linked(DOOR), rules=(law(become(DOOR, LOCKED)),)), pressed)
+    step(env)
+    assert door(env) == "closed"
+    both = (law(become(SWITCH, 0), become(DOOR, LOCKED)),)
+    env = start(replace(linked(DOOR), rules=both), pressed)
+    step(env)
+    assert door(env) == "locked"
+
+
+def test_a_switch_that_is_gone_unlocks_nothing() -> None:
+    env = start(linked(DOOR), {"door": {"state": "locked"}, "switches": [{"state": "pressed", "gone": True}]})
+    assert door(env) == "locked"
+
+
+def test_without_links_there_is_no_code() -> None:
+    assert compiled(workbench()).header(Header.LINKS_PC) == 0
+    assert code(compiled(linked(DOOR)), "links") == ["IF_EQ", "IF_EQ", "IF_EQ", "BECOME", "HALT"]
+
+
+# --- computed statuses ---
+
+
+def test_on_while_the_condition_holds_and_off_when_it_stops() -> None:
+    at_two = Compare("==", World(NUMBER, "t"), number(2))
+    checked = replace(computed(Not(status(SWITCH, 1))), rules=(law(become(SWITCH, 1), when=at_two),))
+    env = start(checked, {"door": {"state": "open"}})
+    seen = [door(env)]
+    for _ in range(3):
+        step(env)
+        seen.append(door(env))
+    assert seen == ["locked", "locked", "closed", "closed"]
+    assert not settles_always(checked), "it only depends on the status of an object"
+
+
+def test_other_statuses_are_left_alone() -> None:
+    env = start(replace(computed(status(SWITCH, 1)), rules=(law(become(DOOR, OPEN)),)))
+    assert door(env) == "closed"
+    step(env)
+    assert door(env) == "open"
+
+
+def test_one_pass_in_the_order_given() -> None:
+    """The second switch follows the door, which follows the first switch."""
+    follows = Computed(OTHER_SWITCH, 1, 0, sited(status(DOOR, LOCKED), "objects.switches.state"))
+    checked = computed(status(SWITCH, 1))
+    checked = replace(checked, computed=(*checked.computed, follows), rules=(law(become(SWITCH, 1)),))
+    env = start(checked)
+    step(env)
+    assert [thing["state"] for thing in env.describe()["switches"]] == ["pressed", "pressed"]
+
+
+def test_what_the_agent_does_is_looked_at_all_the_time() -> None:
+    checked = computed(Compare("<=", FieldOf(NUMBER, entity(AGENT), "x"), number(1)))
+    assert settles_always(checked)
+    env = start(checked, {"agent": {"at": [2, 4], "facing": "left"}})
+    seen = [door(env)]
+    step(env, "forward")
+    seen.append(door(env))
+    assert seen == ["closed", "locked"]
+
+
+def test_what_cannot_change_is_decided_by_the_reset() -> None:
+    checked = computed(Compare("==", DIE, number(2)))
+    program = compiled(checked)
+    assert program.header(Header.SETTLE_PC) == 0
+    assert not settles_always(checked)
+    assert [door(start(checked, {"let": {"die": die}})) for die in range(4)] == [
+        "closed",
+        "closed",
+        "locked",
+        "closed",
+    ]
+    assert door(start(checked, {"let": {"die": 2}, "door": {"state": "open"}})) == "open", (
+        "a layout has its way"
+    )
+
+
+def test_listings_say_where_a_status_comes_from() -> None:
+    program = compiled(computed(status(SWITCH, 1)))
+    assert all(line.endswith("workbench.yaml:1") for line in listed(program, "settle"))
+
+
+# --- what can change ---
+
+THING = Variable(ENTITY, "e")
+
+
+def some(condition: Term, *items: int) -> Quantified:
+    return Quantified(BOOL, "any", "e", tuple(map(entity, items)), condition)
+
+
+def any_cell(condition: Term) -> Quantified:
+    return Quantified(BOOL, "any", "c", (), condition, cells=True)
+
+
+N, S, A = When.NEVER, When.STATUSES, When.ANY_TIME
+OCCASIONS: list[tuple[Term, When]] = [
+    (Compare("==", DIE, number(2)), N),
+    (Compare("==", World(NUMBER, "width"), number(2)), N),
+    (Compare("==", World(NUMBER, "t"), number(2)), A),
+    (Spoke(), A),
+    (PokedNow(entity(STATUE)), A),
+    (Chance(0.5), A),
+    (Read(NUMBER, "memory.acts.filled"), A),
+    (Read(NUMBER, "let.written"), A),
+    (Read(NUMBER, "let.kept"), N),
+    (FieldOf(COLOR, entity(AGENT), "color"), N),
+    (FieldOf(NUMBER, entity(STATUE), "x"), N),
+    (FieldOf(NUMBER, entity(AGENT), "x"), A),
+    (FieldOf(NUMBER, entity(BOX), "y"), S),
+    (FieldOf(BOOL, entity(BOX), "gone"), S),
+    (FieldOf(BOOL, entity(DOOR), "gone"), N),
+    (FieldOf(BOOL, entity(STATUE), "poked"), A),
+    (FieldOf(DIRECTION, entity(STATUE), "dir"), N),
+    (FieldOf(DIRECTION, entity(GUIDE), "dir"), A),
+    (FieldOf(NUMBER, entity(STATUE), "status"), N),
+    (FieldOf(STATUS, Read(Type("entity", DOOR, SWITCH), "let.kept"), "status"), S),
+    (FieldOf(NUMBER, Read(Type("entity", AGENT, STATUE), "let.kept"), "y"), A),
+    (FieldOf(NUMBER, cell(1, 2), "x"), N),
+    (CellOf(CELL, entity(DOOR)), N),
+    (CellOf(CELL, entity(AGENT)), A),
+    (Measure(NUMBER, "distance", (entity(STATUE), entity(DOOR))), N),
+    (Measure(NUMBER, "distance", (entity(STATUE), entity(BOX))), S),
+    (Measure(NUMBER, "distance", (entity(GUIDE), cell(1, 1))), N),
+    (Relation("next_to", entity(STATUE), entity(DOOR)), N),
+    (Relation("next_to", entity(AGENT), entity(DOOR)), A),
+    (Relation("faces", entity(GUIDE), entity(DOOR)), A),
+    (Relation("faces", entity(STATUE), entity(DOOR)), N),
+    (Relation("eye_contact", entity(STATUE), entity(GUIDE)), A),
+    (Relation("in_front_of", entity(STATUE), entity(GUIDE)), A),
+    (Relation("can_reach", entity(STATUE), entity(DOOR)), A),
+    (Relation("unobstructed", entity(STATUE), entity(DOOR)), S),
+    (Relation("looks_at", entity(STATUE), entity(DOOR)), S),
+    (Relation("looks_at", entity(GUIDE), entity(DOOR)), A),
+    (Sees(entity(STATUE), entity(DOOR)), N),
+    (Sees(entity(GUIDE), entity(DOOR)), A),
+    (Sees(entity(GUIDE), entity(DOOR), Const(DIRECTION, 1)), N),
+    (Sees(entity(STATUE), entity(AGENT)), A),
+    (Logic("and", (Compare("==", DIE, number(2)), status(SWITCH, 1))), S),
+    (Not(status(SWITCH, 1)), S),
+    (Select(NUMBER, (status(SWITCH, 1),), (number(1),), World(NUMBER, "t")), A),
+    (some(Relation("next_to", THING, cell(1, 1)), STATUE, DOOR), N),
+    (some(Relation("next_to", THING, cell(1, 1)), STATUE, AGENT), A),
+    (Quantified(ENTITY, "pick", "e", (entity(DOOR), entity(BOX)), None), A),
+    (Quantified(ENTITY, "nearest", "e", (entity(DOOR), entity(STATUE)), None, entity(DOOR)), N),
+    (Quantified(ENTITY, "nearest", "e", (entity(DOOR), entity(STATUE)), None, entity(AGENT)), A),
+    (any_cell(Relation("next_to", HERE, entity(DOOR))), N),
+    (any_cell(Relation("next_to", HERE, entity(AGENT))), A),
+    (Quantified(CELL, "nearest", "c", (), None, entity(AGENT), cells=True), A),
+]
+
+
+@pytest.mark.parametrize(("term", "when"), OCCASIONS)
+def test_when_a_value_can_change(term: Term, when: When) -> None:
+    """The guide turns, the statue does nothing, the box may vanish, a rule writes `let.written`."""
+    checked = with_guide(workbench(), state("waiting", activity("turn_to", Const(DIRECTION, 1))))
+    rule = RulePlan(
+        "law",
+        "rules[0]",
+        SPAN,
+        sets=(("let.written", sited(number(1))),),
+        causes=(Effect("vanish", (entity(BOX),), SPAN),),
+    )
+    assert Changes(replace(checked, rules=(rule,))).of(term) == when
+
+
+@pytest.mark.parametrize(
+    ("name", "walks"), [("stay", False), ("turn", False), ("forward", True), ("go_to", True)]
+)
+def test_who_walks(name: str, walks: bool) -> None:
+    goal = {"turn": (Const(Type("int", -1, 1), 1),), "go_to": (entity(DOOR),)}.get(name, ())
+    checked = with_guide(workbench(), state("waiting", activity(name, *goal)))
+    assert Changes(checked).of(FieldOf(NUMBER, entity(GUIDE), "x")) == (A if walks else N)
+    in_first = RulePlan("r", "guide/r", SPAN, do=activity(name, *goal))
+    checked = with_guide(workbench(), state("waiting", activity("stay"), first=(in_first,)))
+    assert Changes(checked).of(FieldOf(NUMBER, entity(GUIDE), "x")) == (A if walks else N)

@@ -1,0 +1,1241 @@
+"""The order of events in one step: a test for every numbered sentence of docs/one_step.md."""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from tests.tiny import Folder, Play
+
+PAGE = Path(__file__).parents[1] / "docs" / "one_step.md"
+
+EMPTY, DOOR, NPC = 1, 4, 11
+"""Codes of types in the picture."""
+
+
+@pytest.fixture
+def play(tmp_path: Path) -> Folder:
+    """Writes tiny scenarios and begins their episodes."""
+    return Folder(tmp_path)
+
+
+# -- the page and its tests ------------------------------------------------------------------------
+
+
+def _lines_of_lists() -> list[str]:
+    text = PAGE.read_text(encoding="utf-8").split("\n## ", 1)[1]
+    joined = re.sub(r"\n  (?=\S)", " ", text)
+    return [line for line in joined.splitlines() if line and not re.match(r"(## )?\d+\. ", line)]
+
+
+def _numbered() -> dict[str, str]:
+    found = [re.fullmatch(r"\* \*\*(\d+\.\d+)\*\* (.+)", line) for line in _lines_of_lists()]
+    return {match[1]: match[2] for match in found if match}
+
+
+def test_everything_on_the_page_is_a_numbered_sentence() -> None:
+    lines = _lines_of_lists()
+    assert len(lines) > 80
+    assert [line for line in lines if not re.match(r"\* \*\*\d+\.\d+\*\* ", line)] == []
+    assert len(_numbered()) == len(lines), "a number twice"
+    one = [re.search(r"[.?!] [A-Z]", text) is None and text.endswith(".") for text in _numbered().values()]
+    assert all(one), "one sentence for each number"
+
+
+def test_numbers_count_up() -> None:
+    numbers = [tuple(map(int, number.split("."))) for number in _numbered()]
+    for before, after in pairwise(numbers):
+        assert after in ((before[0], before[1] + 1), (before[0] + 1, 1))
+
+
+def test_every_sentence_has_its_test_and_the_other_way_round() -> None:
+    tests = [re.match(r"test_(\d+)_(\d+)_", name) for name in globals()]
+    tested = [f"{match[1]}.{match[2]}" for match in tests if match]
+    assert sorted(tested) == sorted(_numbered()), "each number of the page once"
+
+
+# -- 0. before anything happens --------------------------------------------------------------------
+
+
+def test_0_1_prev_is_the_value_in_the_state_the_last_step_left(play: Folder) -> None:
+    run = play("""
+        frames: {watch: {let: {was: 0, now: 0}, states: {s: {then: [{set: {was: prev(agent.x), now: agent.x}}]}}}}
+        cast: {ann: {at: [5, 5], frame: watch}}
+    """)
+    run.step("forward")
+    assert (run.value("ann.was"), run.value("ann.now")) == (1, 2)
+    run.step("left")
+    assert (run.value("ann.was"), run.value("ann.now")) == (2, 2)
+
+
+def test_0_2_prev_is_kept_for_the_whole_step(play: Folder) -> None:
+    run = play("""
+        frames:
+          walk:
+            let: {early: 0, late: 0}
+            states:
+              s: {first: [{set: {early: prev(self.x)}}], do: forward, then: [{set: {late: prev(self.x)}}]}
+        cast: {ann: {at: [2, 5], facing: right, frame: walk}}
+    """)
+    run.step()
+    assert run.at("ann") == [3, 5]
+    assert (run.value("ann.early"), run.value("ann.late")) == (2, 2)
+
+
+def test_0_3_a_memory_is_open_if_its_condition_held_before(play: Folder) -> None:
+    run = play("memory: {acts: {last: 2, of: agent.acts, while: agent.x == 1}}")
+    run.step("forward")
+    assert run.state["memory"]["acts"] == [["forward", None]], "it stood at x = 1 when the step began"
+    run.step("left").step("left").step("forward")
+    assert run.state["memory"]["acts"] == [["forward", None]], "it came back to x = 1 only in the step"
+
+
+def test_0_4_then_t_grows_by_one(play: Folder) -> None:
+    run = play("""
+        frames: {watch: {let: {was: 0, now: 0}, states: {s: {first: [{set: {was: prev(t), now: t}}]}}}}
+        cast: {ann: {at: [5, 5], frame: watch}}
+    """)
+    run.steps(2)
+    assert run.state["t"] == 2
+    assert (run.value("ann.was"), run.value("ann.now")) == (1, 2)
+
+
+def test_0_5_what_the_agent_does_and_says_is_of_this_step(play: Folder) -> None:
+    run = play("""
+        frames:
+          watch:
+            let: {moved: false, talked: false, greeted: false}
+            states:
+              s:
+                then:
+                  - set: {moved: agent.action == forward, talked: agent.spoke, greeted: agent.said("Say hello")}
+        cast: {ann: {at: [5, 5], frame: watch}}
+    """)
+    names = ("ann.moved", "ann.talked", "ann.greeted")
+    run.step("forward", "Say hello")
+    assert [run.value(name) for name in names] == [True, True, True]
+    run.step()
+    assert [run.value(name) for name in names] == [False, False, False]
+
+
+def test_0_6_poked_is_of_this_step_and_was_poked_of_the_episode(play: Folder) -> None:
+    run = play("""
+        frames:
+          watch:
+            let: {now: false, earlier: false}
+            states: {s: {then: [{set: {now: poked, earlier: was_poked}}]}}
+        cast: {ann: {at: [2, 1], frame: watch}}
+    """)
+    run.step("toggle")
+    assert (run.value("ann.now"), run.value("ann.earlier")) == (True, True)
+    run.step()
+    assert (run.value("ann.now"), run.value("ann.earlier")) == (False, True)
+
+
+# -- 1. the agent's body ---------------------------------------------------------------------------
+
+
+def test_1_1_a_scripted_agent_reads_first_before_it_moves(play: Folder) -> None:
+    run = play("""
+        frames: {script: {let: {seen: 0}, states: {s: {first: [{set: {seen: self.x}}], do: forward}}}}
+        cast: {agent: {frame: script}}
+    """)
+    run.step("forward")
+    assert run.at("agent") == [2, 1]
+    assert run.value("agent.seen") == 1
+
+
+def test_1_2_left_and_right_turn_the_agent(play: Folder) -> None:
+    run = play("about: nothing but a room")
+    turned = [run.step(way).facing("agent") for way in ("left", "left", "right", "right", "right")]
+    assert turned == ["up", "left", "up", "right", "down"]
+    assert run.at("agent") == [1, 1]
+
+
+def test_1_3_forward_enters_unless_solid_or_taken(play: Folder) -> None:
+    door = "objects: {{door: {{type: door, at: [2, 1], state: {}}}}}"
+    assert play("about: free floor").step("forward").at("agent") == [2, 1]
+    assert play(door.format("open")).step("forward").at("agent") == [2, 1]
+    assert play(door.format("closed")).step("forward").at("agent") == [1, 1]
+    assert play("cast: {agent: {facing: up}}").step("forward").at("agent") == [1, 1]
+    assert play("cast: {ann: {at: [2, 1]}}").step("forward").at("agent") == [1, 1]
+
+
+def test_1_4_hidden_npcs_do_not_stop_the_agent(play: Folder) -> None:
+    run = play("""
+        observe: {npcs: hidden}
+        cast: {ann: {at: [2, 1]}}
+    """)
+    assert run.step("forward").at("agent") == run.at("ann") == [2, 1]
+
+
+def test_1_5_the_agent_may_step_onto_a_deadly_cell(play: Folder) -> None:
+    assert play("room: {build: [{lava: column(2)}]}").step("forward").at("agent") == [2, 1]
+
+
+@pytest.mark.parametrize("npcs", ["shown", "hidden"])
+def test_1_6_a_toggle_at_an_npc_pokes_it_and_nothing_else(play: Folder, npcs: str) -> None:
+    run = play(f"""
+        observe: {{npcs: {npcs}}}
+        objects: {{door: {{type: door, at: [2, 1], state: open}}}}
+        cast: {{ann: {{at: [2, 1]}}}}
+    """).step("toggle")
+    assert run.state["ann"]["poked"]
+    assert run.state["last"]["poked"] == "ann"
+    assert run.status("door") == "open"
+
+
+def test_1_7_a_toggle_changes_the_object_ahead(play: Folder) -> None:
+    run = play("""
+        objects: {door: {type: door, at: [2, 1]}, far: {type: door, at: [3, 1]}}
+        outcome: [{success: door.poked}]
+    """).step("toggle")
+    assert (run.status("door"), run.status("far")) == ("open", "closed")
+    assert run.terminated
+
+
+@pytest.mark.parametrize("kind", ["door", "box"])
+def test_1_8_a_locked_object_ignores_a_toggle(play: Folder, kind: str) -> None:
+    run = play(f"objects: {{thing: {{type: {kind}, at: [2, 1], state: locked}}}}").step("toggle")
+    assert run.status("thing") == "locked"
+
+
+def test_1_9_a_one_way_object_never_changes_back(play: Folder) -> None:
+    thing = "objects: {{thing: {{type: switch, at: [2, 1], one_way: {}}}}}"
+    assert play(thing.format("true")).step("toggle").step("toggle").status("thing") == "pressed"
+    assert play(thing.format("false")).step("toggle").step("toggle").status("thing") == "idle"
+
+
+@pytest.mark.parametrize("action", ["pickup", "drop", "done", None])
+def test_1_10_the_other_actions_change_nothing(play: Folder, action: str | None) -> None:
+    run = play("objects: {door: {type: door, at: [2, 1]}}")
+    before = {key: run.state[key] for key in ("agent", "door")}
+    run.step(action)
+    assert {key: run.state[key] for key in ("agent", "door")} == before
+
+
+def test_1_11_then_the_world_is_settled(play: Folder) -> None:
+    run = play("""
+        objects:
+          switch: {type: switch, at: [2, 1], unlocks: linked}
+          linked: {type: door, at: [4, 0], state: locked}
+          computed: {type: door, at: [5, 0], locked: not switch.pressed}
+        frames:
+          watch:
+            let: {a: false, b: false}
+            states: {s: {first: [{set: {a: linked.locked, b: computed.locked}}]}}
+        cast: {ann: {at: [5, 5], frame: watch}}
+    """)
+    run.step()
+    assert (run.value("ann.a"), run.value("ann.b")) == (True, True)
+    run.step("toggle")
+    assert (run.value("ann.a"), run.value("ann.b")) == (False, False), "before anybody else has moved"
+
+
+# -- 2. how the world is settled -------------------------------------------------------------------
+
+
+def test_2_1_a_link_unlocks_what_is_locked(play: Folder) -> None:
+    run = play("""
+        objects:
+          switch: {type: switch, at: [2, 1], unlocks: shut | ajar}
+          shut: {type: door, at: [4, 0], state: locked}
+          ajar: {type: door, at: [5, 0], state: open}
+    """)
+    assert run.status("shut") == "locked"
+    run.step("toggle")
+    assert (run.status("shut"), run.status("ajar")) == ("closed", "open")
+
+
+def test_2_2_what_a_link_unlocks_cannot_be_locked_for_long(play: Folder) -> None:
+    run = play("""
+        objects:
+          switch: {type: switch, at: [1, 0], unlocks: door, pressed: true}
+          door: {type: door, at: [5, 0]}
+        frames:
+          lock: {states: {s: {then: [{cause: [door.lock]}]}}}
+          watch: {let: {seen: false}, states: {s: {first: [{set: {seen: door.locked}}]}}}
+        cast:
+          ann: {at: [5, 5], frame: lock}
+          bob: {at: [4, 5], frame: watch}
+    """).step()
+    assert run.value("bob.seen"), "nothing has been settled between their turns"
+    assert run.status("door") == "closed"
+
+
+def test_2_3_what_a_link_unlocked_stays_so(play: Folder) -> None:
+    run = play("""
+        objects:
+          switch: {type: switch, at: [2, 1], unlocks: door}
+          door: {type: door, at: [5, 0], state: locked}
+    """)
+    run.step("toggle").step("toggle")
+    assert (run.status("switch"), run.status("door")) == ("idle", "closed")
+
+
+def test_2_4_a_switch_that_has_vanished_unlocks_nothing(play: Folder) -> None:
+    run = play("""
+        objects:
+          switch: {type: switch, at: [2, 1], unlocks: door, pressed: true}
+          door: {type: door, at: [5, 0]}
+        rules:
+          - {when: t == 1, cause: [door.lock]}
+          - {when: t == 2, cause: [switch.vanish, door.lock]}
+    """)
+    assert [run.step().status("door") for _ in range(2)] == ["closed", "locked"]
+
+
+COMPUTED = """
+    objects:
+      switch: {type: switch, at: [2, 1]}
+      door: {type: door, at: [1, 2], state: open, locked: switch.pressed}
+"""
+
+
+def test_2_5_a_computed_status_holds_while_its_condition_does(play: Folder) -> None:
+    run = play(COMPUTED)
+    assert run.status("door") == "open"
+    assert run.step("toggle").status("door") == "locked"
+
+
+def test_2_6_what_was_locked_becomes_closed(play: Folder) -> None:
+    run = play(COMPUTED).step("toggle").step("toggle")
+    assert run.status("door") == "closed"
+
+
+def test_2_7_any_other_status_is_left_alone(play: Folder) -> None:
+    run = play(COMPUTED).step("right")
+    assert run.facing("agent") == "down"
+    assert [run.step("toggle").status("door") for _ in range(3)] == ["closed", "open", "closed"]
+
+
+def test_2_8_tagged_is_computed_likewise(play: Folder) -> None:
+    run = play("objects: {ball: {type: ball, at: [3, 3], tagged: agent.in_line(it)}}")
+    assert run.status("ball") == "plain"
+    assert [run.step("forward").status("ball") for _ in range(3)] == ["plain", "tagged", "plain"]
+
+
+def test_2_9_a_computed_status_is_settled_after_those_it_reads(play: Folder) -> None:
+    run = play("""
+        objects:
+          third: {type: door, at: [3, 0], locked: second.locked}
+          second: {type: door, at: [4, 0], locked: switch.pressed}
+          switch: {type: switch, at: [2, 1]}
+    """).step("toggle")
+    assert (run.status("second"), run.status("third")) == ("locked", "locked")
+
+
+def test_2_10_computed_statuses_read_what_links_did(play: Folder) -> None:
+    run = play("""
+        objects:
+          computed: {type: door, at: [3, 0], locked: linked.locked}
+          linked: {type: door, at: [4, 0], state: locked}
+          switch: {type: switch, at: [2, 1], unlocks: linked}
+    """)
+    assert run.status("computed") == "locked"
+    run.step("toggle")
+    assert (run.status("linked"), run.status("computed")) == ("closed", "closed")
+
+
+def test_2_11_a_reset_ends_with_settling(play: Folder) -> None:
+    run = play("""
+        objects:
+          switch: {type: switch, at: [2, 1], unlocks: linked, pressed: true}
+          linked: {type: door, at: [4, 0], state: locked}
+          computed: {type: door, at: [3, 0], locked: agent.x == 1}
+    """)
+    assert run.state["t"] == 0
+    assert (run.status("linked"), run.status("computed")) == ("closed", "locked")
+
+
+# -- 3. the agent's voice --------------------------------------------------------------------------
+
+LISTENER = "ear: {let: {heard_at: 0}, states: {s: {then: [{hears: Say hello, set: {heard_at: t}}]}}}"
+"""A frame that notes when it last heard a hello."""
+
+EAR = f"frames: {{{LISTENER}}}"
+
+
+@pytest.mark.parametrize(("at", "hears"), [([3, 1], True), ([1, 2], False)])
+def test_3_1_earshot_is_measured_after_the_body_moved(play: Folder, at: list[int], hears: bool) -> None:
+    run = play(f"""
+        earshot: next_to
+        {EAR}
+        cast: {{ann: {{at: {at}, frame: ear}}}}
+    """).step("forward", "Say hello")
+    assert run.at("agent") == [2, 1]
+    assert (run.value("ann.heard_at") == 1) is hears
+
+
+@pytest.mark.parametrize(
+    ("earshot", "farthest"), [("next_to", 1), (1, 1), (2, 2), (3, 3), ("room", 4)], ids=str
+)
+def test_3_2_how_far_a_voice_carries(play: Folder, earshot: object, farthest: int) -> None:
+    run = play(f"""
+        earshot: {earshot}
+        {EAR}
+        cast:
+          one: {{at: [2, 1], frame: ear}}
+          two: {{at: [2, 2], frame: ear}}
+          three: {{at: [2, 3], frame: ear}}
+          four: {{at: [3, 3], frame: ear}}
+    """).step(None, "Say hello")
+    heard = [run.value(f"{name}.heard_at") == 1 for name in ("one", "two", "three", "four")]
+    assert heard == [distance <= farthest for distance in (1, 2, 3, 4)]
+
+
+@pytest.mark.parametrize(("earshot", "hears"), [("next_to", False), (1, True), ("room", True)])
+def test_3_3_hidden_npcs_hear_the_agent(play: Folder, earshot: object, hears: bool) -> None:
+    run = play(f"""
+        earshot: {earshot}
+        observe: {{npcs: hidden}}
+        {EAR}
+        cast: {{ann: {{at: [2, 1], frame: ear}}, bob: {{at: [1, 2], frame: ear}}}}
+    """).step("forward", "Say hello")
+    assert run.at("agent") == run.at("ann")
+    assert (run.value("ann.heard_at") == 1) is hears, "on the agent's own cell"
+
+
+def test_3_4_in_a_suite_what_a_member_lacks_is_silence(play: Folder) -> None:
+    play.write("one", "outcome: [{failure: agent.spoke}]")
+    play.write(
+        "two",
+        """
+        grammar: {templates: [Ask <noun>], nouns: [why]}
+        outcome: [{failure: agent.spoke}]
+    """,
+    )
+    path = play.save("both", "suite: both\nmembers: [one.yaml, two.yaml]\n")
+    run = Play(path, {"member": "two"})
+    assert not run.step(None, "Say hello").terminated
+    assert run.state["last"]["said"] is None
+    assert run.step(None, "Ask why").terminated
+
+
+def test_3_5_the_agent_hears_itself_first_if_at_all(play: Folder) -> None:
+    text = """
+        observe: {{own_voice: {}}}
+        frames: {{talk: {{states: {{s: {{then: [{{say: Hi.}}]}}}}}}}}
+        cast: {{ann: {{at: [5, 5], frame: talk}}}}
+    """
+    heard = play(text.format("true")).step(None, "Say hello").info["utterance"].splitlines()
+    assert [line.split(": ")[-1] for line in heard] == ["Say hello", "Hi."]
+    assert play(text.format("false")).step(None, "Say hello").info["utterance"] == "Ann: Hi."
+
+
+def test_3_6_a_scripted_agent_reads_then_before_npcs_move(play: Folder) -> None:
+    run = play("""
+        frames:
+          script: {let: {own: 0, seen: 0}, states: {s: {then: [{after: 1, set: {own: self.x, seen: ann.x}}]}}}
+          walk: {states: {s: {do: forward}}}
+        cast:
+          agent: {frame: script}
+          ann: {at: [5, 5], facing: left, frame: walk}
+    """).step("forward", "Say hello")
+    assert run.state["agent"]["clock"] == 1
+    assert run.at("ann") == [4, 5]
+    assert (run.value("agent.own"), run.value("agent.seen")) == (2, 5)
+
+
+# -- 4. the NPCs, one after the other --------------------------------------------------------------
+
+WALK = "frames: {walk: {states: {s: {do: forward}}}}"
+
+
+@pytest.mark.parametrize(("order", "ends"), [(("ann", "bob"), [2, 4]), (("bob", "ann"), [3, 4])])
+def test_4_1_npcs_take_turns_in_the_order_of_the_cast(
+    play: Folder, order: tuple[str, str], ends: list[int]
+) -> None:
+    column = {"ann": 2, "bob": 3}
+    cast = ", ".join(f"{name}: {{at: [{column[name]}, 5], facing: right, frame: walk}}" for name in order)
+    run = play(f"""
+        {WALK}
+        cast: {{{cast}}}
+    """).step()
+    assert [run.at("ann")[0], run.at("bob")[0]] == ends, "ann can follow only after bob has left his cell"
+
+
+def test_4_2_who_has_vanished_takes_no_turn(play: Folder) -> None:
+    run = play("""
+        frames:
+          leave:
+            let: {turn_at: 0}
+            states:
+              s:
+                then:
+                  - {when: t == 2, set: {turn_at: t}, cause: [self.vanish], say: Bye.}
+                  - {set: {turn_at: t}, say: Here.}
+        cast: {ann: {at: [5, 5], frame: leave}}
+    """)
+    assert [run.step().info["utterance"] for _ in range(4)] == ["Ann: Here.", "Ann: Bye.", "NA", "NA"]
+    assert (run.at("ann"), run.value("ann.turn_at")) == (None, 2)
+
+
+def test_4_3_first_is_read_before_the_body_moves(play: Folder) -> None:
+    run = play("""
+        frames:
+          walk:
+            let: {early: 0, late: 0}
+            states: {s: {first: [{set: {early: self.x}}], do: forward, then: [{set: {late: self.x}}]}}
+        cast: {ann: {at: [2, 5], facing: right, frame: walk}}
+    """).step()
+    assert (run.value("ann.early"), run.value("ann.late")) == (2, 3)
+
+
+@pytest.mark.parametrize("where", ["first", "then"])
+def test_4_4_the_first_rule_that_holds_fires_alone(play: Folder, where: str) -> None:
+    run = play(f"""
+        frames:
+          list:
+            let: {{a: 0, b: 0, c: 0}}
+            states:
+              s: {{{where}: [{{when: agent.x == 5, set: {{a: 1}}}}, {{set: {{b: 1}}}}, {{set: {{c: 1}}}}]}}
+        cast: {{ann: {{at: [5, 5], frame: list}}}}
+    """).step()
+    assert [run.value(f"ann.{name}") for name in "abc"] == [0, 1, 0]
+
+
+def test_4_5_a_rule_with_an_activity_takes_the_whole_turn(play: Folder) -> None:
+    run = play("""
+        frames:
+          turn:
+            let: {late: 0}
+            states: {s: {first: [{when: t == 1, do: left}], do: forward, then: [{set: {late: t}}]}}
+        cast: {ann: {at: [3, 5], facing: right, frame: turn}}
+    """).step()
+    assert (run.at("ann"), run.facing("ann"), run.value("ann.late")) == ([3, 5], "up", 0)
+    run.step()
+    assert (run.at("ann"), run.value("ann.late")) == ([3, 4], 2)
+
+
+def test_4_6_a_goto_in_first_is_of_this_turn(play: Folder) -> None:
+    run = play("""
+        frames:
+          change:
+            let: {old: 0, new: 0}
+            states:
+              before: {first: [{goto: after_it}], do: forward, then: [{set: {old: t}}]}
+              after_it: {do: left, then: [{set: {new: t}}]}
+        cast: {ann: {at: [3, 5], facing: right, frame: change}}
+    """).step()
+    assert (run.at("ann"), run.facing("ann")) == ([3, 5], "up")
+    assert (run.value("ann.old"), run.value("ann.new")) == (0, 1)
+
+
+def test_4_7_one_body_action_a_turn(play: Folder) -> None:
+    run = play("""
+        objects: {switch: {type: switch, at: [5, 3]}}
+        frames: {press: {states: {s: {do: use(switch)}}}}
+        cast: {ann: {at: [3, 5], facing: left, frame: press}}
+    """)
+    for _ in range(8):
+        before = (*run.at("ann"), run.facing("ann"), run.status("switch"))
+        run.step()
+        after = (*run.at("ann"), run.facing("ann"), run.status("switch"))
+        assert sum(a != b for a, b in zip(before, after, strict=True)) == 1
+    assert run.status("switch") == "pressed"
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "cast"),
+    [
+        ("objects: {door: {type: door, at: [4, 5]}}", ""),
+        ("objects: {box: {type: box, at: [4, 5]}}", ""),
+        ("room: {build: [{wall: column(4)}]}", ""),
+        ("room: {build: [{lava: column(4)}]}", ""),
+        ("about: somebody", ", bob: {at: [4, 5]}"),
+        ("about: the agent", ", agent: {at: [4, 5]}"),
+        ("observe: {npcs: hidden}", ", agent: {at: [4, 5]}"),
+    ],
+)
+def test_4_8_npcs_do_not_enter_what_is_solid_deadly_or_taken(play: Folder, obstacle: str, cast: str) -> None:
+    run = play(f"""
+        {obstacle}
+        {WALK}
+        cast: {{ann: {{at: [3, 5], facing: right, frame: walk}}{cast}}}
+    """)
+    assert run.step().at("ann") == [3, 5]
+
+
+def test_4_9_the_toggle_of_an_npc_changes_the_object_and_pokes_nobody(play: Folder) -> None:
+    run = play("""
+        objects: {door: {type: door, at: [4, 5], state: open}}
+        frames: {press: {states: {s: {do: toggle}}}}
+        cast: {ann: {at: [3, 5], facing: right, frame: press}, bob: {at: [4, 5]}}
+        outcome: [{failure: door.poked}]
+    """).step()
+    assert run.status("door") == "closed"
+    assert not run.state["bob"]["poked"]
+    assert not run.terminated
+    assert run.state["last"]["poked"] is None
+
+
+def test_4_10_the_world_is_settled_after_the_body_action(play: Folder) -> None:
+    run = play("""
+        objects:
+          switch: {type: switch, at: [4, 5], unlocks: linked}
+          linked: {type: door, at: [4, 0], state: locked}
+          computed: {type: door, at: [5, 0], locked: not switch.pressed}
+        frames:
+          press:
+            let: {a: true, b: true}
+            states: {s: {do: toggle, then: [{set: {a: linked.locked, b: computed.locked}}]}}
+        cast: {ann: {at: [3, 5], facing: right, frame: press}}
+    """).step()
+    assert (run.value("ann.a"), run.value("ann.b")) == (False, False)
+
+
+CLOCK = """
+    frames:
+      count:
+        let: {{fired_at: 0}}
+        states: {{s: {{{where}: [{{after: 1, once: true, set: {{fired_at: t}}}}]}}}}
+    cast: {{ann: {{at: [5, 5], frame: count}}}}
+"""
+
+
+def test_4_11_after_1_in_then_holds_in_the_first_turn(play: Folder) -> None:
+    run = play(CLOCK.format(where="then"))
+    assert run.state["ann"]["clock"] == 0
+    run.step()
+    assert run.state["ann"]["clock"] == 1
+    assert run.value("ann.fired_at") == 1
+
+
+def test_4_12_after_1_in_first_holds_in_the_second_turn(play: Folder) -> None:
+    assert play(CLOCK.format(where="first")).steps(3).value("ann.fired_at") == 2
+
+
+def test_4_13_a_rule_computes_before_it_acts(play: Folder) -> None:
+    run = play("""
+        frames:
+          swap:
+            let: {a: 1, b: 2}
+            states: {s: {then: [{say: I have <a>., set: {a: b, b: a}}]}}
+        cast: {ann: {at: [5, 5], frame: swap}}
+    """).step()
+    assert (run.value("ann.a"), run.value("ann.b")) == (2, 1)
+    assert run.info["utterance"] == "Ann: I have 1."
+
+
+@pytest.mark.parametrize(
+    ("effects", "status"), [("door.open, door.lock", "locked"), ("door.lock, door.open", "open")]
+)
+def test_4_14_effects_happen_in_the_order_listed(play: Folder, effects: str, status: str) -> None:
+    run = play(f"""
+        objects: {{door: {{type: door, at: [5, 0]}}}}
+        frames: {{act: {{states: {{s: {{then: [{{cause: [{effects}]}}]}}}}}}}}
+        cast: {{ann: {{at: [5, 5], frame: act}}}}
+    """).step()
+    assert run.status("door") == status
+
+
+def test_4_15_what_then_changes_is_settled_later(play: Folder) -> None:
+    run = play("""
+        objects:
+          switch: {type: switch, at: [4, 0], unlocks: door}
+          door: {type: door, at: [5, 0], state: locked}
+        frames:
+          press: {states: {s: {then: [{when: t <= 2, cause: [switch.become(pressed)]}]}}}
+          watch:
+            let: {early: false, late: true}
+            states: {s: {first: [{set: {early: door.locked}}], then: [{set: {late: door.locked}}]}}
+        cast: {ann: {at: [5, 5], frame: press}, bob: {at: [4, 5], frame: watch}}
+    """).step()
+    assert (run.value("bob.early"), run.value("bob.late")) == (True, False)
+
+    alone = play("""
+        objects:
+          switch: {type: switch, at: [4, 0], unlocks: door}
+          door: {type: door, at: [5, 0], state: locked}
+        frames: {press: {states: {s: {then: [{cause: [switch.become(pressed)]}]}}}}
+        cast: {ann: {at: [5, 5], frame: press}}
+    """)
+    assert alone.step().status("door") == "closed", "after the rules of the world"
+
+
+GOING = """
+    frames:
+      change:
+        let: {{fired_at: 0}}
+        states:
+          before: {{then: [{{{go}: after_it}}]}}
+          after_it: {{first: [{{set: {{fired_at: 9}}}}], then: [{{when: fired_at == 0, set: {{fired_at: t}}}}]}}
+    cast: {{ann: {{at: [5, 5], frame: change}}}}
+"""
+
+
+def test_4_16_after_goto_the_new_state_begins_with_the_next_turn(play: Folder) -> None:
+    run = play(GOING.format(go="goto")).step()
+    assert (run.state["ann"]["state"], run.state["ann"]["clock"]) == ("after_it", 0)
+    assert run.value("ann.fired_at") == 0
+    assert run.step().value("ann.fired_at") == 9, "`first` of the next turn"
+
+
+def test_4_17_goto_now_reads_the_new_then_at_once(play: Folder) -> None:
+    run = play(GOING.format(go="goto_now")).step()
+    assert (run.state["ann"]["state"], run.state["ann"]["clock"]) == ("after_it", 0)
+    assert run.value("ann.fired_at") == 1
+
+
+CHOICES = [
+    "pick(d in doors where d.locked)",
+    "first(d in doors where d.locked)",
+    "nearest(d in doors where d.locked to self)",
+]
+
+
+@pytest.mark.parametrize("choice", CHOICES)
+def test_4_18_a_condition_is_false_where_nothing_is_found(play: Folder, choice: str) -> None:
+    run = play(f"""
+        objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]]}}}}
+        frames:
+          look:
+            let: {{a: 0, b: 0, c: 0}}
+            states:
+              s:
+                then:
+                  - when: at({choice})
+                    set: {{a: 1}}
+                  - when: not at({choice})
+                    set: {{b: 1}}
+                  - set: {{c: 1}}
+        cast: {{ann: {{at: [5, 5], frame: look}}}}
+    """).step()
+    assert [run.value(f"ann.{name}") for name in "abc"] == [0, 0, 1]
+
+
+@pytest.mark.parametrize("choice", CHOICES)
+@pytest.mark.parametrize("effect", ['cause: ["{}.open"]', "say: I see <{}.color>", 'set: {{x0: "{}.x"}}'])
+def test_4_19_a_rule_does_not_fire_where_nothing_is_found(play: Folder, choice: str, effect: str) -> None:
+    text = """
+        objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]], state: {}}}}}
+        frames:
+          look:
+            let: {{x0: 0, b: 0}}
+            states:
+              s:
+                then:
+                  - goto: gone_on
+                    {}
+                  - set: {{b: 1}}
+              gone_on: {{}}
+        cast: {{ann: {{at: [5, 5], frame: look}}}}
+    """
+    run = play(text.format("closed", effect.format(choice))).step()
+    assert (run.state["ann"]["state"], run.value("ann.b"), run.info["utterance"]) == ("s", 1, "NA")
+    assert [door["state"] for door in run.state["doors"]] == ["closed", "closed"]
+    run = play(text.format("locked", effect.format(choice))).step()
+    assert (run.state["ann"]["state"], run.value("ann.b")) == ("gone_on", 0)
+
+
+@pytest.mark.parametrize("choice", CHOICES)
+def test_4_20_an_activity_is_staying_where_nothing_is_found(play: Folder, choice: str) -> None:
+    run = play(f"""
+        objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]]}}}}
+        frames:
+          look:
+            steps:
+              - do: go_next_to({choice})
+              - {{do: left}}
+        cast: {{ann: {{at: [5, 5], facing: right, frame: look}}}}
+    """).step()
+    assert (run.at("ann"), run.facing("ann")) == ([5, 5], "right")
+    assert run.step().facing("ann") == "up"
+
+
+def test_4_21_once_is_once_in_an_episode(play: Folder) -> None:
+    run = play("""
+        frames:
+          talk:
+            states:
+              s: {then: [{once: true, say: First., goto: u}, {say: Again.}]}
+              u: {then: [{goto: s}]}
+        cast: {ann: {at: [5, 5], frame: talk}}
+    """)
+    assert [run.step().info["utterance"] for _ in range(4)] == [
+        "Ann: First.",
+        "NA",
+        "Ann: Again.",
+        "Ann: Again.",
+    ]
+    run.env.reset(seed=1)
+    assert run.step().info["utterance"] == "Ann: First."
+
+
+def test_4_22_a_step_acts_when_it_ends_after_the_body(play: Folder) -> None:
+    run = play("""
+        objects: {door: {type: door, at: [5, 0]}}
+        frames:
+          go:
+            let: {ended_at: 0}
+            steps: [{do: forward, for: 2, set: {ended_at: self.x}, cause: [door.open], say: There.}]
+        cast: {ann: {at: [2, 5], facing: right, frame: go}}
+    """)
+    run.step()
+    assert (run.at("ann"), run.status("door"), run.info["utterance"]) == ([3, 5], "closed", "NA")
+    run.step()
+    assert (run.at("ann"), run.status("door"), run.info["utterance"]) == ([4, 5], "open", "Ann: There.")
+    assert run.value("ann.ended_at") == 4
+
+
+def test_4_23_the_next_entry_begins_with_the_next_turn(play: Folder) -> None:
+    run = play("""
+        frames: {go: {steps: [{do: left}, {do: forward}]}}
+        cast: {ann: {at: [3, 5], facing: right, frame: go}}
+    """).step()
+    assert (run.at("ann"), run.facing("ann")) == ([3, 5], "up")
+    assert run.step().at("ann") == [3, 4]
+
+
+def test_4_24_an_entry_without_activity_stays_for_one_turn(play: Folder) -> None:
+    run = play("""
+        frames: {go: {steps: [{say: Now.}, {do: left}]}}
+        cast: {ann: {at: [3, 5], facing: right, frame: go}}
+    """).step()
+    assert (run.at("ann"), run.facing("ann"), run.info["utterance"]) == ([3, 5], "right", "Ann: Now.")
+    assert run.step().facing("ann") == "up"
+
+
+@pytest.mark.parametrize("goal", ["go_next_to(door)", "go_to(self.cell)", "enter(inside)"])
+def test_4_25_what_is_fulfilled_before_it_begins_takes_no_turn(play: Folder, goal: str) -> None:
+    text = """
+        objects: {{door: {{type: door, at: [3, 6]}}, inside: {{type: door, at: [3, 5], state: open}}}}
+        frames: {{go: {{steps: [{{do: {goal}{effect}}}, {{do: left}}]}}}}
+        cast: {{ann: {{at: [3, 5], facing: right, frame: go}}}}
+    """
+    assert play(text.format(goal=goal, effect="")).step().facing("ann") == "up"
+    run = play(text.format(goal=goal, effect=", say: There.")).step()
+    assert (run.facing("ann"), run.info["utterance"]) == ("right", "Ann: There.")
+
+
+DANCE = """
+    let: {{dance: {{sequence: 3, moves: [left, right, forward], utterance: {{chance: 0.5}}}}}}
+    frames: {{dance: {frame}}}
+    cast: {{ann: {{at: [3, 5], facing: {facing}, frame: dance}}}}
+"""
+TURNS = {"let": {"dance": [["left", "Say hello"], ["right", None], ["forward", "Say bye"]]}}
+
+
+def test_4_26_perform_does_and_says_the_kth_element(play: Folder) -> None:
+    run = play(DANCE.format(frame="{steps: [{do: perform(dance)}]}", facing="right"), TURNS)
+    seen = [(run.step().at("ann"), run.facing("ann"), run.info["utterance"]) for _ in range(3)]
+    assert seen == [
+        ([3, 5], "up", "Ann: Say hello"),
+        ([3, 5], "right", "NA"),
+        ([4, 5], "right", "Ann: Say bye"),
+    ]
+
+
+def test_4_27_a_blocked_move_counts(play: Folder) -> None:
+    blocked = {"let": {"dance": [["forward", None], ["forward", "Say bye"], ["left", None]]}}
+    run = play(DANCE.format(frame="{steps: [{do: perform(dance)}]}", facing="down"), blocked)
+    seen = [(run.step().at("ann"), run.facing("ann"), run.info["utterance"]) for _ in range(3)]
+    assert seen == [([3, 5], "down", "NA"), ([3, 5], "down", "Ann: Say bye"), ([3, 5], "right", "NA")]
+
+
+def test_4_28_after_its_last_element_perform_is_finished(play: Folder) -> None:
+    run = play(
+        DANCE.format(frame="{steps: [{do: perform(dance)}, {do: left}]}", facing="right"), TURNS
+    ).steps(3)
+    assert run.step().facing("ann") == "up", "the next entry of `steps`"
+    run = play(DANCE.format(frame="{states: {s: {do: perform(dance)}}}", facing="right"), TURNS).steps(3)
+    for _ in range(3):
+        run.step()
+        assert (run.at("ann"), run.facing("ann"), run.info["utterance"]) == ([4, 5], "right", "NA")
+
+
+@pytest.mark.parametrize(("facing", "heard"), [("left", "Ann: Say hello"), ("right", "NA")])
+def test_4_29_a_line_is_heard_where_the_turn_ends(play: Folder, facing: str, heard: str) -> None:
+    start = {"left": 3, "right": 2}[facing]
+    run = play(f"""
+        earshot: next_to
+        frames: {{talk: {{states: {{s: {{first: [{{say: Say hello}}], do: forward}}}}}}}}
+        cast: {{ann: {{at: [{start}, 1], facing: {facing}, frame: talk}}}}
+    """).step()
+    assert run.info["utterance"] == heard
+
+
+def test_4_30_one_utterance_a_turn(play: Folder) -> None:
+    run = play("""
+        frames: {talk: {states: {s: {first: [{say: Early.}], then: [{say: Late.}]}}}}
+        cast: {ann: {at: [5, 5], frame: talk}}
+    """).step()
+    assert run.info["utterance"] == "Ann: Early."
+    frame = "{states: {s: {do: perform(dance), then: [{say: Late.}]}}}"
+    run = play(DANCE.format(frame=frame, facing="right"), TURNS)
+    assert [run.step().info["utterance"] for _ in range(2)] == ["Ann: Say hello", "Ann: Late."]
+
+
+TALK = "talk: {states: {s: {then: [{when: t == 1, say: Say hello}]}}}"
+
+
+def _listening(play: Folder, cast: str) -> Play:
+    return play(f"""
+        frames:
+          {TALK}
+          {LISTENER}
+        cast: {{{cast}}}
+    """)
+
+
+def test_4_31_an_npc_hears_those_before_it_in_this_step(play: Folder) -> None:
+    run = _listening(play, "ann: {at: [5, 5], frame: talk}, bob: {at: [4, 5], frame: ear}").steps(2)
+    assert run.value("bob.heard_at") == 1
+    run = _listening(play, "bob: {at: [4, 5], frame: ear}").step().step(None, "Say hello")
+    assert run.value("bob.heard_at") == 2
+
+
+def test_4_32_an_npc_hears_those_after_it_a_step_later(play: Folder) -> None:
+    run = _listening(play, "bob: {at: [4, 5], frame: ear}, ann: {at: [5, 5], frame: talk}").steps(3)
+    assert run.value("bob.heard_at") == 2
+
+
+def test_4_33_nobody_hears_himself(play: Folder) -> None:
+    run = (
+        play("""
+        frames:
+          both:
+            let: {heard_at: 0}
+            states: {s: {then: [{hears: Say hello, set: {heard_at: t}}, {when: t == 2, say: Say hello}]}}
+        cast: {ann: {at: [5, 5], frame: both}, agent: {frame: both}}
+    """)
+        .step(None, "Say hello")
+        .step()
+    )
+    assert (run.value("ann.heard_at"), run.value("agent.heard_at")) == (1, 0), "the agent said it"
+    run.step()
+    assert (run.value("ann.heard_at"), run.value("agent.heard_at")) == (1, 3), "Ann said it a step before"
+
+
+@pytest.mark.parametrize(("order", "first"), [(("hello", "bye"), "hello"), (("bye", "hello"), "bye")])
+def test_4_34_the_first_matching_rule_fires(play: Folder, order: tuple[str, str], first: str) -> None:
+    rules = ", ".join(f"{{hears: Say {word}, say: It was {word}.}}" for word in order)
+    run = play(f"""
+        frames:
+          {TALK}
+          listen: {{states: {{s: {{then: [{rules}]}}}}}}
+        cast: {{ann: {{at: [5, 5], frame: talk}}, bob: {{at: [4, 5], frame: listen}}}}
+    """).step(None, "Say bye")
+    assert run.info["utterance"].splitlines()[-1] == f"Bob: It was {first}."
+
+
+def test_4_35_what_was_heard_is_forgotten_at_the_end_of_the_turn(play: Folder) -> None:
+    run = (
+        play("""
+        frames:
+          listen: {let: {heard_at: 0}, states: {s: {then: [{hears: Say hello, when: t > 1, set: {heard_at: t}}]}}}
+        cast: {ann: {at: [5, 5], frame: listen}}
+    """)
+        .step(None, "Say hello")
+        .steps(2)
+    )
+    assert run.value("ann.heard_at") == 0
+    assert run.step(None, "Say hello").value("ann.heard_at") == 4
+    assert run.step().value("ann.heard_at") == 4
+
+
+@pytest.mark.parametrize("text", ["Say hello", "say HELLO", "Say hello.", "Say hello!", "SAY hello?"])
+def test_4_36_case_and_the_final_mark_do_not_matter(play: Folder, text: str) -> None:
+    run = play(f"""
+        frames:
+          talk: {{states: {{s: {{then: [{{say: "{text}"}}]}}}}}}
+          {LISTENER}
+        cast: {{ann: {{at: [5, 5], frame: talk}}, bob: {{at: [4, 5], frame: ear}}}}
+    """).step()
+    assert run.value("bob.heard_at") == 1
+
+
+def test_4_37_hidden_npcs_act_but_only_the_audible_are_heard(play: Folder) -> None:
+    run = play("""
+        observe: {npcs: hidden}
+        frames: {talk: {states: {s: {do: forward, then: [{say: Hi.}]}}}}
+        cast:
+          ann: {at: [2, 5], facing: right, frame: talk}
+          bob: {at: [2, 4], facing: right, frame: talk, audible: always}
+    """).step()
+    assert (run.at("ann"), run.at("bob")) == ([3, 5], [3, 4])
+    assert run.info["utterance"] == "Bob: Hi."
+
+
+def test_4_38_on_one_cell_is_neither_next_to_nor_eye_contact(play: Folder) -> None:
+    run = play("""
+        observe: {npcs: hidden}
+        frames:
+          look:
+            let: {beside: true, eyes: true}
+            states: {s: {then: [{set: {beside: next_to(agent), eyes: eye_contact(agent)}}]}}
+        cast: {ann: {at: [2, 1], facing: left, frame: look}}
+    """).step()
+    assert (run.value("ann.beside"), run.value("ann.eyes")) == (True, True)
+    run.step("forward")
+    assert run.at("agent") == run.at("ann")
+    assert (run.value("ann.beside"), run.value("ann.eyes")) == (False, False)
+
+
+# -- 5. memories -----------------------------------------------------------------------------------
+
+
+def test_5_1_a_memory_takes_in_what_was_done_and_said(play: Folder) -> None:
+    run = (
+        play("memory: {acts: {last: 3, of: agent.acts}}")
+        .step("forward", "Say hello")
+        .step(None, "Say bye")
+        .step()
+    )
+    assert run.state["memory"]["acts"] == [["forward", "Say hello"], ["none", "Say bye"], ["none", None]]
+
+
+def test_5_2_a_closed_memory_keeps_what_it_holds(play: Folder) -> None:
+    run = play("memory: {acts: {last: 3, of: agent.acts, while: t != 1}}")
+    run.step("left").step("forward").step("right")
+    assert run.state["memory"]["acts"] == [["left", None], ["right", None]]
+
+
+def test_5_3_a_full_memory_forgets_the_oldest_act(play: Folder) -> None:
+    run = play("memory: {acts: {last: 2, of: agent.acts}}").step("left").step("forward").step("right")
+    assert run.state["memory"]["acts"] == [["forward", None], ["right", None]]
+
+
+def test_5_4_a_memory_that_is_not_full_equals_nothing(play: Folder) -> None:
+    text = """
+        let: {dance: {sequence: 2, moves: [left, right]}}
+        memory: {attempt: {last: 2, of: agent.acts}}
+        outcome: [{success: attempt == dance}]
+    """
+    run = play(text, {"let": {"dance": [["left", None], ["left", None]]}})
+    assert [run.step("left").terminated for _ in range(2)] == [False, True]
+    run = play(text, {"let": {"dance": [["left", None], ["right", None]]}})
+    assert [run.step(way).terminated for way in ("right", "left", "right")] == [False, False, True]
+    run = play(text, {"let": {"dance": [["left", None], ["right", None]]}})
+    assert not run.step("left").step("right", "Say bye").terminated, "words count as well"
+
+
+# -- 6. rules of the world -------------------------------------------------------------------------
+
+
+def test_6_1_rules_are_read_after_turns_and_memories(play: Folder) -> None:
+    run = play("""
+        let: {dance: {sequence: 1, moves: [left]}}
+        memory: {attempt: {last: 1, of: agent.acts}}
+        objects: {one: {type: door, at: [4, 0]}, two: {type: door, at: [5, 0]}}
+        frames: {walk: {states: {s: {do: forward}}}}
+        cast: {ann: {at: [2, 5], facing: right, frame: walk}}
+        rules:
+          - {when: ann.x == 3, cause: [one.open]}
+          - {when: attempt == dance, cause: [two.open]}
+    """).step("left")
+    assert (run.status("one"), run.status("two")) == ("open", "open")
+
+
+def test_6_2_every_rule_that_holds_takes_effect_in_order(play: Folder) -> None:
+    run = play("""
+        objects: {a: {type: door, at: [4, 0]}, b: {type: door, at: [5, 0]}}
+        rules:
+          - {when: b.locked, cause: [a.lock]}
+          - {when: t == 1, cause: [b.open]}
+          - {when: b.open, cause: [b.lock]}
+    """).step()
+    assert (run.status("a"), run.status("b")) == ("closed", "locked")
+    assert run.step().status("a") == "locked"
+
+
+def test_6_3_once_is_once_in_an_episode(play: Folder) -> None:
+    run = play("""
+        objects: {door: {type: door, at: [1, 0]}}
+        cast: {agent: {facing: up}}
+        rules: [{once: true, cause: [door.open]}]
+    """)
+    assert run.step().status("door") == "open"
+    assert run.step("toggle").status("door") == "closed"
+    run.env.reset(seed=0)
+    assert run.step().status("door") == "open"
+
+
+def test_6_4_the_world_is_settled_after_its_rules(play: Folder) -> None:
+    run = play("""
+        objects:
+          switch: {type: switch, at: [3, 0], unlocks: linked}
+          linked: {type: door, at: [4, 0], state: locked}
+          computed: {type: door, at: [5, 0], locked: switch.pressed}
+        rules: [{when: t == 2, cause: [switch.become(pressed)]}]
+    """).step()
+    assert (run.status("linked"), run.status("computed")) == ("locked", "closed")
+    run.step()
+    assert (run.status("linked"), run.status("computed")) == ("closed", "locked")
+
+
+# -- 7. the end ------------------------------------------------------------------------------------
+
+
+def test_7_1_a_deadly_cell_comes_before_every_outcome(play: Folder) -> None:
+    run = play("""
+        room: {build: [{lava: column(2)}]}
+        outcome: [{success: agent.did(forward)}]
+    """).step("forward")
+    assert (run.terminated, run.truncated, run.reward) == (True, False, 0.0)
+    assert (run.info["success"], run.info["outcome"]) == (False, "deadly")
+
+
+@pytest.mark.parametrize(
+    ("order", "success"), [(("success", "failure"), True), (("failure", "success"), False)]
+)
+def test_7_2_the_first_entry_that_holds_ends_the_episode(
+    play: Folder, order: tuple[str, str], success: bool
+) -> None:
+    entries = ", ".join(f"{{{kind}: agent.x == 3}}" for kind in order)
+    run = play(f"outcome: [{{failure: agent.x == 5}}, {entries}]").step("forward")
+    assert (run.terminated, run.truncated) == (False, False)
+    run.step("forward")
+    assert (run.terminated, run.truncated, run.info["success"]) == (True, False, success)
+
+
+def test_7_3_outcomes_speak_of_the_state_in_the_end(play: Folder) -> None:
+    run = play("""
+        objects: {door: {type: door, at: [5, 0]}, other: {type: door, at: [4, 0], locked: door.open}}
+        frames: {walk: {states: {s: {do: forward}}}}
+        cast: {ann: {at: [2, 5], facing: right, frame: walk}}
+        rules: [{when: ann.x == 3, cause: [door.open]}]
+        outcome: [{success: ann.x == 3 and door.open and other.locked}]
+    """).step()
+    assert run.terminated
+
+
+@pytest.mark.parametrize(
+    ("reward", "share"), [("", 1.0), (", reward: 100", 1.0), (", reward: 40", 0.4), (", reward: 0", 0.0)]
+)
+def test_7_4_what_a_success_pays(play: Folder, reward: str, share: float) -> None:
+    run = play(f"outcome: [{{success: agent.did(done){reward}}}]").steps(2).step("done")
+    assert run.info["success"]
+    assert run.reward == pytest.approx(share * (1 - 0.9 * 3 / 20))
+
+
+def test_7_5_a_failure_and_an_ordinary_step_pay_nothing(play: Folder) -> None:
+    run = play("about: done is a failure").step("forward")
+    assert (run.reward, run.terminated) == (0.0, False)
+    run.step("done")
+    assert (run.reward, run.terminated, run.info["success"]) == (0.0, True, False)
+
+
+def test_7_6_the_name_of_an_outcome(play: Folder) -> None:
+    text = """\
+        outcome:
+          - {success: agent.did(left), id: turned}
+          - failure: agent.did(right)
+          - success: agent.did(forward)
+    """
+    names = [play(text).step(action).info["outcome"] for action in ("left", "right", "forward")]
+    assert names == ["turned", "failure@5", "success@6"]
+
+
+def test_7_7_when_time_is_up(play: Folder) -> None:
+    run = play("horizon: 3").steps(2)
+    assert (run.terminated, run.truncated) == (False, False)
+    run.step()
+    assert (run.terminated, run.truncated, run.reward) == (False, True, 0.0)
+    assert (run.info["outcome"], run.info["success"]) == ("timeout", False)
+
+
+def test_7_8_an_outcome_in_the_last_step_is_terminated_only(play: Folder) -> None:
+    run = (
+        play("""
+        horizon: 3
+        outcome: [{success: agent.did(done)}]
+    """)
+        .steps(2)
+        .step("done")
+    )
+    assert (run.terminated, run.truncated) == (True, False)
+    assert run.reward == pytest.approx(0.1)
+
+
+# -- 8. what the agent perceives -------------------------------------------------------------------
+
+
+def test_8_1_the_picture_is_taken_last(play: Folder) -> None:
+    run = play("""
+        objects: {door: {type: door, at: [3, 2]}}
+        frames: {walk: {states: {s: {do: forward}}}}
+        cast: {ann: {at: [5, 1], facing: left, frame: walk}}
+        rules: [{cause: [door.open]}]
+    """)
+    assert (run.shown(4)[0], run.shown(3)[0]) == (NPC, EMPTY)
+    assert (run.shown(2, 1)[0], run.shown(2, 1)[2]) == (DOOR, 1)
+    run.step()
+    assert (run.shown(4)[0], run.shown(3)[0]) == (EMPTY, NPC)
+    assert (run.shown(2, 1)[0], run.shown(2, 1)[2]) == (DOOR, 0)
+
+
+def test_8_2_the_picture_before_npcs_has_links_but_not_computed_statuses(play: Folder) -> None:
+    run = play("""
+        observe: {image: before_npcs}
+        objects:
+          switch: {type: switch, at: [2, 1], unlocks: linked}
+          linked: {type: door, at: [3, 2], state: locked}
+          computed: {type: door, at: [4, 2], locked: switch.pressed}
+          ruled: {type: door, at: [5, 2]}
+        frames: {walk: {states: {s: {do: forward}}}}
+        cast: {ann: {at: [5, 1], facing: left, frame: walk}}
+        rules: [{cause: [ruled.open]}]
+    """).step("toggle")
+    assert [run.shown(ahead, 1)[:3:2] for ahead in (2, 3, 4)] == [[DOOR, 1], [DOOR, 1], [DOOR, 1]]
+    assert [run.status(name) for name in ("linked", "computed", "ruled")] == ["closed", "locked", "open"]
+    assert (run.shown(1)[0], run.shown(1)[2]) == (12, 1), "the switch that the agent has just pressed"
+    assert (run.shown(4)[0], run.shown(3)[0]) == (NPC, EMPTY), "Ann as she stood before her turn"
+    run.step("left").step("right")
+    assert [run.shown(ahead, 1)[2] for ahead in (2, 3, 4)] == [1, 2, 0], "seen in the next step"
+
+
+@pytest.mark.parametrize("image", ["end", "before_npcs"])
+def test_8_3_what_was_said_is_in_the_words_of_this_step(play: Folder, image: str) -> None:
+    run = play(f"""
+        observe: {{image: {image}}}
+        frames: {{talk: {{states: {{s: {{then: [{{say: Say hello}}]}}}}}}}}
+        cast: {{ann: {{at: [5, 5], frame: talk}}}}
+    """).step()
+    words = run.env.unwrapped.program.vocabulary  # type: ignore[attr-defined]
+    assert [words[token] for token in run.observation["tokens"] if token] == ["ann", "say", "hello"]
+    assert run.info["utterance"] == "Ann: Say hello"
+
+
+def test_8_4_a_line_for_each_thing_heard(play: Folder) -> None:
+    run = play("""
+        frames: {talk: {states: {s: {then: [{when: t == 1, say: I am <self.name>.}]}}}}
+        cast: {bob: {at: [4, 5], frame: talk}, ann: {at: [5, 5], frame: talk}}
+    """)
+    assert run.info["utterance"] == "NA"
+    assert run.step().info["utterance"] == "Bob: I am Bob.\nAnn: I am Ann."
+    assert run.step().info["utterance"] == "NA"
+
+
+def test_8_5_the_history_has_all_lines(play: Folder) -> None:
+    run = play("""
+        frames: {talk: {states: {s: {then: [{when: t != 2, say: I am <self.name>.}]}}}}
+        cast: {ann: {at: [5, 5], frame: talk}}
+    """)
+    assert run.info["history"] == ""
+    assert run.steps(3).info["history"] == "Ann: I am Ann.\nAnn: I am Ann."
+
+
+def test_8_6_lines_without_names(play: Folder) -> None:
+    run = play("""
+        observe: {names: hidden}
+        frames: {talk: {states: {s: {then: [{say: Say hello}]}}}}
+        cast: {ann: {at: [5, 5], frame: talk}}
+    """).step()
+    assert run.info["utterance"] == "Say hello"
+
+
+def test_8_7_hidden_npcs_are_not_in_the_picture(play: Folder) -> None:
+    text = """
+        observe: {{npcs: {}}}
+        objects: {{door: {{type: door, at: [2, 1], state: open}}}}
+        cast: {{ann: {{at: [2, 1]}}, bob: {{at: [3, 1]}}}}
+    """
+    run = play(text.format("shown")).step()
+    assert [run.shown(1)[0], run.shown(2)[0]] == [NPC, NPC]
+    run = play(text.format("hidden")).step()
+    assert [run.shown(1)[0], run.shown(2)[0]] == [DOOR, EMPTY]
