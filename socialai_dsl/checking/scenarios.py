@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from socialai_dsl.checking.groups import spread
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity, did_you_mean
 from socialai_dsl.library import prelude, shared_grammars
 from socialai_dsl.loader import Resolved
@@ -59,8 +60,10 @@ def draft_of(resolved: Resolved, bag: DiagnosticBag) -> Draft | None:
     filled = substitute(resolved, bag)
     data = _with_grammar(filled, resolved, bag)
     abstract = data.get("abstract") is True
+    groups = spread(data, resolved, filled.paths, bag)
+    filled = replace(filled, paths=groups.paths)
     failed = bag.has_errors
-    shaped = model_of(Scenario, data, resolved, bag, partial=abstract)
+    shaped = model_of(Scenario, groups.data, groups.places, bag, partial=abstract)
     if shaped.model is None or abstract or failed:
         return None
     return Draft(shaped.model, resolved.name, shaped, filled)

@@ -1,6 +1,6 @@
 """A batch of environments in memory: programs one behind the other, state, ports, and the threads that serve them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
@@ -25,9 +25,10 @@ from socialai_dsl.engine.state import (
     empty_state,
     no_pins,
 )
-from socialai_dsl.program import VIEW, Header
+from socialai_dsl.program import VIEW, Header, LineColumn
 
 _ROWS_WORTH_A_THREAD: Final = 64
+_PLAIN_CHANNELS: Final = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +43,7 @@ class Part:
         templates, nouns: the program's own index of each of the batch's, -1 if it has no such.
         tokens: the batch's id of each token id of the program.
         name: what an error calls the program.
+        successes: whether each way to end is a success; needed of programs that are acts of an episode.
     """
 
     words: NDArray[np.int32]
@@ -52,6 +54,7 @@ class Part:
     nouns: Sequence[int]
     tokens: Sequence[int]
     name: str = ""
+    successes: Sequence[bool] = ()
 
 
 class Batch:
@@ -70,6 +73,7 @@ class Batch:
         pool_of_row: Sequence[int],
         length: int,
         threads: int,
+        sequences: Collection[int] = (),
     ) -> None:
         """Allocate everything; every row must be reset before its first step.
 
@@ -79,7 +83,10 @@ class Batch:
             pool_of_row: for each environment the number of its pool.
             length: tokens in a history.
             threads: how many threads share the work.
+            sequences: numbers of the pools whose programs are the acts of one episode, played one after another. They
+                have one horizon, and say which of their ways to end are successes.
         """
+        _check_sequences(parts, [pools[number] for number in sequences])
         rows = len(pool_of_row)
         headers = [part.words for part in parts]
         registers = max(int(words[Header.REGISTERS]) for words in headers)
@@ -90,16 +97,22 @@ class Batch:
         words, views, self.offsets, self.first_counters = _link(parts)
         starts = np.cumsum([0, *map(len, pools)])
         self.tables = Tables(
-            words, views, np.array([self.offsets[i] for pool in pools for i in pool], np.int64)
+            words,
+            views,
+            np.array([self.offsets[i] for pool in pools for i in pool], np.int64),
+            np.concatenate([np.arange(1, len(pool) + 1) for pool in pools]).astype(np.int64),
         )
-        self.state: State = empty_state(rows, registers, board, length, VIEW)
+        gestures = any(int(header[Header.CHANNELS]) > _PLAIN_CHANNELS for header in headers)
+        self.state: State = empty_state(rows, registers, board, length, VIEW, gestures)
         counters = int(sum(int(header[Header.COUNTERS]) for header in headers))
         self.ports: Ports = empty_ports(self.state, counters, threads)
         for row, pool in enumerate(pool_of_row):
-            self.state.keys[row, Key.POOL] = int(starts[pool]) | len(pools[pool]) << 32
+            in_sequence = int(pool in sequences)
+            self.state.keys[row, Key.POOL] = int(starts[pool]) | len(pools[pool]) << 32 | in_sequence << 63
             self.state.keys[row, Key.PROGRAM] = self.offsets[pools[pool][0]]
         prepare()
         self._rows = rows
+        self._pool_starts = starts.tolist()
         self._names = [part.name or f"program {number}" for number, part in enumerate(parts)]
         self._book = self._make_book()
         self._cuts = _cut(rows, threads)
@@ -108,6 +121,25 @@ class Batch:
     def program_numbers(self) -> NDArray[np.intp]:
         """Which program each row plays, (E,)."""
         return np.searchsorted(self.offsets, self.state.keys[:, Key.PROGRAM].astype(np.int64))
+
+    def weights(self, pool: int) -> list[int]:
+        """How much each program of a pool weighs when an episode draws one."""
+        start, end = self._pool_starts[pool : pool + 2]
+        return np.diff(self.tables.weights[start:end], prepend=0).tolist()  # type: ignore[no-any-return]
+
+    def set_weights(self, pool: int, weights: Sequence[int]) -> None:
+        """Let later episodes draw the programs of a pool as they weigh; all weigh 1 at first.
+
+        Raises:
+            ValueError: they are not one for each program, 0 or more, and 1 to 2**32 - 1 together.
+        """
+        start, end = self._pool_starts[pool : pool + 2]
+        given = [int(weight) for weight in weights]
+        if len(given) != end - start or min(given) < 0 or not 1 <= sum(given) < 1 << 32:
+            raise ValueError(
+                f"weights: got {given}; expected {end - start} integers from 0 on that add up to 1 to {(1 << 32) - 1}"
+            )
+        self.tables.weights[start:end] = np.cumsum(given)
 
     def step(self, task: Task) -> int:
         """Step all rows with `ports.actions`; how many episodes ended, or BAD_ACTION and nothing happened.
@@ -194,10 +226,22 @@ def _cut(rows: int, threads: int) -> list[tuple[int, int]]:
     return list(pairwise(edges))
 
 
+def _check_sequences(parts: Sequence[Part], sequences: Sequence[Sequence[int]]) -> None:
+    """The clock of an episode in acts is one, so its end must be; and the engine asks how each act ended."""
+    for sequence in sequences:
+        acts = [parts[number] for number in sequence]
+        horizons = {int(part.words[Header.HORIZON]) for part in acts}
+        assert len(horizons) == 1, f"internal: acts of one episode have the horizons {sorted(horizons)}"
+        assert all(len(part.successes) == len(part.outcomes) for part in acts), (
+            "internal: acts without success"
+        )
+
+
 def _link(
     parts: Sequence[Part],
 ) -> tuple[NDArray[np.int32], NDArray[np.uint16], list[int], list[int]]:
     """Lay programs and their links one behind the other: words, views, offset and first counter of each program."""
+    gestures = any(int(part.words[Header.CHANNELS]) > _PLAIN_CHANNELS for part in parts)
     words: list[NDArray[np.int32]] = []
     views: dict[tuple[int, int], int] = {}
     offsets, first_counters = [], []
@@ -215,7 +259,10 @@ def _link(
         link[Link.VIEWS] = views[canvas]
         link[Link.ACTIONS], link[Link.TEMPLATES] = len(part.actions), len(part.templates)
         link[Link.NOUNS] = len(part.nouns)
-        tables = np.array([*part.actions, *part.templates, *part.nouns, *part.outcomes], np.int32)
+        link[Link.GESTURES] = gestures
+        tables = np.array(
+            [*part.actions, *part.templates, *part.nouns, *part.outcomes, *part.successes], np.int32
+        )
         words += [_with_tokens(part), link, tables]
         offsets.append(offset)
         first_counters.append(counter)
@@ -229,8 +276,9 @@ def _with_tokens(part: Part) -> NDArray[np.int32]:
     words = part.words.copy()
     lines = int(words[Header.LINES])
     if lines:
-        table = words[words[Header.LINE_AT] :][: 3 * lines].reshape(lines, 3)
+        columns = int(LineColumn.COLUMNS)
+        table = words[words[Header.LINE_AT] :][: columns * lines].reshape(lines, columns)
         start = int(words[Header.TOKEN_AT])
-        end = start + int((table[:, 0] + table[:, 1]).max())
+        end = start + int((table[:, LineColumn.FIRST_TOKEN] + table[:, LineColumn.TOKENS]).max())
         words[start:end] = np.asarray(part.tokens, np.int32)[words[start:end]]
     return words

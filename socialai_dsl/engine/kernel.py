@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from numba import config, types
+from numpy.typing import NDArray
 
 from socialai_dsl.engine import rng
 from socialai_dsl.engine.cache import entry
@@ -17,12 +18,13 @@ from socialai_dsl.engine.pointers import (
     int16_of,
     int32_of,
     int64_of,
+    uint16_of,
     uint32_of,
     uint64_of,
 )
 from socialai_dsl.engine.reset import draw_member, reset_row
 from socialai_dsl.engine.rows import copy, open_row
-from socialai_dsl.engine.state import ZERO, Book, Key, Link, Row, Size
+from socialai_dsl.engine.state import PIN_NONE, ZERO, Book, Key, Link, Row, Size
 from socialai_dsl.engine.step import TERMINATED, step_row
 from socialai_dsl.engine.vm import interpreter
 from socialai_dsl.program import Header, Register
@@ -50,16 +52,56 @@ def _keep_final(book: Any, row: int) -> None:
     length = int64_of(book, Book.SIZES, ZERO)[Size.TOKENS]
     copy(uint32_of(book, Book.FINAL_IMAGE, row), uint32_of(book, Book.IMAGE, row), np.int64(CELLS))
     copy(int16_of(book, Book.FINAL_TOKENS, row), int16_of(book, Book.TOKENS, row), length)
+    gestures = int64_of(book, Book.SIZES, ZERO)[Size.EXTRA]
+    copy(uint16_of(book, Book.FINAL_EXTRA, row), uint16_of(book, Book.EXTRA, row), gestures)
 
 
 @inline
-def _outcome_of_batch(row: Row) -> int:
-    """The batch's number of how the episode ended."""
+def _how_it_ended(row: Row) -> int:
+    """Where the batch's number of how the episode ended is in the words of the program."""
     link = row.program[Header.SIZE]
     spaces = (
         row.program[link + Link.ACTIONS] + row.program[link + Link.TEMPLATES] + row.program[link + Link.NOUNS]
     )
-    return row.program[link + Link.END + spaces + row.registers[Register.OUTCOME]]
+    return link + Link.END + spaces + row.registers[Register.OUTCOME]
+
+
+@inline
+def _pool_size(key: NDArray[np.uint64]) -> int:
+    """How many programs a row may play."""
+    return np.int64((key[Key.POOL] >> np.uint64(32)) & np.uint64(0x7FFFFFFF))
+
+
+@inline
+def _plays_acts(key: NDArray[np.uint64]) -> bool:
+    """Whether a row plays its programs one after another."""
+    return key[Key.POOL] >> np.uint64(63) != np.uint64(0)
+
+
+@outline
+def _open_act(book: Any, opened: Row) -> int:
+    """After an act has ended let the row's key and program be those of the next; the step of its start.
+
+    0 if there is none, or no time for it: then the episode has ended.
+    """
+    stay_outline()
+    key = opened.key
+    act = np.int64(key[Key.ACT]) + 1
+    t = opened.registers[Register.T]
+    if opened.registers[Register.ENDED] != TERMINATED or act >= _pool_size(key):
+        return ZERO
+    success = opened.program[
+        _how_it_ended(opened) + opened.program[opened.program[Header.SIZE] + Link.OUTCOMES]
+    ]
+    if success == 0 or t >= opened.program[Header.HORIZON]:
+        key[Key.SPOILED] = np.uint64(1)
+    if t >= opened.program[Header.HORIZON]:
+        return ZERO
+    first = np.int64(key[Key.POOL] & np.uint64(0xFFFFFFFF))
+    key[Key.ACT] = np.uint64(act)
+    key[Key.KEY] = rng.act_key(rng.episode_key(key[Key.SEED], key[Key.INDEX], key[Key.EPISODE]), act)
+    key[Key.PROGRAM] = np.uint64(int64_of(book, Book.CHOICES, ZERO)[first + act])
+    return t
 
 
 @inline
@@ -68,10 +110,19 @@ def _open_episode(book: Any, layout: int, row: int) -> None:
     key = uint64_of(book, Book.KEYS, row)
     key[Key.KEY] = rng.episode_key(key[Key.SEED], key[Key.INDEX], key[Key.EPISODE])
     first = np.int64(key[Key.POOL] & np.uint64(0xFFFFFFFF))
-    count = np.int64(key[Key.POOL] >> np.uint64(32))
+    count = _pool_size(key)
     if count > 1:
         pinned = int16_of(book, Book.PINS, layout)[int64_of(book, Book.SIZES, ZERO)[Size.REGISTERS]]
-        first += draw_member(key[Key.KEY], count, pinned)
+        if _plays_acts(key):
+            act = ZERO if pinned == PIN_NONE else pinned
+            key[Key.ACT] = np.uint64(act)
+            key[Key.SPOILED] = np.uint64(0)
+            key[Key.KEY] = rng.act_key(key[Key.KEY], act)
+            first += act
+        elif pinned != PIN_NONE:
+            first += pinned
+        else:
+            first += draw_member(key[Key.KEY], int64_of(book, Book.WEIGHTS, first), count)
     key[Key.PROGRAM] = np.uint64(int64_of(book, Book.CHOICES, ZERO)[first])
 
 
@@ -85,7 +136,8 @@ def _report_nothing(book: Any, row: int) -> None:
 
 @inline
 def _report_end(book: Any, row: int, opened: Row) -> None:
-    int16_of(book, Book.OUTCOME, ZERO)[row] = _outcome_of_batch(opened)
+    int16_of(book, Book.OUTCOME, ZERO)[row] = opened.program[_how_it_ended(opened)]
+    bytes_of(book, Book.SPOILED, ZERO)[row] = np.int64(opened.key[Key.SPOILED])
     if opened.registers[Register.ENDED] == TERMINATED:
         bytes_of(book, Book.TERMINATED, ZERO)[row] = 1
     else:
@@ -130,6 +182,7 @@ def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
         return 0
     for row in range(first, last):
         layout = ZERO
+        t = ZERO
         if task == Task.RESET:
             if bytes_of(book, Book.CHOSEN, ZERO)[row] == 0:
                 continue
@@ -138,23 +191,31 @@ def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
             _report_nothing(book, row)
             if int16_of(book, Book.REGISTERS, row)[Register.ENDED] == 0:
                 opened = open_row(book, thread, ZERO, row)
-                float64_of(book, Book.REWARD, ZERO)[row] = step_row(opened, opened.program[Header.SIZE])
+                reward = step_row(opened, opened.program[Header.SIZE], uint16_of(book, Book.EXTRA, row))
+                if _plays_acts(opened.key):
+                    reward /= np.float64(_pool_size(opened.key))
+                float64_of(book, Book.REWARD, ZERO)[row] = reward
                 if opened.registers[Register.ENDED] == 0:
                     continue
-                ended += 1
-                _report_end(book, row, opened)
-                if task != Task.STEP_SAME:
-                    continue
-                _keep_final(book, row)
+                if _plays_acts(opened.key):
+                    t = _open_act(book, opened)
+                if t == 0:
+                    ended += 1
+                    _report_end(book, row, opened)
+                    if task != Task.STEP_SAME:
+                        continue
+                    _keep_final(book, row)
             elif task != Task.STEP_NEXT:
                 continue
-            uint64_of(book, Book.KEYS, row)[Key.EPISODE] += np.uint64(1)
-        _open_episode(book, layout, row)
+            if t == 0:
+                uint64_of(book, Book.KEYS, row)[Key.EPISODE] += np.uint64(1)
+        if t == 0:
+            _open_episode(book, layout, row)
         fresh = open_row(book, thread, layout, row)
-        if not reset_row(fresh, layout != 0):
+        if not reset_row(fresh, layout != 0, t):
             bytes_of(book, Book.REFUSED, ZERO)[row] = 1
             ended += NO_ROOM
-        take_picture(fresh, fresh.program[Header.SIZE])
+        take_picture(fresh, fresh.program[Header.SIZE], uint16_of(book, Book.EXTRA, row))
     return ended
 
 

@@ -13,8 +13,6 @@ from socialai_dsl.engine.state import NO_CELL, NOTHING, OCCUPIED, ONE, ZERO, Row
 from socialai_dsl.engine.whereabouts import is_somewhere, x_of, y_of
 from socialai_dsl.program import TEMPORARY, Field, Header, Op, Register, Side
 
-_NOUN = np.int64(2)
-
 
 @outline
 def place(row: Row, op: int, a: int, b: int, c: int) -> None:
@@ -33,8 +31,7 @@ def place(row: Row, op: int, a: int, b: int, c: int) -> None:
     elif op == Op.NEAREST_CELL:
         _write_cell(row, a, _nearest_cell(row, b, value(row, c)))
     elif op >= Op.HEARD_FROM:
-        part = ONE if op == Op.HEARD_FROM else _NOUN
-        assign(row, a, first_heard(row, b, c, part))
+        assign(row, a, first_heard(row, b, c, op - Op.HEARD_FROM + 1))
     elif op == Op.B_FLOOR or op == Op.B_RECT:
         _fill_floor(row, a)
         if op == Op.B_RECT:

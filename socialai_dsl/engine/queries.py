@@ -11,12 +11,22 @@ from numpy.typing import NDArray
 from socialai_dsl.engine.cache import entry
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.picture import image_digest
-from socialai_dsl.engine.pointers import int16_of, int64_of, uint32_of, uint64_of
+from socialai_dsl.engine.pointers import int16_of, int64_of, uint16_of, uint32_of, uint64_of
 from socialai_dsl.engine.rows import copy, open_row
 from socialai_dsl.engine.speech import inbox_class
 from socialai_dsl.engine.state import STILL, ZERO, Book, Link, Row, Size
 from socialai_dsl.engine.step import begin
-from socialai_dsl.engine.turns import act, conclude, move_agent, notice, settle
+from socialai_dsl.engine.turns import (
+    act,
+    compute_statuses,
+    conclude,
+    follow_links,
+    go_by_itself,
+    goes_by_itself,
+    move_agent,
+    notice,
+    settle,
+)
 from socialai_dsl.program import Flag, FrameColumn, Header, Register
 
 
@@ -37,7 +47,11 @@ def _play(row: Row, link: int) -> None:
         body = row.registers[Register.LAST_TURN] if chosen else act(row, frame)
         row.registers[Register.ACTION] = body
         move_agent(row, body)
-        settle(row)
+        if goes_by_itself(row):
+            changed = follow_links(row)
+            compute_statuses(row, go_by_itself(row) or changed)
+        else:
+            settle(row)
         conclude(row, frame, heard, chosen)
         line = row.registers[Register.SAID_LINE]
     action = row.action
@@ -106,6 +120,9 @@ def script(book: Any, thread: int, first: int, last: int) -> int:
 @entry
 def identify(book: Any, thread: int, first: int, last: int) -> int:
     """Write digests of the pictures of the rows first to last - 1."""
+    gestures = int64_of(book, Book.SIZES, ZERO)[Size.EXTRA]
     for row in range(first, last):
-        uint64_of(book, Book.IMAGE_IDS, ZERO)[row] = image_digest(uint32_of(book, Book.IMAGE, row))
+        uint64_of(book, Book.IMAGE_IDS, ZERO)[row] = image_digest(
+            uint32_of(book, Book.IMAGE, row), uint16_of(book, Book.EXTRA, row), gestures
+        )
     return 0

@@ -1,6 +1,7 @@
 """The start of an episode: a room is drawn, or taken from a layout, and furnished."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from socialai_dsl import draws
 from socialai_dsl.engine import rng
@@ -20,16 +21,23 @@ MEMBER_SITE = np.int64(draws.site("member"))
 
 
 @inline
-def draw_member(key: np.uint64, count: int, pinned: int) -> int:
-    """Which program of its pool an environment plays in this episode."""
-    if pinned != PIN_NONE:
-        return pinned
-    return rng.below(rng.draw(key, MEMBER_SITE, ZERO, ZERO), count)
+def draw_member(key: np.uint64, weights: NDArray[np.int64], count: int) -> int:
+    """Which program of its pool an environment plays in this episode; `weights` are those of the pool, added up."""
+    drawn = rng.below(rng.draw(key, MEMBER_SITE, ZERO, ZERO), weights[count - 1])
+    low = ZERO
+    high = count - 1
+    while low < high:
+        middle = (low + high) >> 1
+        if drawn < weights[middle]:
+            high = middle
+        else:
+            low = middle + 1
+    return low
 
 
 @inline
-def reset_row(row: Row, pinned: bool) -> bool:
-    """Start an episode; the row's key and program are set already.
+def reset_row(row: Row, pinned: bool, t: int) -> bool:
+    """Start an episode, or an act of one at step `t`; the row's key and program are set already.
 
     Whether its room is as required. If not it is the last of `ATTEMPTS` rooms, complete as any other.
     """
@@ -39,7 +47,7 @@ def reset_row(row: Row, pinned: bool) -> bool:
         required = ZERO  # a moment of an episode, whose room was accepted when it began
     for attempt in range(ATTEMPTS):
         row.key[Key.KEY] = rng.attempt_key(key, attempt)
-        _draw_room(row, pinned)
+        _draw_room(row, pinned, t)
         row.registers[Register.ATTEMPT] = attempt
         if required != 0:
             run(row, required)
@@ -52,12 +60,13 @@ def reset_row(row: Row, pinned: bool) -> bool:
 
 
 @inline
-def _draw_room(row: Row, pinned: bool) -> None:
+def _draw_room(row: Row, pinned: bool, t: int) -> None:
     _blank(row)
     if pinned:
         _pin_early(row)
     run(row, row.program[Header.RESET_PC])
     row.registers[Register.ENDED] = 0
+    row.registers[Register.T] = t
     if pinned:
         _pin_late(row)
     draw_all(row)

@@ -2,16 +2,13 @@
 
 import numpy as np
 
-from socialai_dsl.engine.boards import room_table, type_row
-from socialai_dsl.engine.entities import column, object_at, step_x, step_y
+from socialai_dsl.engine.boards import is_built_opaque, type_row
+from socialai_dsl.engine.entities import column, is_at, step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
+from socialai_dsl.engine.shadows import is_lit
 from socialai_dsl.engine.state import NO_CELL, Row
 from socialai_dsl.engine.whereabouts import is_somewhere, x_of, y_of
-from socialai_dsl.program import CODES_OF_TYPES, EntityColumn, Header, TypeColumn
-
-_EMPTY = CODES_OF_TYPES["empty"]
-_WALL = CODES_OF_TYPES["wall"]
-_WITHOUT_COLOR = np.int64(0xFFFF00FF)
+from socialai_dsl.program import EntityColumn, Flag, Header, TypeColumn
 
 
 @outline
@@ -23,12 +20,19 @@ def is_in_view(row: Row, viewer: int, target: int, direction: int) -> bool:
     stay_outline()
     if viewer >= NO_CELL or not (is_somewhere(row, viewer) and is_somewhere(row, target)):
         return np.bool_(False)
-    dx = x_of(row, target) - x_of(row, viewer)
-    dy = y_of(row, target) - y_of(row, viewer)
-    ahead_x = step_x(direction & 3)
-    ahead_y = step_y(direction & 3)
+    direction &= 3
+    x = x_of(row, viewer)
+    y = y_of(row, viewer)
+    dx = x_of(row, target) - x
+    dy = y_of(row, target) - y
+    ahead = dx * step_x(direction) + dy * step_y(direction)
+    right = dy * step_x(direction) - dx * step_y(direction)
     side = column(row, viewer, EntityColumn.VIEW)
-    return 0 <= dx * ahead_x + dy * ahead_y < side and abs(dx * ahead_y - dy * ahead_x) <= side // 2
+    if not (0 <= ahead < side and abs(right) <= side // 2):
+        return np.bool_(False)
+    return row.program[Header.FLAGS] & Flag.OCCLUSION == 0 or is_lit(
+        row, x, y, direction, side // 2, ahead, right
+    )
 
 
 @outline
@@ -51,21 +55,10 @@ def _is_opaque(row: Row, x: int, y: int) -> bool:
     width = row.program[Header.CANVAS_WIDTH]
     if x < 0 or x >= width or y < 0 or y >= row.program[Header.CANVAS_HEIGHT]:
         return np.bool_(True)
-    entity = object_at(row, x, y)
-    if entity > 0:
-        return row.program[type_row(row, entity) + TypeColumn.TRANSPARENT] == 0
-    return _is_built_opaque(row, row.program[room_table(row) + y * width + x] & _WITHOUT_COLOR)
-
-
-@inline
-def _is_built_opaque(row: Row, look: int) -> bool:
-    """The same for a cell of the bare room, by its look: what is built there is a type in a status."""
-    if look & 0xFF == _EMPTY:
-        return np.bool_(False)
-    table = row.program[Header.TYPE_AT]
-    for _ in range(row.program[Header.TYPE_ROWS]):
-        shown = row.program[table + TypeColumn.CODE] | row.program[table + TypeColumn.STATUS] << 16
-        if look == shown | row.program[table + TypeColumn.ORIENTATION] << 24:
-            return row.program[table + TypeColumn.TRANSPARENT] == 0
-        table += TypeColumn.COLUMNS
-    return look & 0xFF == _WALL
+    furnished = False
+    for entity in range(row.program[Header.NPCS] + 1, row.program[Header.ENTITIES]):
+        if is_at(row, entity, x, y):
+            if row.program[type_row(row, entity) + TypeColumn.TRANSPARENT] == 0:
+                return np.bool_(True)
+            furnished = True
+    return not furnished and is_built_opaque(row, x, y)

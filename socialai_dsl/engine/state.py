@@ -47,7 +47,9 @@ class Key(IntEnum):
     KEY = 3  # of the episode, made of the three
     DIGEST = 4  # of the lines heard since the last reset
     PROGRAM = 5  # offset of the program in `words`
-    POOL = 6  # programs to play: first entry of `choices`, number of entries << 32, 1 << 63 if one after another
+    POOL = (
+        6  # programs to play: first entry of `choices`, number of entries << 32, 1 << 63 if one after another
+    )
     ACT = 7  # of an episode in acts: which of them is played
     SPOILED = 8  # of an episode in acts: 1 if one of those before was no success
     WORDS = 9
@@ -144,7 +146,9 @@ class Tables(NamedTuple):
         np.uint16
     ]  # (poses, 49) cell of the board for each cell of the picture, by (y, x, direction)
     choices: NDArray[np.int64]  # offsets of programs, one pool behind the other
-    weights: NDArray[np.int64]  # of each choice and those before it in its pool, below 2**32; never decreasing
+    weights: NDArray[
+        np.int64
+    ]  # of each choice and those before it in its pool, below 2**32; never decreasing
 
 
 class Ports(NamedTuple):

@@ -1,6 +1,7 @@
 """One step of one environment, in the order the language fixes."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from socialai_dsl.engine.boards import is_deadly
 from socialai_dsl.engine.entities import field
@@ -12,6 +13,8 @@ from socialai_dsl.engine.turns import (
     compute_statuses,
     conclude,
     follow_links,
+    go_by_itself,
+    goes_by_itself,
     move_agent,
     notice,
     say_as_agent,
@@ -35,6 +38,7 @@ def begin(row: Row) -> None:
     registers[Register.HEARD] = 0
     registers[Register.POKED] = -1
     registers[Register.SAID_LINE] = 0
+    registers[Register.BONUS] = 0
 
 
 @inline
@@ -61,8 +65,11 @@ def decode(row: Row, link: int) -> None:
 
 
 @inline
-def step_row(row: Row, link: int) -> float:
-    """One step; the reward. Whether and how the episode ended is in the registers."""
+def step_row(row: Row, link: int, extra: NDArray[np.uint16]) -> float:
+    """One step; the reward. Whether and how the episode ended is in the registers.
+
+    `extra` is the row of `State.extra`.
+    """
     registers = row.registers
     program = row.program
     flags = program[Header.FLAGS]
@@ -76,9 +83,12 @@ def step_row(row: Row, link: int) -> float:
         heard = inbox_class(row, program[frame + FrameColumn.INBOX])
         chosen = notice(row, frame, heard)
     move_agent(row, registers[Register.ACTION])
-    if flags & Flag.PICTURE_BEFORE_NPCS:
+    if flags & Flag.PICTURE_BEFORE_NPCS or goes_by_itself(row):
         changed = follow_links(row)
-        take_picture(row, link)
+        if flags & Flag.PICTURE_BEFORE_NPCS:
+            take_picture(row, link, extra)
+        if goes_by_itself(row):
+            changed |= go_by_itself(row)
         compute_statuses(row, changed)
     else:
         settle(row)
@@ -94,13 +104,16 @@ def step_row(row: Row, link: int) -> float:
     settle(row)
     reward = _judge(row, link)
     if not flags & Flag.PICTURE_BEFORE_NPCS:
-        take_picture(row, link)
+        take_picture(row, link, extra)
+    if registers[Register.BONUS] | program[Header.EACH_STEP]:
+        reward += np.float64(registers[Register.BONUS]) / 100.0
+        reward += np.float64(program[Header.EACH_STEP]) / 1e6
     return reward
 
 
 @inline
 def _judge(row: Row, link: int) -> float:
-    """Whether the episode ends, how, and for what reward."""
+    """Whether the episode ends, how, and for what share of the reward."""
     registers = row.registers
     program = row.program
     outcomes = program[link + Link.OUTCOMES]
@@ -125,4 +138,5 @@ def _judge(row: Row, link: int) -> float:
     row.counters[program[link + Link.RULES] + registers[Register.OUTCOME]] += 1
     row.counters[program[Header.COUNTERS] - 1] += 1
     share = np.float64(registers[Register.PERCENT]) / 100.0
-    return share * (1.0 - 0.9 * np.float64(registers[Register.T]) / np.float64(program[Header.HORIZON]))
+    slope = np.float64(program[Header.SLOPE]) / 1000.0
+    return share * (1.0 - slope * np.float64(registers[Register.T]) / np.float64(program[Header.HORIZON]))

@@ -1,9 +1,8 @@
 """Turns: the body actions of agent and NPCs, and how an NPC follows its frames."""
 
-from socialai_dsl.engine.boards import draw_cell, is_deadly, is_solid, npcs_are_hidden, type_row
+from socialai_dsl.engine.boards import draw_cell, is_solid, npcs_are_hidden, type_row
 from socialai_dsl.engine.entities import (
     field,
-    is_at,
     is_present,
     npc_at,
     object_at,
@@ -12,8 +11,9 @@ from socialai_dsl.engine.entities import (
     step_y,
 )
 from socialai_dsl.engine.jit import inline, outline, stay_outline
+from socialai_dsl.engine.pushing import is_free, push, roll
 from socialai_dsl.engine.speech import deliver, empty_inbox, hear, inbox_class, speak
-from socialai_dsl.engine.state import AGENT, NOTHING, ONE, STILL, Row
+from socialai_dsl.engine.state import AGENT, NOTHING, ONE, STILL, ZERO, Row
 from socialai_dsl.engine.vm import run
 from socialai_dsl.program import Body, Field, Flag, FrameColumn, Header, Register, TypeColumn
 
@@ -52,11 +52,28 @@ def compute_statuses(row: Row, changed: bool) -> None:
         row.registers[Register.CHANGED] = 1
 
 
+@outline
+def go_by_itself(row: Row) -> bool:
+    """What counts or moves by itself does so, with its direct consequences; whether a status has changed."""
+    stay_outline()
+    if row.program[Header.TICK_PC] != 0:
+        run(row, row.program[Header.TICK_PC])
+    if row.program[Header.FLAGS] & Flag.ROLLS:
+        roll(row)
+    return follow_links(row)
+
+
+@inline
+def goes_by_itself(row: Row) -> bool:
+    """Whether anything in this scenario counts or moves by itself."""
+    return row.program[Header.TICK_PC] != 0 or row.program[Header.FLAGS] & Flag.ROLLS != 0
+
+
 @inline
 def _toggle_object(row: Row, x: int, y: int) -> int:
-    """Toggle the object in this cell; its number, or 0 if there is none."""
+    """Toggle the object on top in this cell; its number, or 0 if there is none."""
     entity = object_at(row, x, y)
-    if entity > 0:
+    if entity > 0 and field(row, entity, Field.POKED) == 0:
         status = row.program[type_row(row, entity) + TypeColumn.TOGGLED]
         if status != field(row, entity, Field.STATUS):
             set_field(row, entity, Field.STATUS, status)
@@ -88,7 +105,9 @@ def move_agent(row: Row, action: int) -> None:
     if action == Body.FORWARD:
         x = field(row, AGENT, Field.X) + step_x(direction)
         y = field(row, AGENT, Field.Y) + step_y(direction)
-        if not is_solid(row, x, y) and (npcs_are_hidden(row) or npc_at(row, x, y) == 0):
+        if is_solid(row, x, y):
+            push(row, x, y, direction, ZERO)
+        elif npcs_are_hidden(row) or npc_at(row, x, y) == 0:
             set_field(row, AGENT, Field.X, x)
             set_field(row, AGENT, Field.Y, y)
     elif action <= Body.RIGHT:
@@ -111,18 +130,17 @@ def move_npc(row: Row, npc: int, action: int) -> None:
         set_field(row, npc, Field.DIR, (direction + 2 * action - 1) & 3)
         draw_cell(row, x, y)
     elif action == Body.FORWARD:
-        if (
-            not is_solid(row, ahead_x, ahead_y)
-            and not is_deadly(row, ahead_x, ahead_y)
-            and npc_at(row, ahead_x, ahead_y) == 0
-            and not is_at(row, AGENT, ahead_x, ahead_y)
-        ):
+        if is_solid(row, ahead_x, ahead_y):
+            push(row, ahead_x, ahead_y, direction, ZERO)
+        elif is_free(row, ahead_x, ahead_y):
             set_field(row, npc, Field.X, ahead_x)
             set_field(row, npc, Field.Y, ahead_y)
             draw_cell(row, x, y)
             draw_cell(row, ahead_x, ahead_y)
     elif action == Body.TOGGLE:
         _toggle_object(row, ahead_x, ahead_y)
+    elif action == Body.STOP_POINTING:
+        set_field(row, npc, Field.POINTING, ZERO)
 
 
 @inline
@@ -135,7 +153,9 @@ def _state_table(row: Row, frame: int) -> int:
 
 @inline
 def notice(row: Row, frame: int, heard: int) -> bool:
-    """What a frame does before the body action (`first`); whether it has chosen that action."""
+    """What a frame perceives, and does before the body action (`first`); whether it has chosen that action."""
+    if row.program[frame + FrameColumn.PERCEIVE] != 0:
+        run(row, row.program[frame + FrameColumn.PERCEIVE])
     row.registers[Register.LAST_TURN] = -1
     pc = row.program[_state_table(row, frame) + 1 + heard]
     if pc != 0:
@@ -155,12 +175,13 @@ def act(row: Row, frame: int) -> int:
 
 @inline
 def conclude(row: Row, frame: int, heard: int, chosen: bool) -> None:
-    """The clock ticks, then what is done after the body action (`then`), unless `first` took the whole turn."""
+    """The clock ticks, then what is done after the body action: `then`, or the rest of what took the turn in `first`."""
     row.registers[row.program[frame + FrameColumn.CLOCK]] += 1
+    pc = row.program[frame + FrameColumn.DEFERRED]
     if not chosen:
         pc = row.program[_state_table(row, frame) + 2 + row.program[Header.CLASSES] + heard]
-        if pc != 0:
-            run(row, pc)
+    if pc != 0:
+        run(row, pc)
 
 
 @inline
@@ -214,7 +235,7 @@ def say_as_agent(row: Row) -> None:
     utterance = row.registers[Register.CLASS]
     if utterance == 0:
         return
-    deliver(row, AGENT, utterance)
+    deliver(row, AGENT, utterance, row.registers[Register.NOUN])
     if row.program[Header.FLAGS] & Flag.OWN_VOICE and row.program[Header.AGENT_SAYS] > 0:
         pair = row.registers[Register.TEMPLATE] * row.program[Header.NOUNS]
         hear(row, row.program[Header.AGENT_SAYS] - 1 + pair + row.registers[Register.NOUN])

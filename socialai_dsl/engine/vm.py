@@ -13,11 +13,12 @@ from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.operands import assign, draw_below, value
 from socialai_dsl.engine.places import next_cell, place
 from socialai_dsl.engine.pointers import ROW_TYPES
+from socialai_dsl.engine.pushing import put_on
 from socialai_dsl.engine.separate import Separate
 from socialai_dsl.engine.sets import drop_cell
 from socialai_dsl.engine.sight import is_in_view
 from socialai_dsl.engine.state import NO_PATH, NOTHING, ONE, RESETTING, STILL, ZERO, Row
-from socialai_dsl.engine.whereabouts import attribute, cell_of, x_of, y_of
+from socialai_dsl.engine.whereabouts import attribute, cell_beside, cell_of, x_of, y_of
 from socialai_dsl.program import CELL, Body, Field, FrameColumn, Header, Op, Register
 
 _NO_CELL = -1
@@ -42,6 +43,8 @@ def _compute(row: Row, op: int, a: int, b: int, c: int) -> None:
         result = np.int64(is_in_view(row, result, value(row, c), value(row, a)))
     elif op == Op.CELL_OF:
         result = cell_of(row, result)
+    elif op == Op.CELL_BESIDE:
+        result = cell_beside(row, result, value(row, c))
     elif op == Op.SET_BIT:
         result = value(row, a) | (np.int64(1) << (result & 63))
     else:
@@ -105,10 +108,19 @@ def _effect(row: Row, op: int, a: int, b: int, c: int) -> None:
     elif op == Op.END:
         registers[Register.OUTCOME] = a
         registers[Register.PERCENT] = b
+    elif op == Op.END_GRADED:
+        registers[Register.OUTCOME] = a
+        registers[Register.PERCENT] = max(0, min(value(row, b), 100))
+    elif op == Op.REWARD:
+        registers[Register.BONUS] += value(row, a)
+    elif op == Op.PLACE:
+        put_on(row, value(row, a), value(row, b))
     else:
         entity = value(row, a)
         if op == Op.SET_FIELD:
             set_field(row, entity, b, value(row, c))
+            if b >= Field.POKED:
+                return  # nobody sees it in the cell
         else:
             name = Field.STATUS if op == Op.BECOME else Field.GONE
             wanted = value(row, b) if op == Op.BECOME else ONE
@@ -126,6 +138,9 @@ def _choose(row: Row, op: int, a: int, b: int, c: int) -> int:
         return value(row, a)
     mover = value(row, a)
     target = value(row, b)
+    if op == Op.POINT:
+        set_field(row, mover, Field.POINTING, 1 + (target & 3))
+        return np.int64(Body.POINT)
     direction = field(row, mover, Field.DIR)
     if op == Op.TURN_TO:
         return paths.turn_towards(direction, target, draw_below(row, c, _SIDES))

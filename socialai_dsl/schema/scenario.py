@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, StringConstraints
 
 from socialai_dsl.schema.base import Expression, Model, Word, _as_tuple
 from socialai_dsl.schema.behaviour import CastMember, Frame, Probability, Ranged, Role, WorldRule
@@ -13,6 +13,10 @@ from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGramm
 Primitive = Literal["left", "right", "forward", "pickup", "drop", "toggle", "done"]
 PRIMITIVES: tuple[Primitive, ...] = ("left", "right", "forward", "pickup", "drop", "toggle", "done")
 """The agent's body actions in the order of the paper (appendix, action space)."""
+
+
+MemberName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\[\d+\])?$", max_length=40)]
+"""A member of the cast; those of a group are numbered from 0: `peers[0]`."""
 
 
 class Outcome(Model):
@@ -100,7 +104,7 @@ class Scenario(Model):
     frames: dict[Word, Frame] = Field(default_factory=dict)
     roles: dict[Word, Role] = Field(default_factory=dict, description="parts that members of the cast play")
     npc_defaults: CastMember = CastMember()
-    cast: dict[Word, CastMember]
+    cast: dict[MemberName, CastMember]
     rules: Annotated[tuple[WorldRule, ...], BeforeValidator(_as_tuple)] = Field(
         (), description="rules about the world, read once a step; each that holds takes effect"
     )

@@ -91,8 +91,13 @@ def symbols_of(
     defines = _defines(scenario.define, ("define",), findings)
     _check_names(scenario, findings)
     roles = _roles(scenario, findings)
+    groups: dict[str, tuple[str, ...]] = {}
+    for name in cast:
+        base = name.partition("[")[0]
+        if base != name:
+            groups[base] = (*groups.get(base, ()), name)
     return Symbols(
-        scenario, cast, alternatives, numbers, roles, objects, types, defines, *sizes, prelude.colors
+        scenario, cast, alternatives, numbers, roles, groups, objects, types, defines, *sizes, prelude.colors
     )
 
 
@@ -210,7 +215,7 @@ def _check_frame_names(path: DataPath, frame: Frame, findings: Findings) -> None
 
 
 def _names(scenario: Scenario) -> Iterator[tuple[str, DataPath, str]]:
-    for name in scenario.cast:
+    for name in dict.fromkeys(name.partition("[")[0] for name in scenario.cast):
         yield "member of the cast", ("cast", name), name
     for name in scenario.objects:
         yield "object", ("objects", name), name
@@ -390,7 +395,9 @@ def _declare_file(resolver: Resolver, name: str) -> None:
 def declare_name(resolver: Resolver, name: str) -> None:
     """The name of a member of the cast; by default its key."""
     symbols = resolver.symbols
-    default = name[:1].upper() + name[1:].replace("_", " ")
+    group = symbols.group_of(name)
+    key = f"{group[0]} {group[1] + 1}" if group is not None else name
+    default = key[:1].upper() + key[1:].replace("_", " ")
     names = [member.name if member.name is not None else default for member in symbols.alternatives[name]]
     raws = [str(raw) if isinstance(raw, int) else raw for raw in names]
     plain = [symbols.cast[name].name is None or is_plain_name(resolver, raw) for raw in raws]

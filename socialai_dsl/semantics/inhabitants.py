@@ -37,10 +37,11 @@ def entities_of(resolver: Resolver, placings: Mapping[int, Sequence[Placing]]) -
             _check_shared(resolver, name)
             near, far = _voice(resolver, name, member)
             number = symbols.numbers[name]
+            group = symbols.group_of(name)
             yield Entity(
                 number=number,
-                key=name,
-                index=None,
+                key=name if group is None else group[0],
+                index=None if group is None else group[1],
                 role="agent" if name == AGENT else "npc",
                 span=resolver.findings.places.key_span(("cast", name)),
                 kind=""

@@ -262,6 +262,15 @@ def _kind_of(resolver: Resolver, entity: int) -> str:
 
 
 def _index(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
+    members = [resolver.symbols.member_of(number) for number in (who.type.low, who.type.high)]
+    groups = [resolver.symbols.group_of(member) for member in members if member is not None]
+    if len(groups) == 2 and groups[0] is not None and groups[1] is not None and groups[0][0] == groups[1][0]:
+        first = who.type.low - groups[0][1]
+        return (
+            number(who.value - first)
+            if isinstance(who, Const)
+            else arithmetic("-", _as_number(who), number(first))
+        )
     objects = resolver.symbols.object_of(who.type.low)
     if objects is None or who.type.high not in objects.numbers:
         raise resolver.fail("S204", "only a member of one group of objects has an `index`", node, scope)

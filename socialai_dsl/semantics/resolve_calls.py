@@ -46,6 +46,7 @@ from socialai_dsl.semantics.terms import (
     Term,
     Test,
     Type,
+    Variable,
     World,
 )
 from socialai_dsl.semantics.wording import quoted, usage, wrong_count
@@ -270,6 +271,8 @@ def _did(resolver: Resolver, argument: ast.Expr, scope: Scope) -> Term:
 
 def _is_in_state(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
     """`dancer.is(watching)`: the state is a bare word, looked up in the member's frame."""
+    if isinstance(node.subject, ast.Name) and isinstance(scope.variables.get(node.subject.id), Variable):
+        return _is_each_in_state(resolver, cast(Variable, scope.variables[node.subject.id]), node, scope)
     member = _member(resolver, node.subject, node, scope)
     argument = node.args[0]
     own = scope.frame is not None and node.subject is None
@@ -290,6 +293,20 @@ def _is_in_state(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
         near = did_you_mean(argument.id, states)
         raise resolver.fail("S310", message, argument, scope, suggestion=near)
     return InState(member, frame.name, argument.id)
+
+
+def _is_each_in_state(resolver: Resolver, who: Variable, node: ast.Call, scope: Scope) -> Term:
+    """`any(p in peers where p.is(ready))`: of whoever is meant."""
+    members = [resolver.symbols.member_of(number) for number in range(who.type.low, who.type.high + 1)]
+    named = [member for member in members if member is not None]
+    if who.type.kind != "entity" or len(named) < len(members):
+        raise resolver.fail("S211", "a member of the cast is needed before the dot", node, scope)
+    cases = []
+    for i, member in enumerate(named):
+        asked = replace(node, subject=ast.Name(member, at=node.at))
+        its = _is_in_state(resolver, asked, replace(scope, variables={}))
+        cases.append(all_of([Compare("==", who, Const(who.type, who.type.low + i)), its]))
+    return any_of(cases)
 
 
 def _member(resolver: Resolver, subject: ast.Expr | None, node: ast.Expr, scope: Scope) -> str:

@@ -44,7 +44,11 @@ def is_group(resolver: Resolver, node: ast.Expr, scope: Scope) -> bool:
             if bound is not None:
                 return isinstance(bound, Macro) and is_group(resolver, bound.node, bound.scope)
             objects = resolver.symbols.objects.get(word)
-            return word in ("colors", "nouns", "cells") or (objects is not None and not objects.single)
+            return (
+                word in ("colors", "nouns", "cells")
+                or word in resolver.symbols.groups
+                or (objects is not None and not objects.single)
+            )
     return False
 
 
@@ -65,6 +69,10 @@ def group(resolver: Resolver, node: ast.Expr, expected: Type | None, scope: Scop
                 type_ = COLOR if word == "colors" else resolver.symbols.nouns
                 return Group(type_, _values(type_))
             objects = resolver.symbols.objects.get(word)
+            if bound is None and word in resolver.symbols.groups:
+                numbers = [resolver.symbols.numbers[name] for name in resolver.symbols.groups[word]]
+                type_ = Type("entity", numbers[0], numbers[-1])
+                return Group(type_, _values(type_))
             if bound is None and objects is not None:
                 type_ = Type("entity", objects.numbers[0], objects.numbers[-1])
                 return Group(type_, _values(type_))

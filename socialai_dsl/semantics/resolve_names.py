@@ -24,10 +24,13 @@ from socialai_dsl.semantics.terms import (
     DIRECTION,
     SIDE,
     TURN,
+    Compare,
     Const,
     Here,
+    Select,
     Term,
     Type,
+    Variable,
     World,
 )
 from socialai_dsl.semantics.wording import described, usage, words_of
@@ -84,7 +87,7 @@ def _own(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope
     word, frame = node.id, scope.frame
     if word == "it" and scope.it is not None:
         return scope.it
-    if word == "self" and scope.member is not None:
+    if word in ("self", "it") and scope.member is not None:
         return entity(resolver.symbols.numbers[scope.member])
     if frame is None:
         return None
@@ -158,12 +161,13 @@ def _declared(resolver: Resolver, node: ast.Name, expected: Type | None, scope: 
         word = _player(resolver, word)
     if word in symbols.numbers:
         return entity(symbols.numbers[word])
-    if word in symbols.objects:
-        objects = symbols.objects[word]
-        if objects.single:
+    if word in symbols.objects or word in symbols.groups:
+        objects = symbols.objects.get(word)
+        if objects is not None and objects.single:
             return entity(objects.numbers[0])
+        many = len(objects.numbers) if objects is not None else len(symbols.groups[word])
         raise resolver.fail(
-            "S204", f"`{word}` is a group of {len(objects.numbers)}, here one of them is needed", node, scope,
+            "S204", f"`{word}` is a group of {many}, here one of them is needed", node, scope,
             hint=f"`pick({word})` draws one, `any(d in {word} where ...)` asks for any",
         )  # fmt: skip
     return None
@@ -331,6 +335,11 @@ def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
         if owner == "here" and node.name in ("x", "y") and scope.here:
             _, high = resolver.symbols.width if node.name == "x" else resolver.symbols.height
             return Here(Type("int", 0, high - 1), "x" if node.name == "x" else "y")
+        several = scope.variables.get(owner)
+        if isinstance(several, Variable) and node.name not in VALUES:
+            found = _of_each(resolver, several, node.name)
+            if found is not None:
+                return found
         if owner not in scope.variables and node.name not in VALUES:
             owner = resolver.symbols.roles.get(owner, owner)
             register, played = f"{owner}.{node.name}", resolver.frames.get(owner)
@@ -339,6 +348,20 @@ def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
             if played is not None and played.model.slots.get(node.name) == "bool":
                 return member_truth(resolver, played, node.name, scope)
     return resolve_attributes.without_arguments(resolver, node.name, node.subject, node, scope)
+
+
+def _of_each(resolver: Resolver, who: Variable, name: str) -> Term | None:
+    """A register that each of several members has in its frame: that of the one who is meant. None if some lack it."""
+    if who.type.kind != "entity" or who.type.high >= len(resolver.symbols.numbers):
+        return None
+    members = [resolver.symbols.member_of(number) for number in range(who.type.low, who.type.high + 1)]
+    if not all(f"{member}.{name}" in resolver.registers for member in members):
+        return None
+    values = [resolver.registers.read(f"{member}.{name}") for member in members]
+    *others, last = values
+    low, high = min(v.type.low for v in values), max(v.type.high for v in values)
+    cases = [Compare("==", who, Const(who.type, who.type.low + i)) for i in range(len(others))]
+    return Select(replace(last.type, low=low, high=high), tuple(cases), tuple(others), last)
 
 
 def _statuses(resolver: Resolver) -> set[str]:

@@ -49,6 +49,7 @@ class Symbols:
         alternatives: member -> everything it can be: one for each file of its `one_of`, else only `cast[member]`.
         numbers: member -> number of its entity.
         roles: role -> the member that plays it.
+        groups: name of a group in the cast -> its members.
         objects: name -> its entities.
         types: the object types of the prelude. default_colors: type -> its colour where none is given.
         width, height: least and largest size of the room.
@@ -59,6 +60,7 @@ class Symbols:
     alternatives: Mapping[str, tuple[CastMember, ...]]
     numbers: Mapping[str, int]
     roles: Mapping[str, str]
+    groups: Mapping[str, tuple[str, ...]]
     objects: Mapping[str, Objects]
     types: Mapping[str, ObjectType]
     defines: Mapping[str, Define]
@@ -132,7 +134,14 @@ class Symbols:
         found |= dict.fromkeys(self.scenario.tables, "tables")
         found |= dict.fromkeys(self.scenario.roles, "roles")
         found |= {name: "object" if o.single else "objects" for name, o in self.objects.items()}
-        return found | dict.fromkeys(self.cast, "cast")
+        return found | dict.fromkeys((*self.cast, *self.groups), "cast")
+
+    def group_of(self, member: str) -> tuple[str, int] | None:
+        """The group that a member of the cast belongs to and its place in it; None if it stands for itself."""
+        for name, members in self.groups.items():
+            if member in members:
+                return name, members.index(member)
+        return None
 
 
 @dataclass(frozen=True)

@@ -159,12 +159,30 @@ def colorings(resolver: Resolver) -> Iterator[Coloring]:
                 path = resolver.symbols.member_path(name, "color", numbers[0])
                 scope = reset_scope(path, f"cast.{name}.color", name)
                 color = members[numbers[0]].color
+                if color == "distinct":
+                    yield _distinct_color(resolver, name, path)
+                    continue
                 value = None if color is None else _color(resolver, path, color, scope)
                 number = resolver.symbols.numbers[name]
                 yield Coloring(number, f"cast.{name}.color", 0, resolver.findings.at(path), value, when=when)
     for objects in resolver.symbols.objects.values():
         with surviving():
             yield from _object_colors(resolver, objects, resolver.symbols.scenario.objects[objects.name])
+
+
+def _distinct_color(resolver: Resolver, name: str, path: DataPath) -> Coloring:
+    """The colour of one of a group of the cast that nobody before it in the group has."""
+    symbols = resolver.symbols
+    group = symbols.group_of(name)
+    if group is None:
+        message = "`distinct` colours are for a group: give `count`"
+        raise resolver.findings.fail("S204", message, resolver.findings.at(path))
+    before = tuple(symbols.numbers[one] for one in symbols.groups[group[0]][: group[1]])
+    if len(before) >= COLOR.size:
+        message = f"{len(symbols.groups[group[0]])} distinct colours are asked for; there are {COLOR.size}"
+        raise resolver.findings.fail("S106", message, resolver.findings.at(path))
+    number = symbols.numbers[name]
+    return Coloring(number, f"cast.{group[0]}.color", group[1], resolver.findings.at(path), None, before)
 
 
 def _color(resolver: Resolver, path: DataPath, raw: object, scope: Scope) -> Sited | None:
@@ -288,7 +306,8 @@ def _placement_order(resolver: Resolver) -> list[int]:
     """`order:` first, then objects, NPCs, the agent."""
     symbols = resolver.symbols
     numbers: dict[str, Sequence[int]] = {name: o.numbers for name, o in symbols.objects.items()}
-    numbers |= {name: (n,) for name, n in symbols.numbers.items() if n}
+    numbers |= {name: (n,) for name, n in symbols.numbers.items() if n and symbols.group_of(name) is None}
+    numbers |= {name: [symbols.numbers[one] for one in members] for name, members in symbols.groups.items()}
     numbers["agent"] = (0,)
     first: list[str] = []
     for i, name in enumerate(symbols.scenario.order):

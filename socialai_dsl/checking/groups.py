@@ -1,0 +1,151 @@
+"""Groups in the cast: `peers: {count: 3, ...}` as three members `peers[0]`, `peers[1]`, `peers[2]`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from socialai_dsl.diagnostics import DiagnosticBag
+from socialai_dsl.schema.positions import DataPath, Positions
+from socialai_dsl.source import Span
+
+MOST: Final = 16
+_ONE_EACH: Final = ("name", "color", "place", "facing", "at")
+"""Keys of a group whose lists give one value each."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A document whose groups of the cast are written out.
+
+    Attributes:
+        data: the document.
+        places: where its parts stand; those of a member of a group, where the group is written.
+        paths: the paths that were given, in the document as it is now.
+    """
+
+    data: Mapping[str, object]
+    places: Positions
+    paths: frozenset[DataPath]
+
+
+def spread(
+    data: Mapping[str, object], places: Positions, paths: frozenset[DataPath], bag: DiagnosticBag
+) -> Spread:
+    """Write out the groups; reports counts that are none, and lists of another length.
+
+    Args:
+        data: a scenario as plain data.
+        places: where its parts stand.
+        paths: of values that were a parameter.
+        bag: takes the findings.
+    """
+    cast = data.get("cast")
+    if not isinstance(cast, dict):
+        return Spread(data, places, paths)
+    written: dict[str, object] = {}
+    origins: dict[DataPath, DataPath] = {}
+    for name, member in cast.items():
+        if "[" in str(name):
+            message = f"`{name}` is not a name"
+            hint = "a group is written once, with `count:`"
+            bag.error("S104", message, places.key_span(("cast", name)), hint=hint)
+        if not isinstance(member, dict) or "count" not in member:
+            written[name] = member
+            continue
+        count = _count(name, member["count"], places, bag)
+        for i in range(count):
+            written[f"{name}[{i}]"] = _one(name, member, i, count, places, bag, origins)
+            origins[("cast", f"{name}[{i}]")] = ("cast", name)
+    if not origins:
+        return Spread(data, places, paths)
+    spread_places = _SpreadPlaces(places, origins)
+    moved = {copy for copy in _all_paths(written) if spread_places.written(copy) in paths}
+    return Spread({**data, "cast": written}, spread_places, paths | moved)
+
+
+def _count(name: str, count: object, places: Positions, bag: DiagnosticBag) -> int:
+    if isinstance(count, int) and not isinstance(count, bool) and 1 <= count <= MOST:
+        return count
+    message = f"`count` is a number of members from 1 to {MOST}"
+    bag.error("S106", message, places.value_span(("cast", name, "count")))
+    return 1
+
+
+def _one(
+    name: str,
+    member: Mapping[str, Any],
+    index: int,
+    count: int,
+    places: Positions,
+    bag: DiagnosticBag,
+    origins: dict[DataPath, DataPath],
+) -> dict[str, object]:
+    """One member of a group."""
+    made: dict[str, object] = {}
+    for key, value in member.items():
+        if key == "count":
+            continue
+        listed = isinstance(value, list) and (
+            key in _ONE_EACH[:-1] or (key == "at" and any(isinstance(cell, list) for cell in value))
+        )
+        if not listed:
+            made[key] = value
+            continue
+        if len(value) != count:
+            if index == 0:
+                message = f"{len(value)} given for {count}: a list has one for each member of the group"
+                bag.error("S106", message, places.value_span(("cast", name, key)))
+            continue
+        made[key] = value[index]
+        origins[("cast", f"{name}[{index}]", key)] = ("cast", name, key, index)
+    return made
+
+
+def _all_paths(cast: Mapping[str, object]) -> list[DataPath]:
+    found: list[DataPath] = []
+
+    def walk(part: object, path: DataPath) -> None:
+        found.append(path)
+        if isinstance(part, dict):
+            for key, value in part.items():
+                walk(value, (*path, key))
+        elif isinstance(part, list):
+            for i, value in enumerate(part):
+                walk(value, (*path, i))
+
+    walk(cast, ("cast",))
+    return found
+
+
+@dataclass(frozen=True)
+class _SpreadPlaces:
+    """Positions of a document whose groups are written out."""
+
+    places: Positions
+    origins: Mapping[DataPath, DataPath]
+
+    def written(self, path: DataPath) -> DataPath:
+        """Where the author wrote the part at a path."""
+        for length in (3, 2):
+            origin = self.origins.get(path[:length])
+            if origin is not None:
+                return (*origin, *path[length:])
+        return path
+
+    def locate(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
+        """The place of a character of the text at `path`."""
+        return self.places.locate(self.written(path), offset, width)
+
+    def value_span(self, path: DataPath) -> Span:
+        """The place of the value at `path`."""
+        return self.places.value_span(self.written(path))
+
+    def key_span(self, path: DataPath) -> Span:
+        """The place of the key at `path`."""
+        return self.places.key_span(self.written(path))
+
+    def in_flow(self, path: DataPath) -> bool:
+        """Whether the part at `path` stands inside { } or [ ]."""
+        return self.places.in_flow(self.written(path))
