@@ -267,7 +267,7 @@ cast:
     one_of:
       - {npc: shy, kind: shy, name: Sue, at: [3, 3], facing: up, frame: talk, with: {near: true, line: Hi}}
       - {npc: bold, kind: bold, name: Bob, at: [5, 5], facing: down, frame: talk, with: {near: false, line: Ho}}
-      - {npc: odd, kind: shy, kind_code: 9, at: [3, 1], facing: left, frame: talk, with: {near: true, line: Hm}}
+      - {npc: odd, kind: shy, kind_code: 9, at: [3, 1], facing: left, frame: talk, with: {near: false, line: Hm}}
   agent: {at: [1, 3], facing: left}
 frames:
   talk:
