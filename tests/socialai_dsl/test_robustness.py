@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import copy
 import random
 import re
+import shutil
 from pathlib import Path
 
 import pytest
+import yaml
 
+from socialai_dsl.diagnostics import render_text
 from socialai_dsl.frontend import check
+from socialai_dsl.loader.names import shipped_folder
 
 SMALL = (Path(__file__).parent.parent / "diagnostics" / "small.yaml").read_text()
 PIECES = [
@@ -62,3 +67,102 @@ def test_a_mutilated_file_is_a_finding_or_a_scenario(seed, tmp_path):
         file.write_text(text)
         result = check(file)
         assert result.diagnostics or result.checked, text
+
+
+# -- the scenarios that are shipped, and one with everything in it ---------------------------------------------------
+
+DIAGNOSTICS = Path(__file__).parent.parent / "diagnostics"
+SHIPPED = sorted(str(path.relative_to(shipped_folder())) for path in shipped_folder().rglob("*.yaml"))
+VALUES = [
+    *(0, -1, 3, True, None, "", [], {}, 0.5, [1, 2], {"sequence": 2, "moves": ["left"]}),
+    *(
+        "agent",
+        "doors",
+        "pick(doors)",
+        "cells",
+        "dance",
+        "nowhere",
+        "it",
+        "prev(t)",
+        "attempt == dance",
+        "locked",
+    ),
+]
+
+
+class Plainly(yaml.SafeDumper):
+    """Writes what is there twice twice: the language has no anchors."""
+
+    def ignore_aliases(self, data):
+        return True
+
+
+def paths(data, path=()):
+    """The path of every part of some data."""
+    for key in data if isinstance(data, dict) else range(len(data)) if isinstance(data, list) else ():
+        yield (*path, key)
+        yield from paths(data[key], (*path, key))
+
+
+def part(data, path):
+    for key in path:
+        data = data[key]
+    return data
+
+
+def rebuilt(data, other, rng):
+    """Change one part: take it out, put another part in its place or beside it, rename it, or give it another value."""
+    *before, key = rng.choice(list(paths(data)))
+    parent, kind = part(data, before), rng.random()
+    donor = rng.choice((data, other))
+    *_, name = found = rng.choice(list(paths(donor)))
+    given = copy.deepcopy(part(donor, found))
+    if kind < 0.25:
+        del parent[key]
+    elif kind < 0.55:
+        parent[key] = given
+    elif kind < 0.7 and isinstance(parent, dict):
+        parent[str(name)] = given
+    elif kind < 0.85 and isinstance(parent, dict):
+        parent[str(name)] = parent.pop(key)
+    else:
+        parent[key] = copy.deepcopy(rng.choice(VALUES))
+
+
+@pytest.fixture
+def scenarios(tmp_path, monkeypatch):
+    """A copy of the shipped scenarios beside the one with everything in it, in which we work."""
+    folder = tmp_path / "scenarios"
+    shutil.copytree(shipped_folder(), folder)
+    shutil.copytree(DIAGNOSTICS / "guides", folder / "guides")
+    shutil.copy(DIAGNOSTICS / "rich.yaml", folder)
+    monkeypatch.chdir(folder)
+    return folder
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_mutilated_scenario_is_a_finding_or_a_scenario(seed, scenarios):
+    rng = random.Random(seed)
+    for _ in range(40):
+        name = rng.choice([*SHIPPED, *["rich.yaml"] * 6])
+        file = scenarios / name
+        whole = file.read_text(encoding="utf-8")
+        text = whole
+        if rng.random() < 0.6:
+            data = yaml.safe_load(whole)
+            other = yaml.safe_load((scenarios / rng.choice(SHIPPED)).read_text(encoding="utf-8"))
+            for _ in range(rng.choice((1, 1, 2, 3))):
+                rebuilt(data, other, rng)
+                if not data:
+                    break
+            text = yaml.dump(data, Dumper=Plainly, sort_keys=False)
+        else:
+            for _ in range(rng.choice((1, 1, 2, 3))):
+                text = mutated(text, rng)
+        file.write_text(text, encoding="utf-8")
+        result = check("diverse_exit.yaml" if name.startswith("diverse_exit/") else name)
+        assert (
+            result.diagnostics or result.checked or result.suite or "abstract" in text or "of: any" in text
+        ), text
+        assert bool(render_text(result.diagnostics, result.sources)) == bool(result.diagnostics)
+        file.write_text(whole, encoding="utf-8")
