@@ -31,7 +31,11 @@ from socialai_dsl.program import (
 )
 
 EMPTY, WALL, DOOR, LAVA, NPC = 1, 2, 4, 9, 11
+GENERATOR, MARBLE, PLATFORM = 15, 16, 17
 OPEN, CLOSED, LOCKED = 0, 1, 2
+IDLE, PRESSED = 0, 1
+STILL, ROLLING = 0, 1
+_FIRST_ROW = {"agent": 0, "npc": 1, "door": 2, "lava": 5, "marble": 6, "generator": 8, "platform": 10}
 
 Instruction = tuple[int, ...]
 
@@ -62,14 +66,17 @@ class FrameSpec:
     activities: Sequence[Sequence[Instruction]]
     first: Sequence[dict[int, Sequence[Instruction]]] = ()
     then: Sequence[dict[int, Sequence[Instruction]]] = ()
+    perceive: Sequence[Instruction] = ()
+    deferred: Sequence[Instruction] = ()
 
 
 @dataclass
 class Assembly:
     """A room of `size` on a canvas of `canvas`, entities put where `at` says, and code.
 
-    Entities are numbered agent, NPCs, objects. Object types: door (open, closed, locked) and lava; who can walk
-    through something can look through it.
+    Entities are numbered agent, NPCs, objects. Object types: door (open, closed, locked), lava, marble (still, rolling:
+    it rolls when pushed), generator (idle, pressed: when pushed) and platform. Doors that are not open are the only
+    things one cannot look through; open doors, lava and platforms can be walked on.
     Templates x nouns are 2 x 3; `classes` gives the utterance class of each pair.
     """
 
@@ -92,6 +99,7 @@ class Assembly:
     earshot: tuple[int, int] = (0, 1)
     audible: Sequence[int] = ()
     lines: Sequence[tuple[str, Sequence[int], int]] = ()  # text, token ids, class
+    line_nouns: Sequence[int] = ()  # by line, -1 if left out
     tokens: int = 8
     log: int = 4
     deadly: bool = False
@@ -102,6 +110,12 @@ class Assembly:
     before: Sequence[Instruction] = ()
     links: Sequence[Instruction] = ()
     require: Sequence[Instruction] = ()
+    tick: Sequence[Instruction] = ()
+    slope: int = 900
+    each_step: int = 0
+    channels: int = 4
+    class_sets: Sequence[Sequence[int]] = ()
+    pushed_by_rolling: Sequence[int] = ()  # entities that only something rolling pushes
 
     def __post_init__(self) -> None:
         self.code: list[Instruction] = [(Op.HALT, 0, 0, 0)]
@@ -125,7 +139,7 @@ class Assembly:
         frame_registers = self.own + self.registers
         heard = frame_registers + 2 * len(self.frames)
         inbox = self.inbox_register(0, len(self.frames))
-        log = inbox + 5 * entities
+        log = inbox + self._inbox_registers() * entities
         header = np.zeros(Header.END, np.int64)
         tables: list[tuple[Header, list[int]]] = [
             (Header.ACTION_AT, [*range(7), Body.NONE]),
@@ -139,6 +153,7 @@ class Assembly:
             (Header.LINE_AT, self._lines()),
             (Header.TOKEN_AT, [token for _, tokens, _ in self.lines for token in tokens]),
             (Header.SITE_AT, [number for site in self.sites for number in site]),
+            (Header.CLASS_SET_AT, self._class_sets(classes)),
         ]
         header[Header.RESET_PC] = self.add(self._reset())
         header[Header.SETTLE_PC] = self.add(self.settle)
@@ -146,6 +161,7 @@ class Assembly:
         header[Header.BEFORE_PC] = self.add(self.before)
         header[Header.LINKS_PC] = self.add(self.links)
         header[Header.REQUIRE_PC] = self.add(self.require)
+        header[Header.TICK_PC] = self.add(self.tick)
         tables.append((Header.CODE_AT, [word for instruction in self.code for word in instruction]))
         words = [0] * Header.END
         for at, table in tables:
@@ -182,9 +198,14 @@ class Assembly:
             Header.LINES: len(self.lines),
             Header.STATES: sum(len(frame.activities) for frame in self.frames),
             Header.SITES: len(self.sites),
-            Header.TYPE_ROWS: 6,
+            Header.TYPE_ROWS: 11,
             Header.COUNTERS: self.counted + outcomes + 1,
             Header.AGENT_SAYS: self.agent_says,
+            Header.SLOPE: self.slope,
+            Header.EACH_STEP: self.each_step,
+            Header.CHANNELS: self.channels,
+            Header.CLASS_SETS: len(self.class_sets),
+            Header.CLASS_SET_WORDS: classes // 32 + 1,
         }.items():
             header[name] = number
         words[: Header.END] = header.tolist()
@@ -208,7 +229,13 @@ class Assembly:
 
     def _names(self) -> tuple[EntityName, ...]:
         npcs = [EntityName(f"npc{i}", None, "npc", "peer") for i in range(self.npcs)]
-        statuses = {"door": ("open", "closed", "locked"), "lava": ("",)}
+        statuses = {
+            "door": ("open", "closed", "locked"),
+            "lava": ("",),
+            "marble": ("still", "rolling"),
+            "generator": ("idle", "pressed"),
+            "platform": ("",),
+        }
         objects = [
             EntityName(f"{kind}{i}", None, "object", kind, statuses[kind])
             for i, kind in enumerate(self.objects)
@@ -239,7 +266,8 @@ class Assembly:
             if entity > self.npcs:
                 kind = self.objects[entity - 1 - self.npcs]
             row = [0] * EntityColumn.COLUMNS
-            row[EntityColumn.TYPE] = {"agent": 0, "npc": 1, "door": 2, "lava": 5}[kind]
+            row[EntityColumn.TYPE] = _FIRST_ROW[kind]
+            row[EntityColumn.PUSHED_BY] = int(entity in self.pushed_by_rolling)
             row[EntityColumn.KIND] = entity if kind == "npc" else 0
             row[EntityColumn.NEAR], row[EntityColumn.FAR] = self.earshot
             row[EntityColumn.AUDIBLE] = int(entity in self.audible)
@@ -250,15 +278,22 @@ class Assembly:
 
     @staticmethod
     def _types() -> list[int]:
-        def row(code: int, status: int, walkable: int, toggled: int) -> list[int]:
+        def row(
+            code: int, status: int, walkable: int, toggled: int, pushed: int | None = None, rolls: int = 0
+        ) -> list[int]:
             columns = [0] * TypeColumn.COLUMNS
-            columns[TypeColumn.TRANSPARENT] = walkable
+            columns[TypeColumn.TRANSPARENT] = int(walkable or code in (GENERATOR, MARBLE))
+            columns[TypeColumn.PUSHED] = status if pushed is None else pushed
+            columns[TypeColumn.ROLLS] = rolls
             columns[TypeColumn.CODE], columns[TypeColumn.STATUS] = code, status
             columns[TypeColumn.WALKABLE], columns[TypeColumn.TOGGLED] = walkable, toggled
             return columns
 
         door = [row(DOOR, OPEN, 1, CLOSED), row(DOOR, CLOSED, 0, OPEN), row(DOOR, LOCKED, 0, LOCKED)]
+        marble = [row(MARBLE, STILL, 0, 0, pushed=ROLLING), row(MARBLE, ROLLING, 0, 1, rolls=1 + STILL)]
+        generator = [row(GENERATOR, IDLE, 0, 0, pushed=PRESSED), row(GENERATOR, PRESSED, 0, 1)]
         rows = [row(10, 0, 1, 0), row(NPC, 0, 0, 0), *door, row(LAVA, 0, 1, 0)]
+        rows += [*marble, *generator, row(PLATFORM, 0, 1, 0)]
         return [word for one in rows for word in one]
 
     def _room(self) -> list[int]:
@@ -284,14 +319,19 @@ class Assembly:
             row[FrameColumn.STATE] = registers + 2 * number
             row[FrameColumn.CLOCK] = registers + 2 * number + 1
             row[FrameColumn.ROWS], row[FrameColumn.STATES] = first, len(frame.activities)
-            row[FrameColumn.INBOX] = inbox + 5 * frame.entity
+            row[FrameColumn.INBOX] = inbox + self._inbox_registers() * frame.entity
+            row[FrameColumn.PERCEIVE] = self.add(frame.perceive)
+            row[FrameColumn.DEFERRED] = self.add(frame.deferred)
             rows += row
             first += len(frame.activities)
         return rows
 
     def inbox_register(self, entity: int, frames: int) -> int:
         """The inbox of an entity in a program with so many frames."""
-        return self.own + self.registers + 2 * frames + 4 + 5 * entity
+        return self.own + self.registers + 2 * frames + 4 + self._inbox_registers() * entity
+
+    def _inbox_registers(self) -> int:
+        return 1 + 4 * (3 if self.flags & Flag.HEARD_BY else 1)
 
     def state_register(self, frame: int) -> int:
         """The register of a frame's state; its clock is the next."""
@@ -322,18 +362,28 @@ class Assembly:
     def _lines(self) -> list[int]:
         rows: list[int] = []
         first = 0
-        for _, tokens, heard in self.lines:
-            rows += [first, len(tokens), heard]
+        for number, (_, tokens, heard) in enumerate(self.lines):
+            noun = self.line_nouns[number] if number < len(self.line_nouns) else -1
+            rows += [first, len(tokens), heard, noun]
             first += len(tokens)
+        return rows
+
+    def _class_sets(self, classes: int) -> list[int]:
+        rows: list[int] = []
+        for members in self.class_sets:
+            words = np.zeros(classes // 32 + 1, np.uint32)
+            for member in members:
+                words[member // 32] |= np.uint32(1 << member % 32)
+            rows += words.view(np.int32).tolist()
         return rows
 
 
 HIDDEN = int(Flag.NPCS_HIDDEN)
 
 
-def batch_of(program: Program, rows: int = 1, threads: int = 1, seed: int = 7) -> Batch:
-    """A batch of one program, row i at (seed, i), reset."""
-    part = Part(
+def part_of(program: Program) -> Part:
+    """A program with its links into a batch of programs like it."""
+    return Part(
         words=program.words,
         rules=len(program.rules),
         outcomes=range(len(program.outcome_table)),
@@ -341,8 +391,13 @@ def batch_of(program: Program, rows: int = 1, threads: int = 1, seed: int = 7) -
         templates=range(2),
         nouns=range(3),
         tokens=range(len(program.vocabulary)),
+        successes=[outcome.success for outcome in program.outcome_table],
     )
-    batch = Batch([part], [[0]], [0] * rows, program.header(Header.TOKENS), threads)
+
+
+def batch_of(program: Program, rows: int = 1, threads: int = 1, seed: int = 7) -> Batch:
+    """A batch of one program, row i at (seed, i), reset."""
+    batch = Batch([part_of(program)], [[0]], [0] * rows, program.header(Header.TOKENS), threads)
     batch.state.keys[:, Key.SEED] = seed
     batch.state.keys[:, Key.INDEX] = np.arange(rows)
     batch.reset()

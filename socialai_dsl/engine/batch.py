@@ -125,7 +125,7 @@ class Batch:
     def weights(self, pool: int) -> list[int]:
         """How much each program of a pool weighs when an episode draws one."""
         start, end = self._pool_starts[pool : pool + 2]
-        return np.diff(self.tables.weights[start:end], prepend=0).tolist()  # type: ignore[no-any-return]
+        return np.diff(self.tables.weights[start:end], prepend=0).tolist()
 
     def set_weights(self, pool: int, weights: Sequence[int]) -> None:
         """Let later episodes draw the programs of a pool as they weigh; all weigh 1 at first.

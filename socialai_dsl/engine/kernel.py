@@ -88,7 +88,7 @@ def _open_act(book: Any, opened: Row) -> int:
     key = opened.key
     act = np.int64(key[Key.ACT]) + 1
     t = opened.registers[Register.T]
-    if opened.registers[Register.ENDED] != TERMINATED or act >= _pool_size(key):
+    if opened.registers[Register.ENDED] != TERMINATED or not 0 < act < _pool_size(key):
         return ZERO
     success = opened.program[
         _how_it_ended(opened) + opened.program[opened.program[Header.SIZE] + Link.OUTCOMES]

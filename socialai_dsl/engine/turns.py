@@ -175,7 +175,7 @@ def act(row: Row, frame: int) -> int:
 
 @inline
 def conclude(row: Row, frame: int, heard: int, chosen: bool) -> None:
-    """The clock ticks, then what is done after the body action: `then`, or the rest of what took the turn in `first`."""
+    """The clock ticks, then what is done after the body action: `then`, or the rest of a rule of `first` that acted."""
     row.registers[row.program[frame + FrameColumn.CLOCK]] += 1
     pc = row.program[frame + FrameColumn.DEFERRED]
     if not chosen:
