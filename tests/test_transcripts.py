@@ -1,8 +1,8 @@
 """Dialogues as they read: what the agent does and says, what it hears, how it ends. One file for each point.
 
-`> [body action][, say SENTENCE]` is a step, `< LINE` what is heard in it, `= success|failure|timeout REWARD` its end; a
-step without `<` is silent, one without `=` ends nothing. The header is `scenario:` and a `layout:` in JSON, which may go
-on over several lines.
+`> [body action][, say SENTENCE]` is a step, `< LINE` what is heard in it, `= success|failure|timeout REWARD` its
+end; a step without `<` is silent, one without `=` ends nothing. The header is `scenario:` and a `layout:` in JSON,
+which may go on over several lines.
 """
 
 import json
@@ -19,6 +19,7 @@ FOLDER = Path(__file__).parent / "transcripts"
 FILES = sorted(FOLDER.glob("*.txt"))
 PAPER = [
     "talkitout",
+    "talkitout_no_liar",
     "dance",
     "cointhief",
     "diverse_exit",
