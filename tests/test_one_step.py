@@ -324,7 +324,10 @@ def test_2_9_a_computed_status_is_settled_after_those_it_reads(play: Folder) -> 
           third: {type: door, at: [3, 0], locked: second.locked}
           second: {type: door, at: [4, 0], locked: switch.pressed}
           switch: {type: switch, at: [2, 1]}
+        frames: {watch: {let: {seen: false}, states: {s: {first: [{set: {seen: third.locked}}]}}}}
+        cast: {ann: {at: [5, 5], frame: watch}}
     """).step("toggle")
+    assert run.value("ann.seen"), "in one pass, before anybody else has moved"
     assert (run.status("second"), run.status("third")) == ("locked", "locked")
 
 
@@ -334,9 +337,12 @@ def test_2_10_computed_statuses_read_what_links_did(play: Folder) -> None:
           computed: {type: door, at: [3, 0], locked: linked.locked}
           linked: {type: door, at: [4, 0], state: locked}
           switch: {type: switch, at: [2, 1], unlocks: linked}
+        frames: {watch: {let: {seen: true}, states: {s: {first: [{set: {seen: computed.locked}}]}}}}
+        cast: {ann: {at: [5, 5], frame: watch}}
     """)
     assert run.status("computed") == "locked"
     run.step("toggle")
+    assert not run.value("ann.seen")
     assert (run.status("linked"), run.status("computed")) == ("closed", "closed")
 
 
