@@ -77,8 +77,9 @@ def test_readme_scenario_can_be_won(reader: Path) -> None:
         "gate": {"at": [2, 0]},
     }
     env.reset(seed=0, options={"layout": layout})
-    encode = env.unwrapped.encode_action
-    info, terminated = {}, False
+    encode = env.unwrapped.encode_action  # type: ignore[attr-defined]
+    info: dict[str, object] = {}
+    terminated = False
     for action in [(None, "Please open the door"), ("left", None), ("forward", None)]:
         *_, terminated, _, info = env.step(encode(action))
     assert terminated

@@ -324,7 +324,10 @@ def test_2_9_a_computed_status_is_settled_after_those_it_reads(play: Folder) -> 
           third: {type: door, at: [3, 0], locked: second.locked}
           second: {type: door, at: [4, 0], locked: switch.pressed}
           switch: {type: switch, at: [2, 1]}
+        frames: {watch: {let: {seen: false}, states: {s: {first: [{set: {seen: third.locked}}]}}}}
+        cast: {ann: {at: [5, 5], frame: watch}}
     """).step("toggle")
+    assert run.value("ann.seen"), "in one pass, before anybody else has moved"
     assert (run.status("second"), run.status("third")) == ("locked", "locked")
 
 
@@ -334,9 +337,12 @@ def test_2_10_computed_statuses_read_what_links_did(play: Folder) -> None:
           computed: {type: door, at: [3, 0], locked: linked.locked}
           linked: {type: door, at: [4, 0], state: locked}
           switch: {type: switch, at: [2, 1], unlocks: linked}
+        frames: {watch: {let: {seen: true}, states: {s: {first: [{set: {seen: computed.locked}}]}}}}
+        cast: {ann: {at: [5, 5], frame: watch}}
     """)
     assert run.status("computed") == "locked"
     run.step("toggle")
+    assert not run.value("ann.seen")
     assert (run.status("linked"), run.status("computed")) == ("closed", "closed")
 
 
@@ -462,16 +468,17 @@ def test_4_2_who_has_vanished_takes_no_turn(play: Folder) -> None:
     run = play("""
         frames:
           leave:
-            let: {turn_at: 0}
+            let: {early: 0, late: 0}
             states:
               s:
+                first: [{set: {early: t}}]
                 then:
-                  - {when: t == 2, set: {turn_at: t}, cause: [self.vanish], say: Bye.}
-                  - {set: {turn_at: t}, say: Here.}
+                  - {when: t == 2, set: {late: t}, cause: [self.vanish], say: Bye.}
+                  - {set: {late: t}, say: Here.}
         cast: {ann: {at: [5, 5], frame: leave}}
     """)
     assert [run.step().info["utterance"] for _ in range(4)] == ["Ann: Here.", "Ann: Bye.", "NA", "NA"]
-    assert (run.at("ann"), run.value("ann.turn_at")) == (None, 2)
+    assert (run.at("ann"), run.value("ann.early"), run.value("ann.late")) == (None, 2, 2)
 
 
 def test_4_3_first_is_read_before_the_body_moves(play: Folder) -> None:
@@ -525,7 +532,20 @@ def test_4_6_a_goto_in_first_is_of_this_turn(play: Folder) -> None:
     assert (run.value("ann.old"), run.value("ann.new")) == (0, 1)
 
 
-def test_4_7_one_body_action_a_turn(play: Folder) -> None:
+def test_4_7_who_vanishes_in_first_does_nothing_more(play: Folder) -> None:
+    run = play("""
+        objects: {door: {type: door, at: [4, 5]}}
+        frames:
+          leave:
+            let: {late: 0}
+            states: {s: {first: [{cause: [self.vanish], say: Bye.}], do: toggle, then: [{set: {late: t}}]}}
+        cast: {ann: {at: [3, 5], facing: right, frame: leave}}
+    """).step()
+    assert (run.at("ann"), run.status("door"), run.value("ann.late")) == (None, "closed", 0)
+    assert run.info["utterance"] == "Ann: Bye."
+
+
+def test_4_8_one_body_action_a_turn(play: Folder) -> None:
     run = play("""
         objects: {switch: {type: switch, at: [5, 3]}}
         frames: {press: {states: {s: {do: use(switch)}}}}
@@ -551,7 +571,7 @@ def test_4_7_one_body_action_a_turn(play: Folder) -> None:
         ("observe: {npcs: hidden}", ", agent: {at: [4, 5]}"),
     ],
 )
-def test_4_8_npcs_do_not_enter_what_is_solid_deadly_or_taken(play: Folder, obstacle: str, cast: str) -> None:
+def test_4_9_npcs_do_not_enter_what_is_solid_deadly_or_taken(play: Folder, obstacle: str, cast: str) -> None:
     run = play(f"""
         {obstacle}
         {WALK}
@@ -560,7 +580,7 @@ def test_4_8_npcs_do_not_enter_what_is_solid_deadly_or_taken(play: Folder, obsta
     assert run.step().at("ann") == [3, 5]
 
 
-def test_4_9_the_toggle_of_an_npc_changes_the_object_and_pokes_nobody(play: Folder) -> None:
+def test_4_10_the_toggle_of_an_npc_changes_the_object_and_pokes_nobody(play: Folder) -> None:
     run = play("""
         objects: {door: {type: door, at: [4, 5], state: open}}
         frames: {press: {states: {s: {do: toggle}}}}
@@ -573,7 +593,7 @@ def test_4_9_the_toggle_of_an_npc_changes_the_object_and_pokes_nobody(play: Fold
     assert run.state["last"]["poked"] is None
 
 
-def test_4_10_the_world_is_settled_after_the_body_action(play: Folder) -> None:
+def test_4_11_the_world_is_settled_after_the_body_action(play: Folder) -> None:
     run = play("""
         objects:
           switch: {type: switch, at: [4, 5], unlocks: linked}
@@ -597,7 +617,7 @@ CLOCK = """
 """
 
 
-def test_4_11_after_1_in_then_holds_in_the_first_turn(play: Folder) -> None:
+def test_4_12_after_1_in_then_holds_in_the_first_turn(play: Folder) -> None:
     run = play(CLOCK.format(where="then"))
     assert run.state["ann"]["clock"] == 0
     run.step()
@@ -605,11 +625,11 @@ def test_4_11_after_1_in_then_holds_in_the_first_turn(play: Folder) -> None:
     assert run.value("ann.fired_at") == 1
 
 
-def test_4_12_after_1_in_first_holds_in_the_second_turn(play: Folder) -> None:
+def test_4_13_after_1_in_first_holds_in_the_second_turn(play: Folder) -> None:
     assert play(CLOCK.format(where="first")).steps(3).value("ann.fired_at") == 2
 
 
-def test_4_13_a_rule_computes_before_it_acts(play: Folder) -> None:
+def test_4_14_a_rule_computes_before_it_acts(play: Folder) -> None:
     run = play("""
         frames:
           swap:
@@ -624,7 +644,7 @@ def test_4_13_a_rule_computes_before_it_acts(play: Folder) -> None:
 @pytest.mark.parametrize(
     ("effects", "status"), [("door.open, door.lock", "locked"), ("door.lock, door.open", "open")]
 )
-def test_4_14_effects_happen_in_the_order_listed(play: Folder, effects: str, status: str) -> None:
+def test_4_15_effects_happen_in_the_order_listed(play: Folder, effects: str, status: str) -> None:
     run = play(f"""
         objects: {{door: {{type: door, at: [5, 0]}}}}
         frames: {{act: {{states: {{s: {{then: [{{cause: [{effects}]}}]}}}}}}}}
@@ -633,7 +653,7 @@ def test_4_14_effects_happen_in_the_order_listed(play: Folder, effects: str, sta
     assert run.status("door") == status
 
 
-def test_4_15_what_then_changes_is_settled_later(play: Folder) -> None:
+def test_4_16_what_then_changes_is_settled_later(play: Folder) -> None:
     run = play("""
         objects:
           switch: {type: switch, at: [4, 0], unlocks: door}
@@ -668,14 +688,14 @@ GOING = """
 """
 
 
-def test_4_16_after_goto_the_new_state_begins_with_the_next_turn(play: Folder) -> None:
+def test_4_17_after_goto_the_new_state_begins_with_the_next_turn(play: Folder) -> None:
     run = play(GOING.format(go="goto")).step()
     assert (run.state["ann"]["state"], run.state["ann"]["clock"]) == ("after_it", 0)
     assert run.value("ann.fired_at") == 0
     assert run.step().value("ann.fired_at") == 9, "`first` of the next turn"
 
 
-def test_4_17_goto_now_reads_the_new_then_at_once(play: Folder) -> None:
+def test_4_18_goto_now_reads_the_new_then_at_once(play: Folder) -> None:
     run = play(GOING.format(go="goto_now")).step()
     assert (run.state["ann"]["state"], run.state["ann"]["clock"]) == ("after_it", 0)
     assert run.value("ann.fired_at") == 1
@@ -689,7 +709,7 @@ CHOICES = [
 
 
 @pytest.mark.parametrize("choice", CHOICES)
-def test_4_18_a_condition_is_false_where_nothing_is_found(play: Folder, choice: str) -> None:
+def test_4_19_a_condition_is_false_where_nothing_is_found(play: Folder, choice: str) -> None:
     run = play(f"""
         objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]]}}}}
         frames:
@@ -710,7 +730,7 @@ def test_4_18_a_condition_is_false_where_nothing_is_found(play: Folder, choice: 
 
 @pytest.mark.parametrize("choice", CHOICES)
 @pytest.mark.parametrize("effect", ['cause: ["{}.open"]', "say: I see <{}.color>", 'set: {{x0: "{}.x"}}'])
-def test_4_19_a_rule_does_not_fire_where_nothing_is_found(play: Folder, choice: str, effect: str) -> None:
+def test_4_20_a_rule_does_not_fire_where_nothing_is_found(play: Folder, choice: str, effect: str) -> None:
     text = """
         objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]], state: {}}}}}
         frames:
@@ -733,7 +753,7 @@ def test_4_19_a_rule_does_not_fire_where_nothing_is_found(play: Folder, choice: 
 
 
 @pytest.mark.parametrize("choice", CHOICES)
-def test_4_20_an_activity_is_staying_where_nothing_is_found(play: Folder, choice: str) -> None:
+def test_4_21_an_activity_is_staying_where_nothing_is_found(play: Folder, choice: str) -> None:
     run = play(f"""
         objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]]}}}}
         frames:
@@ -747,7 +767,7 @@ def test_4_20_an_activity_is_staying_where_nothing_is_found(play: Folder, choice
     assert run.step().facing("ann") == "up"
 
 
-def test_4_21_once_is_once_in_an_episode(play: Folder) -> None:
+def test_4_22_once_is_once_in_an_episode(play: Folder) -> None:
     run = play("""
         frames:
           talk:
@@ -766,7 +786,7 @@ def test_4_21_once_is_once_in_an_episode(play: Folder) -> None:
     assert run.step().info["utterance"] == "Ann: First."
 
 
-def test_4_22_a_step_acts_when_it_ends_after_the_body(play: Folder) -> None:
+def test_4_23_a_step_acts_when_it_ends_after_the_body(play: Folder) -> None:
     run = play("""
         objects: {door: {type: door, at: [5, 0]}}
         frames:
@@ -782,7 +802,7 @@ def test_4_22_a_step_acts_when_it_ends_after_the_body(play: Folder) -> None:
     assert run.value("ann.ended_at") == 4
 
 
-def test_4_23_the_next_entry_begins_with_the_next_turn(play: Folder) -> None:
+def test_4_24_the_next_entry_begins_with_the_next_turn(play: Folder) -> None:
     run = play("""
         frames: {go: {steps: [{do: left}, {do: forward}]}}
         cast: {ann: {at: [3, 5], facing: right, frame: go}}
@@ -791,7 +811,7 @@ def test_4_23_the_next_entry_begins_with_the_next_turn(play: Folder) -> None:
     assert run.step().at("ann") == [3, 4]
 
 
-def test_4_24_an_entry_without_activity_stays_for_one_turn(play: Folder) -> None:
+def test_4_25_an_entry_without_activity_stays_for_one_turn(play: Folder) -> None:
     run = play("""
         frames: {go: {steps: [{say: Now.}, {do: left}]}}
         cast: {ann: {at: [3, 5], facing: right, frame: go}}
@@ -801,7 +821,7 @@ def test_4_24_an_entry_without_activity_stays_for_one_turn(play: Folder) -> None
 
 
 @pytest.mark.parametrize("goal", ["go_next_to(door)", "go_to(self.cell)", "enter(inside)"])
-def test_4_25_what_is_fulfilled_before_it_begins_takes_no_turn(play: Folder, goal: str) -> None:
+def test_4_26_what_is_fulfilled_before_it_begins_takes_no_turn(play: Folder, goal: str) -> None:
     text = """
         objects: {{door: {{type: door, at: [3, 6]}}, inside: {{type: door, at: [3, 5], state: open}}}}
         frames: {{go: {{steps: [{{do: {goal}{effect}}}, {{do: left}}]}}}}
@@ -820,7 +840,7 @@ DANCE = """
 TURNS = {"let": {"dance": [["left", "Say hello"], ["right", None], ["forward", "Say bye"]]}}
 
 
-def test_4_26_perform_does_and_says_the_kth_element(play: Folder) -> None:
+def test_4_27_perform_does_and_says_the_kth_element(play: Folder) -> None:
     run = play(DANCE.format(frame="{steps: [{do: perform(dance)}]}", facing="right"), TURNS)
     seen = [(run.step().at("ann"), run.facing("ann"), run.info["utterance"]) for _ in range(3)]
     assert seen == [
@@ -830,14 +850,14 @@ def test_4_26_perform_does_and_says_the_kth_element(play: Folder) -> None:
     ]
 
 
-def test_4_27_a_blocked_move_counts(play: Folder) -> None:
+def test_4_28_a_blocked_move_counts(play: Folder) -> None:
     blocked = {"let": {"dance": [["forward", None], ["forward", "Say bye"], ["left", None]]}}
     run = play(DANCE.format(frame="{steps: [{do: perform(dance)}]}", facing="down"), blocked)
     seen = [(run.step().at("ann"), run.facing("ann"), run.info["utterance"]) for _ in range(3)]
     assert seen == [([3, 5], "down", "NA"), ([3, 5], "down", "Ann: Say bye"), ([3, 5], "right", "NA")]
 
 
-def test_4_28_after_its_last_element_perform_is_finished(play: Folder) -> None:
+def test_4_29_after_its_last_element_perform_is_finished(play: Folder) -> None:
     run = play(
         DANCE.format(frame="{steps: [{do: perform(dance)}, {do: left}]}", facing="right"), TURNS
     ).steps(3)
@@ -849,7 +869,7 @@ def test_4_28_after_its_last_element_perform_is_finished(play: Folder) -> None:
 
 
 @pytest.mark.parametrize(("facing", "heard"), [("left", "Ann: Say hello"), ("right", "NA")])
-def test_4_29_a_line_is_heard_where_the_turn_ends(play: Folder, facing: str, heard: str) -> None:
+def test_4_30_a_line_is_heard_where_the_turn_ends(play: Folder, facing: str, heard: str) -> None:
     start = {"left": 3, "right": 2}[facing]
     run = play(f"""
         earshot: next_to
@@ -859,7 +879,7 @@ def test_4_29_a_line_is_heard_where_the_turn_ends(play: Folder, facing: str, hea
     assert run.info["utterance"] == heard
 
 
-def test_4_30_one_utterance_a_turn(play: Folder) -> None:
+def test_4_31_one_utterance_a_turn(play: Folder) -> None:
     run = play("""
         frames: {talk: {states: {s: {first: [{say: Early.}], then: [{say: Late.}]}}}}
         cast: {ann: {at: [5, 5], frame: talk}}
@@ -882,19 +902,19 @@ def _listening(play: Folder, cast: str) -> Play:
     """)
 
 
-def test_4_31_an_npc_hears_those_before_it_in_this_step(play: Folder) -> None:
+def test_4_32_an_npc_hears_those_before_it_in_this_step(play: Folder) -> None:
     run = _listening(play, "ann: {at: [5, 5], frame: talk}, bob: {at: [4, 5], frame: ear}").steps(2)
     assert run.value("bob.heard_at") == 1
     run = _listening(play, "bob: {at: [4, 5], frame: ear}").step().step(None, "Say hello")
     assert run.value("bob.heard_at") == 2
 
 
-def test_4_32_an_npc_hears_those_after_it_a_step_later(play: Folder) -> None:
+def test_4_33_an_npc_hears_those_after_it_a_step_later(play: Folder) -> None:
     run = _listening(play, "bob: {at: [4, 5], frame: ear}, ann: {at: [5, 5], frame: talk}").steps(3)
     assert run.value("bob.heard_at") == 2
 
 
-def test_4_33_nobody_hears_himself(play: Folder) -> None:
+def test_4_34_nobody_hears_himself(play: Folder) -> None:
     run = (
         play("""
         frames:
@@ -912,7 +932,7 @@ def test_4_33_nobody_hears_himself(play: Folder) -> None:
 
 
 @pytest.mark.parametrize(("order", "first"), [(("hello", "bye"), "hello"), (("bye", "hello"), "bye")])
-def test_4_34_the_first_matching_rule_fires(play: Folder, order: tuple[str, str], first: str) -> None:
+def test_4_35_the_first_matching_rule_fires(play: Folder, order: tuple[str, str], first: str) -> None:
     rules = ", ".join(f"{{hears: Say {word}, say: It was {word}.}}" for word in order)
     run = play(f"""
         frames:
@@ -923,7 +943,7 @@ def test_4_34_the_first_matching_rule_fires(play: Folder, order: tuple[str, str]
     assert run.info["utterance"].splitlines()[-1] == f"Bob: It was {first}."
 
 
-def test_4_35_what_was_heard_is_forgotten_at_the_end_of_the_turn(play: Folder) -> None:
+def test_4_36_what_was_heard_is_forgotten_at_the_end_of_the_turn(play: Folder) -> None:
     run = (
         play("""
         frames:
@@ -939,7 +959,7 @@ def test_4_35_what_was_heard_is_forgotten_at_the_end_of_the_turn(play: Folder) -
 
 
 @pytest.mark.parametrize("text", ["Say hello", "say HELLO", "Say hello.", "Say hello!", "SAY hello?"])
-def test_4_36_case_and_the_final_mark_do_not_matter(play: Folder, text: str) -> None:
+def test_4_37_case_and_the_final_mark_do_not_matter(play: Folder, text: str) -> None:
     run = play(f"""
         frames:
           talk: {{states: {{s: {{then: [{{say: "{text}"}}]}}}}}}
@@ -949,7 +969,7 @@ def test_4_36_case_and_the_final_mark_do_not_matter(play: Folder, text: str) -> 
     assert run.value("bob.heard_at") == 1
 
 
-def test_4_37_hidden_npcs_act_but_only_the_audible_are_heard(play: Folder) -> None:
+def test_4_38_hidden_npcs_act_but_only_the_audible_are_heard(play: Folder) -> None:
     run = play("""
         observe: {npcs: hidden}
         frames: {talk: {states: {s: {do: forward, then: [{say: Hi.}]}}}}
@@ -961,7 +981,7 @@ def test_4_37_hidden_npcs_act_but_only_the_audible_are_heard(play: Folder) -> No
     assert run.info["utterance"] == "Bob: Hi."
 
 
-def test_4_38_on_one_cell_is_neither_next_to_nor_eye_contact(play: Folder) -> None:
+def test_4_39_on_one_cell_is_neither_next_to_nor_eye_contact(play: Folder) -> None:
     run = play("""
         observe: {npcs: hidden}
         frames:
@@ -1177,10 +1197,11 @@ def test_8_2_the_picture_before_npcs_has_links_but_not_computed_statuses(play: F
           linked: {type: door, at: [3, 2], state: locked}
           computed: {type: door, at: [4, 2], locked: switch.pressed}
           ruled: {type: door, at: [5, 2]}
-        frames: {walk: {states: {s: {do: forward}}}}
+        frames: {walk: {let: {seen: false}, states: {s: {first: [{set: {seen: computed.locked}}], do: forward}}}}
         cast: {ann: {at: [5, 1], facing: left, frame: walk}}
         rules: [{cause: [ruled.open]}]
     """).step("toggle")
+    assert run.value("ann.seen"), "settled before anybody else has moved"
     assert [run.shown(ahead, 1)[:3:2] for ahead in (2, 3, 4)] == [[DOOR, 1], [DOOR, 1], [DOOR, 1]]
     assert [run.status(name) for name in ("linked", "computed", "ruled")] == ["closed", "locked", "open"]
     assert (run.shown(1)[0], run.shown(1)[2]) == (12, 1), "the switch that the agent has just pressed"

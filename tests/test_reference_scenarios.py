@@ -551,6 +551,93 @@ class TestHelpAsHelper:
         assert 55 < goals[0] < 95
 
 
+class TestAsCoded:
+    """What the research code did and the paper's text does not say."""
+
+    def test_dance_is_heard_without_a_name_and_seen_late(self):
+        dance = Reference("dance+as_coded")
+        dance.reset(0, layout={**HALL, "agent": {"at": [3, 6], "facing": "up"}})
+        steps = [dance.step(NOTHING) for _ in range(7)]
+        assert [step.heard for step in steps] == [
+            ("Look at me!",),
+            (),
+            ("Move your body",),
+            (),
+            ("Shake your head",),
+            ("Now repeat my moves!",),
+            (),
+        ]
+        # The dancer is two ahead; it turns left in the third step, back in the fourth, and comes nearer in the fifth.
+        assert [step.image[3, 4][3] for step in steps[:5]] == [1, 1, 1, 0, 1]
+        assert [step.image[3, 5][0] for step in steps[4:6]] == [1, 11]
+
+    def test_thief(self):
+        thief = Reference("cointhief+as_coded")
+        thief.reset(0, layout=COINS)
+        first, second = thief.step(NOTHING), thief.step(NOTHING)
+        assert first.heard == ("Freeze! Give me all the coins you have!",)
+        assert [step.image[3, 5][3] for step in (first, second)] == [0, 3], "to the agent, then to its side"
+        assert thief.step((FORWARD, 1, 0, 5)).reward > 0
+        thief.reset(0, layout=COINS)
+        assert thief.step((FORWARD, 0, 0, 0)).outcome == 1
+
+    def test_numbers_of_the_teachers(self):
+        diverse = Reference("diverse_exit+as_coded")
+        for number in range(12):
+            diverse.reset(0, layout={"let": {"teacher.one_of": number}})
+            teacher = diverse.world.cast["teacher"]
+            likes = {name: teacher.slots[name].tree.value for name in ("near", "after_poke", "gaze")}
+            assert teacher.kind_code == number
+            assert teacher.name == ("Bobby", "Robby", "Toby")[number % 3]
+            assert likes == {
+                "near": number % 3 > 0,
+                "after_poke": number % 3 == 2,
+                "gaze": number // 3 % 2 == 0,
+            }
+            assert teacher.slots["formula"].tree.plain == (
+                "Where is the exit" if number // 6 else "Which is the correct door"
+            )
+
+    def test_the_lock_is_seen_one_step_late(self):
+        show = Reference("showme+as_coded")
+        show.reset(0, layout={**WORKSHOP, "jim": {"at": [1, 1]}, "agent": {"at": [3, 5], "facing": "down"}})
+        play(show, TOGGLE)
+        assert show.world.objects["door"].status == "closed"
+        show.reset(0, layout={**WORKSHOP, "jim": {"at": [1, 1]}, "agent": {"at": [3, 5], "facing": "down"}})
+        # Beside the button on its left wall, so that the door is in sight while it is pressed.
+        show.world.objects["door"].cell = (6, 5)
+        show.world.agent.facing = "down"
+        late = play(show, TOGGLE).image
+        prompt = play(show, STAY).image
+        assert (tuple(late[0, 6]), tuple(prompt[0, 6])) == ((4, 0, 2, 0), (4, 0, 1, 0))
+
+    def test_the_peer_goes_back_if_the_door_is_locked_again(self):
+        show = Reference("showme+as_coded")
+        show.reset(0, layout={**WORKSHOP, "agent": {"at": [5, 4], "facing": "left"}})
+        jim = show.world.cast["jim"]
+        while show.world.objects["door"].status == "locked":
+            play(show, STAY)
+        play(show, STAY)
+        assert jim.state == "leaving"
+        show.world.agent.cell, show.world.agent.facing = (1, 5), "down"
+        play(show, TOGGLE)
+        play(show, STAY)
+        assert jim.state == "pressing"
+
+    def test_the_guide_without_a_liar_is_heard_though_unseen(self):
+        talk = Reference("talkitout_no_liar+as_coded+unsocial")
+        layout = {
+            "room": {"width": 8, "height": 8},
+            "wizard": {"at": [6, 6]},
+            "honest": {"at": [2, 2]},
+            "agent": {"at": [2, 3]},
+        }
+        talk.reset(0, layout=layout)
+        assert talk.step((STAY, 1, 3, 3)).heard == ("John: I am well.",)
+        talk.world.agent.cell = (6, 5)
+        assert talk.step((STAY, 1, 3, 3)).heard == ()
+
+
 def test_parameters_are_read_like_scalars():
     assert script_of("dance?pause=1&sing=1&length=2").let["dance"].length == 2
     assert script_of("dance?sing=0").let["dance"].chance == 0

@@ -22,6 +22,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="default: talkitout; two or more also run as one batch",
     )
     parser.add_argument(
+        "--all", action="store_true", help="every shipped scenario, each by itself and all as one batch"
+    )
+    parser.add_argument(
         "--batch", type=_batches, default="1,16,256,4096", metavar="N,N", help="default: 1,16,256,4096"
     )
     parser.add_argument("--mix", choices=("walk", "random", "both"), default="both", help="default: both")
@@ -38,10 +41,13 @@ def execute(arguments: argparse.Namespace) -> Exit:
     """Measure, then print."""
     if arguments.repeat < 1 or arguments.seconds <= 0:
         raise UsageError("--repeat and --seconds: expected positive numbers")
+    if arguments.all and arguments.scenarios:
+        raise UsageError("--all: expected no SCENARIO beside it")
     from socialai_dsl.cli.measure import measure_all
+    from socialai_dsl.cli.shipped import shipped_scenarios
 
     report = measure_all(
-        arguments.scenarios or ["talkitout"],
+        shipped_scenarios() if arguments.all else arguments.scenarios or ["talkitout"],
         arguments.batch,
         ("walk", "random") if arguments.mix == "both" else (arguments.mix,),
         arguments.repeat,

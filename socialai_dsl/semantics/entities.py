@@ -48,6 +48,9 @@ AGENT = "agent"
 ANY_TEXT = Type("text", 0, -1)
 """Expected: any text."""
 
+_OF_LAYOUTS = frozenset({"let", "last", "heard", "pending", "memory", "member", "one_of", "state"})
+"""Keys of layouts and descriptions beside the names of objects and members of the cast."""
+
 _TAKEN = frozenset({"name", "kind", "index", "cell", "frame", "clock"})
 """What a member of the cast has already, so that no slot or register of its frame may be called so."""
 
@@ -180,6 +183,9 @@ def _check_names(scenario: Scenario, findings: Findings) -> None:
         span = findings.places.key_span(path)
         if name in WORDS and name != AGENT:
             message = f"`{name}` is a word of the language; call the {kind} something else"
+            findings.error("S213", message, span)
+        elif name in _OF_LAYOUTS and path[0] in ("objects", "cast"):
+            message = f"`{name}` is a key of every layout; call the {kind} something else"
             findings.error("S213", message, span)
         elif name in taken:
             article = "an" if taken[name] == "object" else "a"

@@ -212,6 +212,11 @@ def _attribute(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: 
         case "gone":
             return FieldOf(BOOL, who, "gone")
         case "was_poked":
+            if resolver.symbols.object_of(who.type.high) is not None:
+                message = "only an NPC remembers that it was poked"
+                raise resolver.fail(
+                    "S204", message, node, scope, hint="`x.poked` is whether it was in this step"
+                )
             return FieldOf(BOOL, who, "poked")
         case "poked":
             return PokedNow(who)

@@ -126,9 +126,10 @@ def member_truth(resolver: Resolver, frame: PlayedFrame, slot: str, scope: Scope
     ]
     cases = []
     for truth, numbers in by_value(truths).items():
-        chosen = drawn(resolver, member, numbers)
-        cases.append(truth if chosen is None else all_of([chosen, truth]))
-    return any_of(case for case in cases if case != FALSE)
+        if truth != FALSE:
+            chosen = drawn(resolver, member, numbers)
+            cases.append(truth if chosen is None else all_of([chosen, truth]))
+    return any_of(cases)
 
 
 def slot_truth(resolver: Resolver, slot: str, raw: object, scope: Scope) -> Term:

@@ -47,13 +47,14 @@ def can_enter(world: World, body: Entity, cell: Cell) -> bool:
 
 
 def toggle(world: World, user: Entity, cell: Cell) -> None:
-    """An NPC in the cell is poked; else the object there changes as its type says."""
+    """The agent pokes an NPC in the cell; else the object there changes as its type says."""
     npc = next((npc for npc in world.npcs if npc.cell == cell), None)
-    if npc is not None:
+    if npc is not None and user is world.agent:
         npc.poked = npc.was_poked = True
         return
     thing = world.object_at(cell)
     if thing is not None:
+        thing.poked = thing.poked or user is world.agent
         thing.toggled_by.append(user)
         changes = TYPES[thing.type].toggled
         if thing.one_way:

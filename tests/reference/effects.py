@@ -54,7 +54,7 @@ def assign(world: World, me: Entity | None, values: dict[str, Any]) -> None:
 def affect(target: Entity, verb: str, status: str | None) -> None:
     """One effect on one entity; what does not apply to its status changes nothing."""
     if verb == "vanish":
-        target.cell = None
+        target.left_from, target.cell = target.cell or target.left_from, None
     elif verb == "reset":
         target.status = target.initial
     elif verb == "become":

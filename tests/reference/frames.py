@@ -241,7 +241,7 @@ class FrameRunner:
         """ "A rule computes first, then acts": all values from the state in which its condition held."""
         found = Consequence(rule)
         if isinstance(rule, Rule) and rule.do is not None:
-            found.activity = bodies.plan(self.expression(f"{path}.do", rule.do), context)
+            found.activity = self.activity(f"{path}.do", rule.do, context)
         found.registers = assignments(self.sources, rule, path, context, self.me.frame)
         found.causes = causes(self.sources, rule, path, context, self.me.frame)
         if rule.say is not None:
@@ -271,9 +271,9 @@ class FrameRunner:
         """A value written inside the frame."""
         return self.sources.expression(site, source, self.me.frame)
 
-    def activity(self, site: str, source: str) -> bodies.Activity:
+    def activity(self, site: str, source: str, context: Context | None = None) -> bodies.Activity:
         """The activity of a `do:`; one whose argument cannot be found is staying."""
         try:
-            return bodies.plan(self.expression(site, source), self.context())
+            return bodies.plan(self.expression(site, source), context or self.context())
         except NothingFoundError:
             return bodies.Activity("stay")

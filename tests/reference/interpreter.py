@@ -177,7 +177,7 @@ class Reference:
         for member in self.world.cast.values():
             member.utterance, member.action, member.poked, member.pair = None, "none", False, 0
         for thing in self.world.things():
-            thing.toggled_by = []
+            thing.toggled_by, thing.poked = [], False
 
     def primitive(self, action: Action) -> str:
         """The word for the first number of an action."""

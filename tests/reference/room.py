@@ -414,18 +414,16 @@ class Setup:
             self.world.lets[name] = evaluate(self.let_value(name), self.context())
 
     def compute_slots(self, member: Entity) -> None:
-        """Text and bool slots stay expressions, read at every use; all others are computed now."""
+        """Texts, utterances and bools stay expressions, read at every use; all others are computed now."""
         frame = self.sources.frame_of(member.frame)
         if frame is None or member.slots:
             return
         for name, type_ in frame.slots.items():
             path, source = f"cast.{member.key}.with.{name}", self.members[member.key].with_[name]
-            if type_ == "text":
+            if type_ in ("text", "utterance"):
                 member.slots[name] = self.sources.text(path, source)
             elif type_ == "bool":
                 member.slots[name] = self.sources.expression(path, source)
-            elif type_ == "utterance":
-                member.slots[name] = evaluate(self.sources.text(path, source), self.context(member))
             else:
                 member.slots[name] = evaluate(self.sources.expression(path, source), self.context(member))
 

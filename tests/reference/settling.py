@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from socialai_dsl.grammar import ast
 from tests.reference.effects import unlock
 from tests.reference.evaluate import Context, NothingFoundError, holds
 from tests.reference.script import Group, Script
@@ -14,6 +15,29 @@ class Settling:
 
     def __init__(self, scenario: Script, sources: Sources, world: World) -> None:
         self.scenario, self.sources, self.world = scenario, sources, world
+        self.order = self.ordered()
+
+    def ordered(self) -> list[tuple[str, str]]:
+        """The computed statuses as (object, status), each after those of the objects that it speaks of."""
+        computed = {
+            (name, on): self.sources.expression(f"objects.{name}.{on}", getattr(group, on))
+            for name, group in self.scenario.objects.items()
+            for on in ("locked", "tagged")
+            if getattr(group, on) is not None
+        }
+        found: list[tuple[str, str]] = []
+
+        def add(status: tuple[str, str], busy: frozenset[tuple[str, str]]) -> None:
+            named = {node.id for node in computed[status].tree.walk() if isinstance(node, ast.Name)}
+            for other in computed:
+                if other[0] in named and other not in busy | set(found):
+                    add(other, busy | {other})
+            if status not in found:
+                found.append(status)
+
+        for status in computed:
+            add(status, frozenset({status}))
+        return found
 
     def all(self) -> None:
         """Links, then computed statuses."""
@@ -29,11 +53,9 @@ class Settling:
 
     def statuses(self) -> None:
         """`locked:` and `tagged:`: on while they hold; what is found on while they do not becomes off."""
-        for name, group in self.scenario.objects.items():
-            for on in ("locked", "tagged"):
-                if getattr(group, on) is not None:
-                    for thing in as_list(self.world.objects[name]):
-                        self.settle(thing, group, on)
+        for name, on in self.order:
+            for thing in as_list(self.world.objects[name]):
+                self.settle(thing, self.scenario.objects[name], on)
 
     def settle(self, thing: Entity, group: Group, on: str) -> None:
         """One computed status of one object, `it`."""

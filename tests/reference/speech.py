@@ -39,18 +39,20 @@ def match(pieces: list[str | None], text: str, world: World) -> dict[str, Any] |
 
 def within_earshot(world: World, speaker: Entity, hearer: Entity) -> bool:
     """An utterance carries as far as its speaker's earshot, from where the speaker stands now."""
-    if speaker.cell is None or hearer.cell is None:
+    # What is said in the turn in which one vanishes is heard from where that was.
+    start = speaker.cell or speaker.left_from
+    if start is None or hearer.cell is None:
         return False
     reach = world.earshot[speaker.key]
     if reach == "room":
         return True
-    apart = distance(speaker.cell, hearer.cell)
+    apart = distance(start, hearer.cell)
     return apart == 1 if reach == "next_to" else apart <= int(reach)
 
 
 def speak(world: World, speaker: Entity, text: str, noun: str | int | None = None) -> None:
     """Says something: it reaches every member of the cast within earshot, and the agent's history."""
-    if speaker.cell is None:
+    if speaker.gone and speaker.left_from is None:
         return
     speaker.utterance = text
     speaker.noun = noun

@@ -83,6 +83,7 @@ class Entity:
     sort: str  # object, npc, agent
     index: int = 0
     cell: Cell | None = None
+    left_from: Cell | None = None  # where it was when it vanished
     color: str | None = None
     # objects
     type: str = ""
