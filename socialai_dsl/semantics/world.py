@@ -26,9 +26,11 @@ def rules(resolver: Resolver) -> Iterator[RulePlan]:
 
 def _rule(resolver: Resolver, rule: WorldRule, path: DataPath) -> RulePlan:
     name = f"rules[{rule.id}]" if rule.id else dotted(path)
-    if not rule.cause:
+    if not (rule.cause or rule.set or rule.reward):
         span = resolver.findings.places.value_span(path)
-        resolver.findings.error("S105", "a rule of the world needs `cause`: what it changes", span)
+        resolver.findings.error(
+            "S105", "a rule of the world needs `cause`, `set` or `reward`: what it does", span
+        )
     when: Sited | None = None
     with surviving():
         if rule.when is not None:
