@@ -13,6 +13,8 @@ from socialai_dsl.source import Span
 
 VARIANT_KEYS: Final = ("variant", "of", "about", "notes", "skills", "remove", "set", "add")
 
+PATCH_VERBS: Final = ("remove", "set", "add")
+
 _DESCRIPTION: Final = ("about", "notes", "skills")
 
 # Sections that every scenario has, if only empty: a patch may put something into them though the file has none.

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
 from socialai_dsl.loader.build import Build, Builder
-from socialai_dsl.loader.document import Data, DataPath, Document, Positions
+from socialai_dsl.loader.document import DataPath, Document, Positions
 from socialai_dsl.loader.files import is_file
 from socialai_dsl.loader.library import Library, yaml_files
 from socialai_dsl.loader.limits import MAX_CHAIN
+from socialai_dsl.loader.members import Member, check_splits, members_of
 from socialai_dsl.loader.names import (
     Part,
     ScenarioName,
@@ -21,24 +21,10 @@ from socialai_dsl.loader.names import (
     parse_name,
     shipped_folder,
 )
+from socialai_dsl.loader.patches import PATCH_VERBS
 from socialai_dsl.loader.tree import Node
 from socialai_dsl.loader.variants import names_in, vary
 from socialai_dsl.source import Source, Span
-
-
-@dataclass(frozen=True)
-class Member:
-    """A scenario as a suite's file names it.
-
-    Attributes:
-        name: what the suite calls it: its name with the variants and parameters written there.
-        scenario: with the variants that the suite passes on.
-        place: where it is named.
-    """
-
-    name: str
-    scenario: Resolved
-    place: DataPath
 
 
 class Resolved(Positions):
@@ -85,6 +71,26 @@ class Resolved(Positions):
         """The variants that a suite passes on to its members."""
         return tuple(part.text for part in self._build.passed_on)
 
+    @property
+    def passed_on(self) -> tuple[Part, ...]:
+        """The same, with the places where they are asked for."""
+        return tuple(self._build.passed_on)
+
+    @property
+    def own_variants(self) -> tuple[str, ...]:
+        """The variants for which there was a file of its own."""
+        return tuple(self._build.own_variants)
+
+    def given(self, name: str) -> Part | None:
+        """A parameter's value as written behind `?`, with its place; None if it is not given."""
+        return self._given.get(name)
+
+    def error(
+        self, code: str, message: str, span: Span, hint: str | None = None, suggestion: str | None = None
+    ) -> ScenarioError:
+        """The exception for one finding, with the sources read so far."""
+        return self._builder.library.error(code, message, span, hint, suggestion)
+
     def find(self, path: DataPath) -> tuple[Document, DataPath]:
         """The file and the path in it where the part at `path`, or its nearest ancestor, was written."""
         path = tuple(path)
@@ -112,10 +118,24 @@ class Resolved(Positions):
         text = self.part(path)
         if not isinstance(text, str):
             raise library.error("S104", "the name of a file is a text", document.value_span(there))
+        return self._named(text, document.locate(there), _folder(document))
+
+    def include_key(self, path: DataPath) -> Resolved:
+        """The scenario that the key at `path` names, relative to the file that the key stands in.
+
+        Raises:
+            ScenarioError: whatever is wrong with the name or the file.
+        """
+        document, there = self.find(path)
+        return self._named(str(path[-1]), document.key_span(there), _folder(document))
+
+    def _named(self, text: str, start: Span, folder: Path) -> Resolved:
+        """The file of a name that is written in a file."""
+        library = self._builder.library
         found = DiagnosticBag()
-        name = parse_name(text, document.locate(there), found)
+        name = parse_name(text, start, found)
         found.raise_errors(library.sources)
-        file = library.find(name.base.text, _folder(document), name.base.span)
+        file = library.find(name.base.text, folder, name.base.span)
         return _resolved(self._builder, file, name, name.base.span)
 
     def include_all(self, path: DataPath) -> tuple[Resolved, ...]:
@@ -189,82 +209,17 @@ class Resolved(Positions):
             ScenarioError: whatever is wrong with the members; S503 if no member can take a variant; S206 if there is
                 no such split.
         """
-        places = self._member_places(self._chosen_split())
-        found = DiagnosticBag()
-        members = [member for place in places if (member := self._member(place, found)) is not None]
-        found.raise_errors(self.files)
-        for variant in self._build.passed_on:
-            changed = [member.scenario._varied(variant) for member in members]
-            if not any(changed) and variant.text not in self._build.own_variants:
-                message = f"no member of `{self.name}` has a variant `{variant.text}`"
-                raise self._builder.library.error("S503", message, variant.span)
-            members = [
-                replace(member, scenario=now or member.scenario)
-                for now, member in zip(changed, members, strict=True)
-            ]
-        return tuple(members)
+        return members_of(self)
 
     def check_splits(self) -> None:
-        """Whether every split names scenarios, also those that are not chosen.
+        """Whether every split names members, also those that are not chosen.
 
         Raises:
             ScenarioError: whatever is wrong with them.
         """
-        found = DiagnosticBag()
-        for split in self._splits():
-            for place in self._member_places(split):
-                if place[0] == "splits":
-                    self._member(place, found)
-        found.raise_errors(self.files)
+        check_splits(self)
 
-    def _member(self, place: DataPath, found: DiagnosticBag) -> Member | None:
-        """The scenario that is named at a place; None if something is wrong with it."""
-        try:
-            scenario = self.include(place)
-        except ScenarioError as error:
-            found.extend(error.diagnostics)
-            return None
-        abstract = isinstance(scenario.data, dict) and scenario.data.get("abstract") is True
-        if scenario.kind == "scenario" and not abstract:
-            return Member(_member_name(scenario), scenario, place)
-        what = "an abstract scenario" if abstract else f"a file of the kind `{scenario.kind}`"
-        message = f"`{self.part(place)}` is {what}; the members of a suite are scenarios"
-        found.error("S108", message, self.value_span(place))
-        return None
-
-    def _splits(self) -> dict[str, Data]:
-        known = self.data.get("splits") if isinstance(self.data, dict) else None
-        return known if isinstance(known, dict) else {}
-
-    def _chosen_split(self) -> str | None:
-        split, known = self._given.get("split"), self._splits()
-        if split is None or split.text in known:
-            return split.text if split else None
-        near = did_you_mean(split.text, known)
-        hint = None if near else "it has " + ", ".join(known) if known else "it has none"
-        message = f"`{self.name}` has no split `{split.text}`"
-        raise self._builder.library.error("S206", message, split.span, hint, near)
-
-    def _member_places(self, split: str | None) -> list[DataPath]:
-        """Where the members of a split are named."""
-        written = self.part(("members",))
-        own: list[DataPath] = [
-            ("members", i) for i in range(len(written) if isinstance(written, list) else 0)
-        ]
-        chosen = self._splits().get(split) if split is not None else None
-        if not isinstance(chosen, dict) or split is None:
-            return own
-        others, swapped = chosen.get("members"), chosen.get("replace")
-        if isinstance(others, list):
-            return [("splits", split, "members", i) for i in range(len(others))]
-        if not isinstance(swapped, dict):
-            return own
-        return [
-            ("splits", split, "replace", name) if (name := str(self.part(place))) in swapped else place
-            for place in own
-        ]
-
-    def _varied(self, variant: Part) -> Resolved | None:
+    def varied(self, variant: Part) -> Resolved | None:
         """This scenario with a variant that a suite passes on; None if it has no such variant."""
         build = self._build.copy()
         try:
@@ -283,8 +238,30 @@ class Resolved(Positions):
         """
         build = self._build.copy()
         document, there = holder.find(path)
-        self._builder.patch(build, Node(document, there, document.part(there)))
+        patch = Node(document, there, document.part(there))
+        if isinstance(patch.children, dict):
+            patch.children = {verb: part for verb, part in patch.children.items() if verb in PATCH_VERBS}
+        self._builder.patch(build, patch)
         return Resolved(self._builder, build, self._given)
+
+    def with_value(self, path: str, holder: Positions, place: DataPath) -> Resolved:
+        """This scenario with the value at `place` of another file set at a path of it.
+
+        Raises:
+            ScenarioError: S501, S004.
+        """
+        build = self._build.copy()
+        document, there = holder.find(place)
+        patch, values = Node(document, there, {}), Node(document, there, {})
+        values.children = {path: Node(document, there, document.part(there))}
+        patch.children = {"set": values}
+        self._builder.patch(build, patch)
+        return Resolved(self._builder, build, self._given)
+
+    def with_params(self, values: Mapping[str, tuple[str, Span]]) -> Resolved:
+        """This scenario with values for parameters, as if they were written behind `?`: name -> text and its place."""
+        given = {name: Part(text, span) for name, (text, span) in values.items()}
+        return Resolved(self._builder, self._build.copy(), {**self._given, **given})
 
 
 def resolve(name: str, base: Path | None = None) -> Resolved:
@@ -323,11 +300,6 @@ def _resolved(builder: Builder, path: Path, name: ScenarioName, asked: Span | No
     for variant in name.variants:
         vary(builder, build, variant)
     return Resolved(builder, build, name.params)
-
-
-def _member_name(scenario: Resolved) -> str:
-    given = "&".join(f"{name}={value}" for name, value in scenario.params.items())
-    return f"{scenario.name}?{given}" if given else scenario.name
 
 
 def _folder(document: Document) -> Path:

@@ -1,0 +1,356 @@
+"""The members of a suite: those it lists, what it sweeps over, or the leaves of its tree; all of them or a split."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from itertools import product
+from typing import TYPE_CHECKING
+
+from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
+from socialai_dsl.loader.document import Data, DataPath
+from socialai_dsl.loader.leaves import MAX_LEAVES, Leaf, label_of, leaves_of, parameters_of
+
+if TYPE_CHECKING:
+    from socialai_dsl.loader.resolved import Resolved
+
+
+@dataclass(frozen=True)
+class Member:
+    """A scenario as a suite's file names it.
+
+    Attributes:
+        name: what the suite calls it: its name with the variants and parameters written there, or its leaf.
+        scenario: with what the suite changes in it, and with the variants that the suite passes on.
+        place: where it is named.
+        weight: how likely an episode plays it, in proportion to the others.
+        labels: of a leaf, parameter -> value.
+        layout: where the suite's file says how its episodes start; None if they are drawn.
+    """
+
+    name: str
+    scenario: Resolved
+    place: DataPath
+    weight: Fraction = Fraction(1)
+    labels: Mapping[str, str] = field(default_factory=dict)
+    layout: DataPath | None = None
+
+
+def members_of(suite: Resolved) -> tuple[Member, ...]:
+    """The members in order: of the split that `?split=` chooses, with the variants passed on.
+
+    Raises:
+        ScenarioError: whatever is wrong with the members; S503 if no member can take a variant; S206 if there is
+            no such split.
+    """
+    split = _chosen_split(suite)
+    found = DiagnosticBag()
+    if _mapping(suite.data, "tree") is not None:
+        members = _leaf_members(suite, split, found)
+    else:
+        members = [
+            one for place in _member_places(suite, split) for one in _swept(suite, place, split, found)
+        ]
+    found.raise_errors(suite.files)
+    return tuple(_with_variants(suite, members))
+
+
+def check_splits(suite: Resolved) -> None:
+    """Whether every split names members, also those that are not chosen.
+
+    Raises:
+        ScenarioError: whatever is wrong with them.
+    """
+    found = DiagnosticBag()
+    if _mapping(suite.data, "tree") is not None:
+        leaves = leaves_of(_part(suite.data, "tree"), suite, DiagnosticBag())
+        for split in _splits(suite):
+            _split_leaves(suite, leaves, split, found)
+    else:
+        for split in _splits(suite):
+            for place in _member_places(suite, split):
+                if place[0] == "splits":
+                    _member(suite, place, found)
+    found.raise_errors(suite.files)
+
+
+def _with_variants(suite: Resolved, members: Sequence[Member]) -> Sequence[Member]:
+    for variant in suite.passed_on:
+        changed = [member.scenario.varied(variant) for member in members]
+        if not any(changed) and variant.text not in suite.own_variants:
+            message = f"no member of `{suite.name}` has a variant `{variant.text}`"
+            raise suite.error("S503", message, variant.span)
+        members = [
+            replace(member, scenario=now or member.scenario)
+            for now, member in zip(changed, members, strict=True)
+        ]
+    return members
+
+
+# --- members that are listed ---
+
+
+def _member(suite: Resolved, place: DataPath, found: DiagnosticBag) -> Member | None:
+    """The scenario that is named at a place; None if something is wrong with it."""
+    entry = suite.part(place) if place[0] != "sweep" else None
+    try:
+        if not isinstance(entry, dict):
+            scenario = suite.include_key(place) if place[0] == "sweep" else suite.include(place)
+            member = Member(_called(scenario), scenario, place)
+        else:
+            named = (*place, "scenario")
+            scenario = suite.include(named).patched(suite, place)
+            name = entry.get("name")
+            layout = (*place, "layout") if "layout" in entry else None
+            member = Member(str(name) if name else _called(scenario), scenario, named, layout=layout)
+    except ScenarioError as error:
+        found.extend(error.diagnostics)
+        return None
+    return member if _can_be_played(suite, member.scenario, member.place, found) else None
+
+
+def _called(scenario: Resolved) -> str:
+    given = "&".join(f"{name}={value}" for name, value in scenario.params.items())
+    return f"{scenario.name}?{given}" if given else scenario.name
+
+
+def _can_be_played(suite: Resolved, scenario: Resolved, place: DataPath, found: DiagnosticBag) -> bool:
+    abstract = isinstance(scenario.data, dict) and scenario.data.get("abstract") is True
+    if scenario.kind == "scenario" and not abstract:
+        return True
+    what = "an abstract scenario" if abstract else f"a file of the kind `{scenario.kind}`"
+    written = place[-1] if place[0] == "sweep" else suite.part(place)
+    message = f"`{written}` is {what}; the members of a suite are scenarios"
+    found.error("S108", message, suite.value_span(place))
+    return False
+
+
+def _member_places(suite: Resolved, split: str | None) -> list[DataPath]:
+    """Where the members of a split are named."""
+    written, swept = _part(suite.data, "members"), _mapping(suite.data, "sweep")
+    own: list[DataPath] = (
+        [("members", i) for i in range(len(written))]
+        if isinstance(written, list)
+        else [("sweep", name) for name in swept or ()]
+    )
+    chosen = _splits(suite).get(split) if split is not None else None
+    if not isinstance(chosen, dict) or split is None:
+        return own
+    others, swapped = chosen.get("members"), chosen.get("replace")
+    if isinstance(others, list):
+        return [("splits", split, "members", i) for i in range(len(others))]
+    if not isinstance(swapped, dict):
+        return own
+    names = {place: _written_name(suite, place) for place in own}
+    return [("splits", split, "replace", names[place]) if names[place] in swapped else place for place in own]
+
+
+def _written_name(suite: Resolved, place: DataPath) -> str:
+    """What the file calls a member: its text, or its name."""
+    entry = place[-1] if place[0] == "sweep" else suite.part(place)
+    return str(entry.get("name", entry.get("scenario")) if isinstance(entry, dict) else entry)
+
+
+# --- members that are swept over ---
+
+
+def _swept(suite: Resolved, place: DataPath, split: str | None, found: DiagnosticBag) -> Iterator[Member]:
+    """A member once for each combination of the values that are swept over; they share its weight."""
+    member = _member(suite, place, found)
+    if member is None:
+        return
+    name = _written_name(suite, place)
+    values = _mapping(_mapping(suite.data, "sweep") or {}, name)
+    if not values:
+        yield member
+        return
+    combinations = list(product(*([(path, i) for i in range(len(_listed(values[path])))] for path in values)))
+    if len(combinations) > MAX_LEAVES:
+        message = f"this sweep has {len(combinations)} members; at most {MAX_LEAVES} are played"
+        found.error("S004", message, suite.key_span(("sweep", name)))
+        return
+    for combination in combinations:
+        scenario = member.scenario
+        labels = {path: label_of(_listed(values[path])[i]) for path, i in combination}
+        try:
+            for path, i in combination:
+                scenario = scenario.with_value(path, suite, ("sweep", name, path, i))
+        except ScenarioError as error:
+            found.extend(d for d in error.diagnostics if str(d) not in map(str, found))
+            continue
+        text = ",".join(f"{path}={label}" for path, label in labels.items())
+        weight = member.weight / len(combinations)
+        yield replace(member, name=f"{member.name}[{text}]", scenario=scenario, weight=weight, labels=labels)
+
+
+def _listed(values: Data) -> list[Data]:
+    return values if isinstance(values, list) else []
+
+
+# --- leaves ---
+
+
+def _leaf_members(suite: Resolved, split: str | None, found: DiagnosticBag) -> list[Member]:
+    tree = _part(suite.data, "tree")
+    leaves = leaves_of(tree, suite, found)
+    scenarios: dict[DataPath, Resolved | None] = {}
+    for leaf in leaves:
+        if leaf.scenario is None:
+            place = list(leaf.places.values())[-1] if leaf.places else ("tree",)
+            message = f"nothing says which scenario the leaf `{leaf.name}` is"
+            hint = "give `scenario: file.yaml` at one of its values, or at the tree's own level"
+            found.error("S105", message, suite.value_span(place), hint=hint)
+        elif leaf.scenario not in scenarios:
+            scenarios[leaf.scenario] = _included(suite, leaf.scenario, found)
+    _check_parameters(suite, tree, leaves, scenarios, found)
+    played = _split_leaves(suite, leaves, split, found) if split is not None else leaves
+    made = (_leaf_member(suite, leaf, scenarios.get(leaf.scenario or ()), found) for leaf in played)
+    return [member for member in made if member is not None]
+
+
+def _included(suite: Resolved, place: DataPath, found: DiagnosticBag) -> Resolved | None:
+    try:
+        scenario = suite.include(place)
+    except ScenarioError as error:
+        found.extend(error.diagnostics)
+        return None
+    return scenario if _can_be_played(suite, scenario, place, found) else None
+
+
+def _leaf_member(
+    suite: Resolved, leaf: Leaf, scenario: Resolved | None, found: DiagnosticBag
+) -> Member | None:
+    """A leaf as a member: its scenario, with the leaf's values for the parameters it declares, and its changes."""
+    if scenario is None or leaf.scenario is None:
+        return None
+    try:
+        for node in leaf.nodes:
+            scenario = scenario.patched(suite, node)
+    except ScenarioError as error:
+        known = set(map(str, found))
+        found.extend(d for d in error.diagnostics if str(d) not in known)
+        return None
+    declared = _mapping(scenario.data, "params") or {}
+    scenario = scenario.with_params(
+        {
+            name: (label, suite.value_span(leaf.places[name]))
+            for name, label in leaf.labels.items()
+            if name in declared
+        }
+    )
+    return Member(leaf.name, scenario, leaf.scenario, leaf.weight, leaf.labels, leaf.layout)
+
+
+def _check_parameters(
+    suite: Resolved,
+    tree: Data,
+    leaves: Sequence[Leaf],
+    scenarios: Mapping[DataPath, Resolved | None],
+    found: DiagnosticBag,
+) -> None:
+    """A parameter that no scenario below it declares, and whose values say nothing, is a mistake."""
+    for parameter, place, values in parameters_of(tree):
+        if isinstance(values, dict) and any(values.values()):
+            continue
+        below = [leaf for leaf in leaves if leaf.places.get(parameter, ())[: len(place)] == place]
+        files = [scenarios.get(leaf.scenario or ()) for leaf in below]
+        known = {name for file in files if file is not None for name in _mapping(file.data, "params") or {}}
+        added = {
+            name
+            for leaf in below
+            for node in leaf.nodes
+            for verb in ("set", "add")
+            for path in _mapping(suite.part(node), verb) or {}
+            for name in (path.removeprefix("params."), "params" if path == "params" else path)
+        }
+        if parameter not in known | added and "params" not in added and None not in files and files:
+            near = did_you_mean(parameter, known)
+            hint = None if near else "its values may be mappings that say what they change"
+            message = f"no scenario has a parameter `{parameter}`, and its values change nothing"
+            found.error("S206", message, suite.key_span(place), suggestion=near, hint=hint)
+
+
+def _split_leaves(
+    suite: Resolved, leaves: Sequence[Leaf], split: str, found: DiagnosticBag
+) -> tuple[Leaf, ...]:
+    """The leaves of a split: with all the values of `only`, and not with all the values of `without`."""
+    chosen = _splits(suite).get(split)
+    if not isinstance(chosen, dict):
+        return tuple(leaves)
+    kept = tuple(leaves)
+    tests: list[tuple[str, Callable[[bool], bool]]] = [
+        ("only", lambda has: has),
+        ("without", lambda h: not h),
+    ]
+    for word, keeps in tests:
+        wanted = _mapping(chosen, word)
+        if wanted is None:
+            continue
+        place: DataPath = ("splits", split, word)
+        if not _are_known(suite, leaves, wanted, place, found):
+            return tuple(leaves)
+        kept = tuple(leaf for leaf in kept if keeps(_has(leaf, wanted)))
+    if not kept and leaves:
+        found.error("S504", f"no leaf is in the split `{split}`", suite.key_span(("splits", split)))
+    return kept
+
+
+def _has(leaf: Leaf, wanted: Mapping[str, Data]) -> bool:
+    """Whether a leaf has one of the values that are wanted, for every parameter."""
+    return all(leaf.labels.get(parameter) in _labels(values) for parameter, values in wanted.items())
+
+
+def _labels(values: Data) -> list[str]:
+    return [label_of(value) for value in (values if isinstance(values, list) else [values])]
+
+
+def _are_known(
+    suite: Resolved, leaves: Sequence[Leaf], wanted: Mapping[str, Data], place: DataPath, found: DiagnosticBag
+) -> bool:
+    """Whether the tree has these parameters with these values."""
+    before = len(list(found))
+    for parameter, values in wanted.items():
+        known = list(dict.fromkeys(leaf.labels[parameter] for leaf in leaves if parameter in leaf.labels))
+        span = suite.key_span((*place, parameter))
+        if not known:
+            parameters = list(dict.fromkeys(name for leaf in leaves for name in leaf.labels))
+            near = did_you_mean(parameter, parameters)
+            hint = None if near else "its parameters are " + ", ".join(parameters)
+            found.error("S504", f"the tree has no parameter `{parameter}`", span, suggestion=near, hint=hint)
+            continue
+        for i, label in enumerate(_labels(values)):
+            if label not in known:
+                near = did_you_mean(label, known)
+                hint = None if near else "one of " + ", ".join(known)
+                at = (*place, parameter, i) if isinstance(values, list) else (*place, parameter)
+                message = f"`{label}` is no value of `{parameter}` in the tree"
+                found.error("S504", message, suite.value_span(at), suggestion=near, hint=hint)
+    return len(list(found)) == before
+
+
+# --- splits ---
+
+
+def _splits(suite: Resolved) -> dict[str, Data]:
+    return _mapping(suite.data, "splits") or {}
+
+
+def _chosen_split(suite: Resolved) -> str | None:
+    split, known = suite.given("split"), _splits(suite)
+    if split is None or split.text in known:
+        return split.text if split else None
+    near = did_you_mean(split.text, known)
+    hint = None if near else "it has " + ", ".join(known) if known else "it has none"
+    message = f"`{suite.name}` has no split `{split.text}`"
+    raise suite.error("S206", message, split.span, hint, near)
+
+
+def _part(data: Data, key: str) -> Data:
+    return data.get(key) if isinstance(data, dict) else None
+
+
+def _mapping(data: Data, key: str) -> dict[str, Data] | None:
+    """A mapping in a mapping; None if there is none."""
+    part = _part(data, key)
+    return part if isinstance(part, dict) else None
