@@ -18,13 +18,24 @@ from socialai_dsl.program import (
 )
 
 _ENTITIES = frozenset({*range(Op.IF_SAME_CELL, Op.IF_UNOBSTRUCTED + 1), Op.GO_TO, Op.GO_NEXT_TO})
-_FIRST_IS_ENTITY = _ENTITIES | {Op.PUT, Op.SAY, Op.TURN_TO, Op.BECOME, Op.VANISH, Op.SET_FIELD}
+_FIRST_IS_ENTITY = _ENTITIES | {
+    Op.PUT,
+    Op.SAY,
+    Op.TURN_TO,
+    Op.POINT,
+    Op.BECOME,
+    Op.VANISH,
+    Op.SET_FIELD,
+    Op.PLACE,
+}
 _SECOND_IS_ENTITY = _ENTITIES | {
     Op.FIELD,
     Op.DISTANCE,
     Op.QUADRANT,
     Op.SEES,
     Op.CELL_OF,
+    Op.CELL_BESIDE,
+    Op.PLACE,
     Op.B_NEXT_TO,
     Op.B_IN_FRONT_OF,
 }
@@ -40,6 +51,8 @@ _LITERALS: dict[Op, tuple[int, ...]] = {
     Op.GOTO: (0, 1),
     Op.COUNT: (0,),
     Op.END: (0, 1),
+    Op.END_GRADED: (0,),
+    **dict.fromkeys((Op.HEARD_FROM, Op.HEARD_NOUN), (1, 2)),
     Op.TURN_TO: (2,),
     Op.GO_TO: (2,),
     Op.GO_NEXT_TO: (2,),
@@ -57,6 +70,7 @@ _ENTRIES = {
     Header.LINKS_PC: "links",
     Header.SETTLE_PC: "settle",
     Header.RULES_PC: "rules",
+    Header.TICK_PC: "tick",
 }
 
 
@@ -115,6 +129,12 @@ def _frames(program: Program) -> list[str]:
         entity, first, count = (
             int(words[at + column]) for column in (FrameColumn.ENTITY, FrameColumn.ROWS, FrameColumn.STATES)
         )
+        shared = {"perceive": FrameColumn.PERCEIVE, "deferred": FrameColumn.DEFERRED}
+        rows += [
+            f"       {program.entities[entity]}: {name} {int(words[at + column])}"
+            for name, column in shared.items()
+            if words[at + column]
+        ]
         register = next(n for n in program.registers if n.register == int(words[at + FrameColumn.STATE]))
         for k in range(count):
             row = h(Header.STATE_AT) + (first + k) * (1 + 2 * classes)
@@ -158,7 +178,7 @@ class _Names:
     def _operand(self, op: Op, position: int, word: int) -> str:
         if op == Op.COUNT:
             return self.program.rules[word] if position == 0 else "0"
-        if op == Op.END and position == 0:
+        if op in (Op.END, Op.END_GRADED) and position == 0:
             return self.program.outcomes[word]
         if position in _LITERALS.get(op, ()):
             return Field(word).name.lower() if op in (Op.FIELD, Op.SET_FIELD) else str(word)
@@ -180,7 +200,7 @@ class _Names:
 
 
 def _least_operands(op: Op) -> int:
-    one = (Op.COUNT, Op.BODY, Op.VANISH, Op.IF_UNPINNED, Op.B_FLOOR, Op.B_FREE)
+    one = (Op.COUNT, Op.BODY, Op.VANISH, Op.REWARD, Op.IF_UNPINNED, Op.B_FLOOR, Op.B_FREE)
     three = (
         *range(Op.ADD, Op.ABS),
         Op.FIELD,
@@ -191,5 +211,8 @@ def _least_operands(op: Op) -> int:
         Op.SEES,
         Op.NEAREST_CELL,
         Op.SET_FIELD,
+        Op.CELL_BESIDE,
+        Op.HEARD_FROM,
+        Op.HEARD_NOUN,
     )
     return 1 if op in one else 3 if op in three else 2

@@ -11,13 +11,16 @@ from socialai_dsl.compiler.assembler import Block, CodeTable, Sites
 from socialai_dsl.compiler.behaviour import Behaviour
 from socialai_dsl.compiler.classes import Classes
 from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.compiler.lines import Lines
+from socialai_dsl.compiler.homes import Homes
+from socialai_dsl.compiler.lines import Lines, note_what_is_said
+from socialai_dsl.compiler.links import links
 from socialai_dsl.compiler.memories import push_acts, remember
 from socialai_dsl.compiler.outcomes import outcome_table
 from socialai_dsl.compiler.registers import Registers
 from socialai_dsl.compiler.setup import require, reset
-from socialai_dsl.compiler.statuses import ComputedStatuses, links
+from socialai_dsl.compiler.statuses import ComputedStatuses
 from socialai_dsl.compiler.tables import Tables
+from socialai_dsl.compiler.timers import tick
 from socialai_dsl.compiler.verifier import verify
 from socialai_dsl.compiler.world_rules import world_rules
 from socialai_dsl.program import Flag, Header, Program
@@ -35,6 +38,8 @@ def compile_scenario(checked: Checked) -> Program:
     classes = Classes(checked)
     sites = Sites()
     lines = Lines(checked, classes)
+    note_what_is_said(checked, lines, registers)
+    homes = Homes(checked, registers)
     code = CodeTable()
     tables = Tables(checked, registers, classes, sites, lines, code)
     computed = ComputedStatuses(checked)
@@ -45,16 +50,17 @@ def compile_scenario(checked: Checked) -> Program:
             emit(to)
         return code.add(to.block, label)
 
-    entries = {Header.RESET_PC: entry("reset", lambda to: reset(to, computed))}
+    entries = {Header.RESET_PC: entry("reset", lambda to: reset(to, computed, homes))}
     inboxes = tables.reserve_inboxes()
-    behaviour = Behaviour(checked, registers, classes, sites, lines, code, [], inboxes)
-    frames = [(frame, behaviour.rows(number, frame)) for number, frame in enumerate(checked.frames)]
+    behaviour = Behaviour(checked, registers, classes, sites, lines, homes, code, [], inboxes)
+    frames = [behaviour.frame(number, frame) for number, frame in enumerate(checked.frames)]
     entries |= {
         Header.REQUIRE_PC: entry("require", require),
         Header.BEFORE_PC: entry("before", remember),
         Header.LINKS_PC: entry("links", links),
         Header.SETTLE_PC: entry("settle", computed.settle),
-        Header.RULES_PC: entry("rules", push_acts, lambda to: world_rules(to, lines, behaviour.rules)),
+        Header.RULES_PC: entry("rules", push_acts, lambda to: world_rules(to, lines, homes, behaviour.rules)),
+        Header.TICK_PC: entry("tick", tick),
     }
     outcomes = outcome_table(checked, registers, classes, sites, code)
     flags = Flag.SETTLE_ALWAYS if computed.settle_always else 0

@@ -57,6 +57,15 @@ class Activities:
                 self._use(to.value(activity.args[0]))
             case "enter":
                 self._enter(activity.args[0])
+            case "push":
+                self._push(activity)
+            case "point":
+                block.emit(Op.POINT, own, to.value(activity.args[0]))
+            case "stop_pointing":
+                block.emit(Op.BODY, constant(Body.STOP_POINTING))
+            case "flee":
+                away = self._turned_round(to.into_temporary(Op.QUADRANT, own, to.value(activity.args[0])))
+                self._walk(away)
             case "perform":
                 self._perform(activity)
             case "choose":
@@ -120,6 +129,34 @@ class Activities:
         self._use(entity)
         block.bind(done)
 
+    def _push(self, activity: Activity) -> None:
+        """Go behind the thing, face the way it is to go, walk into it."""
+        to, block = self.to, self.to.block
+        thing, way = (to.value(arg) for arg in activity.args)
+        behind = to.into_temporary(Op.CELL_BESIDE, thing, self._turned_round(way))
+        elsewhere, done = Label(), Label()
+        block.test(Op.IF_SAME_CELL, constant(self.entity), behind, elsewhere)
+        self._walk(way)
+        block.skip(done)
+        block.bind(elsewhere)
+        block.emit(Op.GO_TO, constant(self.entity), behind, self.turn)
+        block.bind(done)
+
+    def _turned_round(self, way: int) -> int:
+        to = self.to
+        return to.into_temporary(Op.MOD, to.into_temporary(Op.ADD, way, constant(2)), constant(4))
+
+    def _walk(self, way: int) -> None:
+        """Turn until it faces that way, then go forward."""
+        block = self.to.block
+        aside, done = Label(), Label()
+        block.test(Op.IF_EQ, entity_register(self.entity, Field.DIR), way, aside)
+        block.emit(Op.BODY, constant(Body.FORWARD))
+        block.skip(done)
+        block.bind(aside)
+        block.emit(Op.TURN_TO, constant(self.entity), way, self.turn)
+        block.bind(done)
+
     def _perform(self, activity: Activity) -> None:
         """In turn k of the state the k-th move and utterance, after the last nothing."""
         block = self.to.block
@@ -159,7 +196,7 @@ class Activities:
         If its argument finds nothing, on to `nothing`.
         """
         to, block = self.to, self.to.block
-        if activity.name not in (*GOING, "use", "perform"):
+        if activity.name not in (*GOING, "use", "push", "perform"):
             return
         to.site, block.span = activity.site, activity.span
         own = constant(self.entity)
@@ -167,6 +204,8 @@ class Activities:
         to.failed = nothing
         if activity.name == "perform":
             block.test(Op.IF_LE, constant(len(_elements(activity))), self.clock, otherwise)
+        elif activity.name == "push":
+            self._unless_pushed(activity.args[0], otherwise)
         elif activity.name == "use":
             last = entity_register(self.entity, Field.LAST)
             goal = to.value(activity.args[0])
@@ -178,6 +217,15 @@ class Activities:
         to.failed = None
         block.release(mark)
 
+    def _unless_pushed(self, goal: Term, otherwise: Label) -> None:
+        """Pushed: the last step forward led into it, and it is as a push leaves it."""
+        to, block = self.to, self.to.block
+        thing = to.value(goal)
+        after = frozenset(_kind_of(self.checked, goal).pushed.values())
+        block.test(Op.IF_EQ, entity_register(self.entity, Field.LAST), constant(Body.FORWARD), otherwise)
+        block.test(Op.IF_FACES, constant(self.entity), thing, otherwise)
+        to.one_of(Op.IF_EQ, to.into_temporary(Op.FIELD, thing, Field.STATUS), after, otherwise)
+
 
 def _elements(activity: Activity) -> list[tuple[Term, Term]]:
     """Moves and utterances of a sequence."""
@@ -185,8 +233,8 @@ def _elements(activity: Activity) -> list[tuple[Term, Term]]:
 
 
 def _kind_of(checked: Checked, goal: Term) -> ObjectType:
-    """The object type of what a term can be; the resolver lets only objects of one type be entered."""
+    """The object type of what a term can be; the resolver lets only objects of one type be entered or pushed."""
     number = goal.value if isinstance(goal, Const) else goal.type.low
     kind = checked.entities[number].type
-    assert kind is not None, "internal: only objects can be entered"
+    assert kind is not None, "internal: only objects can be entered or pushed"
     return kind

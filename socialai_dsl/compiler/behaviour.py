@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 from socialai_dsl.compiler.activities import GOING, Activities
 from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Sites, constant
+from socialai_dsl.compiler.beliefs import perceive
 from socialai_dsl.compiler.classes import Classes
+from socialai_dsl.compiler.deferred import Deferred
 from socialai_dsl.compiler.effects import Effects
 from socialai_dsl.compiler.expressions import Expressions, chance_word
 from socialai_dsl.compiler.folding import FALSE, SEVERAL, Facts, fold
+from socialai_dsl.compiler.homes import Homes
 from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.registers import Registers, state_names
 from socialai_dsl.program import Op
@@ -19,6 +21,20 @@ from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.terms import BOOL, Checked, FramePlan, RulePlan, StepPlan
 
 FOR_EVER = -1
+
+
+@dataclass(frozen=True, slots=True)
+class FrameCode:
+    """Where the code of a frame instance is.
+
+    Attributes:
+        rows: of the state table: activity, `first` by class, `then` by class. perceive: of beliefs. deferred: of what
+        rules of `first` do after the body action.
+    """
+
+    rows: list[list[int]]
+    perceive: int
+    deferred: int
 
 
 @dataclass
@@ -34,13 +50,15 @@ class Behaviour:
     classes: Classes
     sites: Sites
     lines: Lines
+    homes: Homes
     code: CodeTable
     rules: list[str]
     inbox_of: dict[str, int]
 
-    def rows(self, number: int, frame: FramePlan) -> list[list[int]]:
-        """The state table of frame instance `number`: activity, `first` by class, `then` by class."""
-        return _FrameCompiler(self, number, frame).rows()
+    def frame(self, number: int, frame: FramePlan) -> FrameCode:
+        """The code of frame instance `number`."""
+        compiler = _FrameCompiler(self, number, frame)
+        return FrameCode(compiler.rows(), compiler.perceive(), compiler.deferred())
 
 
 class _FrameCompiler:
@@ -57,6 +75,8 @@ class _FrameCompiler:
             for rule in (*state.first, *state.then)
             if rule.once
         }
+        self.speaker = shared.checked.entities[frame.entity]
+        self.later = Deferred(frame, self.speaker, shared.registers, shared.lines)
 
     def _names(self) -> list[str]:
         if self.frame.steps:
@@ -71,6 +91,27 @@ class _FrameCompiler:
         if self.frame.steps:
             return [self._step_row(k) for k in range(len(self.frame.steps))] + [self._idle_row()]
         return [self._state_row(k) for k in range(len(self.frame.states))]
+
+    def perceive(self) -> int:
+        """The address of what is done at the start of a turn."""
+        to = self._expressions(Facts())
+        perceive(to, self.frame.member)
+        return self.shared.code.add(to.block, f"{self.frame.member}.believes")
+
+    def deferred(self) -> int:
+        """The address of what rules of `first` do after the body action that they have chosen."""
+        to = self._expressions(Facts())
+        for rule in self.later.rules:
+            following = Label()
+            mark = to.block.taken
+            to.block.span = rule.span
+            to.block.test(Op.IF_EQ, *self.later.is_pending(rule), following)
+            self._effects(to).carry_out(rule, self.later.recall(to, rule), self.speaker)
+            to.block.span = rule.span
+            self._go(to, rule, follow=False)
+            to.block.bind(following)
+            to.block.release(mark)
+        return self.shared.code.add(to.block, f"{self.frame.member}.{self.frame.frame}.deferred")
 
     # --- shared by both forms ---
 
@@ -117,13 +158,8 @@ class _FrameCompiler:
     def _idle_row(self) -> list[int]:
         return [0] * (1 + 2 * (self.shared.classes.count + 1))
 
-    def _effects(self, to: Expressions, what: RulePlan | StepPlan, failed: Label) -> None:
-        """What a rule does (its body action first, `goto` comes after), or a step at its end."""
-        speaker = self.shared.checked.entities[self.frame.entity]
-        body = None
-        if isinstance(what, RulePlan) and what.do is not None:
-            body = partial(self._activities(to).emit, what.do)
-        Effects(to, self.shared.lines).emit(what, self.counters[what.name], failed, speaker, body)
+    def _effects(self, to: Expressions) -> Effects:
+        return Effects(to, self.shared.lines, self.shared.homes)
 
     # --- frames by states ---
 
@@ -167,11 +203,20 @@ class _FrameCompiler:
         if rule.chance is not None:
             site = self.shared.sites.row(f"{rule.site}.chance")
             block.test(Op.IF_CHANCE, chance_word(rule.chance), site, following)
-        self._effects(to, rule, following)
+        operands = self._effects(to).compute(rule, following, self.speaker)
+        block.emit(Op.COUNT, self.counters[rule.name])
+        if rule.do is None:
+            self._effects(to).carry_out(rule, operands, self.speaker)
+        elif rule in self.later.rules:
+            self.later.note(to, rule, operands)
         if rule.once:
             block.emit(Op.LOAD, self.once[rule.name], constant(1))
         block.span = rule.span
-        self._go(to, rule, follow)
+        if rule.do is None:
+            self._go(to, rule, follow)
+        else:
+            self._activities(to).emit(rule.do)
+            block.halt()
         block.bind(following)
         block.release(mark)
 
@@ -245,7 +290,7 @@ class _FrameCompiler:
         elif step.duration is None:
             self._activities(to).unless_finished(step.activity, running, ended)
         block.bind(ended)
-        self._effects(to, step, running)
+        self._effects(to).emit(step, self.counters[step.name], running, self.speaker)
         block.emit(Op.GOTO, self.number, self._next(k))
         block.halt()
         block.bind(running)

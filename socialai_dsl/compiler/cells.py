@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 NOWHERE = CELL - 1
 """The cell of what is in no cell."""
-_ROW = 32
+ROW = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ def one_cell(to: Expressions, term: terms.Quantified) -> int:
     if to.failed is not None:
         block.test(Op.IF_LE, constant(0), x, to.failed)
     result = block.temporary()
-    block.emit(Op.MUL, result, x + 1, constant(_ROW))
+    block.emit(Op.MUL, result, x + 1, constant(ROW))
     block.emit(Op.ADD, result, result, x)
     block.emit(Op.ADD, result, result, constant(CELL))
     block.emit(Op.MAX, result, result, constant(NOWHERE))
@@ -102,7 +102,7 @@ def coordinate(to: Expressions, term: terms.FieldOf) -> int:
     assert term.name in ("x", "y"), f"internal: a cell has no {term.name}"
     of, loop = term.entity, to.loop
     if isinstance(of, Const):
-        return constant((of.value - CELL) % _ROW if term.name == "x" else (of.value - CELL) // _ROW)
+        return constant((of.value - CELL) % ROW if term.name == "x" else (of.value - CELL) // ROW)
     if isinstance(of, terms.Variable) and loop is not None and of.name == loop.name:
         return loop.x if term.name == "x" else loop.y
     return to.into_temporary(Op.FIELD, to.value(of), Field.X if term.name == "x" else Field.Y)

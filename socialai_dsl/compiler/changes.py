@@ -7,11 +7,10 @@ from dataclasses import fields
 from enum import IntEnum
 
 from socialai_dsl.compiler.folding import substitute
+from socialai_dsl.compiler.mobility import Mobility, numbers_of, plans
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.terms import Activity, Checked, Const, Entity, RulePlan, StepPlan, Term
+from socialai_dsl.semantics.terms import Checked, Const, Entity, Term
 
-_STILL = ("stay", "toggle")
-_TURNING = ("left", "right", "face", "turn_to", "turn")
 _LOOKING = ("faces", "faces_toward", "eye_contact")
 _OVER_OBJECTS = ("looks_at", "unobstructed")
 
@@ -29,24 +28,14 @@ class Changes:
 
     def __init__(self, checked: Checked) -> None:
         self.entities = checked.entities
-        plans = list(_plans(checked))
-        self.written = {path for plan in plans for path, _ in plan.sets}
+        self.occlusion = checked.room.occlusion
+        self.written = {path for plan in plans(checked) for path, _ in plan.sets}
         self.written |= {item.path for item in checked.remembered}
-        self.vanishing = {
-            number
-            for plan in plans
-            for effect in plan.causes
-            if effect.name == "vanish"
-            for target in effect.entities
-            for number in _numbers(target)
-        }
-        # The agent does what it likes.
-        self.turning, self.walking = {0}, {0}
-        for entity, activity in _activities(checked):
-            if activity.name not in _STILL:
-                self.turning.add(entity)
-                if activity.name not in _TURNING:
-                    self.walking.add(entity)
+        self.written |= {belief.path for belief in checked.beliefs}
+        self.written |= {f"{frame.member}.{part}" for frame in checked.frames for part in ("frame", "clock")}
+        mobility = Mobility(checked)
+        self.vanishing, self.turning, self.walking = mobility.vanishing, mobility.turning, mobility.walking
+        self.objects_move = any(checked.entities[number].role == "object" for number in self.walking)
 
     def of(self, term: Term) -> When:
         """When the value of a term can change."""
@@ -57,6 +46,8 @@ class Changes:
                 return When.NEVER
             case terms.World() | terms.PokedNow() | terms.Said() | terms.Spoke() | terms.Heard():
                 return When.ANY_TIME
+            case terms.SaidBy() | terms.Speaker() | terms.HeardNoun():
+                return When.ANY_TIME
             case terms.InState() | terms.Chance() | terms.Quantified(op="pick"):
                 return When.ANY_TIME
             case terms.Read():
@@ -66,6 +57,8 @@ class Changes:
                 return max(self.of(term.entity), self._field(term))
             case terms.CellOf():
                 return max(self.of(term.entity), self._place(term.entity))
+            case terms.CellBeside():
+                return max(self.of(term.entity), self.of(term.direction), self._place(term.entity))
             case terms.Measure():
                 return max(*map(self.of, term.args), *map(self._place, term.args))
             case terms.Sees():
@@ -115,7 +108,7 @@ class Changes:
         if term.name == "can_reach":
             return When.ANY_TIME
         if term.name in _OVER_OBJECTS:
-            when = max(when, When.STATUSES)
+            when = max(when, self._line_of_sight())
         if term.subject is not None and (term.name in _LOOKING or term.name == "looks_at"):
             when = max(when, self._direction(term.subject))
         if term.name in ("eye_contact", "in_front_of"):
@@ -125,10 +118,16 @@ class Changes:
     def _sees(self, term: terms.Sees) -> When:
         parts = [part for part in (term.viewer, term.target, term.facing) if part is not None]
         when = max(*map(self.of, parts), self._place(term.viewer), self._place(term.target))
+        if self.occlusion:
+            when = max(when, self._line_of_sight())
         return when if term.facing is not None else max(when, self._direction(term.viewer))
 
+    def _line_of_sight(self) -> When:
+        """When what stands in between can change."""
+        return When.ANY_TIME if self.objects_move else When.STATUSES
+
     def _things(self, term: Term) -> list[Entity]:
-        return [self.entities[number] for number in _numbers(term)]
+        return [self.entities[number] for number in numbers_of(term)]
 
     def _place(self, term: Term) -> When:
         """When an entity can be elsewhere; a cell stays where it is."""
@@ -150,27 +149,3 @@ class Changes:
             return When.NEVER
         turns = any(thing.number in self.turning for thing in self._things(term))
         return When.ANY_TIME if turns else When.NEVER
-
-
-def _numbers(term: Term) -> Iterable[int]:
-    return (term.value,) if isinstance(term, Const) else range(term.type.low, term.type.high + 1)
-
-
-def _plans(checked: Checked) -> Iterable[RulePlan | StepPlan]:
-    yield from checked.rules
-    for frame in checked.frames:
-        yield from frame.steps
-        for state in frame.states:
-            yield from (*state.first, *state.then)
-
-
-def _activities(checked: Checked) -> Iterable[tuple[int, Activity]]:
-    """Who may do what."""
-    for frame in checked.frames:
-        for step in frame.steps:
-            yield frame.entity, step.activity
-        for state in frame.states:
-            yield frame.entity, state.activity
-            for rule in (*state.first, *state.then):
-                if rule.do is not None:
-                    yield frame.entity, rule.do

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar
 
-from socialai_dsl.semantics.terms import Activity, Checked, Pattern
+from socialai_dsl.semantics.terms import Activity, Checked, HeardNoun, Pattern, Speaker
 
 _Kind = TypeVar("_Kind")
 
 SILENCE = 0
 OTHER = 1
+NO_NOUN = -1
+_WORD = 32
 
 
 def normal(text: str) -> str:
@@ -25,10 +27,17 @@ class Classes:
     Attributes:
         of_pair: class of each pair that the agent says. of_performed: class of each pair that an NPC says as part of a
         sequence; empty where nobody performs one.
+        speakers_matter: whether a rule asks who said something, or with which noun.
+        sets: sets of classes that a rule waits for and wants to know more about.
+        said: for each NPC and pattern that somebody asks about, the lines of that NPC that fit it.
     """
 
     def __init__(self, checked: Checked) -> None:
-        self.patterns = list(dict.fromkeys(_all(checked, Pattern)))
+        self.patterns = list(dict.fromkeys(parts(checked, Pattern)))
+        self.speakers_matter = any(True for kind in (Speaker, HeardNoun) for _ in parts(checked, kind))
+        self.sets: list[frozenset[int]] = []
+        self.said: dict[tuple[int, Pattern | None], frozenset[int]] = {}
+        self._nouns = {normal(text): noun for pattern in self.patterns for text, noun in pattern.nouns}
         self._numbers: dict[frozenset[int], int] = {frozenset(): OTHER}
         self._texts = [frozenset(normal(text) for text in pattern.said_by_npcs) for pattern in self.patterns]
         nouns = len(checked.nouns)
@@ -36,7 +45,7 @@ class Classes:
         for texts in self._texts:
             for text in sorted(texts):
                 self.of_text(text)
-        performs = any(activity.name == "perform" for activity in _all(checked.frames, Activity))
+        performs = any(activity.name == "perform" for activity in parts(checked.frames, Activity))
         self.of_performed = [
             self._number(self._of_pair(k, nouns) | self._of_text(text))
             for k, text in enumerate(texts_of_pairs(checked))
@@ -61,6 +70,30 @@ class Classes:
         position = self.patterns.index(pattern)
         return frozenset(number for signature, number in self._numbers.items() if position in signature)
 
+    def noun_in(self, text: str) -> int:
+        """The noun that a pattern finds in what an NPC says."""
+        return self._nouns.get(normal(text), NO_NOUN)
+
+    def set_of(self, patterns: Iterable[Pattern]) -> int:
+        """The number of the set of all classes whose utterances fit one of the patterns."""
+        wanted = frozenset[int]().union(*map(self.matching, patterns))
+        if wanted not in self.sets:
+            self.sets.append(wanted)
+        return self.sets.index(wanted)
+
+    @property
+    def words_of_a_set(self) -> int:
+        """How many words of 32 classes each a set has."""
+        return -(-self.count // _WORD) if self.sets else 0
+
+    def set_words(self) -> list[int]:
+        """The sets as words, one behind the other."""
+        return [
+            sum(1 << number % _WORD for number in wanted if number // _WORD == word)
+            for wanted in self.sets
+            for word in range(self.words_of_a_set)
+        ]
+
     @property
     def count(self) -> int:
         """Number of classes, silence included."""
@@ -72,13 +105,13 @@ def texts_of_pairs(checked: Checked) -> list[str]:
     return [template.replace("<noun>", noun) for template in checked.templates for noun in checked.nouns]
 
 
-def _all(node: Any, kind: type[_Kind]) -> Iterator[_Kind]:
+def parts(node: Any, kind: type[_Kind]) -> Iterator[_Kind]:
     """All parts of this kind, in order of the fields."""
     if isinstance(node, kind):
         yield node
     if isinstance(node, tuple):
         for item in node:
-            yield from _all(item, kind)
+            yield from parts(item, kind)
     elif is_dataclass(node):
         for field in fields(node):
-            yield from _all(getattr(node, field.name), kind)
+            yield from parts(getattr(node, field.name), kind)

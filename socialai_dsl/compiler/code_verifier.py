@@ -13,6 +13,8 @@ from socialai_dsl.program import (
     FIRST_ENTITY,
     TESTS,
     Field,
+    Flag,
+    FrameColumn,
     Header,
     Op,
     Program,
@@ -27,6 +29,7 @@ _ENTRIES = (
     Header.BEFORE_PC,
     Header.LINKS_PC,
     Header.REQUIRE_PC,
+    Header.TICK_PC,
 )
 
 
@@ -61,13 +64,15 @@ class _Code:
         set_up = frozenset(
             FIRST_ENTITY + ENTITY_FIELDS * entity + which
             for entity in range(program.header(Header.ENTITIES))
-            for which in (Field.DIR, Field.COLOR, Field.STATUS)
+            for which in (Field.X, Field.Y, Field.DIR, Field.COLOR, Field.STATUS, Field.GONE, Field.INSIDE)
         )
         self.writable = {
             Header.RESET_PC: named | set_up,
             Header.REQUIRE_PC: frozenset((int(Register.ACCEPTED),)),
         }
         self.named = named
+        self.of_agent = _of_agent(program)
+        self.is_agents = False
 
     def check(self) -> None:
         if not self.code or self.code[0][0] != Op.HALT:
@@ -75,6 +80,7 @@ class _Code:
         for pc, entry in sorted(set(self._entries())):
             if not 0 <= pc < len(self.code):
                 raise InvalidProgramError(f"an entry at {pc}, outside of the code")
+            self.is_agents = pc in self.of_agent
             self._block(pc, entry)
 
     def _entries(self) -> Iterator[tuple[int, Header]]:
@@ -86,6 +92,8 @@ class _Code:
         for table, size in ((Header.STATE_AT, states), (Header.OUTCOME_AT, 8 * h(Header.CLASSES))):
             for pc in words[h(table) : h(table) + size]:
                 yield int(pc), table
+        for pc in _of_frames(self.program):
+            yield pc, Header.FRAME_AT
 
     def _block(self, start: int, entry: Header) -> None:
         pending: dict[int, _Path] = {
@@ -119,7 +127,7 @@ class _Code:
             return
         before = known.copy()
         writable = self.writable.get(entry, self.named)
-        problem = problem_of((Op(op), a, b, c), self.program, known, writable)
+        problem = problem_of((Op(op), a, b, c), self.program, known, writable, self.is_agents)
         if problem:
             raise InvalidProgramError(f"at {pc}, {Op(op).name} {a} {b} {c}: {problem}")
         if op == Op.SKIP or op in TESTS:
@@ -153,3 +161,23 @@ class _Code:
             known.temporaries[temporary] = ANYTHING
         own = written_temporaries(*self.code[pc][:3])
         return _Loop(end, frozenset(inside.union(own)), before)
+
+
+def _of_frames(program: Program) -> Iterator[int]:
+    """Addresses in the frame table."""
+    for number in range(program.header(Header.FRAMES)):
+        at = program.header(Header.FRAME_AT) + FrameColumn.COLUMNS * number
+        for column in (FrameColumn.PERCEIVE, FrameColumn.DEFERRED):
+            yield int(program.words[at + column])
+
+
+def _of_agent(program: Program) -> frozenset[int]:
+    """Addresses of the code that chooses what the agent does, if it follows a frame."""
+    h, words = program.header, program.words
+    if not h(Header.FLAGS) & Flag.AGENT_FRAME or not h(Header.FRAMES):
+        return frozenset()
+    frame = h(Header.FRAME_AT)
+    columns = 1 + 2 * (h(Header.CLASSES) + 1)
+    first = h(Header.STATE_AT) + columns * int(words[frame + FrameColumn.ROWS])
+    rows = words[first : first + columns * int(words[frame + FrameColumn.STATES])]
+    return frozenset(int(pc) for pc in rows)

@@ -3,80 +3,113 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.expressions import Expressions
+from socialai_dsl.compiler.homes import Homes
 from socialai_dsl.compiler.lines import Lines
+from socialai_dsl.compiler.mobility import numbers_of
 from socialai_dsl.compiler.registers import Registers
-from socialai_dsl.program import Field, Op
-from socialai_dsl.semantics.terms import Const, Effect, Entity, RulePlan, Sited, StepPlan, Term
+from socialai_dsl.program import TEMPORARY, Field, Op
+from socialai_dsl.semantics.terms import Effect, Entity, RulePlan, Sited, StepPlan, Term
 
-_TARGETS = {"open": "open", "close": "closed", "lock": "locked", "unlock": "closed"}
+_TARGETS = {"open": "open", "close": "closed", "lock": "locked", "unlock": "closed", "reveal": "opened"}
+
+
+@dataclass(frozen=True, slots=True)
+class Operands:
+    """Where the values are that a rule or step needs.
+
+    Attributes:
+        sets: of each register that is set. targets: for each effect, of what it is about. values: for each effect, of
+        its value, if it has one. line: of what is said, if anything is.
+    """
+
+    sets: tuple[int, ...]
+    targets: tuple[tuple[int, ...], ...]
+    values: tuple[int | None, ...]
+    line: int | None
 
 
 class Effects:
     """Emits effects through `to`."""
 
-    def __init__(self, to: Expressions, lines: Lines) -> None:
-        self.to, self.lines = to, lines
+    def __init__(self, to: Expressions, lines: Lines, homes: Homes) -> None:
+        self.to, self.lines, self.homes = to, lines, homes
         self.checked, self.registers = to.checked, to.registers
 
     def emit(
-        self,
-        what: RulePlan | StepPlan,
-        counter: int,
-        failed: Label,
-        speaker: Entity | None = None,
-        body: Callable[[], None] | None = None,
+        self, what: RulePlan | StepPlan, counter: int, failed: Label, speaker: Entity | None = None
     ) -> None:
-        """Compute all values first (a pick that finds nothing skips to `failed`), then act: `body`, set, cause, say."""
-        to, block = self.to, self.to.block
+        """Compute all values first (a pick that finds nothing skips to `failed`), then act: set, cause, say."""
+        operands = self.compute(what, failed, speaker)
+        self.to.block.emit(Op.COUNT, counter)
+        self.carry_out(what, operands, speaker)
+
+    def compute(self, what: RulePlan | StepPlan, failed: Label, speaker: Entity | None) -> Operands:
+        """Compute all values; a pick that finds nothing skips to `failed`."""
+        to = self.to
         to.failed = failed
-        values = [(path, self._kept(sited)) for path, sited in what.sets]
-        entities = [self._targets(effect) for effect in what.causes]
+        sets = tuple(self._kept(sited) for _, sited in what.sets)
+        targets: list[tuple[int, ...]] = []
+        values: list[int | None] = []
+        for effect in what.causes:
+            to.site = effect.site
+            targets.append(tuple(self._steady(entity, what) for entity in effect.entities))
+            values.append(None if effect.value is None else self._steady(effect.value, what))
         line = None
         if what.say is not None:
             assert speaker is not None, "internal: nobody is there to say it"
             line = self.lines.say(to, speaker, what.say)
         to.failed = None
-        block.span = what.span
-        block.emit(Op.COUNT, counter)
-        if body is not None:
-            body()
-            block.span = what.span
-        for path, value in values:
-            store(to.registers, block.emit, path, value)
-        for effect, targets in zip(what.causes, entities, strict=True):
-            for term, entity in zip(effect.entities, targets, strict=True):
-                self._cause(effect, term, entity)
-        if line is not None and speaker is not None:
-            block.emit(Op.SAY, constant(speaker.number), line)
+        to.block.span = what.span
+        return Operands(sets, tuple(targets), tuple(values), line)
 
-    def _targets(self, effect: Effect) -> list[int]:
-        self.to.site = effect.site
-        return [self.to.value(entity) for entity in effect.entities]
+    def carry_out(self, what: RulePlan | StepPlan, operands: Operands, speaker: Entity | None) -> None:
+        """Set, reward, cause, say."""
+        block = self.to.block
+        for (path, _), operand in zip(what.sets, operands.sets, strict=True):
+            store(self.registers, block.emit, path, operand)
+        if isinstance(what, RulePlan) and what.reward:
+            block.emit(Op.REWARD, constant(what.reward))
+        for effect, targets, value in zip(what.causes, operands.targets, operands.values, strict=True):
+            for term, entity in zip(effect.entities, targets, strict=True):
+                self._cause(effect, term, entity, value)
+        if operands.line is not None and speaker is not None:
+            self.lines.speak(self.to, speaker, operands.line)
 
     def _kept(self, sited: Sited) -> int:
         """A value in a temporary, so that no later effect of the same rule can change it."""
         return self.to.into_temporary(Op.LOAD, self.to.sited_value(sited))
 
-    def _cause(self, effect: Effect, term: Term, entity: int) -> None:
+    def _steady(self, term: Term, what: RulePlan | StepPlan) -> int:
+        """A value that nothing the rule sets can change."""
+        value = self.to.value(term)
+        is_set = value in {self.registers.by_path[path] for path, _ in what.sets}
+        return self.to.into_temporary(Op.LOAD, value) if is_set else value
+
+    def _cause(self, effect: Effect, term: Term, entity: int, value: int | None) -> None:
         block = self.to.block
         block.span = effect.span
         if effect.name == "vanish":
             block.emit(Op.VANISH, entity)
-        elif effect.name == "become":
-            assert effect.value is not None
-            block.emit(Op.BECOME, entity, self.to.value(effect.value))
         elif effect.name == "reset":
             self._reset(term, entity)
-        else:
+        elif value is None:
             self._change(effect, term, entity)
+        elif effect.name == "become":
+            block.emit(Op.BECOME, entity, value)
+        else:
+            block.emit(Op.PLACE, entity, value)
+            if effect.name == "move_into":
+                block.emit(Op.VANISH, entity)
+                block.emit(Op.SET_FIELD, entity, Field.INSIDE, value)
 
     def _change(self, effect: Effect, term: Term, entity: int) -> None:
-        """Open, close, lock; unlock only what is locked."""
+        """Open, close, lock, reveal; unlock only what is locked."""
         block = self.to.block
-        thing = self.checked.entities[_numbers(term)[0]]
+        thing = self.checked.entities[numbers_of(term)[0]]
         assert thing.type is not None, "internal: only objects have a status"
         states = thing.type.states
         done = Label()
@@ -87,35 +120,39 @@ class Effects:
         block.bind(done)
 
     def _reset(self, term: Term, entity: int) -> None:
-        """Back to the initial status, which may differ from one object of a group to the next."""
+        """Back to what it was at first, which may differ from one object of a group to the next."""
         block = self.to.block
-        numbers = _numbers(term)
-        statuses = {number: self._initial(self.checked.entities[number]) for number in numbers}
+        numbers = numbers_of(term)
+        things = [self.checked.entities[number] for number in numbers]
+        fixed = all(self.homes.is_fixed(thing) and thing.initial is None for thing in things)
+        if fixed and len({thing.status for thing in things}) == 1:
+            self._become_initial(things[0], entity)
+            return
         done = Label()
-        for number in numbers[:-1]:
-            if len(set(statuses.values())) == 1:
-                break
+        for thing in things[:-1]:
             following = Label()
-            block.test(Op.IF_EQ, entity, constant(number), following)
-            block.emit(Op.BECOME, entity, statuses[number])
+            block.test(Op.IF_EQ, entity, constant(thing.number), following)
+            self._put_back(thing, entity)
             block.skip(done)
             block.bind(following)
-        block.emit(Op.BECOME, entity, statuses[numbers[-1]])
+        self._put_back(things[-1], entity)
         block.bind(done)
 
-    def _initial(self, thing: Entity) -> int:
-        return constant(thing.status) if thing.initial is None else self.to.value(thing.initial)
+    def _put_back(self, thing: Entity, entity: int) -> None:
+        self._become_initial(thing, entity)
+        self.homes.put_back(self.to.block, thing.number)
+
+    def _become_initial(self, thing: Entity, entity: int) -> None:
+        if thing.role == "object":
+            status = constant(thing.status) if thing.initial is None else self.to.value(thing.initial)
+            self.to.block.emit(Op.BECOME, entity, status)
 
 
 def store(registers: Registers, emit: Callable[..., None], path: str, value: int) -> None:
     """Put a temporary into a register; those that hold plain integers saturate."""
     name = next(name for name in registers.names if name.path == path)
+    assert value >= TEMPORARY, "internal: what is stored is cut to its range in place"
     if not name.values:
         emit(Op.MAX, value, value, constant(name.low))
         emit(Op.MIN, value, value, constant(name.high))
     emit(Op.LOAD, name.register, value)
-
-
-def _numbers(term: Term) -> list[int]:
-    """The entities that a term may name."""
-    return [term.value] if isinstance(term, Const) else list(range(term.type.low, term.type.high + 1))

@@ -10,7 +10,7 @@ from socialai_dsl.compiler.cells import LoopCell, coordinate, count_cells, one_c
 from socialai_dsl.compiler.classes import SILENCE, Classes
 from socialai_dsl.compiler.folding import TRUE, Facts, fold, substitute
 from socialai_dsl.compiler.quantifiers import count_things, first_thing, nearest_thing, picked_thing
-from socialai_dsl.compiler.registers import Registers, entity_register, state_names
+from socialai_dsl.compiler.registers import Registers, entity_register, said_path, state_names
 from socialai_dsl.compiler.selects import among, asks, selected_condition, selected_value
 from socialai_dsl.program import CONSTANT, TEMPORARY, Field, Op, Register
 from socialai_dsl.semantics import terms
@@ -24,6 +24,9 @@ _FIELDS = {
     "status": Field.STATUS,
     "gone": Field.GONE,
     "poked": Field.POKED,
+    "last": Field.LAST,
+    "pointing": Field.POINTING,
+    "inside": Field.INSIDE,
 }
 _WORLD = {
     "t": Register.T,
@@ -121,7 +124,8 @@ class Expressions:
             case terms.Not():
                 self._negated(term.arg, otherwise)
             case terms.Compare():
-                block.test(_COMPARE[term.op], self.value(term.left), self.value(term.right), otherwise)
+                left, right = self._compared(term.left), self._compared(term.right)
+                block.test(_COMPARE[term.op], left, right, otherwise)
             case terms.Test(subject=None):
                 self._about_here(term, otherwise)
             case terms.Test():
@@ -150,6 +154,8 @@ class Expressions:
             case terms.Heard():
                 heard = frozenset[int]().union(*(self.classes.matching(pattern) for pattern in term.patterns))
                 self.one_of(Op.IF_HEARD, self.inbox, heard, otherwise)
+            case terms.SaidBy():
+                self._said_by(term, otherwise)
             case terms.InState():
                 self._in_state(term, otherwise)
             case _:  # a value of type bool
@@ -192,6 +198,20 @@ class Expressions:
         self.block.test(op, left, last, otherwise)
         self.block.bind(found)
 
+    def _said_by(self, term: terms.SaidBy, otherwise: Label) -> None:
+        """Whether what an NPC has said in this step is one of its lines that fit."""
+        said = self.registers.by_path.get(said_path(self.checked.entities[term.entity]))
+        lines = self.classes.said[term.entity, term.pattern]
+        if said is None or not lines:
+            self.block.skip(otherwise)
+        elif term.pattern is None:
+            self.block.test(Op.IF_NE, said, constant(0), otherwise)
+        elif max(lines) - min(lines) == len(lines) - 1:
+            self.block.test(Op.IF_LE, constant(1 + min(lines)), said, otherwise)
+            self.block.test(Op.IF_LE, said, constant(1 + max(lines)), otherwise)
+        else:
+            self.one_of(Op.IF_EQ, said, frozenset(1 + line for line in lines), otherwise)
+
     def _in_state(self, term: terms.InState, otherwise: Label) -> None:
         frame = next(f for f in self.checked.frames if f.member == term.member and f.frame == term.frame)
         register = self.registers.by_path[f"{term.member}.frame"]
@@ -226,6 +246,10 @@ class Expressions:
         self.site, self.block.span = sited.site, sited.span
         return self.saturated(fold(sited.term, self.facts, self.classes))
 
+    def _compared(self, term: Term) -> int:
+        """A value that is only compared: no noun at all is unlike any noun."""
+        return Register.NOUN if term == terms.World(term.type, "noun") else self.value(term)
+
     def value(self, term: Term) -> int:
         """Emit what computes the term; the operand it is in afterwards."""
         match term:
@@ -233,12 +257,16 @@ class Expressions:
                 return constant(term.value)
             case terms.Read():
                 return self.registers.by_path[term.path]
+            case terms.World(name="noun"):
+                return self._found(Register.NOUN)
             case terms.World():
                 return int(_WORLD[term.name])
             case terms.Here():
                 return self._loop("").x if term.name == "x" else self._loop("").y
             case terms.FieldOf() if term.entity.type.kind == "cell":
                 return coordinate(self, term)
+            case terms.FieldOf(name="inside"):
+                return self._container(term)
             case terms.FieldOf(entity=Const(value=entity)):
                 return entity_register(entity, _FIELDS[term.name])
             case terms.FieldOf():
@@ -252,6 +280,13 @@ class Expressions:
             case terms.CellOf():
                 of = self.value(term.entity)
                 return of if term.entity.type.kind == "cell" else self.into_temporary(Op.CELL_OF, of)
+            case terms.CellBeside():
+                beside = self.value(term.entity)
+                return self.into_temporary(Op.CELL_BESIDE, beside, self.value(term.direction))
+            case terms.Speaker():
+                return self._heard(Op.HEARD_FROM, term)
+            case terms.HeardNoun():
+                return self._heard(Op.HEARD_NOUN, term)
             case terms.Select():
                 return selected_value(self, term)
             case terms.Quantified(op="count", cells=True):
@@ -270,6 +305,25 @@ class Expressions:
                 return self._loop(term.name).cell
             case _:
                 return self._truth_value(term)
+
+    def _found(self, number: int) -> int:
+        """Something's number, where -1 is nothing: that fails, or else is as good as the first."""
+        if self.failed is not None:
+            self.block.test(Op.IF_LE, constant(0), number, self.failed)
+        return self.into_temporary(Op.MAX, number, constant(0))
+
+    def _heard(self, op: Op, term: terms.Speaker | terms.HeardNoun) -> int:
+        assert self.inbox >= 0, "internal: nobody is there to hear it"
+        return self._found(self.into_temporary(op, self.inbox, self.classes.set_of(term.patterns)))
+
+    def _container(self, term: terms.FieldOf) -> int:
+        """What a thing lies in: among those that can hold something, even if it never did."""
+        if isinstance(term.entity, Const):
+            number = entity_register(term.entity.value, Field.INSIDE)
+        else:
+            number = self.into_temporary(Op.FIELD, self.value(term.entity), Field.INSIDE)
+        number = self.into_temporary(Op.MAX, number, constant(term.type.low))
+        return self.into_temporary(Op.MIN, number, constant(term.type.high))
 
     def saturated(self, term: Term) -> int:
         """The operand of a value that is cut to its type: of things that are gone, places and distances are odd."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from socialai_dsl.compiler.interval_arithmetic import ARITHMETIC
-from socialai_dsl.compiler.intervals import ANYTHING, Interval, Known
+from socialai_dsl.compiler.intervals import ANYTHING, Interval, Known, inbox_registers
 from socialai_dsl.program import (
     BOARDS,
     CELL,
@@ -13,7 +13,9 @@ from socialai_dsl.program import (
     FIRST_ENTITY,
     TEMPORARIES,
     TEMPORARY,
+    Body,
     Field,
+    Flag,
     FrameColumn,
     Header,
     Op,
@@ -22,22 +24,30 @@ from socialai_dsl.program import (
 
 _TWO_PLACES = range(Op.IF_SAME_CELL, Op.IF_UNOBSTRUCTED + 1)
 _BOUNDS = 64
+_WHOLE_REWARD = 100
 _NOWHERE = CELL - 1
 
 
 def problem_of(
-    instruction: tuple[Op, int, int, int], program: Program, known: Known, writable: frozenset[int]
+    instruction: tuple[Op, int, int, int],
+    program: Program,
+    known: Known,
+    writable: frozenset[int],
+    is_agents: bool = False,
 ) -> str | None:
-    """What is wrong with an instruction where so much is known, or None; then `known` includes what it writes."""
+    """What is wrong with an instruction where so much is known, or None; then `known` includes what it writes.
+
+    `is_agents`: it belongs to the frame of the agent, who can do less than NPCs.
+    """
     op, a, b, c = instruction
-    return _Instruction(program, known, writable).problem(op, a, b, c)
+    return _Instruction(program, known, writable, is_agents).problem(op, a, b, c)
 
 
 class _Instruction:
     """Checks one instruction and notes what it writes."""
 
-    def __init__(self, program: Program, known: Known, writable: frozenset[int]) -> None:
-        self.program, self.known, self.writable = program, known, writable
+    def __init__(self, program: Program, known: Known, writable: frozenset[int], is_agents: bool) -> None:
+        self.program, self.known, self.writable, self.is_agents = program, known, writable, is_agents
         self.entities = program.header(Header.ENTITIES)
 
     def problem(self, op: Op, a: int, b: int, c: int) -> str | None:
@@ -138,6 +148,21 @@ class _Instruction:
         h = self.program.header
         return CELL + 32 * (h(Header.CANVAS_HEIGHT) - 1) + h(Header.CANVAS_WIDTH) - 1
 
+    def cell_beside(self, a: int, b: int, c: int) -> str | None:
+        return self.value(c, 0, 3) or self.cell_of(a, b, c)
+
+    def heard_from(self, a: int, b: int, c: int) -> str | None:
+        return self._about_heard(b, c) or self.write(a, (-1, self.program.header(Header.NPCS)))
+
+    def heard_noun(self, a: int, b: int, c: int) -> str | None:
+        return self._about_heard(b, c) or self.write(a, (-1, self.program.header(Header.NOUNS) - 1))
+
+    def _about_heard(self, inbox: int, classes: int) -> str | None:
+        h = self.program.header
+        if not h(Header.FLAGS) & Flag.HEARD_BY:
+            return "nobody notes who said what"
+        return self.inbox(inbox) or self.literal(classes, 0, h(Header.CLASS_SETS) - 1)
+
     def draw(self, a: int, b: int, c: int) -> str | None:
         problem = self.value(b, 1, 1 << 30) or self.site(c)
         return problem or self.write(a, (0, self._interval(b)[1] - 1))
@@ -173,15 +198,17 @@ class _Instruction:
 
     def heard(self, a: int, b: int, _c: int) -> str | None:
         h = self.program.header
-        inboxes = range(h(Header.INBOX), h(Header.INBOX) + h(Header.FRAMES) * (1 + h(Header.INBOX_SIZE)))
-        if a not in inboxes[:: 1 + h(Header.INBOX_SIZE)]:
-            return f"{a} is not the first register of an inbox"
-        return self.literal(b, 1, h(Header.CLASSES) - 1)
+        return self.inbox(a) or self.literal(b, 1, h(Header.CLASSES) - 1)
+
+    def inbox(self, register: int) -> str | None:
+        h, size = self.program.header, inbox_registers(self.program)
+        inboxes = range(h(Header.INBOX), h(Header.INBOX) + h(Header.FRAMES) * size)
+        return None if register in inboxes[::size] else f"{register} is not the first register of an inbox"
 
     # --- effects and activities ---
 
     def set_field(self, a: int, b: int, c: int) -> str | None:
-        if b not in (Field.DIR, Field.COLOR, Field.POKED, Field.LAST):
+        if b not in (Field.DIR, Field.COLOR, Field.POKED, Field.LAST, Field.POINTING, Field.INSIDE):
             return f"field {b} is not to be set like this"
         if problem := self.entity(a) or self.value(c):
             return problem
@@ -223,8 +250,26 @@ class _Instruction:
     def end(self, a: int, b: int, _c: int) -> str | None:
         return self.literal(a, 0, len(self.program.outcome_table) - 3) or self.literal(b, 0, 100)
 
+    def end_graded(self, a: int, b: int, _c: int) -> str | None:
+        return self.literal(a, 0, len(self.program.outcome_table) - 3) or self.value(b)
+
+    def reward(self, a: int, _b: int, _c: int) -> str | None:
+        return self.value(a, -_WHOLE_REWARD, _WHOLE_REWARD)
+
+    def put_on(self, a: int, b: int, _c: int) -> str | None:
+        return self.entity(a) or self.place(b)
+
     def body(self, a: int, _b: int, _c: int) -> str | None:
-        return self.value(a, 0, 7)
+        if self.is_agents:
+            return self.value(a, 0, Body.NONE)
+        if self.known.value(a) == (Body.STOP_POINTING, Body.STOP_POINTING):
+            return None
+        return self.value(a, 0, Body.NONE)
+
+    def point(self, a: int, b: int, _c: int) -> str | None:
+        if self.is_agents:
+            return "the agent cannot point"
+        return self.value(a, 1, self.program.header(Header.NPCS)) or self.value(b, 0, 3)
 
     def turn_to(self, a: int, b: int, c: int) -> str | None:
         return self.entity(a) or self.value(b, 0, 3) or self.site(c)
@@ -323,6 +368,9 @@ _CHECKS: dict[Op, Callable[[_Instruction, int, int, int], str | None]] = {
     Op.PICK_BIT: _Instruction.pick_bit,
     Op.SEES: _Instruction.sees,
     Op.CELL_OF: _Instruction.cell_of,
+    Op.CELL_BESIDE: _Instruction.cell_beside,
+    Op.HEARD_FROM: _Instruction.heard_from,
+    Op.HEARD_NOUN: _Instruction.heard_noun,
     Op.SET_FIELD: _Instruction.set_field,
     Op.BECOME: _Instruction.become,
     Op.VANISH: _Instruction.vanish,
@@ -330,6 +378,10 @@ _CHECKS: dict[Op, Callable[[_Instruction, int, int, int], str | None]] = {
     Op.GOTO: _Instruction.goto,
     Op.COUNT: _Instruction.count,
     Op.END: _Instruction.end,
+    Op.END_GRADED: _Instruction.end_graded,
+    Op.REWARD: _Instruction.reward,
+    Op.PLACE: _Instruction.put_on,
+    Op.POINT: _Instruction.point,
     Op.BODY: _Instruction.body,
     Op.TURN_TO: _Instruction.turn_to,
     **dict.fromkeys((Op.GO_TO, Op.GO_NEXT_TO), _Instruction.go),
@@ -349,7 +401,9 @@ _CHECKS: dict[Op, Callable[[_Instruction, int, int, int], str | None]] = {
     Op.MAKE_ROOM: _Instruction.make_room,
 }
 
-_ONE_TEMPORARY = frozenset((*ARITHMETIC, *range(Op.LOAD, Op.CELL_OF + 1), Op.B_COUNT))
+_ONE_TEMPORARY = frozenset(
+    (*ARITHMETIC, *range(Op.LOAD, Op.CELL_BESIDE + 1), Op.B_COUNT, Op.HEARD_FROM, Op.HEARD_NOUN)
+)
 _TWO_TEMPORARIES = frozenset((Op.PICK_CELL, Op.FIRST_CELL, Op.NEAREST_CELL))
 
 

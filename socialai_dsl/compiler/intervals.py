@@ -11,8 +11,10 @@ from socialai_dsl.program import (
     FIRST_ENTITY,
     TEMPORARIES,
     TEMPORARY,
+    Body,
     EntityColumn,
     Field,
+    Flag,
     Header,
     Program,
     Register,
@@ -22,6 +24,7 @@ Interval = tuple[int, int]
 WHOLE_REGISTER: Interval = (-32768, 32767)
 WIDEST = 1 << 62
 ANYTHING: Interval = (-WIDEST, WIDEST)
+LAST_BODY = Body.STOP_POINTING
 
 
 def hull(a: Interval, b: Interval) -> Interval:
@@ -51,7 +54,7 @@ class Ranges:
         ranges[Register.WIDTH] = (header(Header.MIN_WIDTH), width)
         ranges[Register.HEIGHT] = (least, least + header(Header.HEIGHTS) - 1)
         ranges[Register.ACTION] = (0, 7)
-        ranges[Register.LAST_TURN] = (-1, 7)
+        ranges[Register.LAST_TURN] = (-1, LAST_BODY)
         ranges[Register.CLASS] = (0, header(Header.CLASSES) - 1)
         ranges[Register.TEMPLATE] = (-1, header(Header.TEMPLATES) - 1)
         ranges[Register.NOUN] = (-1, header(Header.NOUNS) - 1)
@@ -83,7 +86,9 @@ def _field_ranges(program: Program, entity: int, width: int, height: int) -> dic
         Field.STATUS: (0, greatest_status(program, entity)),
         Field.GONE: (0, 1),
         Field.POKED: (0, 1),
-        Field.LAST: (-1, 7),
+        Field.LAST: (-1, LAST_BODY),
+        Field.POINTING: (0, 4),
+        Field.INSIDE: (0, program.header(Header.ENTITIES) - 1),
     }
 
 
@@ -150,6 +155,12 @@ class Known:
             if temporary in before.temporaries:
                 known.temporaries[temporary] = ANYTHING
         return known
+
+
+def inbox_registers(program: Program) -> int:
+    """Registers of an inbox: a count, then entries of a class each, or of class, speaker and noun."""
+    entry = 3 if program.header(Header.FLAGS) & Flag.HEARD_BY else 1
+    return 1 + entry * program.header(Header.INBOX_SIZE)
 
 
 def greatest_status(program: Program, entity: int) -> int:

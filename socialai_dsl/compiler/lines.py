@@ -6,12 +6,25 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from math import prod
 
 from socialai_dsl.compiler.assembler import Label, constant
-from socialai_dsl.compiler.classes import OTHER, Classes, normal, texts_of_pairs
+from socialai_dsl.compiler.classes import OTHER, Classes, normal, parts, texts_of_pairs
 from socialai_dsl.compiler.expressions import Expressions
+from socialai_dsl.compiler.registers import Registers, said_path
 from socialai_dsl.program import Op
-from socialai_dsl.semantics.terms import Checked, Const, Entity, Line, Term, Type, Variable
+from socialai_dsl.semantics.terms import (
+    Activity,
+    Checked,
+    Const,
+    Entity,
+    Line,
+    Pattern,
+    SaidBy,
+    Term,
+    Type,
+    Variable,
+)
 
 UNKNOWN = 1
 MAX_TOKENS = 256
@@ -27,7 +40,8 @@ class Lines:
     """The line table.
 
     Attributes:
-        texts: text of each line as the agent hears it. classes: utterance class to NPCs. tokens: ids of its words.
+        texts: text of each line as the agent hears it. classes: utterance class to NPCs. nouns: what `<noun>` is in it,
+        -1 nothing. tokens: ids of its words.
         agent_says: 1 + number of the agent's utterance (0, 0) where the agent's utterances are lines; else 0.
         speakers: for each entity that says something, the numbers of its lines.
     """
@@ -36,6 +50,7 @@ class Lines:
     classes_of: Classes
     texts: list[str] = field(default_factory=list)
     classes: list[int] = field(default_factory=list)
+    nouns: list[int] = field(default_factory=list)
     tokens: list[list[int]] = field(default_factory=list)
     agent_says: int = 0
     speakers: dict[int, set[int]] = field(default_factory=dict)
@@ -54,12 +69,14 @@ class Lines:
         for k, text in enumerate(self.grammar):
             line = self._append(agent, self._word(agent.name), text)
             self.classes[line] = self.classes_of.of_pair[k]
+            self.nouns[line] = self._noun_of_pair(k)
 
     def _append(self, speaker: Entity, name: str, text: str) -> int:
         heard = f"{name}: {text}" if self.checked.names_shown else text
         line = len(self.texts)
         self.texts.append(heard)
         self.classes.append(self.classes_of.of_text(text))
+        self.nouns.append(self.classes_of.noun_in(text))
         # A text without a single word still has to be heard as something.
         self.tokens.append([self._ids.get(word, UNKNOWN) for word in words_of(heard)] or [UNKNOWN])
         self.speakers.setdefault(speaker.number, set()).add(line)
@@ -70,14 +87,45 @@ class Lines:
         assert isinstance(term, Const), "internal: the agent's name is drawn"
         return term.type.words[term.value - term.type.low]
 
+    def _noun_of_pair(self, k: int) -> int:
+        return k % len(self.checked.nouns)
+
+    def said_by(self, speaker: int, pattern: Pattern | None) -> frozenset[int]:
+        """The lines of an NPC that fit a pattern (None: all of them), once it is known what everybody says."""
+        wanted = None if pattern is None else self.classes_of.matching(pattern)
+        own = self.speakers.get(speaker, set())
+        return frozenset(line for line in own if wanted is None or self.classes[line] in wanted)
+
+    def bounds(self, speaker: Entity, line: Line) -> tuple[int, int]:
+        """The least and the greatest number of the line that `say` gives."""
+        if speaker.number == 0:
+            numbers = self._utterances(line)
+            return min(numbers), max(numbers)
+        first = self._family(speaker, (speaker.name or "", *line.parts))
+        return first, first + prod(map(len, map(_choices, (speaker.name or "", *line.parts)))) - 1
+
+    def speak(self, to: Expressions, speaker: Entity, line: int) -> None:
+        """Emit that `speaker` says the line in an operand, and note it where somebody asks what was said."""
+        block = to.block
+        block.emit(Op.SAY, constant(speaker.number), line)
+        noted = to.registers.by_path.get(said_path(speaker))
+        if noted is None:
+            return
+        spoken = Label()
+        mark = block.taken
+        block.test(Op.IF_EQ, noted, constant(0), spoken)
+        block.emit(Op.LOAD, noted, to.into_temporary(Op.ADD, line, constant(1)))
+        block.bind(spoken)
+        block.release(mark)
+
     def say(self, to: Expressions, speaker: Entity, line: Line) -> int:
         """Emit the number of the line that `speaker` says; the operand it is in."""
         to.site, to.block.span = line.site, line.span
         if speaker.number == 0:
             return self._utterance(to, line)
-        parts = (speaker.name or "", *line.parts)
-        varying = [part for part in parts if not isinstance(part, str | Const)]
-        first = self._family(speaker, parts)
+        pieces = (speaker.name or "", *line.parts)
+        varying = [part for part in pieces if not isinstance(part, str | Const)]
+        first = self._family(speaker, pieces)
         return self._index(to, varying, first)
 
     def perform(self, to: Expressions, speaker: Entity, utterance: Term) -> None:
@@ -91,20 +139,20 @@ class Lines:
             block.test(Op.IF_NE, said, constant(0), silent)
             said = to.into_temporary(Op.MAX, said, constant(1))
         line = self._line_performed(to, speaker, said)
-        block.emit(Op.SAY, constant(speaker.number), line)
+        self.speak(to, speaker, line)
         block.bind(silent)
 
     def _line_performed(self, to: Expressions, speaker: Entity, said: int) -> int:
         """The operand of the line for a pair that is in an operand, counted from 1."""
         name = speaker.name if speaker.number != 0 else None
-        if (before := self._first_performed(speaker) - 1) != 0:
+        if (before := self.first_performed(speaker) - 1) != 0:
             said = to.into_temporary(Op.ADD, said, constant(before))
         if name is not None and not isinstance(name, Const):
             named = to.into_temporary(Op.MUL, self._index(to, [name], 0), constant(len(self.grammar)))
             said = to.into_temporary(Op.ADD, said, named)
         return said
 
-    def _first_performed(self, speaker: Entity) -> int:
+    def first_performed(self, speaker: Entity) -> int:
         """The line of the first pair; the others follow."""
         if speaker.number == 0:
             return self.agent_says - 1
@@ -113,6 +161,7 @@ class Lines:
         first = self._family(speaker, (speaker.name or "", anything))
         for k in range(len(_choices(speaker.name or "")) * len(texts)):
             self.classes[first + k] = self.classes_of.of_performed[k % len(texts)]
+            self.nouns[first + k] = self._noun_of_pair(k % len(texts))
         return first
 
     @staticmethod
@@ -142,10 +191,7 @@ class Lines:
 
     def _utterance(self, to: Expressions, line: Line) -> int:
         """The agent's line among the utterances of the grammar: its parts are a fixed text, or enumerated."""
-        pairs = {normal(text): self.agent_says - 1 + k for k, text in enumerate(self.grammar)}
-        numbers = [
-            pairs[normal("".join(pieces))] for pieces in product(*(_choices(part) for part in line.parts))
-        ]
+        numbers = self._utterances(line)
         varying = [part for part in line.parts if not isinstance(part, str | Const)]
         position = self._index(to, varying, 0)
         result = to.block.temporary()
@@ -156,6 +202,13 @@ class Lines:
             to.block.emit(Op.LOAD, result, constant(number))
             to.block.bind(following)
         return result
+
+    def _utterances(self, line: Line) -> list[int]:
+        """The agent's lines for all that the parts can be."""
+        pairs = {normal(text): self.agent_says - 1 + k for k, text in enumerate(self.grammar)}
+        return [
+            pairs[normal("".join(pieces))] for pieces in product(*(_choices(part) for part in line.parts))
+        ]
 
     @property
     def history_length(self) -> int:
@@ -171,6 +224,25 @@ class Lines:
         return sum(
             any(self.classes[line] > OTHER for line in lines) for s, lines in self.speakers.items() if s != 0
         )
+
+
+def note_what_is_said(checked: Checked, lines: Lines, registers: Registers) -> None:
+    """Where somebody asks what an NPC has said: find all lines there are, and make room to note them."""
+    asked = list(parts(checked, SaidBy))
+    if not asked:
+        return
+    for frame in checked.frames:
+        speaker = checked.entities[frame.entity]
+        for said in parts(frame, Line):
+            lines.bounds(speaker, said)
+        for activity in parts(frame, Activity):
+            if activity.name == "perform":
+                lines.first_performed(speaker)
+    for number in sorted({term.entity for term in asked}):
+        if number in lines.speakers:
+            registers.add(said_path(checked.entities[number]), Type("int", 0, len(lines.texts)))
+    for term in asked:
+        lines.classes_of.said[term.entity, term.pattern] = lines.said_by(term.entity, term.pattern)
 
 
 def _choices(part: str | Term) -> tuple[str, ...]:

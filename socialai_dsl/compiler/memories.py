@@ -5,12 +5,16 @@ from __future__ import annotations
 from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.effects import store
 from socialai_dsl.compiler.expressions import Expressions
+from socialai_dsl.compiler.registers import said_path
 from socialai_dsl.program import Op, Register
 from socialai_dsl.semantics.terms import MemoryPlan
 
 
 def remember(to: Expressions) -> None:
-    """Before anything happens in a step: what rules will want to know about the state that the last step left."""
+    """Before anything happens in a step: what rules will want to know about the state that the last step left.
+
+    Then nobody has said anything yet.
+    """
     block = to.block
     for item in to.checked.remembered:
         mark = block.taken
@@ -19,6 +23,10 @@ def remember(to: Expressions) -> None:
         block.release(mark)
     for memory in to.checked.memories:
         _ask_whether_open(to, memory)
+    for entity in to.checked.entities:
+        said = to.registers.by_path.get(said_path(entity))
+        if said is not None:
+            block.emit(Op.LOAD, said, constant(0))
 
 
 def _ask_whether_open(to: Expressions, memory: MemoryPlan) -> None:

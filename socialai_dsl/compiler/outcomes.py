@@ -10,6 +10,9 @@ from socialai_dsl.compiler.registers import Registers
 from socialai_dsl.program import Body, Op
 from socialai_dsl.semantics.terms import Checked
 
+_BODIES = range(Body.NONE + 1)
+"""What the agent can do."""
+
 
 def outcome_table(
     checked: Checked, registers: Registers, classes: Classes, sites: Sites, code: CodeTable
@@ -17,7 +20,7 @@ def outcome_table(
     """Addresses by (class, action), row by row."""
     table = []
     for said in range(classes.count):
-        for action in Body:
+        for action in map(Body, _BODIES):
             facts = Facts(said=said, action=action)
             to = Expressions(Block(), checked, registers, classes, sites)
             to.facts = facts
@@ -33,7 +36,12 @@ def _first_that_holds(to: Expressions, checked: Checked) -> None:
             continue
         following = Label()
         to.sited_condition(outcome.condition, following)
-        block.emit(Op.END, number, outcome.percent if outcome.success else 0)
+        if outcome.graded is not None and outcome.success:
+            mark = block.taken
+            block.emit(Op.END_GRADED, number, to.sited_value(outcome.graded))
+            block.release(mark)
+        else:
+            block.emit(Op.END, number, outcome.percent if outcome.success else 0)
         block.halt()
         block.bind(following)
     block.halt()

@@ -6,7 +6,8 @@ from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.cells import keep_each
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import mentions
-from socialai_dsl.program import Op, Register, Side
+from socialai_dsl.compiler.registers import entity_register
+from socialai_dsl.program import Field, Op, Register, Side
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.terms import Placing, Region, Term
 
@@ -21,10 +22,15 @@ class Places:
         self.to = to
 
     def put(self, placing: Placing) -> None:
-        """Emit the draw of a cell and the putting of the entity there."""
+        """Emit the draw of a cell and the putting of the entity there, or that it lies in something."""
         to, block = self.to, self.to.block
         block.span = placing.span
         mark = block.taken
+        if placing.inside is not None:
+            to.site = placing.where_site
+            self._inside(placing.entity, placing.inside)
+            block.release(mark)
+            return
         cell = block.temporary(2)
         if placing.at is not None:
             to.site = placing.where_site
@@ -37,13 +43,24 @@ class Places:
             to.site = placing.where_site
             boards = block.boards_taken
             board = self._union(placing.regions)
-            block.emit(Op.B_FREE, board)
+            if not placing.overlap:
+                block.emit(Op.B_FREE, board)
             if placing.where is not None:
                 self._keep(board, placing.where)
             block.emit(Op.PICK_CELL, cell, board, to.sites.row(placing.site, placing.number))
             block.release_boards(boards)
         block.emit(Op.PUT, constant(placing.entity), cell)
         block.release(mark)
+
+    def _inside(self, content: int, holder: Term) -> None:
+        """On the cell of what it lies in, but not in the room."""
+        block = self.to.block
+        number = self.to.into_temporary(Op.LOAD, self.to.value(holder))
+        for field in (Field.X, Field.Y):
+            where = self.to.into_temporary(Op.FIELD, number, field)
+            block.emit(Op.LOAD, entity_register(content, field), where)
+        block.emit(Op.LOAD, entity_register(content, Field.INSIDE), number)
+        block.emit(Op.LOAD, entity_register(content, Field.GONE), constant(1))
 
     def _coordinate(self, target: int, coordinate: Term, size: int) -> None:
         """A coordinate, kept on the canvas where it comes from something that may be anywhere."""

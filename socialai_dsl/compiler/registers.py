@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from socialai_dsl.compiler.cells import NOWHERE
 from socialai_dsl.program import CELL, ENTITY_FIELDS, FIRST_ENTITY, Field, RegisterName
-from socialai_dsl.semantics.terms import ACTION, BOOL, Checked, Drawn, FramePlan, MemoryPlan, Type
+from socialai_dsl.semantics.terms import ACTION, BOOL, Checked, Drawn, Entity, FramePlan, MemoryPlan, Type
 
 
 def entity_register(entity: int, which: Field) -> int:
@@ -39,6 +39,9 @@ class Registers:
             registers.add(item.path, item.type)
         for memory in checked.memories:
             registers._add_memory(memory)
+        for entity in checked.entities:
+            if entity.timer:
+                registers.add(f"{label(entity)}.timer", Type("int", 0, entity.timer))
         return registers
 
     def _add_memory(self, memory: MemoryPlan) -> None:
@@ -51,19 +54,34 @@ class Registers:
 
     def add(self, path: str, type_: Type) -> int:
         """A named register. One of a cell may hold any cell of the canvas, and none."""
-        if type_.kind == "cell":
-            width, height = self.canvas
-            type_ = replace(type_, low=NOWHERE, high=CELL + 32 * (height - 1) + width - 1)
+        type_ = self.cut(type_)
         register = self.reserve(1)
         self.by_path[path] = register
         self.names.append(RegisterName(path, register, type_.words, type_.low, type_.high, type_.kind))
         return register
+
+    def cut(self, type_: Type) -> Type:
+        """The type with the cells that there are."""
+        if type_.kind != "cell":
+            return type_
+        width, height = self.canvas
+        return replace(type_, low=NOWHERE, high=CELL + 32 * (height - 1) + width - 1)
 
     def reserve(self, count: int) -> int:
         """The first of `count` registers without a name."""
         first = self.next_free
         self.next_free += count
         return first
+
+
+def label(entity: Entity) -> str:
+    """What an entity is called in the path of a register of its own."""
+    return entity.key if entity.index is None else f"{entity.key}[{entity.index}]"
+
+
+def said_path(speaker: Entity) -> str:
+    """The register of what an NPC has said in this step: 1 + the line, 0 nothing."""
+    return f"{speaker.key}.said"
 
 
 def state_names(frame: FramePlan) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.behaviour import FOR_EVER
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import fold
+from socialai_dsl.compiler.homes import Homes
 from socialai_dsl.compiler.places import Places
 from socialai_dsl.compiler.registers import entity_register, state_names
 from socialai_dsl.compiler.statuses import ComputedStatuses
@@ -25,7 +26,7 @@ from socialai_dsl.semantics.terms import (
 ALL_COLORS = (1 << len(COLORS)) - 1
 
 
-def reset(to: Expressions, computed: ComputedStatuses) -> None:
+def reset(to: Expressions, computed: ComputedStatuses, homes: Homes) -> None:
     """Emit everything that happens at reset."""
     checked, registers = to.checked, to.registers
     _room(to, checked.room)
@@ -44,6 +45,7 @@ def reset(to: Expressions, computed: ComputedStatuses) -> None:
     for item in checked.remembered:
         _not_yet(to, registers.by_path[item.path])
     computed.fix(to)
+    homes.save(to)
 
 
 def require(to: Expressions) -> None:

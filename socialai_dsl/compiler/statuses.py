@@ -1,4 +1,4 @@
-"""Statuses that follow from other things to code: links (`unlocks`), and statuses that are computed from conditions."""
+"""Statuses that are computed from conditions, to code."""
 
 from __future__ import annotations
 
@@ -7,34 +7,7 @@ from socialai_dsl.compiler.changes import Changes, When
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.registers import entity_register
 from socialai_dsl.program import Field, Op
-from socialai_dsl.semantics.terms import Checked, Computed, Entity
-
-
-def links(to: Expressions) -> None:
-    """While a switch is in the room and in an active status, what it unlocks is not locked."""
-    for switch in to.checked.entities:
-        targets = [to.checked.entities[number] for number in switch.unlocks]
-        lockable = [target for target in targets if target.type and "locked" in target.type.states]
-        if switch.type is None or not lockable:
-            continue
-        to.block.span = switch.span
-        following = Label()
-        status = entity_register(switch.number, Field.STATUS)
-        to.one_of(Op.IF_EQ, status, switch.type.active, following)
-        to.block.test(Op.IF_EQ, entity_register(switch.number, Field.GONE), constant(0), following)
-        for target in lockable:
-            _unlock(to, target)
-        to.block.bind(following)
-
-
-def _unlock(to: Expressions, target: Entity) -> None:
-    assert target.type is not None
-    states = target.type.states
-    left_alone = Label()
-    status = entity_register(target.number, Field.STATUS)
-    to.block.test(Op.IF_EQ, status, constant(states.index("locked")), left_alone)
-    to.block.emit(Op.BECOME, constant(target.number), constant(states.index("closed")))
-    to.block.bind(left_alone)
+from socialai_dsl.semantics.terms import Checked, Computed
 
 
 class ComputedStatuses:

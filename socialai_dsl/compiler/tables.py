@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from socialai_dsl.compiler.assembler import CodeTable, Sites
+from socialai_dsl.compiler.behaviour import FrameCode
 from socialai_dsl.compiler.classes import Classes
 from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.registers import Registers, state_names
@@ -22,7 +23,7 @@ from socialai_dsl.program import (
     Program,
     TypeColumn,
 )
-from socialai_dsl.semantics.terms import Checked, Entity, FramePlan, ObjectType
+from socialai_dsl.semantics.terms import Checked, Entity, ObjectType
 
 
 class Tables:
@@ -44,18 +45,23 @@ class Tables:
         self.sites, self.lines, self.code = sites, lines, code
         # A member hears each of the others at most once between two of its turns.
         self.inbox_size = 1 + len(checked.frames)
+        self.entry_size = 3 if classes.speakers_matter else 1
         self.inbox = 0
 
     def reserve_inboxes(self) -> dict[str, int]:
-        """First register of the inbox of each member with a frame: a count, then classes."""
+        """First register of the inbox of each member with a frame: a count, then entries."""
         self.inbox = self.registers.reserve(0)
-        return {frame.member: self.registers.reserve(1 + self.inbox_size) for frame in self.checked.frames}
+        return {frame.member: self.registers.reserve(self._inbox_registers) for frame in self.checked.frames}
+
+    @property
+    def _inbox_registers(self) -> int:
+        return 1 + self.entry_size * self.inbox_size
 
     def program(
         self,
         entries: dict[Header, int],
         flags: int,
-        frames: list[tuple[FramePlan, list[list[int]]]],
+        frames: list[FrameCode],
         outcomes: list[int],
         rules: tuple[str, ...],
     ) -> Program:
@@ -84,11 +90,12 @@ class Tables:
         table(Header.TYPE_AT, [word for row in types.rows for word in row])
         table(Header.ROOM_AT, room_templates(checked.room))
         table(Header.FRAME_AT, self._frame_rows(frames))
-        table(Header.STATE_AT, [word for _, rows in frames for row in rows for word in row])
+        table(Header.STATE_AT, [word for frame in frames for row in frame.rows for word in row])
         table(Header.OUTCOME_AT, outcomes)
         table(Header.LINE_AT, self._line_rows())
         table(Header.TOKEN_AT, [token for tokens in lines.tokens for token in tokens])
         table(Header.SITE_AT, self.sites.words())
+        table(Header.CLASS_SET_AT, self.classes.set_words())
 
         header |= entries | {
             Header.SIZE: Header.END + len(body),
@@ -118,11 +125,16 @@ class Tables:
             Header.OUTSIDE: WALL,
             Header.INSTRUCTIONS: len(self.code.instructions),
             Header.LINES: len(lines.texts),
-            Header.STATES: sum(len(rows) for _, rows in frames),
+            Header.STATES: sum(len(frame.rows) for frame in frames),
             Header.SITES: len(self.sites.rows),
             Header.TYPE_ROWS: len(types.rows),
             Header.COUNTERS: len(rules) + len(checked.outcomes) + 3,
             Header.AGENT_SAYS: lines.agent_says,
+            Header.SLOPE: checked.slope,
+            Header.EACH_STEP: checked.each_step,
+            Header.CLASS_SETS: len(self.classes.sets),
+            Header.CLASS_SET_WORDS: self.classes.words_of_a_set,
+            Header.CHANNELS: checked.channels,
         }
         words = np.array([*(header[word] for word in Header if word != Header.END), *body], dtype=np.int64)
         # Boards are sets of bits, so a word may use the sign bit.
@@ -154,33 +166,40 @@ class Tables:
             Flag.AGENT_FRAME: any(frame.entity == 0 for frame in checked.frames),
             Flag.OWN_VOICE: checked.own_voice,
             Flag.EGOCENTRIC: checked.egocentric,
+            Flag.OCCLUSION: checked.room.occlusion,
+            Flag.ROLLS: any(entity.type and entity.type.rolls for entity in checked.entities),
+            Flag.HEARD_BY: self.classes.speakers_matter,
         }
         return sum(flag for flag, on in flags.items() if on)
 
-    def _frame_rows(self, frames: list[tuple[FramePlan, list[list[int]]]]) -> list[int]:
+    def _frame_rows(self, frames: list[FrameCode]) -> list[int]:
         words = []
         first_row = 0
-        for number, (frame, rows) in enumerate(frames):
+        for number, (made, frame) in enumerate(zip(frames, self.checked.frames, strict=True)):
             row = dict.fromkeys(FrameColumn, 0) | {
                 FrameColumn.ENTITY: frame.entity,
                 FrameColumn.STATE: self.registers.by_path[f"{frame.member}.frame"],
                 FrameColumn.CLOCK: self.registers.by_path[f"{frame.member}.clock"],
                 FrameColumn.ROWS: first_row,
                 FrameColumn.STATES: len(state_names(frame)),
-                FrameColumn.INBOX: self.inbox + number * (1 + self.inbox_size),
+                FrameColumn.INBOX: self.inbox + number * self._inbox_registers,
+                FrameColumn.PERCEIVE: made.perceive,
+                FrameColumn.DEFERRED: made.deferred,
             }
-            first_row += len(rows)
+            first_row += len(made.rows)
             words += [row[column] for column in FrameColumn if column != FrameColumn.COLUMNS]
         return words
 
     def _line_rows(self) -> list[int]:
         words = []
         first_token = 0
-        for tokens, number in zip(self.lines.tokens, self.lines.classes, strict=True):
+        lines = self.lines
+        for tokens, number, noun in zip(lines.tokens, lines.classes, lines.nouns, strict=True):
             row = {
                 LineColumn.FIRST_TOKEN: first_token,
                 LineColumn.TOKENS: len(tokens),
                 LineColumn.CLASS: number,
+                LineColumn.NOUN: noun,
             }
             words += [row[column] for column in LineColumn if column != LineColumn.COLUMNS]
             first_token += len(tokens)
@@ -211,6 +230,8 @@ class _TypeTable:
         orientation: int = 0,
         walkable: int = 0,
         transparent: int = 0,
+        pushed: int = 0,
+        rolls: int = 0,
     ) -> int:
         row = {
             TypeColumn.CODE: code,
@@ -219,6 +240,8 @@ class _TypeTable:
             TypeColumn.WALKABLE: walkable,
             TypeColumn.TRANSPARENT: transparent,
             TypeColumn.TOGGLED: toggled,
+            TypeColumn.PUSHED: pushed,
+            TypeColumn.ROLLS: rolls,
         }
         self.rows.append([row[column] for column in TypeColumn if column != TypeColumn.COLUMNS])
         return len(self.rows) - 1
@@ -233,6 +256,8 @@ class _TypeTable:
                 toggled=kind.toggled.get(status, status),
                 walkable=int(status in kind.walkable),
                 transparent=int(status in kind.transparent),
+                pushed=kind.pushed.get(status, status),
+                rolls=1 + kind.initial if status in kind.rolls else 0,
             )
             for status in range(len(kind.states))
         ]
@@ -254,6 +279,7 @@ def _entity_row(entity: Entity, types: _TypeTable) -> list[int]:
         EntityColumn.AUDIBLE: int(entity.audible),
         EntityColumn.IN_WALL: int(entity.in_wall),
         EntityColumn.VIEW: entity.view,
+        EntityColumn.PUSHED_BY: int(entity.pushed_by_rolling),
     }
     return [row[column] for column in EntityColumn if column != EntityColumn.COLUMNS]
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 from socialai_dsl.compiler.code_verifier import verify_code
+from socialai_dsl.compiler.intervals import inbox_registers
 from socialai_dsl.compiler.invalid import InvalidProgramError
 from socialai_dsl.program import (
     ENTITY_FIELDS,
@@ -57,6 +58,7 @@ def _sizes(program: Program) -> dict[Header, int]:
         Header.OUTCOME_AT: h(Header.CLASSES) * 8,
         Header.LINE_AT: h(Header.LINES) * LineColumn.COLUMNS,
         Header.SITE_AT: 2 * h(Header.SITES),
+        Header.CLASS_SET_AT: h(Header.CLASS_SETS) * h(Header.CLASS_SET_WORDS),
     }
 
 
@@ -82,6 +84,10 @@ def _header(program: Program) -> None:
         h(Header.MIN_HEIGHT) + h(Header.HEIGHTS) - 1 <= h(Header.CANVAS_HEIGHT),
         "a room is higher than the canvas",
     )
+    sets, words = h(Header.CLASS_SETS), h(Header.CLASS_SET_WORDS)
+    _require(0 <= sets < 32768 and (not sets or 32 * words >= h(Header.CLASSES)), "a class in no set")
+    _require(h(Header.CHANNELS) in (4, 6), f"a picture of {h(Header.CHANNELS)} channels")
+    _require(0 <= h(Header.SLOPE) <= 1000, f"SLOPE is {h(Header.SLOPE)}")
     for offset in _OFFSETS:
         _require(Header.END <= h(offset) <= len(program.words), f"{offset.name} is {h(offset)}")
     for offset, size in _sizes(program).items():
@@ -98,7 +104,7 @@ def _registers(program: Program) -> None:
     areas = sorted(
         [
             (0, FIRST_ENTITY + ENTITY_FIELDS * h(Header.ENTITIES), "entities"),
-            (h(Header.INBOX), h(Header.INBOX) + h(Header.FRAMES) * (1 + h(Header.INBOX_SIZE)), "inboxes"),
+            (h(Header.INBOX), h(Header.INBOX) + h(Header.FRAMES) * inbox_registers(program), "inboxes"),
             (h(Header.HEARD), h(Header.HEARD) + h(Header.HEARD_SIZE), "lines heard"),
             (h(Header.LOG), h(Header.LOG) + h(Header.LOG_SIZE), "log"),
         ]
@@ -132,11 +138,17 @@ def _entities(program: Program) -> None:
         kind, view = (int(program.words[at + column]) for column in (EntityColumn.KIND, EntityColumn.VIEW))
         _require(0 <= kind < 256, f"the status code of {entity} does not fit into the picture")
         _require(0 < view <= 2 * MAX_SIDE, f"{entity} sees {view} cells far")
+        pushed_by = int(program.words[at + EntityColumn.PUSHED_BY])
+        _require(pushed_by in (0, 1), f"{entity} is pushed by {pushed_by}")
         for status in range(statuses):
-            toggled = int(
-                program.words[h(Header.TYPE_AT) + TypeColumn.COLUMNS * (first + status) + TypeColumn.TOGGLED]
+            row = h(Header.TYPE_AT) + TypeColumn.COLUMNS * (first + status)
+            toggled, pushed, rolls = (
+                int(program.words[row + column])
+                for column in (TypeColumn.TOGGLED, TypeColumn.PUSHED, TypeColumn.ROLLS)
             )
             _require(0 <= toggled < statuses, f"a toggle gives {entity} a status it does not have")
+            _require(0 <= pushed < statuses, f"a push gives {entity} a status it does not have")
+            _require(0 <= rolls <= statuses, f"what stops {entity} gives it a status it does not have")
     for row in range(rows):
         at = h(Header.TYPE_AT) + TypeColumn.COLUMNS * row
         _require(0 < int(program.words[at + TypeColumn.CODE]) < 32, f"type row {row} has no type code")
@@ -168,7 +180,7 @@ def _frames(program: Program) -> None:
         assert state is not None
         _require(state.high < row[FrameColumn.STATES], f"frame {number} may be in a state it does not have")
         _require(clock is not None, f"frame {number} has no clock")
-        inbox = h(Header.INBOX) + number * (1 + h(Header.INBOX_SIZE))
+        inbox = h(Header.INBOX) + number * inbox_registers(program)
         _require(row[FrameColumn.INBOX] == inbox, f"frame {number} has no inbox of its own")
 
 
@@ -179,7 +191,7 @@ def _lines(program: Program) -> None:
     _require(h(Header.TOKENS) >= 8, "no room for a history")
     for number in range(h(Header.LINES)):
         at = h(Header.LINE_AT) + LineColumn.COLUMNS * number
-        first, count, heard_as = (int(word) for word in program.words[at : at + LineColumn.COLUMNS])
+        first, count, heard_as, noun = (int(word) for word in program.words[at : at + LineColumn.COLUMNS])
         _require(1 <= count <= h(Header.TOKENS), f"line {number} does not fit into the history")
         inside = first >= 0 and h(Header.TOKEN_AT) + first + count <= tokens_end
         _require(inside, f"words of line {number} are out of range")
@@ -188,6 +200,7 @@ def _lines(program: Program) -> None:
             f"the log cannot hold line {number} often enough",
         )
         _require(1 <= heard_as < h(Header.CLASSES), f"line {number} has no utterance class")
+        _require(-1 <= noun < h(Header.NOUNS), f"line {number} has a noun that does not exist")
         tokens = program.words[h(Header.TOKEN_AT) + first : h(Header.TOKEN_AT) + first + count]
         known = bool(((tokens >= 1) & (tokens < len(program.vocabulary))).all())
         _require(known, f"line {number} has a word outside the vocabulary")

@@ -6,21 +6,22 @@ from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.effects import Effects
 from socialai_dsl.compiler.expressions import Expressions, chance_word
 from socialai_dsl.compiler.folding import FALSE, fold
+from socialai_dsl.compiler.homes import Homes
 from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.program import Op
 from socialai_dsl.semantics.terms import BOOL, RulePlan
 
 
-def world_rules(to: Expressions, lines: Lines, counted: list[str]) -> None:
+def world_rules(to: Expressions, lines: Lines, homes: Homes, counted: list[str]) -> None:
     """Emit the rules top to bottom, and add their names to those that are counted."""
     for rule in to.checked.rules:
         counted.append(rule.name)
         if rule.when is not None and fold(rule.when.term, to.facts, to.classes) == FALSE:
             continue
-        _rule(to, lines, rule, len(counted) - 1)
+        _rule(to, lines, homes, rule, len(counted) - 1)
 
 
-def _rule(to: Expressions, lines: Lines, rule: RulePlan, counter: int) -> None:
+def _rule(to: Expressions, lines: Lines, homes: Homes, rule: RulePlan, counter: int) -> None:
     assert not rule.hears, "internal: the world has no ears"
     assert rule.say is None, "internal: the world has no voice"
     assert rule.do is None, "internal: the world has no body"
@@ -37,7 +38,7 @@ def _rule(to: Expressions, lines: Lines, rule: RulePlan, counter: int) -> None:
     if rule.chance is not None:
         site = to.sites.row(f"{rule.site}.chance")
         block.test(Op.IF_CHANCE, chance_word(rule.chance), site, following)
-    Effects(to, lines).emit(rule, counter, following)
+    Effects(to, lines, homes).emit(rule, counter, following)
     if fired is not None:
         block.emit(Op.LOAD, fired, constant(1))
     block.bind(following)

@@ -28,7 +28,7 @@ from socialai_dsl.program import (
 )
 
 _UNLIMITED = np.iinfo(np.int16).max
-_ADDRESSES = (Header.SETTLE_PC, Header.RULES_PC, Header.BEFORE_PC, Header.LINKS_PC)
+_ADDRESSES = (Header.SETTLE_PC, Header.RULES_PC, Header.BEFORE_PC, Header.LINKS_PC, Header.TICK_PC)
 
 _OF_ONE_STEP = (
     Register.ACTION,
@@ -39,6 +39,7 @@ _OF_ONE_STEP = (
     Register.POKED,
     Register.SAID_LINE,
     Register.LAST_TURN,
+    Register.BONUS,
 )
 """Written anew in every step; code can read what the last step left only at BEFORE_PC."""
 
@@ -55,12 +56,13 @@ _READ: dict[Op, tuple[int, ...]] = {
     **dict.fromkeys((Op.LOAD, Op.ABS, Op.FIELD, Op.DRAW, Op.CELL_OF), (1,)),
     **dict.fromkeys((Op.COUNT_BITS, Op.LOWEST_BIT, Op.PICK_BIT), (1,)),
     **dict.fromkeys((Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.MOD, Op.MIN, Op.MAX), (1, 2)),
-    **dict.fromkeys((Op.DISTANCE, Op.QUADRANT), (1, 2)),
+    **dict.fromkeys((Op.DISTANCE, Op.QUADRANT, Op.CELL_BESIDE), (1, 2)),
+    **dict.fromkeys((Op.HEARD_FROM, Op.HEARD_NOUN, Op.END_GRADED), (1,)),
     Op.SET_BIT: (0, 1),
     Op.SEES: (0, 1, 2),
     Op.SET_FIELD: (0, 2),
-    **dict.fromkeys((Op.BECOME, Op.SAY, Op.TURN_TO, Op.GO_TO, Op.GO_NEXT_TO), (0, 1)),
-    **dict.fromkeys((Op.VANISH, Op.BODY), (0,)),
+    **dict.fromkeys((Op.BECOME, Op.SAY, Op.TURN_TO, Op.GO_TO, Op.GO_NEXT_TO, Op.POINT, Op.PLACE), (0, 1)),
+    **dict.fromkeys((Op.VANISH, Op.BODY, Op.REWARD), (0,)),
 }
 """Positions of the operands that are read; of other instructions all may be."""
 
@@ -68,7 +70,7 @@ _COMPARISONS = (Op.IF_EQ, Op.IF_NE, Op.IF_LT, Op.IF_LE)
 _DRAWS = (Op.DRAW, Op.PICK_BIT, Op.PICK_CELL)
 _CHANCY = (Op.IF_CHANCE, Op.TURN_TO, Op.GO_TO, Op.GO_NEXT_TO)
 _VALUES = (*map(Op, range(Op.LOAD, Op.ABS + 1)), Op.FIELD, Op.DISTANCE, Op.QUADRANT, Op.SET_BIT, Op.COUNT_BITS,
-           Op.LOWEST_BIT, Op.SEES, Op.CELL_OF)  # fmt: skip
+           Op.LOWEST_BIT, Op.SEES, Op.CELL_OF, Op.CELL_BESIDE)  # fmt: skip
 
 Instruction = tuple[Op, tuple[int, int, int]]
 
@@ -110,7 +112,8 @@ class Relevance:
         return cls(
             np.array(kept, np.intp),
             np.array([limits[r] if r in counting else _UNLIMITED for r in kept], np.int16),
-            any(register in limits for register in _WHOLE_UTTERANCE),
+            any(register in limits for register in _WHOLE_UTTERANCE)
+            or any(op == Op.HEARD_NOUN for block in blocks for op, _ in block),
             any(_draws_matter(program, block) for block in blocks),
         )
 
@@ -122,6 +125,8 @@ def _entries(program: Program) -> Iterator[int]:
     states = h(Header.STATES) * (1 + 2 * (h(Header.CLASSES) + 1))
     for table, size in ((Header.STATE_AT, states), (Header.OUTCOME_AT, 8 * h(Header.CLASSES))):
         yield from (int(pc) for pc in words[h(table) : h(table) + size])
+    for column in (FrameColumn.PERCEIVE, FrameColumn.DEFERRED):
+        yield from _frame_column(program, column)
 
 
 def _block(program: Program, start: int) -> Iterator[Instruction]:
@@ -171,9 +176,13 @@ def _lasts(program: Program) -> list[int]:
 
 
 def _clocks(program: Program) -> list[int]:
+    return _frame_column(program, FrameColumn.CLOCK)
+
+
+def _frame_column(program: Program, column: FrameColumn) -> list[int]:
     start, rows = program.header(Header.FRAME_AT), program.header(Header.FRAMES)
     table = program.words[start : start + rows * FrameColumn.COLUMNS].reshape(rows, FrameColumn.COLUMNS)
-    return [int(register) for register in table[:, FrameColumn.CLOCK]]
+    return [int(word) for word in table[:, column]]
 
 
 def _draws_matter(program: Program, block: list[Instruction]) -> bool:
