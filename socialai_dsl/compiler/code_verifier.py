@@ -64,7 +64,7 @@ class _Code:
         set_up = frozenset(
             FIRST_ENTITY + ENTITY_FIELDS * entity + which
             for entity in range(program.header(Header.ENTITIES))
-            for which in (Field.X, Field.Y, Field.DIR, Field.COLOR, Field.STATUS, Field.GONE, Field.INSIDE)
+            for which in (Field.DIR, Field.COLOR, Field.STATUS)
         )
         self.writable = {
             Header.RESET_PC: named | set_up,

@@ -6,7 +6,6 @@ from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.cells import keep_each
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import mentions
-from socialai_dsl.compiler.registers import entity_register
 from socialai_dsl.program import Field, Op, Register, Side
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.terms import Placing, Region, Term
@@ -55,12 +54,13 @@ class Places:
     def _inside(self, content: int, holder: Term) -> None:
         """On the cell of what it lies in, but not in the room."""
         block = self.to.block
-        number = self.to.into_temporary(Op.LOAD, self.to.value(holder))
-        for field in (Field.X, Field.Y):
-            where = self.to.into_temporary(Op.FIELD, number, field)
-            block.emit(Op.LOAD, entity_register(content, field), where)
-        block.emit(Op.LOAD, entity_register(content, Field.INSIDE), number)
-        block.emit(Op.LOAD, entity_register(content, Field.GONE), constant(1))
+        cell = block.temporary(2)
+        number = self.to.value(holder)
+        block.emit(Op.FIELD, cell, number, Field.X)
+        block.emit(Op.FIELD, cell + 1, number, Field.Y)
+        block.emit(Op.PUT, constant(content), cell)
+        block.emit(Op.VANISH, constant(content))
+        block.emit(Op.SET_FIELD, constant(content), Field.INSIDE, number)
 
     def _coordinate(self, target: int, coordinate: Term, size: int) -> None:
         """A coordinate, kept on the canvas where it comes from something that may be anywhere."""
