@@ -262,7 +262,8 @@ class Expressions:
             case terms.World():
                 return int(_WORLD[term.name])
             case terms.Here():
-                return self._loop("").x if term.name == "x" else self._loop("").y
+                here = self._loop("")
+                return {"x": here.x, "y": here.y, "cell": here.cell}[term.name]
             case terms.FieldOf() if term.entity.type.kind == "cell":
                 return coordinate(self, term)
             case terms.FieldOf(name="inside"):
