@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from socialai_dsl.grammar import ast
-from tests.reference import chance, geometry
+from tests.reference import chance, geometry, motion
 from tests.reference.evaluate import Context, drawn, of, weighed
 from tests.reference.source import Value
 from tests.reference.world import (
@@ -27,7 +27,9 @@ SEARCH_ORDER = ("down", "up", "right", "left")
 
 def act(world: World, body: Entity, primitive: str) -> None:
     """Executes a primitive; what cannot be done is not done. pickup, drop and done change nothing in the room."""
-    body.action = primitive
+    # A body action with a direction: `point up`.
+    word, _, way = primitive.partition(" ")
+    body.action = body.last_act = word
     if body.cell is None:
         return
     ahead = step_from(body.cell, body.facing)
@@ -35,6 +37,13 @@ def act(world: World, body: Entity, primitive: str) -> None:
         body.facing = turned(body.facing, -1 if primitive == "left" else 1)
     elif primitive == "forward" and can_enter(world, body, ahead):
         body.cell = ahead
+    elif primitive == "forward":
+        body.bumped = True
+        motion.push(world, ahead, body.facing)
+    elif word == "point":
+        body.pointing = way
+    elif word == "stop_pointing":
+        body.pointing = None
     elif primitive == "toggle":
         toggle(world, body, ahead)
 
@@ -60,7 +69,8 @@ def toggle(world: World, user: Entity, cell: Cell) -> None:
         if thing.one_way:
             # "`one_way: true` drops the second entry": there is no way back.
             changes = dict(list(changes.items())[:1])
-        thing.status = changes.get(thing.status, thing.status)
+        if not thing.blocked:
+            thing.status = changes.get(thing.status, thing.status)
 
 
 @dataclass
@@ -69,12 +79,13 @@ class Activity:
 
     verb: str
     goal: Any = None
+    way: Any = None  # of a push
 
     def primitive(self, world: World, me: Entity) -> str:
         """The body action it asks for now."""
         if me.cell is None:
             return "none"
-        if self.verb in ("left", "right", "forward", "toggle"):
+        if self.verb in ("left", "right", "forward", "toggle", "stop_pointing"):
             return self.verb
         if self.verb == "turn":
             return str(self.goal)
@@ -86,8 +97,13 @@ class Activity:
             return self.element(me)[0]
         if all(where(goal) is None for goal in as_list(self.goal)):
             return "none"
+        if self.verb == "push":
+            return push(world, me, self.goal, self.way)
         return {
             "face": face,
+            "point": point,
+            "follow": go_next_to,
+            "flee": flee,
             "go_to": go_to,
             "go_next_to": go_next_to,
             "use": use,
@@ -112,6 +128,8 @@ class Activity:
 
     def finished(self, world: World, me: Entity) -> bool:
         """Whether it ended with the turn that was just taken; single actions take one turn."""
+        if self.verb == "push":
+            return me.bumped and me.facing == self.way and geometry.faces(world, me, self.goal)
         if self.verb == "use":
             return me.action == "toggle" and geometry.faces(world, me, self.goal)
         if self.verb in ("go_to", "enter", "go_next_to"):
@@ -133,7 +151,7 @@ def plan(value: Value, context: Context) -> Activity:
             return Activity(("forward", "left", "right")[drawn(context, node, 3)])
         return Activity(node.id)
     assert isinstance(node, ast.Call), "internal: no activity"
-    return Activity(node.name, of(node.args[0], context))
+    return Activity(node.name, *(of(argument, context) for argument in node.args))
 
 
 def turn_towards(world: World, me: Entity, wanted: str) -> str:
@@ -196,6 +214,27 @@ def use(world: World, me: Entity, goal: Any) -> str:
         return go_next_to(world, me, goal)
     near = next(one for one in as_list(goal) if geometry.next_to(world, me, one))
     return face(world, me, near)
+
+
+def point(world: World, me: Entity, goal: Any) -> str:
+    """Points in the direction of the quadrant in which x lies."""
+    return f"point {quadrant(where(me), where(goal))}"  # type: ignore[arg-type]
+
+
+def flee(world: World, me: Entity, goal: Any) -> str:
+    """Turns its back on x, then walks."""
+    away = turned(quadrant(where(me), where(goal)), 2)  # type: ignore[arg-type]
+    return "forward" if me.facing == away else turn_towards(world, me, away)
+
+
+def push(world: World, me: Entity, goal: Any, way: str) -> str:
+    """Goes to the cell behind x, turns, and walks into x."""
+    cell = where(goal)
+    assert cell is not None
+    behind = step_from(cell, turned(way, 2))
+    if me.cell != behind:
+        return go_to(world, me, behind)
+    return "forward" if me.facing == way else turn_towards(world, me, way)
 
 
 def enter(world: World, me: Entity, goal: Any) -> str:

@@ -6,15 +6,16 @@ from dataclasses import replace
 from typing import Any
 
 from socialai_dsl.grammar import ast
+from tests.reference import geometry
 from tests.reference.evaluate import Context, evaluate, of
 from tests.reference.source import Sources
-from tests.reference.world import TYPES, Entity, World, as_list
+from tests.reference.world import TYPES, Entity, World, as_list, where
 
-Cause = tuple[str, list[Entity], str | None]
+Cause = tuple[str, list[Entity], Any]
 
 
 def causes(sources: Sources, rule: Any, path: str, context: Context, frame: str | None) -> list[Cause]:
-    """The effects of a rule in order: a verb, what it is done to, and the status that `become` names."""
+    """The effects of a rule in order: a verb, what it is done to, and the status, cell or container it names."""
     found = []
     for number, source in enumerate(rule.cause):
         value = sources.expression(f"{path}.cause[{number}]", source, frame)
@@ -27,8 +28,10 @@ def cause(node: Any, context: Context) -> Cause:
     if isinstance(node, ast.Name):
         return node.id, as_list(context.me), None
     subject = as_list(context.me) if node.subject is None else as_list(of(node.subject, context))
-    status = None
-    if isinstance(node, ast.Call) and node.args:
+    status: Any = None
+    if node.name in ("put", "move_into"):
+        status = of(node.args[0], context)
+    elif isinstance(node, ast.Call) and node.args:
         status = node.args[0].id if isinstance(node.args[0], ast.Name) else str(of(node.args[0], context))
     return node.name, subject, status
 
@@ -51,12 +54,18 @@ def assign(world: World, me: Entity | None, values: dict[str, Any]) -> None:
         holder.registers[name] = min(max(value, low), high) if name in holder.ranges else value
 
 
-def affect(target: Entity, verb: str, status: str | None) -> None:
+def affect(world: World, target: Entity, verb: str, status: Any) -> None:
     """One effect on one entity; what does not apply to its status changes nothing."""
     if verb == "vanish":
-        target.left_from, target.cell = target.cell or target.left_from, None
+        vanish(target)
     elif verb == "reset":
-        target.status = target.initial
+        reset(world, target)
+    elif verb == "put":
+        target.cell = where(status)
+    elif verb == "move_into":
+        target.cell, target.inside = None, status
+    elif verb == "reveal":
+        reveal(target)
     elif verb == "become":
         target.status = str(status)
     elif verb == "unlock":
@@ -66,6 +75,36 @@ def affect(target: Entity, verb: str, status: str | None) -> None:
     else:
         target.status = {"open": "open", "close": "closed", "lock": "locked"}[verb]
     assert target.sort != "object" or target.status in TYPES[target.type].states
+
+
+def remember(entity: Entity) -> None:
+    """Keeps what `reset` will bring back."""
+    entity.at_reset = (entity.status, entity.cell, entity.facing, entity.blocked, entity.inside)
+
+
+def reset(world: World, target: Entity) -> None:
+    """As at the end of the reset of this episode; an NPC only goes back if its place is free."""
+    status, cell, facing, blocked, inside = target.at_reset
+    if target.sort == "object":
+        target.status, target.blocked, target.inside = status, blocked, inside
+    else:
+        target.pointing = None
+        if cell is None or not geometry.free(world, cell, target):
+            return
+    target.cell, target.facing = cell, facing
+
+
+def reveal(content: Entity) -> None:
+    """What lies in something takes its cell."""
+    container = content.inside
+    if container is not None and content.gone and not container.gone:
+        content.cell = container.cell
+        vanish(container)
+
+
+def vanish(target: Entity) -> None:
+    """It is no longer in the room."""
+    target.left_from, target.cell = target.cell or target.left_from, None
 
 
 def unlock(target: Entity) -> None:

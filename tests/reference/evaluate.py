@@ -114,6 +114,8 @@ def _name(node: ast.Name, context: Context) -> Any:
         return _let(word, context)
     if word in world.registers:
         return world.registers[word]
+    if word in world.groups:
+        return world.groups[word]
     if word in world.memories:
         return world.memories[word]
     word = world.roles.get(word, word)
@@ -134,7 +136,7 @@ def _name(node: ast.Name, context: Context) -> Any:
     }
     if word in words:
         return words[word]()
-    if me is not None and word in ("poked", "was_poked", "gone", "spoke", "action"):
+    if me is not None and word in ("poked", "was_poked", "gone", "spoke", "action", "pointing"):
         return attribute(me, word, context)
     return word
 
@@ -166,6 +168,11 @@ def _slot(word: str, context: Context) -> tuple[bool, Any]:
 
 
 def _attribute(node: ast.Attribute, context: Context) -> Any:
+    if isinstance(node.subject, ast.Attribute) and node.subject.name == "believes":
+        holder = of(node.subject.subject, context)
+        if context.setup:
+            context.setup.compute_beliefs(holder)
+        return holder.believes[node.name]
     subject = of(node.subject, context)
     if isinstance(subject, list):
         return [attribute(item, node.name, context) for item in subject]
@@ -190,6 +197,12 @@ def attribute(subject: Any, name: str, context: Context) -> Any:
         if context.setup:
             context.setup.compute_facing(subject)
         return subject.facing
+    if name == "pointing":
+        return subject.pointing is not None
+    if name == "inside":
+        if context.setup:
+            context.setup.compute_inside(subject)
+        return subject.inside
     if name == "spoke":
         return subject.utterance is not None
     if name == "toggled":
@@ -322,6 +335,8 @@ def _quantifier(node: ast.Quantifier, context: Context) -> Any:
 def _call(node: ast.Call, context: Context) -> Any:
     if node.subject is None and node.name in FUNCTIONS:
         return FUNCTIONS[node.name](node, context)
+    if node.subject is None and (node.name in context.world.tables or in_tables(node.name, context)):
+        return _table(node, context)
     # "In a frame a verb without a subject is the NPC's own."
     subject = context.me if node.subject is None else of(node.subject, context)
     if isinstance(subject, list):
@@ -347,6 +362,18 @@ def _verb(subject: Any, node: ast.Call, context: Context) -> Any:
     if name == "toggled_by":
         return any(user in subject.toggled_by for user in as_list(arguments[0]))
     return getattr(geometry, name)(world, subject, *arguments)
+
+
+def in_tables(name: str, context: Context) -> bool:
+    """Whether a table of this name will be drawn."""
+    return context.setup is not None and name in context.setup.scenario.tables
+
+
+def _table(node: ast.Call, context: Context) -> Any:
+    """What a table holds for a key; keys are known by their texts."""
+    if context.setup:
+        context.setup.compute_table(node.name)
+    return context.world.tables[node.name][spelled(of(node.args[0], context))]
 
 
 def _in_state(member: Entity, node: Any, context: Context) -> bool:

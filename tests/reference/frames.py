@@ -49,8 +49,22 @@ class FrameRunner:
 
     # -- a turn --------------------------------------------------------------------------------------------
 
+    def perceive(self) -> None:
+        """Step 4a: beliefs whose `when` holds take the value of what they are about."""
+        for name, belief in self.sources.beliefs_of(self.me):
+            site = f"cast.{self.me.key}.beliefs.{name}"
+            context = Context(self.world, self.me)
+            try:
+                if belief.when is None or holds(
+                    self.sources.expression(f"{site}.when", belief.when), context
+                ):
+                    self.me.believes[name] = evaluate(self.sources.expression(site, belief.of), context)
+            except NothingFoundError:
+                continue
+
     def begin(self) -> Turn:
         """Step 4b, first part: `first`, and which activity runs."""
+        self.perceive()
         frame = self.frame
         if frame is None:
             return Turn(bodies.Activity("stay"))
@@ -198,9 +212,9 @@ class FrameRunner:
         """What the rule will do, or None if one of its conditions is false or a value cannot be found."""
         if rule.once and path in self.me.fired_once:
             return None
-        if rule.after is not None and self.me.clock < rule.after:
-            return None
         try:
+            if rule.after is not None and self.me.clock < self.turns_before(rule, path):
+                return None
             context = self.heard(rule, path)
             if context is None or not holds(self.when(rule, path), context):
                 return None
@@ -216,6 +230,10 @@ class FrameRunner:
         if rule.once:
             self.me.fired_once.add(path)
         return found
+
+    def turns_before(self, rule: Rule, path: str) -> int:
+        """From which turn in the state on a rule can fire."""
+        return int(evaluate(self.expression(f"{path}.after", rule.after), self.context()))
 
     def when(self, rule: Rule, path: str) -> Any:
         """The `when` of a rule."""
@@ -253,7 +271,7 @@ class FrameRunner:
         assign(self.world, self.me, found.registers)
         for verb, targets, status in found.causes:
             for target in targets:
-                affect(target, verb, status)
+                affect(self.world, target, verb, status)
         if found.say is not None and turn.say is None:
             turn.say = found.say
         if isinstance(found.rule, Rule):

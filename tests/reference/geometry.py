@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from tests.reference.sight import lit
 from tests.reference.world import (
     AHEAD,
     Cell,
@@ -95,11 +96,12 @@ def looks_at(world: World, a: Any, x: Any) -> bool:
 
 
 def would_see(world: World, a: Any, x: Any, direction: str) -> bool:
-    """x in the view square of a if it faced that way: a in the middle of the near edge, no occlusion."""
+    """x in the view square of a if it faced that way: a in the middle of the near edge; lit, where there is shadow."""
 
     def seen(_: World, a: Any, x: Any) -> bool:
         ahead, aside = _ahead_and_aside(where(a), direction, where(x))  # type: ignore[arg-type]
-        return 0 <= ahead < a.view and abs(aside) <= a.view // 2
+        in_square = 0 <= ahead < a.view and abs(aside) <= a.view // 2
+        return in_square and (not world.occlusion or (ahead, aside) in lit(world, a.cell, direction, a.view))
 
     return _some(seen)(world, a, x)
 
@@ -123,6 +125,12 @@ def joint_attention(world: World, a: Any, b: Any, x: Any = None) -> bool:
     """Both look at x, or without x at the same object."""
     goals = world.things() if x is None else as_list(x)
     return any(looks_at(world, a, goal) and looks_at(world, b, goal) for goal in goals)
+
+
+@_some
+def points_at(world: World, a: Any, x: Any) -> bool:
+    """a points in the direction of the quadrant in which x lies."""
+    return a.pointing is not None and a.pointing == quadrant(where(a), where(x))  # type: ignore[arg-type]
 
 
 def distance(world: World, a: Any, x: Any) -> int:

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from tests.reference import bodies, chance, geometry, rules, speech
-from tests.reference.evaluate import Context, NothingFoundError, holds
+from tests.reference import bodies, chance, geometry, motion, rules, speech
+from tests.reference.effects import remember
+from tests.reference.evaluate import Context, NothingFoundError, evaluate, holds
 from tests.reference.frames import FrameRunner, Turn
 from tests.reference.picture import picture
 from tests.reference.room import Setup, sizes
-from tests.reference.script import script_of
+from tests.reference.script import Outcome, script_of
 from tests.reference.settling import Settling
 from tests.reference.source import Sources
 from tests.reference.vocabulary import Vocabulary
@@ -44,6 +45,10 @@ class Reference:
         self.sources = Sources(self.scenario)
         self.vocabulary = Vocabulary(self.scenario, self.sources)
         self.looks_back = "prev(" in repr(self.scenario)
+        self.canvas = self.scenario.room.canvas or (
+            max(sizes(self.scenario, self.sources, "width")),
+            max(sizes(self.scenario, self.sources, "height")),
+        )
         self.history: list[list[int]] = []
         self.world = World(0)
         self.rooms_refused = 0
@@ -81,6 +86,9 @@ class Reference:
             npcs_hidden=scenario.observe.npcs == "hidden",
             own_voice=scenario.observe.own_voice,
             egocentric=scenario.observe.directions == "egocentric",
+            occlusion=scenario.room.occlusion,
+            gestures="pointing" in scenario.observe.channels,
+            canvas=self.canvas,
             step_names={
                 name: [entry.state for entry in frame.steps]
                 for name, frame in scenario.frames.items()
@@ -96,15 +104,12 @@ class Reference:
         self.world.always_audible = frozenset(n for n, m in setup.members.items() if m.audible == "always")
         self.settling = Settling(scenario, self.sources, self.world)
         self.settling.all()
-
-        def largest(side: str) -> int:
-            return max(sizes(scenario, self.sources, side))
-
-        self.canvas = scenario.room.canvas or (largest("width"), largest("height"))
         for member in self.world.cast.values():
             frame = self.sources.frame_of(member.frame)
             if frame is not None and frame.steps is not None:
                 FrameRunner(self.sources, self.world, member).skip_empty(frame)
+        for entity in self.world.entities():
+            remember(entity)
 
     def accepted(self) -> bool:
         """Whether the room is as `require` wants it."""
@@ -133,7 +138,8 @@ class Reference:
         self.settling.links()
         early = picture(world, self.canvas)
         self.settling.statuses()
-        # Step 2: nothing in the language moves or counts by itself yet.
+        # Step 2: what counts, then what moves by itself.
+        self.go_on()
         # Step 3: the agent's utterance is delivered; then a scripted agent's `then` is read.
         self.utter(action)
         runner.end(turn)
@@ -150,6 +156,7 @@ class Reference:
         self.remember()
         # Step 8: outcome, then time.
         result = self.judge()
+        result.reward += world.bonus / 100 + self.scenario.reward.each_step
         # Step 9: the observation.
         result.image = early if self.scenario.observe.image == "before_npcs" else picture(world, self.canvas)
         result.tokens = [token for line in self.history for token in line]
@@ -174,14 +181,22 @@ class Reference:
         """The clock; what is true of one step only is forgotten."""
         self.world.t += 1
         self.world.lines = []
+        self.world.bonus = 0
         for member in self.world.cast.values():
             member.utterance, member.action, member.poked, member.pair = None, "none", False, 0
+            member.bumped = False
         for thing in self.world.things():
             thing.toggled_by, thing.poked = [], False
 
     def primitive(self, action: Action) -> str:
         """The word for the first number of an action."""
         return self.scenario.actions[action[0]] if action[0] < len(self.scenario.actions) else "none"
+
+    def go_on(self) -> None:
+        """Timers, then things that roll, in object order; then the world settles."""
+        motion.count_down(self.world)
+        motion.roll(self.world)
+        self.settling.all()
 
     def utter(self, action: Action) -> None:
         """The agent speaks if it wants to."""
@@ -231,17 +246,20 @@ class Reference:
                     continue
             except NothingFoundError:
                 continue
-            paid = (
-                outcome.reward / 100 * (1 - 0.9 * world.t / self.scenario.horizon)
-                if kind == "success"
-                else 0.0
-            )
+            paid = self.paid(outcome, number) if kind == "success" else 0.0
             return Result(
                 nothing, [], paid, terminated=True, outcome=number if outcome.id is None else outcome.id
             )
         if world.t >= self.scenario.horizon:
             return Result(nothing, [], truncated=True, outcome="timeout")
         return Result(nothing, [])
+
+    def paid(self, outcome: Outcome, number: int) -> float:
+        """The reward of a success: a share of what is left of it by now."""
+        path = f"outcome[{outcome.id or number}].reward"
+        per_cent = evaluate(self.sources.expression(path, outcome.reward), Context(self.world))
+        left = 1 - self.scenario.reward.slope * self.world.t / self.scenario.horizon
+        return float(min(max(per_cent, 0), 100) / 100 * left)
 
     # -- questions -----------------------------------------------------------------------------------------
 
@@ -258,6 +276,7 @@ class Reference:
             primitive = turn.activity.primitive(world, world.agent)
             bodies.act(world, world.agent, primitive)
             self.settling.all()
+            self.go_on()
             text = runner.end(turn)
         finally:
             self.world, self.settling = kept
@@ -282,6 +301,7 @@ class Reference:
         """An entity by its name in the scenario; a let that holds one counts too."""
         name = self.world.roles.get(name, name)
         found = self.world.lets.get(name) or self.world.cast.get(name) or self.world.objects.get(name)
+        found = found or self.world.groups.get(name)
         if found is None:
             group, _, number = name.rstrip("]").partition("[")
             return as_list(self.world.objects[group])[int(number)]

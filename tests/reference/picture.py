@@ -4,25 +4,47 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.reference.world import AHEAD, COLORS, DIRECTIONS, TYPES, Cell, World
+from tests.reference.sight import cell_in_view, lit
+from tests.reference.world import COLORS, DIRECTIONS, TYPES, Cell, World
 
 SIZE = 7
+UNSEEN = (0, 0, 0, 0)
+NOTHING = 255  # in the channels of gestures
+LAST_ACTS = {"forward": 0, "left": 1, "right": 2, "toggle": 3, "point": 4, "stop_pointing": 8, "none": 10}
 EMPTY, WALL = (1, 0, 0, 0), (2, 5, 0, 0)
 NPC = 11
 
 
 def picture(world: World, canvas: tuple[int, int]) -> np.ndarray:
-    """`image[i, j]` shows the cell (6 - j) ahead and (i - 3) to the right of the agent; uint8 (7, 7, 4)."""
-    image = np.empty((SIZE, SIZE, 4), dtype=np.uint8)
+    """`image[i, j]` shows the cell (6 - j) ahead and (i - 3) to the right of the agent; uint8 (7, 7, 4), with gestures
+    (7, 7, 6)."""
+    image = np.full((SIZE, SIZE, 6 if world.gestures else 4), NOTHING, dtype=np.uint8)
     agent = world.agent
-    x, y = agent.cell or (0, 0)
-    fx, fy = AHEAD[agent.facing]
+    eye = agent.cell or (0, 0)
+    bright = lit(world, eye, agent.facing, SIZE) if world.occlusion else None
     for i in range(SIZE):
         for j in range(SIZE):
             ahead, right = 6 - j, i - 3
-            cell = (x + ahead * fx - right * fy, y + ahead * fy + right * fx)
-            image[i, j] = EMPTY if ahead == right == 0 else shown(world, cell, canvas)
+            cell = cell_in_view(eye, agent.facing, ahead, right)
+            if bright is not None and (ahead, right) not in bright:
+                image[i, j, :4] = UNSEEN
+            elif ahead == right == 0:
+                image[i, j, :4] = EMPTY
+            else:
+                image[i, j, :4] = shown(world, cell, canvas)
+                if world.gestures:
+                    image[i, j, 4:] = gestures(world, cell)
     return image
+
+
+def gestures(world: World, cell: Cell) -> tuple[int, int]:
+    """Where an NPC in the cell points, and its last act."""
+    npc = next((npc for npc in world.npcs if npc.cell == cell and not world.npcs_hidden), None)
+    if npc is None:
+        return NOTHING, NOTHING
+    towards = NOTHING if npc.pointing is None else direction_shown(world, npc.pointing)
+    act = LAST_ACTS[npc.last_act]
+    return towards, act + towards if npc.last_act == "point" else act
 
 
 def shown(world: World, cell: Cell, canvas: tuple[int, int]) -> tuple[int, int, int, int]:

@@ -14,19 +14,16 @@ from tests.reference.world import SIDES, Cell, World, as_list
 
 def region(value: Value, context: Context) -> list[Cell]:
     """The cells of a place, row by row; its `where` is asked of each as `here`."""
-    tree, condition = value.tree, None
-    if isinstance(tree, ast.Placed):
-        tree, condition = tree.region, tree.where
-    context = replace(context, value=value)
-    cells = cells_of(tree, context)
-    if condition is not None:
-        cells = [cell for cell in cells if of(condition, context.knowing(here=cell))]
+    cells = cells_of(value.tree, replace(context, value=value))
     return sorted(cells, key=lambda cell: (cell[1], cell[0]))
 
 
 def cells_of(node: Any, context: Context) -> list[Cell]:
-    """The cells of a place without its condition: interior ones, or those of walls."""
+    """The cells of a place: interior ones, or those of walls."""
     world = context.world
+    if isinstance(node, ast.Placed):
+        region, condition = cells_of(node.region, context), node.where
+        return [c for c in region if condition is None or of(condition, context.knowing(here=c))]
     if isinstance(node, ast.Alternatives):
         together = [cell for option in node.options for cell in cells_of(option, context)]
         return list(dict.fromkeys(together))

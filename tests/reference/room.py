@@ -45,6 +45,8 @@ class Setup:
         self.draw_members()
         self.make_entities()
         self.build()
+        for name in self.scenario.tables:
+            self.compute_table(name)
         self.pin()
         for name in self.order():
             self.place(name)
@@ -58,12 +60,14 @@ class Setup:
         for thing in self.world.things():
             self.compute_status(thing)
             self.compute_links(thing)
+            self.compute_inside(thing)
         for name, source in self.scenario.state.items():
             self.compute_register(self.world, name, source, f"state.{name}", None)
         for member in self.world.cast.values():
             self.compute_slots(member)
             self.compute_earshot(member)
             self.compute_registers(member)
+            self.compute_beliefs(member)
 
     def context(self, me: Entity | None = None, **variables: Any) -> Context:
         """Who asks during reset: outside any frame; a pick that finds nothing takes the first member."""
@@ -127,6 +131,8 @@ class Setup:
             ]
             for thing in things:
                 thing.one_way, thing.dark, thing.single = group.one_way, group.dark, size is None
+                thing.exclusive, thing.timer = group.exclusive, group.timer
+                thing.only_rolled = group.pushed_by is not None
             self.world.objects[name] = things[0] if size is None else things
         kinds = self.kinds()
         for name, member in self.members.items():
@@ -140,6 +146,10 @@ class Setup:
             if name in self.scenario.files:
                 drawn = self.scenario.versions(name).index(member)
                 person.drawn_from = list(self.scenario.files[name])[drawn]
+            group, _, number = name.rstrip("]").partition("[")
+            if number:
+                person.index = int(number)
+                self.world.groups.setdefault(group, []).append(person)
             self.world.cast[name] = person
         self.world.roles = {role: self.scenario.player_of(role) for role in self.scenario.roles}
         for name, memory in self.scenario.memory.items():
@@ -233,7 +243,7 @@ class Setup:
 
     def pinned(self, entity: Entity) -> dict[str, Any]:
         """What a layout says of an entity."""
-        given = self.layout.get(entity.key)
+        given = self.layout.get(entity.key.partition("[")[0])
         if isinstance(given, list):
             given = given[entity.index] if entity.index < len(given) else None
         return given or {}
@@ -262,16 +272,18 @@ class Setup:
         """One uniform draw from the free cells that satisfy the place; if there is none it is not in the room."""
         if repr((entity.key, entity.index)) in self.drawn_cells:
             return
+        if isinstance(holder, Group) and holder.inside is not None:
+            return
         if holder.at is not None:
             cells = [self.exact_cell(path, holder.at, entity)]
-            cells = [cell for cell in cells if self.world.inside(cell) and not self.taken(cell)]
+            cells = [cell for cell in cells if self.world.inside(cell) and not self.taken(cell, holder)]
         else:
             written = leaves(f"{path}.place", holder.place) or [(f"{path}.place", "anywhere")]
             _, source = written[entity.index % len(written)]
             value = self.sources.expression(f"{site_of(entity)}.place", source)
-            cells = [cell for cell in region(value, self.context(entity)) if not self.taken(cell)]
+            cells = [cell for cell in region(value, self.context(entity)) if not self.taken(cell, holder)]
         if cells:
-            entity.cell = cells[self.draw(f"{path}.cell", entity.index, len(cells))]
+            entity.cell = cells[self.draw(f"{path}.cell", number_of(entity), len(cells))]
 
     def exact_cell(self, path: str, at: Any, entity: Entity) -> Cell:
         """`at: [x, y]`, or one of a list of them."""
@@ -286,8 +298,10 @@ class Setup:
         )
         return x, y
 
-    def taken(self, cell: Cell) -> bool:
-        """Whether something was put there, or fixed things stand there."""
+    def taken(self, cell: Cell, holder: Group | Member) -> bool:
+        """Whether fixed things stand there, or something was put there that must not be shared."""
+        if isinstance(holder, Group) and holder.overlap:
+            return cell in self.world.terrain
         return cell in self.world.terrain or any(entity.cell == cell for entity in self.world.entities())
 
     # -- what is drawn or computed once --------------------------------------------------------------------
@@ -307,14 +321,72 @@ class Setup:
         sources = leaves(f"{path}.color", written)
         _, source = sources[entity.index % len(sources)]
         if source == "random":
-            entity.color = COLORS[self.draw(f"{path}.color", entity.index, len(COLORS))]
+            entity.color = COLORS[self.draw(f"{path}.color", number_of(entity), len(COLORS))]
         elif source == "distinct":
-            self.distinct_colors(path, as_list(self.world.objects[entity.key]))
+            group, group_path = self.group_of(entity)
+            self.distinct_colors(group_path, group)
+        elif str(source).startswith("permuted("):
+            self.permuted_colors(entity, source)
         else:
             value = self.sources.expression(f"{site_of(entity)}.color", source)
             found = evaluate(value, self.context(entity, it=entity))
             # "Group attributes (`doors.color`) give one each."
             entity.color = found[entity.index % len(found)] if isinstance(found, list) else found
+
+    def group_of(self, entity: Entity) -> tuple[list[Entity], str]:
+        """The group that an entity is one of, and where it is written."""
+        if entity.sort == "object":
+            return as_list(self.world.objects[entity.key]), f"objects.{entity.key}"
+        name = entity.key.partition("[")[0]
+        return self.world.groups.get(name, [entity]), f"cast.{name}"
+
+    def permuted_colors(self, entity: Entity, source: Any) -> None:
+        """The colours of another group in random order, one each."""
+        group, path = self.group_of(entity)
+        tree = self.sources.expression(f"{path}.color", source).tree
+        assert isinstance(tree, ast.Call)
+        given = as_list(evaluate(Value(f"{path}.color", tree.args[0]), self.context(entity, it=entity)))
+        for thing, number in zip(group, self.permutation(f"{path}.order", len(given)), strict=True):
+            thing.color = thing.color or given[number]
+
+    def permutation(self, path: str, size: int) -> list[int]:
+        """The numbers below `size` in random order: each one drawn from those that are left."""
+        left = list(range(size))
+        return [left.pop(self.draw(f"{path}[{k}]", 0, len(left))) for k in range(size)]
+
+    def compute_table(self, name: str) -> None:
+        """A table as it is written, or the values of another in random order."""
+        tables, written = self.world.tables, self.scenario.tables[name]
+        if name in tables:
+            return
+        if not isinstance(written, dict):
+            other = str(written).strip().removeprefix("permuted(").removesuffix(")").strip()
+            self.compute_table(other)
+            values = list(tables[other].values())
+            order = self.permutation(f"tables.{name}", len(values))
+            tables[name] = {key: values[n] for key, n in zip(tables[other], order, strict=True)}
+            return
+        tables[name] = {
+            str(key): evaluate(self.sources.name(f"tables.{name}.{key}", value), self.context())
+            for key, value in written.items()
+        }
+
+    def compute_inside(self, thing: Entity) -> None:
+        """What it lies in: it has no cell of its own until that is opened."""
+        source = self.scenario.objects[thing.key].inside if thing.sort == "object" else None
+        if source is None or thing.inside is not None:
+            return
+        found = evaluate(
+            self.sources.expression(f"{site_of(thing)}.inside", source), self.context(thing, it=thing)
+        )
+        thing.inside = found[thing.index] if isinstance(found, list) else found
+
+    def compute_beliefs(self, member: Entity) -> None:
+        """Beliefs start with what is the case."""
+        for name, belief in self.sources.beliefs_of(member):
+            if name not in member.believes:
+                value = self.sources.expression(f"cast.{member.key}.beliefs.{name}", belief.of)
+                member.believes[name] = evaluate(value, self.context(member))
 
     def distinct_colors(self, path: str, group: list[Entity]) -> None:
         """One after another, each among the colours that are not taken yet."""
@@ -369,16 +441,21 @@ class Setup:
                 thing.status = thing.initial = "open" if word not in TYPES[thing.type].states else word
 
     def compute_links(self, thing: Entity) -> None:
-        """What it unlocks: groups of one size pairwise, else each of them all."""
-        source = self.scenario.objects[thing.key].unlocks
-        if source is None:
-            return
-        value = self.sources.expression(f"objects.{thing.key}.unlocks", source)
+        """What it unlocks and opens: groups of one size pairwise, else each of them all."""
+        group = self.scenario.objects[thing.key]
+        if group.unlocks is not None:
+            thing.unlocks = self.linked(thing, "unlocks", group.unlocks)
+        if group.opens is not None:
+            thing.opens = self.linked(thing, "opens", group.opens)
+
+    def linked(self, thing: Entity, word: str, source: Any) -> list[Entity]:
+        """The things that one is linked to."""
+        value = self.sources.expression(f"objects.{thing.key}.{word}", source)
         others, group = evaluate(value, self.context(thing)), self.world.objects[thing.key]
         if isinstance(others, list) and isinstance(group, list):
             assert len(others) == len(group), "groups of different sizes cannot be linked one by one"
             others = others[thing.index]
-        thing.unlocks = as_list(others)
+        return as_list(others)
 
     def draw_sequence(self, name: str, sequence: Sequence) -> Performance:
         """Each element: one of the moves, and at a chance one of all utterances."""
@@ -472,6 +549,11 @@ def group_size(group: Group) -> int | None:
     if group.count is not None:
         return group.count
     return len(group.at) if group.at and isinstance(group.at[0], tuple) else None
+
+
+def number_of(entity: Entity) -> int:
+    """The number of its draws: objects of a group share a place, members of the cast have one each."""
+    return entity.index if entity.sort == "object" else 0
 
 
 def site_of(entity: Entity) -> str:

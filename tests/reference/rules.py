@@ -35,4 +35,5 @@ def apply(rule: Rule, path: str, sources: Sources, world: World) -> None:
     assign(world, None, registers)
     for verb, targets, status in effects:
         for target in targets:
-            affect(target, verb, status)
+            affect(world, target, verb, status)
+    world.bonus += rule.reward

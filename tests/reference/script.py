@@ -13,6 +13,23 @@ from socialai_dsl.loader import Resolved, resolve
 PRIMITIVES: Final = ("left", "right", "forward", "pickup", "drop", "toggle", "done")
 SHARED_GRAMMARS: Final = {
     "body": {"templates": ["Move your <noun>", "Shake your <noun>"], "nouns": ["body", "head"]},
+    "school": {
+        "templates": ["Where is <noun>", "Help <noun>", "Close <noun>", "How are <noun>"],
+        "nouns": [
+            *(
+                "please",
+                "the exit",
+                "the wall",
+                "you",
+                "the ceiling",
+                "the window",
+                "the entrance",
+                "the closet",
+            ),
+            *("the drawer", "the fridge", "the floor", "the lamp", "the trash can", "the chair", "the bed"),
+            "the sofa",
+        ],
+    },
 }
 
 
@@ -23,7 +40,7 @@ class Rule:
     id: str | None = None
     hears: tuple[str, ...] = ()
     when: Any = None
-    after: int | None = None
+    after: Any = None
     chance: float | None = None
     once: bool = False
     do: str | None = None
@@ -32,6 +49,7 @@ class Rule:
     say: str | None = None
     goto: str | None = None
     goto_now: str | None = None
+    reward: int = 0  # of the world's rules: per cent
 
 
 @dataclass(frozen=True)
@@ -69,6 +87,14 @@ class Frame:
 
 
 @dataclass(frozen=True)
+class Belief:
+    """What a member takes for true: what it saw last."""
+
+    of: Any
+    when: Any = None
+
+
+@dataclass(frozen=True)
 class Member:
     """A member of the cast, or what an npc file says of one."""
 
@@ -83,6 +109,7 @@ class Member:
     earshot: Any = None
     frame: str | None = None
     with_: dict[str, Any] = field(default_factory=dict)
+    beliefs: dict[str, Belief] = field(default_factory=dict)
     audible: str | None = None
     kind_code: int | None = None
 
@@ -91,6 +118,7 @@ class Member:
         kept = {name: value for name, value in vars(self).items() if value is not None}
         if self.place is not None or self.at is not None:
             base = replace(base, place=None, at=None)
+        kept["beliefs"] = self.beliefs or base.beliefs
         return replace(base, **{**kept, "with_": {**base.with_, **self.with_}})
 
 
@@ -111,6 +139,12 @@ class Group:
     unlocks: Any = None
     one_way: bool = False
     dark: bool = False
+    inside: Any = None
+    exclusive: bool = False
+    overlap: bool = False
+    timer: int | None = None
+    opens: Any = None
+    pushed_by: str | None = None
 
 
 @dataclass(frozen=True)
@@ -137,8 +171,21 @@ class Outcome:
 
     success: Any = None
     failure: Any = None
-    reward: int = 100
+    reward: Any = 100
     id: str | None = None
+
+
+@dataclass(frozen=True)
+class Pay:
+    """What is earned: 1 - slope t / horizon at success, and something in every step."""
+
+    success: str = "linear(0.9)"
+    each_step: float = 0.0
+
+    @property
+    def slope(self) -> float:
+        """The part of the success reward that is lost by the horizon."""
+        return float(self.success.removeprefix("linear(").removesuffix(")"))
 
 
 @dataclass(frozen=True)
@@ -150,6 +197,7 @@ class Observe:
     names: str = "shown"
     directions: str = "absolute"
     own_voice: bool = False
+    channels: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -161,6 +209,7 @@ class Room:
     height: Any = None
     build: tuple[dict[str, str], ...] = ()
     canvas: tuple[int, int] | None = None
+    occlusion: bool = False
 
 
 @dataclass(frozen=True)
@@ -195,6 +244,7 @@ class Script:
     let: dict[str, Any] = field(default_factory=dict)
     define: dict[str, Any] = field(default_factory=dict)
     state: dict[str, Any] = field(default_factory=dict)
+    tables: dict[str, Any] = field(default_factory=dict)
     memory: dict[str, Memory] = field(default_factory=dict)
     frames: dict[str, Frame] = field(default_factory=dict)
     roles: dict[str, Member] = field(default_factory=dict)
@@ -206,6 +256,7 @@ class Script:
     rules: tuple[Rule, ...] = ()
     require: tuple[Any, ...] = ()
     outcome: tuple[Outcome, ...] = ()
+    reward: Pay = field(default_factory=Pay)
     observe: Observe = field(default_factory=Observe)
 
     def versions(self, name: str) -> list[Member]:
@@ -258,6 +309,7 @@ def of_data(
         name: parameter(entry, (given or {}).get(name)) for name, entry in data.get("params", {}).items()
     }
     data = dict(substituted(tuples(data), params))
+    data["cast"] = spread(data["cast"])
     frames: dict[str, Any] = dict(data.get("frames", {}))
     known: dict[str, dict[str, Member]] = {}
     for name, npcs in (files or written_out(data["cast"])).items():
@@ -274,6 +326,29 @@ def of_data(
     return record(Script, data, READERS)
 
 
+def spread(cast: Mapping[str, Any]) -> dict[str, Any]:
+    """The cast with its groups written out as `peers[0]`, `peers[1]`; a list has one value for each."""
+    written: dict[str, Any] = {}
+    for name, member in cast.items():
+        if not member or "count" not in member:
+            written[name] = member
+            continue
+        for number in range(member["count"]):
+            written[f"{name}[{number}]"] = {
+                key: value[number] if listed(key, value) else value
+                for key, value in member.items()
+                if key != "count"
+            }
+    return written
+
+
+def listed(key: str, value: Any) -> bool:
+    """Whether a value of a group is a list with one for each member."""
+    if key == "at":
+        return any(isinstance(cell, tuple) for cell in value)
+    return key in ("name", "color", "place", "facing") and isinstance(value, tuple)
+
+
 def written_out(cast: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """The npc files of members whose `one_of` holds what is in the files, not their names."""
     return {
@@ -288,7 +363,8 @@ def parameter(entry: Any, given: str | None) -> Any:
     values = entry.get("values") if isinstance(entry, dict) else None
     value = entry["default"] if isinstance(entry, dict) else entry
     if isinstance(values, Mapping):
-        return values[str(value) if given is None else given]
+        # The default is a label, or a value of its own.
+        return values.get(str(value), value) if given is None else values[given]
     return value if given is None else scalar(given)
 
 
@@ -354,7 +430,8 @@ def frame_of(entry: Any) -> Frame:
 
 def member_of(entry: Any) -> Member:
     """A member of the cast; where several files can be it, they are read apart from it."""
-    return record(Member, {key: value for key, value in (entry or {}).items() if key != "one_of"}, {})
+    kept = {key: value for key, value in (entry or {}).items() if key != "one_of"}
+    return record(Member, kept, {"beliefs": each(lambda belief: record(Belief, belief, {}))})
 
 
 def let_of(entry: Any) -> Any:
@@ -386,6 +463,7 @@ READERS: Final[dict[str, Callable[[Any], Any]]] = {
     "cast": each(member_of),
     "rules": rules,
     "require": many,
+    "reward": lambda entry: record(Pay, entry, {}),
     "outcome": lambda entries: tuple(record(Outcome, entry, {}) for entry in entries),
-    "observe": lambda entry: record(Observe, entry, {}),
+    "observe": lambda entry: record(Observe, entry, {"channels": many}),
 }

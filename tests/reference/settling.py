@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from socialai_dsl.grammar import ast
-from tests.reference.effects import unlock
+from tests.reference.effects import unlock, vanish
 from tests.reference.evaluate import Context, NothingFoundError, holds
 from tests.reference.script import Group, Script
 from tests.reference.source import Sources
@@ -45,9 +45,42 @@ class Settling:
         self.statuses()
 
     def links(self) -> None:
-        """While something is active, what it unlocks and is locked becomes closed: a level, not an event."""
+        """What follows from statuses directly. All are levels, none an event."""
+        self.release_contents()
+        self.unlock()
+        self.open()
+        self.block()
+
+    def release_contents(self) -> None:
+        """What lies in a box that is opened takes its place."""
+        for box in self.world.things():
+            for content in self.world.things():
+                if not box.gone and box.status == "opened" and content.gone and content.inside is box:
+                    content.cell = box.cell
+                    vanish(box)
+
+    def open(self) -> None:
+        """A remote door is open while something that opens it is active, and closed otherwise."""
+        opened_by: dict[int, list[Entity]] = {}
         for thing in self.world.things():
-            if not thing.gone and thing.status in TYPES[thing.type].active:
+            for door in thing.opens:
+                opened_by.setdefault(id(door), []).append(thing)
+        for door in self.world.things():
+            openers = opened_by.get(id(door))
+            if openers:
+                door.status = "open" if any(map(active, openers)) else "closed"
+
+    def block(self) -> None:
+        """Of an exclusive group nothing reacts once another one of it was used."""
+        for group in self.world.objects.values():
+            used = [thing for thing in as_list(group) if thing.status != thing.initial]
+            for thing in as_list(group):
+                thing.blocked = thing.exclusive and any(other is not thing for other in used)
+
+    def unlock(self) -> None:
+        """While something is active, what it unlocks and is locked becomes closed."""
+        for thing in self.world.things():
+            if active(thing):
                 for other in thing.unlocks:
                     unlock(other)
 
@@ -68,3 +101,8 @@ class Settling:
             thing.status = on
         elif thing.status == on:
             thing.status = {"locked": "shut" if thing.type == "box" else "closed", "tagged": "plain"}[on]
+
+
+def active(thing: Entity) -> bool:
+    """Whether it works on what it is linked to."""
+    return not thing.gone and thing.status in TYPES[thing.type].active

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import fields, replace
 from itertools import count
 from typing import Any
 
 from socialai_dsl.grammar import ParseProblem, ast, parse_expression, parse_text
-from tests.reference.script import Frame, Script
+from tests.reference.script import Belief, Frame, Script
+from tests.reference.world import Entity
 
 
 class Value:
@@ -70,6 +72,14 @@ class Sources:
     def frame_of(self, name: str | None) -> Frame | None:
         """The frame of that name."""
         return None if name is None else self.scenario.frames[name]
+
+    def beliefs_of(self, member: Entity) -> Iterable[tuple[str, Belief]]:
+        """What a member takes for true, by name; `one_of` as it was drawn."""
+        versions = self.scenario.versions(member.key)
+        drawn = (
+            0 if member.drawn_from is None else list(self.scenario.files[member.key]).index(member.drawn_from)
+        )
+        return versions[drawn].beliefs.items()
 
     def _value(self, site: str, kind: str, source: Any, frame: str | None) -> Value:
         key = (site, f"{kind} {source!r}")

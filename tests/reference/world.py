@@ -26,6 +26,9 @@ class ObjectType:
     toggled: dict[str, str] = field(default_factory=dict)
     deadly: bool = False
     active: tuple[str, ...] = ()  # statuses in which it works on what it is linked to
+    expired: dict[str, str] = field(default_factory=dict)  # what its active statuses become when time is up
+    pushed: dict[str, str] = field(default_factory=dict)
+    rolls: tuple[str, ...] = ()  # statuses in which it moves by itself
 
 
 TYPES = {
@@ -53,7 +56,15 @@ TYPES = {
         active=("pressed",),
     ),
     "lever": ObjectType(
-        14, ("down", "up"), "down", "red", (), ("down", "up"), {"down": "up"}, active=("up",)
+        14,
+        ("down", "up", "spent"),
+        "down",
+        "red",
+        (),
+        ("down", "up", "spent"),
+        {"down": "up"},
+        active=("up",),
+        expired={"up": "spent"},
     ),
     "box": ObjectType(
         7,
@@ -63,6 +74,22 @@ TYPES = {
         toggled={"shut": "opened"},
     ),
     "apple": ObjectType(13, ("whole", "eaten"), "whole", "red", (), ("whole", "eaten"), {"whole": "eaten"}),
+    "generator": ObjectType(
+        15,
+        ("idle", "pressed"),
+        "idle",
+        transparent=("idle", "pressed"),
+        pushed={"idle": "pressed"},
+        active=("pressed",),
+    ),
+    "marble": ObjectType(
+        16,
+        ("still", "rolling"),
+        "still",
+        transparent=("still", "rolling"),
+        pushed={"still": "rolling"},
+        rolls=("rolling",),
+    ),
 }
 
 
@@ -94,6 +121,14 @@ class Entity:
     one_way: bool = False
     dark: bool = False
     unlocks: list[Entity] = field(default_factory=list)
+    opens: list[Entity] = field(default_factory=list)
+    inside: Entity | None = None  # the container it lies in, or came out of
+    timer: int | None = None  # steps until an active status expires
+    counted: int = 0  # steps since its status became active
+    only_rolled: bool = False  # pushed by what rolls, by nobody else
+    exclusive: bool = False
+    blocked: bool = False  # another of its exclusive group was used: it reacts to no toggle and no push
+    at_reset: tuple[Any, ...] = ()  # what `reset` brings back
     # the cast
     facing: str = "right"
     name: str | None = None
@@ -113,6 +148,10 @@ class Entity:
     noun: str | int | None = None  # of the last utterance
     pair: int = 0  # the number of the agent's utterance in this step, 0 for silence
     action: str = "none"  # in this step
+    last_act: str = "none"  # of its last turn, as it is seen
+    bumped: bool = False  # it went forward in this step and did not get there
+    pointing: str | None = None
+    believes: dict[str, Any] = field(default_factory=dict)
     poked: bool = False
     was_poked: bool = False
 
@@ -163,10 +202,12 @@ class World:
     terrain: dict[Cell, str] = field(default_factory=dict)
     objects: dict[str, Entity | list[Entity]] = field(default_factory=dict)
     cast: dict[str, Entity] = field(default_factory=dict)
+    groups: dict[str, list[Entity]] = field(default_factory=dict)  # of the cast
     roles: dict[str, str] = field(default_factory=dict)  # role -> who plays it
     lets: dict[str, Any] = field(default_factory=dict)
     registers: dict[str, Any] = field(default_factory=dict)  # the world's `state`
     ranges: dict[str, tuple[int, int]] = field(default_factory=dict)  # of registers that saturate
+    tables: dict[str, dict[str, Any]] = field(default_factory=dict)  # by the text of the key
     memories: dict[str, Recall] = field(default_factory=dict)
     fired_once: set[str] = field(default_factory=set)  # of the world's rules
     before: World | None = None  # as the last step left it, for `prev`
@@ -177,6 +218,10 @@ class World:
     npcs_hidden: bool = False
     own_voice: bool = False
     egocentric: bool = False
+    occlusion: bool = False
+    gestures: bool = False  # whether the picture shows them
+    canvas: tuple[int, int] = (0, 0)
+    bonus: int = 0  # per cent that rules pay in this step
     lines: list[tuple[Entity, str]] = field(default_factory=list)  # what the agent heard in this step
 
     @property
@@ -209,16 +254,20 @@ class World:
         """The cells within the walls, row by row."""
         return [(x, y) for y in range(1, self.height - 1) for x in range(1, self.width - 1)]
 
+    def objects_at(self, cell: Cell) -> list[Entity]:
+        """All objects in a cell, those that were written first at the bottom."""
+        return [thing for thing in self.things() if thing.cell == cell]
+
     def object_at(self, cell: Cell) -> Entity | None:
-        """The object in a cell."""
-        return next((thing for thing in self.things() if thing.cell == cell), None)
+        """The object in a cell; of several, the one on top."""
+        return next(reversed(self.objects_at(cell)), None)
 
     def _holds(self, cell: Cell, quality: str) -> bool:
         if not self.inside(cell):
             return False
-        thing = self.object_at(cell)
-        if thing is not None:
-            return thing.status in getattr(TYPES[thing.type], quality)
+        things = self.objects_at(cell)
+        if things:
+            return all(thing.status in getattr(TYPES[thing.type], quality) for thing in things)
         ground = self.terrain.get(cell)
         if ground is not None:
             return TYPES[ground].initial in getattr(TYPES[ground], quality)
@@ -234,9 +283,8 @@ class World:
 
     def deadly(self, cell: Cell) -> bool:
         """Whether the cell kills the agent."""
-        thing = self.object_at(cell)
-        ground = thing.type if thing is not None else self.terrain.get(cell)
-        return ground is not None and TYPES[ground].deadly
+        here = [thing.type for thing in self.objects_at(cell)] or [self.terrain.get(cell)]
+        return any(type_ is not None and TYPES[type_].deadly for type_ in here)
 
 
 def as_list(value: Any) -> list[Any]:
