@@ -190,24 +190,34 @@ class Lines:
         return self._known[key]
 
     def _utterance(self, to: Expressions, line: Line) -> int:
-        """The agent's line among the utterances of the grammar: its parts are a fixed text, or enumerated."""
+        """The agent's line among the utterances of the grammar: its parts are a fixed text, or enumerated.
+
+        What the grammar cannot say makes the rule false, as a pick that finds nothing does.
+        """
         numbers = self._utterances(line)
         varying = [part for part in line.parts if not isinstance(part, str | Const)]
         position = self._index(to, varying, 0)
         result = to.block.temporary()
-        to.block.emit(Op.LOAD, result, constant(numbers[0]))
-        for i, number in enumerate(numbers[1:], 1):
+        sayable = [number for number in numbers if number is not None]
+        to.block.emit(Op.LOAD, result, constant(sayable[0]))
+        for i, number in enumerate(numbers):
+            if number == sayable[0]:
+                continue
+            if number is None:
+                assert to.failed is not None, "internal: an unsayable line outside of a rule"
+                to.block.test(Op.IF_NE, position, constant(i), to.failed)
+                continue
             following = Label()
             to.block.test(Op.IF_EQ, position, constant(i), following)
             to.block.emit(Op.LOAD, result, constant(number))
             to.block.bind(following)
         return result
 
-    def _utterances(self, line: Line) -> list[int]:
-        """The agent's lines for all that the parts can be."""
+    def _utterances(self, line: Line) -> list[int | None]:
+        """The agent's lines for all that the parts can be; None for what it cannot say."""
         pairs = {normal(text): self.agent_says - 1 + k for k, text in enumerate(self.grammar)}
         return [
-            pairs[normal("".join(pieces))] for pieces in product(*(_choices(part) for part in line.parts))
+            pairs.get(normal("".join(pieces))) for pieces in product(*(_choices(part) for part in line.parts))
         ]
 
     @property

@@ -13,7 +13,7 @@ from socialai_dsl.schema import UtteranceGrammar
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import resolve_groups
 from socialai_dsl.semantics.alternatives import by_value, drawn, select
-from socialai_dsl.semantics.build import all_of, any_of
+from socialai_dsl.semantics.build import all_of, any_of, walk
 from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.scope import Draws, Scope
 from socialai_dsl.semantics.terms import (
@@ -310,14 +310,25 @@ class Utterances:
         """The line in the grammar's own spelling."""
         findings = self._resolver.findings
         spelled: dict[str, str] = {normal(text): text for text in self.all_texts()}
-        for said in texts_of(line):
-            if normal(said) not in spelled:
-                near = did_you_mean(said, spelled.values())
-                message = f'the agent cannot say "{said}" with this grammar'
-                raise findings.fail("S401", message, line.span, suggestion=f'"{near}"' if near else None)
+        unsayable = [said for said in texts_of(line) if normal(said) not in spelled]
+        if unsayable:
+            said, values = unsayable[0], [part for part in line.parts if not isinstance(part, str)]
+            message = f'the agent cannot say "{said}" with this grammar'
+            if len(unsayable) < len(texts_of(line)) and any(self._may_change(value) for value in values):
+                hint = "then it says nothing; give the register a range, or the grammar the noun"
+                findings.warning("S402", message, line.span, hint=hint)
+                return line
+            near = did_you_mean(said, spelled.values())
+            raise findings.fail("S401", message, line.span, suggestion=f'"{near}"' if near else None)
         if len(line.parts) == 1 and isinstance(line.parts[0], str):
             return Line((spelled[normal(line.parts[0])],), line.site, line.span)
         return line
+
+    def _may_change(self, value: Term) -> bool:
+        """Whether a value is made of registers that rules set, whose range may be wider than what happens."""
+        return any(
+            isinstance(part, Read) and self._resolver.registers.is_set(part.path) for part in walk(value)
+        )
 
 
 @dataclass(frozen=True)
