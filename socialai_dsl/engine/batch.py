@@ -21,11 +21,12 @@ from socialai_dsl.engine.state import (
     Ports,
     State,
     Tables,
+    Trait,
     empty_ports,
     empty_state,
     no_pins,
 )
-from socialai_dsl.program import VIEW, Header, LineColumn
+from socialai_dsl.program import VIEW, EntityColumn, Flag, Header, LineColumn, Op, TypeColumn
 
 _ROWS_WORTH_A_THREAD: Final = 64
 _PLAIN_CHANNELS: Final = 4
@@ -259,16 +260,37 @@ def _link(
         link[Link.VIEWS] = views[canvas]
         link[Link.ACTIONS], link[Link.TEMPLATES] = len(part.actions), len(part.templates)
         link[Link.NOUNS] = len(part.nouns)
-        link[Link.GESTURES] = gestures
         tables = np.array(
             [*part.actions, *part.templates, *part.nouns, *part.outcomes, *part.successes], np.int32
         )
-        words += [_with_tokens(part), link, tables]
+        own = _with_tokens(part)
+        own[Header.FLAGS] |= _traits(own) | (Trait.GESTURES if gestures else 0)
+        words += [own, link, tables]
         offsets.append(offset)
         first_counters.append(counter)
         offset += len(part.words) + len(link) + len(tables)
         counter += int(part.words[Header.COUNTERS])
     return np.concatenate(words), np.concatenate([view_table(*c) for c in views]), offsets, first_counters
+
+
+def _traits(words: NDArray[np.int32]) -> int:
+    """What may happen in a program, as bits of `Trait`."""
+    traits = 0
+    if words[Header.TICK_PC] or words[Header.FLAGS] & Flag.ROLLS:
+        traits |= Trait.GOES_BY_ITSELF
+    first, rows = int(words[Header.ENTITY_AT]), int(words[Header.ENTITIES])
+    entities = words[first : first + rows * EntityColumn.COLUMNS].reshape(rows, EntityColumn.COLUMNS)
+    first, rows = int(words[Header.TYPE_AT]), int(words[Header.TYPE_ROWS])
+    types = words[first : first + rows * TypeColumn.COLUMNS].reshape(rows, TypeColumn.COLUMNS)
+    # A type has as many rows as it is far to the next; what has one status only cannot change it.
+    starts = np.unique(entities[:, EntityColumn.TYPE])
+    status = np.arange(rows) - starts[np.searchsorted(starts, np.arange(rows), "right") - 1]
+    if (types[:, TypeColumn.PUSHED] != status).any():
+        traits |= Trait.PUSHED
+    first, rows = int(words[Header.CODE_AT]), int(words[Header.INSTRUCTIONS])
+    if words[Header.EACH_STEP] or (words[first : first + 4 * rows : 4] == Op.REWARD).any():
+        traits |= Trait.REWARDS
+    return traits
 
 
 def _with_tokens(part: Part) -> NDArray[np.int32]:

@@ -191,8 +191,8 @@ def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
             _report_nothing(book, row)
             if int16_of(book, Book.REGISTERS, row)[Register.ENDED] == 0:
                 opened = open_row(book, thread, ZERO, row)
-                reward = step_row(opened, opened.program[Header.SIZE], uint16_of(book, Book.EXTRA, row))
-                if _plays_acts(opened.key):
+                reward = step_row(opened, opened.program[Header.SIZE], book, row)
+                if reward != 0.0 and _plays_acts(opened.key):
                     reward /= np.float64(_pool_size(opened.key))
                 float64_of(book, Book.REWARD, ZERO)[row] = reward
                 if opened.registers[Register.ENDED] == 0:
@@ -215,7 +215,7 @@ def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
         if not reset_row(fresh, layout != 0, t):
             bytes_of(book, Book.REFUSED, ZERO)[row] = 1
             ended += NO_ROOM
-        take_picture(fresh, fresh.program[Header.SIZE], uint16_of(book, Book.EXTRA, row))
+        take_picture(fresh, fresh.program[Header.SIZE], book, row)
     return ended
 
 

@@ -1,6 +1,6 @@
 """The agent's picture: a gather of 49 cells through a table by pose."""
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from socialai_dsl.engine import rng
 from socialai_dsl.engine.entities import field, npc_at, step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
+from socialai_dsl.engine.pointers import uint16_of
 from socialai_dsl.engine.shadows import light_next, look_around
-from socialai_dsl.engine.state import AGENT, ONE, Link, Row
+from socialai_dsl.engine.state import AGENT, ONE, Book, Link, Row, Trait
 from socialai_dsl.program import (
     CODES_OF_TYPES,
     LAST_ACTS,
@@ -72,8 +73,8 @@ def image_digest(image: NDArray[np.uint32], extra: NDArray[np.uint16], gestures:
 
 
 @inline
-def take_picture(row: Row, link: int, extra: NDArray[np.uint16]) -> None:
-    """Write what the agent sees; its own cell reads empty. `extra` is the row of `State.extra`."""
+def take_picture(row: Row, link: int, book: Any, number: int) -> None:
+    """Write what the agent, in row `number` of the book, sees; its own cell reads empty."""
     x = field(row, AGENT, Field.X)
     y = field(row, AGENT, Field.Y)
     if x < 0:
@@ -90,8 +91,8 @@ def take_picture(row: Row, link: int, extra: NDArray[np.uint16]) -> None:
             if row.program[Header.FLAGS] & Flag.EGOCENTRIC:
                 _turn_npcs(row, field(row, AGENT, Field.DIR))
     row.image[OWN_PLACE] = OWN_LOOK
-    if row.program[link + Link.GESTURES] != 0:
-        _take_gestures(row, link, extra)
+    if row.program[Header.FLAGS] & Trait.GESTURES:
+        _take_gestures(row, link, uint16_of(book, Book.EXTRA, number))
 
 
 @outline

@@ -18,13 +18,12 @@ from socialai_dsl.engine.whereabouts import x_of, y_of
 from socialai_dsl.program import EntityColumn, Field, Header, Register, TypeColumn
 
 
-@outline
+@inline
 def put_on(row: Row, entity: int, thing: int) -> None:
     """Put an entity on the cell where a thing is, or was when it left the room; a body only where it can stand.
 
     It is in the room then. Nothing happens if that thing never had a cell.
     """
-    stay_outline()
     x = x_of(row, thing)
     y = y_of(row, thing)
     width = row.program[Header.CANVAS_WIDTH]

@@ -14,7 +14,7 @@ from socialai_dsl.engine.picture import image_digest
 from socialai_dsl.engine.pointers import int16_of, int64_of, uint16_of, uint32_of, uint64_of
 from socialai_dsl.engine.rows import copy, open_row
 from socialai_dsl.engine.speech import inbox_class
-from socialai_dsl.engine.state import STILL, ZERO, Book, Link, Row, Size
+from socialai_dsl.engine.state import STILL, ZERO, Book, Link, Row, Size, Trait
 from socialai_dsl.engine.step import begin
 from socialai_dsl.engine.turns import (
     act,
@@ -22,7 +22,6 @@ from socialai_dsl.engine.turns import (
     conclude,
     follow_links,
     go_by_itself,
-    goes_by_itself,
     move_agent,
     notice,
     settle,
@@ -47,7 +46,7 @@ def _play(row: Row, link: int) -> None:
         body = row.registers[Register.LAST_TURN] if chosen else act(row, frame)
         row.registers[Register.ACTION] = body
         move_agent(row, body)
-        if goes_by_itself(row):
+        if program[Header.FLAGS] & Trait.GOES_BY_ITSELF:
             changed = follow_links(row)
             compute_statuses(row, go_by_itself(row) or changed)
         else:

@@ -70,8 +70,16 @@ class Link(IntEnum):
     ACTIONS = 5  # choices of the batch's action space
     TEMPLATES = 6
     NOUNS = 7
-    GESTURES = 8  # 1 if pictures of the batch have channels 5 and 6
-    END = 9
+    END = 8
+
+
+class Trait(IntEnum):
+    """Bits that a batch adds to Header.FLAGS of its programs: what does not happen need not be asked for one by one."""
+
+    GOES_BY_ITSELF = 1 << 20  # something counts or rolls
+    PUSHED = 1 << 21  # some object takes another status when it is pushed
+    GESTURES = 1 << 22  # pictures of the batch have channels 5 and 6
+    REWARDS = 1 << 23  # there are rewards besides that of an outcome
 
 
 class Book(IntEnum):

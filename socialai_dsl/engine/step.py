@@ -1,20 +1,20 @@
 """One step of one environment, in the order the language fixes."""
 
+from typing import Any
+
 import numpy as np
-from numpy.typing import NDArray
 
 from socialai_dsl.engine.boards import is_deadly
 from socialai_dsl.engine.entities import field
 from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.picture import take_picture
 from socialai_dsl.engine.speech import empty_inbox, inbox_class
-from socialai_dsl.engine.state import AGENT, Link, Row
+from socialai_dsl.engine.state import AGENT, Link, Row, Trait
 from socialai_dsl.engine.turns import (
     compute_statuses,
     conclude,
     follow_links,
     go_by_itself,
-    goes_by_itself,
     move_agent,
     notice,
     say_as_agent,
@@ -65,10 +65,10 @@ def decode(row: Row, link: int) -> None:
 
 
 @inline
-def step_row(row: Row, link: int, extra: NDArray[np.uint16]) -> float:
+def step_row(row: Row, link: int, book: Any, number: int) -> float:
     """One step; the reward. Whether and how the episode ended is in the registers.
 
-    `extra` is the row of `State.extra`.
+    It is row `number` of the book.
     """
     registers = row.registers
     program = row.program
@@ -83,11 +83,11 @@ def step_row(row: Row, link: int, extra: NDArray[np.uint16]) -> float:
         heard = inbox_class(row, program[frame + FrameColumn.INBOX])
         chosen = notice(row, frame, heard)
     move_agent(row, registers[Register.ACTION])
-    if flags & Flag.PICTURE_BEFORE_NPCS or goes_by_itself(row):
+    if flags & (Flag.PICTURE_BEFORE_NPCS | Trait.GOES_BY_ITSELF):
         changed = follow_links(row)
         if flags & Flag.PICTURE_BEFORE_NPCS:
-            take_picture(row, link, extra)
-        if goes_by_itself(row):
+            take_picture(row, link, book, number)
+        if flags & Trait.GOES_BY_ITSELF:
             changed |= go_by_itself(row)
         compute_statuses(row, changed)
     else:
@@ -104,8 +104,8 @@ def step_row(row: Row, link: int, extra: NDArray[np.uint16]) -> float:
     settle(row)
     reward = _judge(row, link)
     if not flags & Flag.PICTURE_BEFORE_NPCS:
-        take_picture(row, link, extra)
-    if registers[Register.BONUS] | program[Header.EACH_STEP]:
+        take_picture(row, link, book, number)
+    if flags & Trait.REWARDS:
         reward += np.float64(registers[Register.BONUS]) / 100.0
         reward += np.float64(program[Header.EACH_STEP]) / 1e6
     return reward

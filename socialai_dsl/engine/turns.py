@@ -13,7 +13,7 @@ from socialai_dsl.engine.entities import (
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.pushing import is_free, push, roll
 from socialai_dsl.engine.speech import deliver, empty_inbox, hear, inbox_class, speak
-from socialai_dsl.engine.state import AGENT, NOTHING, ONE, STILL, ZERO, Row
+from socialai_dsl.engine.state import AGENT, NOTHING, ONE, STILL, ZERO, Row, Trait
 from socialai_dsl.engine.vm import run
 from socialai_dsl.program import Body, Field, Flag, FrameColumn, Header, Register, TypeColumn
 
@@ -64,12 +64,6 @@ def go_by_itself(row: Row) -> bool:
 
 
 @inline
-def goes_by_itself(row: Row) -> bool:
-    """Whether anything in this scenario counts or moves by itself."""
-    return row.program[Header.TICK_PC] != 0 or row.program[Header.FLAGS] & Flag.ROLLS != 0
-
-
-@inline
 def _toggle_object(row: Row, x: int, y: int) -> int:
     """Toggle the object on top in this cell; its number, or 0 if there is none."""
     entity = object_at(row, x, y)
@@ -106,7 +100,8 @@ def move_agent(row: Row, action: int) -> None:
         x = field(row, AGENT, Field.X) + step_x(direction)
         y = field(row, AGENT, Field.Y) + step_y(direction)
         if is_solid(row, x, y):
-            push(row, x, y, direction, ZERO)
+            if row.program[Header.FLAGS] & Trait.PUSHED:
+                push(row, x, y, direction, ZERO)
         elif npcs_are_hidden(row) or npc_at(row, x, y) == 0:
             set_field(row, AGENT, Field.X, x)
             set_field(row, AGENT, Field.Y, y)
@@ -131,7 +126,8 @@ def move_npc(row: Row, npc: int, action: int) -> None:
         draw_cell(row, x, y)
     elif action == Body.FORWARD:
         if is_solid(row, ahead_x, ahead_y):
-            push(row, ahead_x, ahead_y, direction, ZERO)
+            if row.program[Header.FLAGS] & Trait.PUSHED:
+                push(row, ahead_x, ahead_y, direction, ZERO)
         elif is_free(row, ahead_x, ahead_y):
             set_field(row, npc, Field.X, ahead_x)
             set_field(row, npc, Field.Y, ahead_y)
@@ -151,11 +147,17 @@ def _state_table(row: Row, frame: int) -> int:
     return row.program[Header.STATE_AT] + columns * state
 
 
+@outline
+def _run_apart(row: Row, pc: int) -> None:
+    stay_outline()
+    run(row, pc)
+
+
 @inline
 def notice(row: Row, frame: int, heard: int) -> bool:
     """What a frame perceives, and does before the body action (`first`); whether it has chosen that action."""
     if row.program[frame + FrameColumn.PERCEIVE] != 0:
-        run(row, row.program[frame + FrameColumn.PERCEIVE])
+        _run_apart(row, row.program[frame + FrameColumn.PERCEIVE])
     row.registers[Register.LAST_TURN] = -1
     pc = row.program[_state_table(row, frame) + 1 + heard]
     if pc != 0:
@@ -177,8 +179,9 @@ def act(row: Row, frame: int) -> int:
 def conclude(row: Row, frame: int, heard: int, chosen: bool) -> None:
     """The clock ticks, then what is done after the body action: `then`, or the rest of a rule of `first` that acted."""
     row.registers[row.program[frame + FrameColumn.CLOCK]] += 1
-    pc = row.program[frame + FrameColumn.DEFERRED]
-    if not chosen:
+    if chosen:
+        pc = row.program[frame + FrameColumn.DEFERRED]
+    else:
         pc = row.program[_state_table(row, frame) + 2 + row.program[Header.CLASSES] + heard]
     if pc != 0:
         run(row, pc)

@@ -9,7 +9,7 @@ from socialai_dsl.engine.bits import count_bits, lowest_bit, nth_bit
 from socialai_dsl.engine.boards import draw_entity
 from socialai_dsl.engine.conditions import holds
 from socialai_dsl.engine.entities import field, quadrant, set_field
-from socialai_dsl.engine.jit import inline
+from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.operands import assign, draw_below, value
 from socialai_dsl.engine.places import next_cell, place
 from socialai_dsl.engine.pointers import ROW_TYPES
@@ -108,19 +108,12 @@ def _effect(row: Row, op: int, a: int, b: int, c: int) -> None:
     elif op == Op.END:
         registers[Register.OUTCOME] = a
         registers[Register.PERCENT] = b
-    elif op == Op.END_GRADED:
-        registers[Register.OUTCOME] = a
-        registers[Register.PERCENT] = max(0, min(value(row, b), 100))
-    elif op == Op.REWARD:
-        registers[Register.BONUS] += value(row, a)
-    elif op == Op.PLACE:
-        put_on(row, value(row, a), value(row, b))
+    elif op >= Op.PLACE:
+        _rare_effect(row, op, a, b)
     else:
         entity = value(row, a)
         if op == Op.SET_FIELD:
             set_field(row, entity, b, value(row, c))
-            if b >= Field.POKED:
-                return  # nobody sees it in the cell
         else:
             name = Field.STATUS if op == Op.BECOME else Field.GONE
             wanted = value(row, b) if op == Op.BECOME else ONE
@@ -129,6 +122,18 @@ def _effect(row: Row, op: int, a: int, b: int, c: int) -> None:
                 set_field(row, entity, name, wanted)
         if registers[Register.ENDED] != RESETTING:
             draw_entity(row, entity)
+
+
+@outline
+def _rare_effect(row: Row, op: int, a: int, b: int) -> None:
+    stay_outline()
+    if op == Op.PLACE:
+        put_on(row, value(row, a), value(row, b))
+    elif op == Op.REWARD:
+        row.registers[Register.BONUS] += value(row, a)
+    else:
+        row.registers[Register.OUTCOME] = a
+        row.registers[Register.PERCENT] = max(0, min(value(row, b), 100))
 
 
 @inline

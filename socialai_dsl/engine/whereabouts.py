@@ -3,7 +3,7 @@
 import numpy as np
 
 from socialai_dsl.engine.entities import field, is_present, step_x, step_y
-from socialai_dsl.engine.jit import inline
+from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.state import NO_CELL, NOTHING, Row
 from socialai_dsl.program import CELL, Field, Header
 
@@ -54,9 +54,10 @@ def cell_of(row: Row, thing: int) -> int:
     return _FIRST_CELL + 32 * y_of(row, thing) + x_of(row, thing)
 
 
-@inline
+@outline
 def cell_beside(row: Row, thing: int, direction: int) -> int:
     """The cell beside it in this direction, as an operand; `NO_CELL` if that is off the canvas."""
+    stay_outline()
     x = x_of(row, thing) + step_x(direction & 3)
     y = y_of(row, thing) + step_y(direction & 3)
     on_canvas = 0 <= x < row.program[Header.CANVAS_WIDTH] and 0 <= y < row.program[Header.CANVAS_HEIGHT]
