@@ -99,7 +99,7 @@ class Lines:
     def bounds(self, speaker: Entity, line: Line) -> tuple[int, int]:
         """The least and the greatest number of the line that `say` gives."""
         if speaker.number == 0:
-            numbers = self._utterances(line)
+            numbers = [number for number in self._utterances(line) if number is not None]
             return min(numbers), max(numbers)
         first = self._family(speaker, (speaker.name or "", *line.parts))
         return first, first + prod(map(len, map(_choices, (speaker.name or "", *line.parts)))) - 1
