@@ -106,7 +106,8 @@ def _computed(resolver: Resolver, objects: Objects, key: str, left_for: str | No
         return
     path: DataPath = ("objects", objects.name, key)
     on = _status(resolver, objects, key, None, path)
-    off = objects.type.states.index(left_for) if left_for else objects.type.initial
+    states = objects.type.states
+    off = states.index(left_for) if left_for in states else objects.type.initial
     for index, number in enumerate(objects.numbers):
         scope = object_scope(objects, index, path, key, at_reset=False)
         condition = resolver.written(path, raw, BOOL, scope)
