@@ -163,6 +163,24 @@ def test_spaces(name: str) -> None:
     assert env.observation_space["image"].shape == (7, 7, 4)
 
 
+def test_what_can_be_said() -> None:
+    def grammar(name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        return made(name).program.templates, made(name).program.nouns
+
+    for name in ("dance", "showme", "showme_no_social", "help", "help_as_helper"):
+        for variant in (name, f"{name}+as_coded"):
+            assert grammar(variant) == (("Move your <noun>", "Shake your <noun>"), ("body", "head"))
+    for name in ("cointhief", "cointhief+as_coded"):
+        assert grammar(name) == (("Here is <noun>",), tuple("0123456"))
+    for name in ("talkitout", "talkitout_no_liar", "diverse_exit"):
+        paper, coded = grammar(name), grammar(f"{name}+as_coded")
+        assert paper[0] == ("Where is <noun>", "Open <noun>", "Which is <noun>", "How are <noun>")
+        assert coded[0][2] == ("Which is <noun>" if name == "diverse_exit" else "Close <noun>")
+        assert (paper[1][10], coded[1][10]) == ("oven", "the floor")
+        assert paper[1][2] == coded[1][2] == ("the correct door" if name == "diverse_exit" else "the wall")
+        assert [k for k in range(16) if paper[1][k] != coded[1][k]] == [10]
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_time_runs_out_unpaid(name: str) -> None:
     episode, horizon = Episode(name), HORIZONS[name.partition("+")[0]]
