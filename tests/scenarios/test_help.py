@@ -431,7 +431,6 @@ def test_whatever_the_agent_does_nobody_leaves_without_eye_contact(name: str) ->
 class TestTheSwitches:
     """In the research code they look the same before and after."""
 
-    @pytest.mark.xfail(reason="switches of scenarios/help.yaml are not `dark`")
     @pytest.mark.parametrize("name", EXITER)
     def test_the_exiter_does_not_see_which_is_pressed(self, name: str) -> None:
         episode = agreed(name)
@@ -440,7 +439,6 @@ class TestTheSwitches:
         episode.acts("right", "right")
         assert episode.seen((0, 1)) == (SWITCH, COLORS.index("red"), 0, 0)
 
-    @pytest.mark.xfail(reason="switches of scenarios/help.yaml are not `dark`")
     @pytest.mark.parametrize("name", HELPER)
     def test_nor_does_the_helper(self, name: str) -> None:
         episode = Episode(name, {**OTHER_ROOM, "agent": {"at": [1, 1], "facing": "left"}})
