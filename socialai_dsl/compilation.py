@@ -32,4 +32,8 @@ def compile_loaded(loaded: Loaded) -> Program | ProgramSuite:
         space.nouns,
         space.template_maps,
         space.noun_maps,
+        loaded.labels,
+        loaded.weights,
+        tuple(None if start is None else start.layout for start in loaded.starts),
+        loaded.in_sequence,
     )

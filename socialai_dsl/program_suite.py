@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
 from itertools import chain
+from typing import Any
 
 from socialai_dsl.program import Flag, Header, Outcome, Program
 
@@ -23,6 +25,10 @@ class ProgramSuite:
         programs: in the order of the suite. members: what each is called in layouts, infos and counters.
         actions, templates, nouns: words of the action space, in order of index.
         template_maps, noun_maps: for each program its own index of each template and noun.
+        labels: of members that are leaves or were swept over, parameter -> value.
+        weights: how likely an episode plays each, in proportion; all alike if empty.
+        starts: the layout that each member's episodes start from, None if they are drawn; none has one if empty.
+        in_sequence: whether an episode plays all of them, one after another.
     """
 
     name: str
@@ -33,6 +39,10 @@ class ProgramSuite:
     nouns: tuple[str, ...]
     template_maps: tuple[Positions, ...]
     noun_maps: tuple[Positions, ...]
+    labels: tuple[Mapping[str, str], ...] = ()
+    weights: tuple[int, ...] = ()
+    starts: tuple[Mapping[str, Any] | None, ...] = ()
+    in_sequence: bool = False
 
     @cached_property
     def vocabulary(self) -> tuple[str, ...]:
@@ -64,6 +74,12 @@ class ProgramSuite:
             digest.update("\x1f".join(words).encode())
             digest.update(b"\x1e")
         digest.update(repr((self.template_maps, self.noun_maps)).encode())
+        if any(weight != 1 for weight in self.weights):
+            digest.update(repr(self.weights).encode())
+        if any(start is not None for start in self.starts):
+            digest.update(json.dumps(self.starts, sort_keys=True).encode())
+        if self.in_sequence:
+            digest.update(b"in sequence")
         return digest.hexdigest()
 
     def live(self, number: int) -> tuple[frozenset[int], frozenset[int]]:

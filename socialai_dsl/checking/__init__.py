@@ -1,7 +1,7 @@
 """Resolved files to what they mean, or to what is wrong with them: one module for each kind of file."""
 
 from socialai_dsl.checking.libraries import check_library, check_npc
-from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
+from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite, Start
 from socialai_dsl.checking.scenarios import check_scenario, naming_the_patch
 from socialai_dsl.checking.suites import check_suite
 
@@ -9,6 +9,7 @@ __all__ = [
     "Loaded",
     "LoadedScenario",
     "LoadedSuite",
+    "Start",
     "check_library",
     "check_npc",
     "check_scenario",

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from socialai_dsl.diagnostics import Diagnostic
-from socialai_dsl.loader import Resolved
+from socialai_dsl.loader import DataPath, Resolved
 from socialai_dsl.schema import Scenario
 from socialai_dsl.schema.suite import Suite
 from socialai_dsl.semantics.suite import SharedSpace
@@ -33,12 +35,28 @@ class LoadedScenario:
 
 
 @dataclass(frozen=True)
+class Start:
+    """How a suite lets the episodes of a member start.
+
+    Attributes:
+        layout: a layout of the member, as plain data. place: where it stands in the suite's file.
+    """
+
+    layout: Mapping[str, Any]
+    place: DataPath
+
+
+@dataclass(frozen=True)
 class LoadedSuite:
     """A suite that is right: scenarios of which each episode plays one.
 
     Attributes:
         name: with variants, e.g. `social_env+unsocial`.
         members: the scenarios in order. member_names: what the suite's file calls them.
+        labels: of each member that is a leaf of a tree or is swept over, parameter -> value.
+        weights: how likely each member is, in proportion to the others.
+        starts: how each member's episodes start; None if they are drawn.
+        in_sequence: whether an episode plays all of them, one after another.
         space: the action space and how each member's utterances are found in it.
         suite: the models. resolved: the data with its positions.
         warnings: findings that do not keep it from running.
@@ -47,6 +65,10 @@ class LoadedSuite:
     name: str
     members: tuple[LoadedScenario, ...]
     member_names: tuple[str, ...]
+    labels: tuple[Mapping[str, str], ...]
+    weights: tuple[int, ...]
+    starts: tuple[Start | None, ...]
+    in_sequence: bool
     space: SharedSpace
     suite: Suite
     resolved: Resolved

@@ -39,6 +39,10 @@ class Draft:
         given = tuple(action for action in PRIMITIVES if action in actions)
         return replace(self, scenario=self.scenario.model_copy(update={"actions": given}))
 
+    def with_horizon(self, horizon: int) -> Draft:
+        """The same with another horizon, as the acts of one episode share one."""
+        return replace(self, scenario=self.scenario.model_copy(update={"horizon": horizon}))
+
 
 def check_scenario(resolved: Resolved, bag: DiagnosticBag) -> tuple[Checked | None, Scenario | None]:
     """What a scenario means, and its models; None for what cannot be had. `bag` takes the findings."""

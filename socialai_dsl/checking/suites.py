@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import gcd, lcm
 
-from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite
+from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite, Start
 from socialai_dsl.checking.scenarios import Draft, draft_of, meaning_of, naming_the_patch
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
 from socialai_dsl.loader import Member, Resolved
+from socialai_dsl.loader.leaves import NODE_KEYS, parameters_of
 from socialai_dsl.schema.shape import model_of
-from socialai_dsl.schema.suite import Suite
+from socialai_dsl.schema.suite import Entry, Split, Suite
 from socialai_dsl.semantics.suite import shared_actions, shared_space
 
 
@@ -27,26 +29,103 @@ def check_suite(resolved: Resolved, bag: DiagnosticBag) -> LoadedSuite | None:
         actions = shared_actions(suite, [scenario.scenario for scenario in loaded])
         space = shared_space(suite, names, checked, actions, resolved, own)
         if not own.has_errors:
-            made = LoadedSuite(resolved.name, tuple(loaded), tuple(names), space, suite, resolved)
+            made = LoadedSuite(
+                resolved.name,
+                tuple(loaded),
+                tuple(names),
+                tuple(member.labels for member in members),
+                _weights(members),
+                tuple(_start(member, resolved) for member in members),
+                suite.draw == "in_sequence",
+                space,
+                suite,
+                resolved,
+            )
     bag.extend(naming_the_patch(finding, resolved) for finding in own)
     return replace(made, warnings=tuple(bag)) if made is not None else None
 
 
 def _right_shape(resolved: Resolved, own: DiagnosticBag) -> Suite | None:
     """The suite's models; None if the members cannot be looked at."""
+    if not _has_parameters(resolved, own):
+        return None
     shaped = model_of(Suite, resolved.data, resolved, own)
     _check_parameters(resolved, own)
     if shaped.model is None or own.has_errors:
+        return None
+    if not _is_of_one_kind(shaped.model, resolved, own):
         return None
     _check_splits(shaped.model, resolved, own)
     return shaped.model
 
 
+def _has_parameters(resolved: Resolved, own: DiagnosticBag) -> bool:
+    """Whether every other key of a tree has values, so that it can be a parameter."""
+    tree = resolved.data.get("tree") if isinstance(resolved.data, dict) else None
+    wrong = [
+        (name, path) for name, path, values in parameters_of(tree) if not isinstance(values, list | dict)
+    ]
+    for name, path in wrong:
+        near = did_you_mean(name, NODE_KEYS)
+        hint = None if near else "a parameter has a list or a mapping of values"
+        message = f"`{name}` is no key of a tree, and no parameter, which has values"
+        own.error("S101", message, resolved.key_span(path), suggestion=near, hint=hint)
+    return not wrong
+
+
+def _is_of_one_kind(suite: Suite, resolved: Resolved, bag: DiagnosticBag) -> bool:
+    """Whether a suite has members (with or without a sweep over them) or a tree; `bag` says what is too much."""
+    own = DiagnosticBag()
+    if suite.members is None and suite.sweep is None and suite.tree is None:
+        own.error(
+            "S105", "a suite needs a key `members`", resolved.key_span(()), hint="or a `tree`, or a `sweep`"
+        )
+    for word in ("members", "sweep"):
+        if suite.tree is not None and getattr(suite, word) is not None:
+            message = f"a suite has only one of `tree` and `{word}`"
+            own.error("S107", message, resolved.key_span((word,)))
+    if suite.draw == "in_sequence":
+        _check_acts(suite, resolved, own)
+    bag.extend(own)
+    return not own.has_errors
+
+
+def _check_acts(suite: Suite, resolved: Resolved, own: DiagnosticBag) -> None:
+    """Acts are listed, and begin where the act before them ends."""
+    for word in ("tree", "sweep"):
+        if getattr(suite, word) is not None:
+            message = f"the acts of an episode are listed in `members`; a `{word}` has no order"
+            own.error("S107", message, resolved.key_span((word,)))
+    for i, member in enumerate(suite.members or ()):
+        if isinstance(member, Entry) and member.layout is not None:
+            message = "an act begins where the one before it ends, so it has no `layout`"
+            own.error("S107", message, resolved.key_span(("members", i, "layout")))
+
+
+def _weights(members: Sequence[Member]) -> tuple[int, ...]:
+    """The members' weights as whole numbers, as small as can be."""
+    common = lcm(*(member.weight.denominator for member in members))
+    whole = [int(member.weight * common) for member in members]
+    return tuple(weight // gcd(*whole) for weight in whole)
+
+
+def _start(member: Member, resolved: Resolved) -> Start | None:
+    if member.layout is None:
+        return None
+    layout = resolved.part(member.layout)
+    assert isinstance(layout, dict), "internal: the shape of layouts was checked"
+    return Start(layout, member.layout)
+
+
 def _loaded(suite: Suite, members: Sequence[Member], bag: DiagnosticBag) -> list[LoadedScenario]:
     """The members that are right, with the suite's actions."""
     found = [_Found(member, draft_of(member.scenario, own := DiagnosticBag()), own) for member in members]
-    actions = shared_actions(suite, [f.draft.scenario for f in found if f.draft is not None])
-    return [scenario for one in found if (scenario := one.loaded(actions, bag)) is not None]
+    scenarios = [f.draft.scenario for f in found if f.draft is not None]
+    actions = shared_actions(suite, scenarios)
+    horizon = None
+    if suite.draw == "in_sequence":
+        horizon = max((scenario.horizon for scenario in scenarios), default=None)
+    return [scenario for one in found if (scenario := one.loaded(actions, horizon, bag)) is not None]
 
 
 @dataclass(frozen=True)
@@ -57,9 +136,16 @@ class _Found:
     draft: Draft | None
     own: DiagnosticBag
 
-    def loaded(self, actions: tuple[str, ...], bag: DiagnosticBag) -> LoadedScenario | None:
-        """The member with the suite's actions; None if something is wrong with it, which `bag` then says."""
+    def loaded(
+        self, actions: tuple[str, ...], horizon: int | None, bag: DiagnosticBag
+    ) -> LoadedScenario | None:
+        """The member with the suite's actions and, of an act, the horizon of the whole episode.
+
+        None if something is wrong with it, which `bag` then says.
+        """
         draft = self.draft.with_actions(actions) if self.draft is not None else None
+        if draft is not None and horizon is not None:
+            draft = draft.with_horizon(horizon)
         checked = meaning_of(draft, self.own) if draft is not None else None
         findings = tuple(naming_the_patch(finding, self.member.scenario) for finding in self.own)
         bag.extend(findings)
@@ -96,17 +182,47 @@ def _check_parameters(resolved: Resolved, bag: DiagnosticBag) -> None:
 
 
 def _check_splits(suite: Suite, resolved: Resolved, bag: DiagnosticBag) -> None:
+    before = len(list(bag))
     for name, split in suite.splits.items():
-        if split.replace and split.members is not None:
-            message = f"the split `{name}` has only one of `replace` and `members`"
-            bag.error("S107", message, resolved.key_span(("splits", name, "members")))
-        for member in split.replace:
-            if member not in suite.members:
-                near = did_you_mean(member, suite.members)
-                hint = None if near else "its members are " + ", ".join(suite.members)
-                span = resolved.key_span(("splits", name, "replace", member))
+        _check_split(suite, name, split, resolved, bag)
+    if suite.sweep is not None and suite.members is not None:
+        names = _written(suite)
+        for member in suite.sweep:
+            if member not in names:
+                near = did_you_mean(member, names)
+                hint = None if near else "its members are " + ", ".join(names)
+                span = resolved.key_span(("sweep", member))
                 bag.error("S504", f"`{member}` is no member of this suite", span, suggestion=near, hint=hint)
+    if len(list(bag)) > before:
+        return
     try:
         resolved.check_splits()
     except ScenarioError as error:
         bag.extend(error.diagnostics)
+
+
+def _check_split(suite: Suite, name: str, split: Split, resolved: Resolved, bag: DiagnosticBag) -> None:
+    of_trees, of_members = ("only", "without"), ("replace", "members")
+    for word in of_members if suite.tree is not None else of_trees:
+        if getattr(split, word):
+            owner = "a tree's splits have" if suite.tree is not None else "splits of members have"
+            words = of_trees if suite.tree is not None else of_members
+            message = f"{owner} `{words[0]}` and `{words[1]}`, no `{word}`"
+            bag.error("S107", message, resolved.key_span(("splits", name, word)))
+    if split.replace and split.members is not None:
+        message = f"the split `{name}` has only one of `replace` and `members`"
+        bag.error("S107", message, resolved.key_span(("splits", name, "members")))
+    for member in split.replace if suite.tree is None else ():
+        names = _written(suite)
+        if member not in names:
+            near = did_you_mean(member, names)
+            hint = None if near else "its members are " + ", ".join(names)
+            span = resolved.key_span(("splits", name, "replace", member))
+            bag.error("S504", f"`{member}` is no member of this suite", span, suggestion=near, hint=hint)
+
+
+def _written(suite: Suite) -> list[str]:
+    """What the file calls the members."""
+    if suite.members is None:
+        return list(suite.sweep or ())
+    return [m if isinstance(m, str) else m.name or m.scenario for m in suite.members]

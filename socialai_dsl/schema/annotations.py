@@ -23,7 +23,7 @@ from socialai_dsl.schema.behaviour import (
 )
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.schema.scenario import Memory, Outcome, Parameter, Reward, Scenario, Sequence, SungWith
-from socialai_dsl.schema.suite import Split, Suite
+from socialai_dsl.schema.suite import Entry, Split, Suite, Value, Values
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
 
 CALLED: Final[dict[type, str]] = {
@@ -51,6 +51,8 @@ CALLED: Final[dict[type, str]] = {
     Parameter: "a parameter",
     Suite: "a suite",
     Split: "a split",
+    Entry: "a member",
+    Value: "a value of a tree",
 }
 """How messages call what a model describes."""
 
@@ -92,6 +94,8 @@ def _step(annotation: Any, step: str | int) -> Any:
                     return (
                         Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation
                     )
+            if part is Value and isinstance(step, str):
+                return Values
         elif origin is dict and isinstance(step, str):
             return arguments[1]
         elif origin in (tuple, list) and isinstance(step, int):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag
+from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, JsonValue, StringConstraints, Tag
 
 from socialai_dsl.schema.base import Model, Word, _as_tuple
 from socialai_dsl.schema.scenario import Primitive
@@ -20,13 +20,65 @@ def _form(value: Any) -> str:
     return "written out" if isinstance(value, dict | UtteranceGrammar | list | tuple) else "word"
 
 
+Label = Annotated[str, StringConstraints(pattern=r"^[^,=\[\]]+$", max_length=80)]
+"""A value of a tree's parameter, as people call it."""
+
+Labels = (
+    Annotated[tuple[str | int | float | bool, ...], BeforeValidator(_as_tuple)] | str | int | float | bool
+)
+
+
+class Changes(Model):
+    """What a suite changes in a scenario, like a variant, and how its episodes start."""
+
+    set: dict[str, JsonValue] = Field(default_factory=dict, description="path: value, as in a variant")
+    remove: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = Field((), description="paths")
+    add: dict[str, JsonValue] = Field(default_factory=dict, description="path: items or keys")
+    layout: dict[str, JsonValue] | None = Field(
+        None, description="how every episode starts; the rest is drawn"
+    )
+
+
+class Entry(Changes):
+    """A member that the suite changes."""
+
+    scenario: MemberName
+    name: Word | None = Field(None, description="what the suite calls it; default the scenario's name")
+
+
+class Value(Changes):
+    """A value of a parameter in a tree; every other key is a parameter below it, which has a value as well."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[Word, Values]
+
+    about: str | None = None
+    scenario: MemberName | None = Field(None, description="what is played; deeper ones replace it")
+
+
+Values = Annotated[
+    Annotated[
+        tuple[Label | int | float | bool, ...], Field(min_length=1), BeforeValidator(_as_tuple), Tag("list")
+    ]
+    | Annotated[dict[Label, Value], Field(min_length=1), Tag("mapping")],
+    Discriminator(lambda value: "mapping" if isinstance(value, dict) else "list"),
+]
+"""The values of a parameter, of which an episode draws one: plain ones, or label -> what it means."""
+
+
 class Split(Model):
-    """Other members than the suite's own: some replaced, or all written anew."""
+    """Other members than the suite's own: some replaced, all written anew, or some leaves of its tree."""
 
     replace: dict[MemberName, MemberName] = Field(
         default_factory=dict, description="member -> what is played in its place"
     )
     members: MemberNames | None = Field(None, min_length=1, max_length=64)
+    only: dict[Word, Labels] | None = Field(
+        None, description="parameter: value or values; leaves that have all of them"
+    )
+    without: dict[Word, Labels] | None = Field(
+        None, description="parameter: value or values; leaves that do not have all of them"
+    )
 
 
 class Suite(Model):
@@ -36,8 +88,21 @@ class Suite(Model):
     about: str | None = None
     notes: str | None = None
     skills: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = ()
-    draw: Literal["uniform"] = Field("uniform", description="how the member of an episode is chosen")
-    members: MemberNames = Field(min_length=1, max_length=64)
+    draw: Literal["uniform", "in_sequence"] = Field(
+        "uniform", description="uniform: an episode plays one member; in_sequence: all, one after another"
+    )
+    members: (
+        Annotated[
+            tuple[MemberName | Entry, ...], BeforeValidator(_as_tuple), Field(min_length=1, max_length=64)
+        ]
+        | None
+    ) = Field(None, description="scenarios")
+    sweep: (
+        dict[MemberName, dict[str, Annotated[tuple[JsonValue, ...], BeforeValidator(_as_tuple)]]] | None
+    ) = Field(
+        None, min_length=1, description="member: {path: values}; each combination is a member of its own"
+    )
+    tree: Value | None = Field(None, description="parameters with their values; an episode plays a leaf")
     grammar: Annotated[
         Annotated[Literal["union", "concat"], Tag("word")] | Annotated[UtteranceGrammar, Tag("written out")],
         Discriminator(_form),

@@ -185,6 +185,8 @@ def effect(resolver: Resolver, path: DataPath, raw: object, scope: Scope) -> Eff
     if len(args) != len(signature.takes):
         raise resolver.fail("S211", wrong_count(signature, len(args)), node, scope)
     entities = _entities(resolver, subject, scope)
+    if name == "vanish" and any(entity.type.low == 0 for entity in entities):
+        raise resolver.fail("S204", "the agent cannot vanish", node, scope)
     value = None
     if name in ("put", "move_into"):
         value = _target(resolver, name, subject, entities, args[0], scope)

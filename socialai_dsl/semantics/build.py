@@ -6,7 +6,17 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from socialai_dsl.semantics.terms import BOOL, Compare, Const, Logic, ObjectType, Operation, Term, Type
+from socialai_dsl.semantics.terms import (
+    BOOL,
+    Compare,
+    Const,
+    Logic,
+    ObjectType,
+    Operation,
+    Quantified,
+    Term,
+    Type,
+)
 
 TRUE = Const(BOOL, 1)
 FALSE = Const(BOOL, 0)
@@ -132,6 +142,11 @@ def walk(term: Any) -> Iterator[Term]:
         yield from _parts(term)
     elif is_dataclass(term) and not isinstance(term, Type | ObjectType | type):
         yield from _parts(term)
+
+
+def draws(term: Term) -> bool:
+    """Whether something is drawn anew wherever a term is evaluated."""
+    return any(isinstance(part, Quantified) and part.op == "pick" for part in walk(term))
 
 
 def _parts(value: Any) -> Iterator[Term]:

@@ -61,7 +61,8 @@ def at(resolver: Resolver, spot: Spot, pair: Sequence[Expression], scope: Scope)
         resolver.written((*spot.path, i), raw, _INT, _inside(scope, spot.path, i))
         for i, raw in enumerate(pair)
     )
-    return Placing(spot.entity, spot.site, spot.number, findings.at(spot.path), at=(x, y))
+    span = findings.at(spot.path)
+    return Placing(spot.entity, spot.site, spot.number, span, at=(x, y), where_site=scope.draws.site)
 
 
 def _inside(scope: Scope, path: DataPath, index: int) -> Scope:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import resolve_groups, resolve_names, tables
-from socialai_dsl.semantics.build import all_of, any_of, arithmetic, number, one_of, walk
+from socialai_dsl.semantics.build import all_of, any_of, arithmetic, draws, number, one_of, walk
 from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.resolve_attributes import (
     ENTITY,
@@ -187,6 +187,9 @@ def _before(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Sc
     if any(isinstance(part, Heard) for part in walk(term)):
         message = "what was heard is forgotten when a step ends; note it in a register of the frame"
         raise resolver.fail("S211", message, node, scope)
+    if draws(term):
+        message = "`prev` asks how things were, so nothing can be drawn in it"
+        raise resolver.fail("S211", message, node, scope, hint="draw it in `let`, and use that")
     site = f"{scope.draws.site}.prev[{node.at}]"
     return resolver.registers.remember(Sited(term, site, resolver.findings.node(scope.path, node)))
 

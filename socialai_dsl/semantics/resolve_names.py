@@ -198,6 +198,10 @@ def _language(resolver: Resolver, node: ast.Name, scope: Scope) -> Term | None:
     """t, W, H, and the noun that was heard."""
     symbols = resolver.symbols
     match node.id:
+        case "t" if scope.at_reset:
+            raise resolver.fail(
+                "S204", "`t` counts steps, and this is computed before the first", node, scope
+            )
         case "t":
             return World(Type("int", 0, symbols.scenario.horizon), "t")
         case "W":

@@ -14,6 +14,7 @@ from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import contents, places, resolve_groups, tables
 from socialai_dsl.semantics.alternatives import by_value, drawn
 from socialai_dsl.semantics.build import walk
+from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.findings import FailedError, surviving
 from socialai_dsl.semantics.scope import Objects, Scope, object_scope, reset_scope
 from socialai_dsl.semantics.terms import (
@@ -85,7 +86,10 @@ def _member_placing(resolver: Resolver, name: str, member: CastMember, which: in
         if member.place is not None:
             _both_places(resolver, path)
         return places.at(resolver, spot, member.at, scope)
-    return places.place(resolver, spot, member.place or "anywhere", scope)
+    placing = places.place(resolver, spot, member.place or "anywhere", scope)
+    if placing.nowhere and name == AGENT:
+        raise resolver.findings.fail("S204", "the agent has to be somewhere in the room", placing.span)
+    return placing
 
 
 def _both_places(resolver: Resolver, path: DataPath) -> None:

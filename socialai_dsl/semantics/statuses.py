@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.semantics.build import walk
+from socialai_dsl.semantics.build import draws, walk
 from socialai_dsl.semantics.findings import surviving
 from socialai_dsl.semantics.scope import Objects, object_scope
 from socialai_dsl.semantics.terms import (
@@ -106,10 +106,15 @@ def _computed(resolver: Resolver, objects: Objects, key: str, left_for: str | No
         return
     path: DataPath = ("objects", objects.name, key)
     on = _status(resolver, objects, key, None, path)
-    off = objects.type.states.index(left_for) if left_for else objects.type.initial
+    states = objects.type.states
+    off = states.index(left_for) if left_for in states else objects.type.initial
     for index, number in enumerate(objects.numbers):
         scope = object_scope(objects, index, path, key, at_reset=False)
         condition = resolver.written(path, raw, BOOL, scope)
+        if draws(condition):
+            message = f"`{key}` follows from how things are, so nothing can be drawn in it"
+            hint = "draw it in `let`, and use that"
+            raise resolver.findings.fail("S204", message, resolver.findings.at(path), hint=hint)
         yield Computed(number, on, off, Sited(condition, scope.draws.site, resolver.findings.at(path)))
 
 

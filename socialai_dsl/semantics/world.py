@@ -10,6 +10,7 @@ from socialai_dsl.schema import WorldRule
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.activities import effect
 from socialai_dsl.semantics.behaviour import assigned
+from socialai_dsl.semantics.build import draws
 from socialai_dsl.semantics.findings import dotted, surviving
 from socialai_dsl.semantics.scope import Scope, at_every_step, reset_scope
 from socialai_dsl.semantics.terms import BOOL, Effect, RulePlan, Sited
@@ -85,4 +86,8 @@ def requirements(resolver: Resolver) -> Iterator[Sited]:
         with surviving():
             scope = reset_scope(path)
             term = resolver.written(path, raw, BOOL, scope)
+            if draws(term):
+                message = "a condition on the room draws nothing itself"
+                hint = "draw it in `let`, and use that"
+                raise resolver.findings.fail("S204", message, resolver.findings.at(path), hint=hint)
             yield Sited(term, scope.draws.site, resolver.findings.at(path))

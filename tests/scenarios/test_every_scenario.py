@@ -110,10 +110,6 @@ def drawn_action(rng: random.Random, episode: Episode) -> tuple[str | None, str 
     return (body if body in program.actions else None), (sentence if rng.random() < 0.3 else None)
 
 
-# Switches of Help are shown as pressed, which they are not in the research code: see test_help.
-PLAYED = [name for name in DEFAULT if not name.startswith("help")]
-
-
 @pytest.mark.parametrize("name", [*NAMES, *(f"{name}+unsocial" for name in NAMES)])
 def test_the_first_picture(name: str) -> None:
     for seed in range(150):
@@ -123,7 +119,7 @@ def test_the_first_picture(name: str) -> None:
         )
 
 
-@pytest.mark.parametrize("name", [*PLAYED, *(f"{name}+unsocial" for name in PLAYED)])
+@pytest.mark.parametrize("name", [*DEFAULT, *(f"{name}+unsocial" for name in DEFAULT)])
 def test_the_picture_after_each_step(name: str) -> None:
     rng = random.Random(name)
     for seed in range(60):
@@ -161,6 +157,24 @@ def test_spaces(name: str) -> None:
     env = made(name)
     assert env.action_space.nvec.tolist() == sizes.get(name.partition("_")[0].partition("+")[0], body)
     assert env.observation_space["image"].shape == (7, 7, 4)
+
+
+def test_what_can_be_said() -> None:
+    def grammar(name: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        return made(name).program.templates, made(name).program.nouns
+
+    for name in ("dance", "showme", "showme_no_social", "help", "help_as_helper"):
+        for variant in (name, f"{name}+as_coded"):
+            assert grammar(variant) == (("Move your <noun>", "Shake your <noun>"), ("body", "head"))
+    for name in ("cointhief", "cointhief+as_coded"):
+        assert grammar(name) == (("Here is <noun>",), tuple("0123456"))
+    for name in ("talkitout", "talkitout_no_liar", "diverse_exit"):
+        paper, coded = grammar(name), grammar(f"{name}+as_coded")
+        assert paper[0] == ("Where is <noun>", "Open <noun>", "Which is <noun>", "How are <noun>")
+        assert coded[0][2] == ("Which is <noun>" if name == "diverse_exit" else "Close <noun>")
+        assert (paper[1][10], coded[1][10]) == ("oven", "the floor")
+        assert paper[1][2] == coded[1][2] == ("the correct door" if name == "diverse_exit" else "the wall")
+        assert [k for k in range(16) if paper[1][k] != coded[1][k]] == [10]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -205,6 +205,17 @@ class TestThePeer:
         episode.acts(*[None] * 30)
         assert episode.now()["jim"]["at"] == [3, 5]
 
+    @pytest.mark.parametrize("name", NAMES)
+    def test_it_waits_while_the_agent_stands_in_its_way(self, name: str) -> None:
+        layout = room_with(0, jim={"at": [1, 3], "facing": "down"}, agent={"at": [1, 5], "facing": "up"})
+        episode = Episode(name, layout)
+        episode.acts(*[None] * 20)
+        assert episode.now()["heard"] == ["Jim: Look at me"]
+        assert switches(episode) == [False] * 3
+        episode.go_to((3, 5), avoid=[episode.now()["jim"]["at"]])
+        episode.acts(*[None] * 8)
+        assert switches(episode) == [True, False, False]
+
     def test_hidden_it_is_silent_but_the_door_is_seen_to_move(self) -> None:
         episode = Episode("showme+as_coded+unsocial", {**ROOM, "agent": {"at": [3, 3], "facing": "left"}})
         heard = episode.hears(None, None, "right")
