@@ -95,19 +95,28 @@ def put_into_inbox(row: Row, inbox: int, utterance: int, speaker: int, noun: int
     """Add what was said to an inbox, unless it is full."""
     count = row.registers[inbox]
     if count < row.program[Header.INBOX_SIZE]:
-        size = entry_size(row)
-        place = inbox + 1 + size * count
-        row.registers[place] = utterance
-        if size > 1:
-            row.registers[place + 1] = speaker
-            row.registers[place + 2] = noun
         row.registers[inbox] = count + 1
+        if row.program[Header.FLAGS] & Flag.HEARD_BY:
+            _put_with_speaker(row, inbox + 1 + 3 * count, utterance, speaker, noun)
+        else:
+            row.registers[inbox + 1 + count] = utterance
+
+
+@outline
+def _put_with_speaker(row: Row, place: int, utterance: int, speaker: int, noun: int) -> None:
+    stay_outline()
+    row.registers[place] = utterance
+    row.registers[place + 1] = speaker
+    row.registers[place + 2] = noun
 
 
 @inline
 def empty_inbox(row: Row, inbox: int) -> None:
     """Forget what was heard."""
-    for i in range(1, entry_size(row) * row.registers[inbox] + 1):
+    last = row.registers[inbox]
+    if row.program[Header.FLAGS] & Flag.HEARD_BY:
+        last *= 3
+    for i in range(1, last + 1):
         row.registers[inbox + i] = 0
     row.registers[inbox] = 0
 
@@ -119,10 +128,11 @@ def inbox_class(row: Row, inbox: int) -> int:
     if count == 0:
         return 0
     first = row.registers[inbox + 1]
-    size = entry_size(row)
-    for i in range(1, count):
-        if row.registers[inbox + 1 + size * i] != first:
-            return row.program[Header.CLASSES]
+    if count > 1:
+        size = entry_size(row)
+        for i in range(1, count):
+            if row.registers[inbox + 1 + size * i] != first:
+                return row.program[Header.CLASSES]
     return first
 
 
