@@ -178,8 +178,12 @@ class _Run:
                     self._findings.error("S212", message, line.span)
                 elif member != AGENT:
                     self.resolver.npc_texts |= dict.fromkeys(texts_of(line))
-        if any(member != AGENT and performs(played.model) for member, played in self._played.items()):
-            self.resolver.npc_texts |= dict.fromkeys(self.resolver.utterances.all_texts())
+                    self.resolver.said_by.setdefault(member, {}).update(dict.fromkeys(texts_of(line)))
+        for member, played in self._played.items():
+            if member != AGENT and performs(played.model):
+                texts = dict.fromkeys(self.resolver.utterances.all_texts())
+                self.resolver.npc_texts |= texts
+                self.resolver.said_by.setdefault(member, {}).update(texts)
         return _Spoken(found)
 
     def _plans(self, spoken: _Spoken) -> Iterator[FramePlan]:

@@ -45,7 +45,7 @@ class Resolver:
         registers: what is drawn or computed at reset, resolved when first needed.
         utterances: what the agent can say.
         frames: member -> the frame it plays.
-        npc_texts: every text that an NPC can say, for what others may hear.
+        npc_texts: every text that an NPC can say, for what others may hear. said_by: member -> those it can say.
     """
 
     def __init__(
@@ -62,6 +62,7 @@ class Resolver:
         self.registers = Registers(self, words, ranges)
         self.utterances = Utterances(self, symbols.scenario.grammar)
         self.npc_texts: dict[str, None] = {}
+        self.said_by: dict[str, dict[str, None]] = {}
         self._tables: dict[str, tuple[tuple[str, ...], tuple[Term, ...]] | None] = {}
 
     def table(self, name: str) -> tuple[tuple[str, ...], tuple[Term, ...]]:

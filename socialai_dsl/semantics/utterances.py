@@ -246,12 +246,21 @@ class Utterances:
 
     def said_by(self, member: str, node: ast.Expr, scope: Scope) -> Term:
         """Whether an NPC said one of the texts at `node` in this step."""
-        span = self._resolver.findings.node(scope.path, node)
-        return any_of(
-            all_of([SaidBy(self._resolver.symbols.numbers[member], pattern), *_given(drawn), *_given(given)])
+        resolver = self._resolver
+        span, own = resolver.findings.node(scope.path, node), resolver.said_by.get(member, {})
+        found = [
+            all_of([SaidBy(resolver.symbols.numbers[member], pattern), *_given(drawn), *_given(given)])
             for text, drawn in self._texts(node, scope)
             for pattern, given in self.patterns(text, scope, span, True)
-        )
+            if pattern.said_by_npcs & own.keys()
+        ]
+        if not found:
+            near = did_you_mean(quoted(node).strip('"'), own)
+            hint = None if near else "what somebody can say stands in the `say` of its frame"
+            suggestion = f'"{near}"' if near else None
+            message = f"`{member}` never says {quoted(node)}"
+            raise resolver.findings.fail("S401", message, span, suggestion=suggestion, hint=hint)
+        return any_of(found)
 
     # -- lines -----------------------------------------------------------------------------------------------
 

@@ -64,7 +64,7 @@ def test_requirements_are_conditions_at_reset(meaning):
 @pytest.mark.parametrize(
     ("rule", "said"),
     [
-        ({"when": "t == 3"}, "S105 a rule of the world needs `cause`: what it changes"),
+        ({"when": "t == 3"}, "S105 a rule of the world needs `cause`, `set` or `reward`: what it does"),
         ({"cause": "self.vanish"}, "S201 `self` is the member of the cast who follows a frame; here nobody does"),
         ({"cause": "cells.open"}, "S204 `cells` is a cell, but an object or a member of the cast is expected here"),
         ({"cause": "colors.vanish"},
