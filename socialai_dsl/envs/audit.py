@@ -11,6 +11,7 @@ from socialai_dsl.program import (
     Body,
     EntityColumn,
     Field,
+    Flag,
     FrameColumn,
     Header,
     Program,
@@ -76,7 +77,7 @@ def _common(program: Program) -> list[Range]:
         Register.ENDED: (0, 2),
         Register.POKED: (-1, h(Header.ENTITIES) - 1),
         Register.SAID_LINE: (0, lines),
-        Register.LAST_TURN: (-1, int(Body.NONE)),
+        Register.LAST_TURN: (-1, int(Body.STOP_POINTING)),
         Register.UTTERANCE: (0, h(Header.TEMPLATES) * h(Header.NOUNS)),
         Register.CHANGED: (0, 1),
         Register.ACCEPTED: (0, 1),
@@ -107,7 +108,9 @@ def _entities(program: Program) -> list[Range]:
             Field.STATUS: (0, greatest_status),
             Field.GONE: (0, 1),
             Field.POKED: (0, 1),
-            Field.LAST: (0, int(Body.NONE)),
+            Field.LAST: (0, int(Body.STOP_POINTING)),
+            Field.POINTING: (0, 4),
+            Field.INSIDE: (0, program.header(Header.ENTITIES) - 1),
         }
         base = FIRST_ENTITY + ENTITY_FIELDS * number
         ranges += [(base + name, 1, *bounds) for name, bounds in greatest.items()]
@@ -133,6 +136,18 @@ def _frames(program: Program) -> list[Range]:
             (row[FrameColumn.STATE], 1, 0, row[FrameColumn.STATES] - 1),
             (row[FrameColumn.CLOCK], 1, 0, h(Header.HORIZON)),
             (row[FrameColumn.INBOX], 1, 0, h(Header.INBOX_SIZE)),
-            (row[FrameColumn.INBOX] + 1, h(Header.INBOX_SIZE), 0, h(Header.CLASSES) - 1),
+            *_entries(program, row[FrameColumn.INBOX] + 1),
         ]
     return ranges
+
+
+def _entries(program: Program, first: int) -> list[Range]:
+    """What an inbox may hold: classes, or for each entry a class, a speaker and a noun."""
+    h = program.header
+    size, last_class = h(Header.INBOX_SIZE), h(Header.CLASSES) - 1
+    if not h(Header.FLAGS) & Flag.HEARD_BY:
+        return [(first, size, 0, last_class)]
+    bounds = ((0, last_class), (0, h(Header.ENTITIES) - 1), (-1, h(Header.NOUNS) - 1))
+    return [
+        (first + 3 * entry + part, 1, *bounds[part]) for entry in range(size) for part in range(len(bounds))
+    ]

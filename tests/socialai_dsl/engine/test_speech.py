@@ -190,3 +190,60 @@ def test_the_log_is_bounded_by_lines_too() -> None:
     play(batch, *[SILENT] * 5)
     assert logged(room, batch) == [0, 0, 0]
     assert batch.state.registers[0, Register.TOKENS] == 0
+
+
+def hearing(*rules: tuple[int, ...], **more: object) -> tuple[Assembly, FrameSpec]:
+    """A listener, entity 2, whose `then` runs some code; entity 1 speaks in the step before, line 0 then line 1."""
+    speaker = [(Op.SAY, constant(1), Register.T)]
+    frames = (FrameSpec(1, ([],), then=({-1: speaker},)), FrameSpec(2, ([],), then=({-1: list(rules)},)))
+    lines = (("zero", (2,), 1), ("one", (2,), 3), ("two", (3,), 40), ("three", (4,), 2))
+    room = Assembly(
+        at=((1, 1), (2, 1), (2, 2)),
+        npcs=2,
+        frames=frames,
+        lines=lines,
+        line_nouns=(-1, -1, 2, 1),
+        earshot=(0, 9),
+        flags=int(Flag.HEARD_BY),
+        classes=(1, 2, 3, 1, 1, 41),
+        class_sets=((2,), (3, 40), (33, 35)),
+        **more,  # type: ignore[arg-type]
+    )
+    return room, frames[1]
+
+
+def test_who_said_it_and_which_noun_was_in_it() -> None:
+    own = Assembly(at=((1, 1),) * 3).own
+    room, _ = hearing(
+        *[(Op.HEARD_FROM, own + 2 * k, 0, k) for k in range(3)],
+        *[(Op.HEARD_NOUN, own + 2 * k + 1, 0, k) for k in range(3)],
+    )
+    inbox = room.inbox_register(2, 2)
+    code = [(op, a, inbox, c) for op, a, _, c in room.frames[1].then[0][-1]]
+    room, _ = hearing(*code)
+    batch = batch_of(room.program())
+
+    def heard() -> list[int]:
+        return batch.state.registers[0, room.own : room.own + 6].tolist()
+
+    play(batch, SILENT)
+    assert heard() == [-1, -1, 1, -1, -1, -1], "the NPC, without a noun"
+    play(batch, (7, 1, 0, 1))
+    assert heard() == [0, 1, 1, 2, -1, -1], "the agent of class 2, then the NPC of class 40"
+    play(batch, SILENT)
+    assert heard() == [1, 1, -1, -1, -1, -1]
+    play(batch, (7, 1, 0, 2))
+    assert heard() == [-1, -1, 0, 2, -1, -1], "the agent of class 3; what was heard before is forgotten"
+    assert not batch.state.registers[0, inbox : inbox + 13].any()
+
+
+def test_the_first_of_several_entries_counts() -> None:
+    own = Assembly(at=((1, 1),) * 3).own
+    room, _ = hearing()
+    inbox = room.inbox_register(2, 2)
+    room, _ = hearing(
+        (Op.HEARD_FROM, own, inbox, 1), (Op.IF_HEARD, inbox, 40, 1), (Op.LOAD, own + 1, constant(5))
+    )
+    batch = batch_of(room.program())
+    play(batch, SILENT, (7, 1, 0, 2))
+    assert batch.state.registers[0, [room.own, room.own + 1]].tolist() == [0, 5], "the agent spoke first"

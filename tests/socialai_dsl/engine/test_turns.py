@@ -371,3 +371,83 @@ def test_lava_under_a_hidden_npc_is_deadly() -> None:
     batch = batch_of(Assembly(**room).program())  # type: ignore[arg-type]
     play(batch, body(Body.FORWARD))
     assert batch.state.registers[0, Register.OUTCOME] == 2
+
+
+def test_what_is_perceived_comes_before_anything_else_of_a_turn_even_of_one_without_rules() -> None:
+    own = Assembly(at=((1, 1), (2, 2)), npcs=1).own
+    frames = (
+        FrameSpec(1, ([*noting(own, 3), *FORWARD],), first=({-1: noting(own, 2)},), perceive=noting(own, 1)),
+        FrameSpec(1, ([],), perceive=noting(own, 4)),
+    )
+    batch = batch_of(Assembly(at=((1, 1), (2, 2)), npcs=1, frames=frames).program())
+    play(batch, body(Body.NONE))
+    assert batch.state.registers[0, own] == 1234
+
+
+def test_the_rest_of_a_rule_of_first_comes_after_the_move_and_the_clock() -> None:
+    own = Assembly(at=((1, 1), (2, 2)), npcs=1).own
+    frame = FrameSpec(
+        1,
+        ([(Op.BODY, constant(Body.LEFT))], []),
+        first=({-1: [(Op.IF_EQ, Register.T, constant(2), 1), (Op.BODY, constant(Body.RIGHT))]},),
+        then=({-1: noting(own, 1)},),
+        deferred=[
+            *noting(own, 2),
+            (Op.LOAD, own + 1, entity_register(1, Field.DIR)),
+            (Op.SAY, constant(1), constant(0)),
+            (Op.GOTO, 0, 1),
+        ],
+    )
+    room = Assembly(at=((1, 1), (2, 2)), npcs=1, frames=(frame,), lines=(("so", (2,), 1),), earshot=(0, 9))
+    batch = batch_of(room.program())
+    state = room.state_register(0)
+    play(batch, body(Body.NONE))
+    assert batch.state.registers[0, [own, state, state + 1]].tolist() == [1, 0, 1]
+    play(batch, body(Body.NONE))
+    assert batch.state.registers[0, [own, own + 1, state, state + 1]].tolist() == [12, 0, 1, 0]
+    assert batch.state.registers[0, Register.HEARD] == 1
+
+
+def test_the_scripted_agent_defers_too() -> None:
+    own = Assembly(at=((2, 2),)).own
+    frame = FrameSpec(
+        0,
+        ([],),
+        first=({-1: [(Op.BODY, constant(Body.RIGHT))]},),
+        deferred=noting(own, 1),
+        perceive=noting(own, 2),
+    )
+    batch = batch_of(Assembly(at=((2, 2),), frames=(frame,), flags=int(Flag.AGENT_FRAME)).program())
+    batch.script()
+    assert batch.ports.actions[0, 0] == Body.RIGHT
+    assert batch.state.registers[0, own] == 0
+    play(batch, body(Body.RIGHT))
+    assert batch.state.registers[0, own] == 21
+
+
+def test_what_moves_by_itself_moves_in_the_look_ahead_of_the_script_too() -> None:
+    """What the agent says may depend on it, and everything is put back."""
+    at = ((2, 2), (2, 3))
+    marble_x = entity_register(1, Field.X)
+    say = [
+        (Op.IF_EQ, marble_x, constant(3), 2),
+        (Op.SAY, constant(0), constant(1)),
+        (Op.SKIP, 0, 0, 1),
+        (Op.SAY, constant(0), constant(0)),
+    ]
+    frame = FrameSpec(0, ([(Op.BODY, constant(Body.NONE))],), then=({-1: say},))
+    room = Assembly(
+        at=at,
+        objects=("marble",),
+        frames=(frame,),
+        flags=int(Flag.AGENT_FRAME | Flag.ROLLS),
+        reset=[(Op.LOAD, entity_register(1, Field.STATUS), constant(1))],
+        lines=tuple((f"line{i}", (2,), 1) for i in range(6)),
+        agent_says=1,
+    )
+    batch = batch_of(room.program())
+    before, board = batch.state.registers.copy(), batch.state.boards.copy()
+    batch.script()
+    assert batch.ports.actions[0].tolist() == [7, 1, 0, 1]
+    assert np.array_equal(batch.state.registers, before)
+    assert np.array_equal(batch.state.boards, board)

@@ -168,3 +168,27 @@ def test_a_register_may_hold_a_cell_or_an_entity() -> None:
         batch.state.registers[:, own : own + 3],
         [[CELL + 32 + 1, 2, 1], [CELL + 32 * 3 + 3, 2, 3]],
     )
+
+
+@pytest.mark.parametrize(
+    ("thing", "direction", "cell"),
+    [
+        (0, 0, (3, 2)),
+        (0, 1, (2, 3)),
+        (0, 2, (1, 2)),
+        (0, 3, (2, 1)),
+        (CELL + 32 * 0 + 5, 0, None),
+        (CELL + 32 * 0 + 5, 3, None),
+        (CELL + 32 * 0 + 5, 1, (5, 1)),
+        (CELL + 32 * 6 + 0, 2, None),
+        (CELL - 1, 0, None),
+        (1, 0, None),
+    ],
+)
+def test_the_cell_beside(thing: int, direction: int, cell: tuple[int, int] | None) -> None:
+    at = ((2, 2), None)
+    own = Assembly(at=at).own
+    beside = result_of(
+        [(Op.CELL_BESIDE, own, constant(thing), constant(direction))], own, at=at, objects=("door",)
+    )
+    assert beside == (CELL - 1 if cell is None else CELL + 32 * cell[1] + cell[0])
