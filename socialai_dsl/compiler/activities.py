@@ -14,11 +14,34 @@ GOING = ("go_to", "go_next_to", "enter")
 """Activities that take no step when they are fulfilled before they begin."""
 
 
-class Activities:
-    """Emits the activities of one cast member through `to`; `clock` is the register of its frame's clock."""
+NOTHING = -1
+"""In the register of an aim: the activity found nothing to be about."""
 
-    def __init__(self, to: Expressions, checked: Checked, lines: Lines, entity: int, clock: int) -> None:
+
+def has_aim(activity: Activity) -> bool:
+    """Whether what an activity is about is computed anew in each turn, so that its end must know what it was."""
+    return activity.name in (*GOING, "use", "push") and not isinstance(activity.args[0], Const)
+
+
+class Activities:
+    """Emits the activities of one cast member through `to`.
+
+    Attributes:
+        clock: the register of its frame's clock.
+        aim: where it is noted what the activity of this turn is about (`has_aim`); None: nowhere.
+    """
+
+    def __init__(
+        self,
+        to: Expressions,
+        checked: Checked,
+        lines: Lines,
+        entity: int,
+        clock: int,
+        aim: int | None = None,
+    ) -> None:
         self.to, self.checked, self.lines, self.entity, self.clock = to, checked, lines, entity, clock
+        self.aim = aim
         self.turn = to.sites.row(f"cast.{checked.entities[entity].key}.turn")
 
     def emit(self, activity: Activity) -> None:
@@ -32,6 +55,8 @@ class Activities:
         if nothing.uses:
             block.skip(done)
             block.bind(nothing)
+            if self.aim is not None:
+                block.emit(Op.LOAD, self.aim, constant(NOTHING))
             block.emit(Op.BODY, constant(Body.NONE))
             block.bind(done)
 
@@ -50,13 +75,13 @@ class Activities:
             case "turn":
                 self._turn(activity.args[0])
             case "go_to":
-                block.emit(Op.GO_TO, own, to.value(activity.args[0]), self.turn)
+                block.emit(Op.GO_TO, own, self._aimed_at(activity), self.turn)
             case "go_next_to":
-                block.emit(Op.GO_NEXT_TO, own, to.value(activity.args[0]), self.turn)
+                block.emit(Op.GO_NEXT_TO, own, self._aimed_at(activity), self.turn)
             case "use":
-                self._use(to.value(activity.args[0]))
+                self._use(self._aimed_at(activity))
             case "enter":
-                self._enter(activity.args[0])
+                self._enter(activity)
             case "push":
                 self._push(activity)
             case "point":
@@ -70,6 +95,13 @@ class Activities:
                 self._perform(activity)
             case "choose":
                 self._choose(activity)
+
+    def _aimed_at(self, activity: Activity) -> int:
+        """What the activity is about, noted if its end asks for it."""
+        goal = self.to.value(activity.args[0])
+        if self.aim is not None:
+            self.to.block.emit(Op.LOAD, self.aim, goal)
+        return goal
 
     def _turn_towards(self, goal: int) -> None:
         block = self.to.block
@@ -107,12 +139,12 @@ class Activities:
         block.emit(Op.GO_NEXT_TO, own, goal, self.turn)
         block.bind(done)
 
-    def _enter(self, goal: Term) -> None:
+    def _enter(self, activity: Activity) -> None:
         """Use it while it cannot be walked on, then go there."""
         block = self.to.block
-        entity = self.to.value(goal)
+        entity = self._aimed_at(activity)
         shut, done = Label(), Label()
-        walkable = sorted(_kind_of(self.checked, goal).walkable)
+        walkable = sorted(_kind_of(self.checked, activity.args[0]).walkable)
         status = block.temporary()
         block.emit(Op.FIELD, status, entity, Field.STATUS)
         found = Label()
@@ -132,7 +164,7 @@ class Activities:
     def _push(self, activity: Activity) -> None:
         """Go behind the thing, face the way it is to go, walk into it."""
         to, block = self.to, self.to.block
-        thing, way = (to.value(arg) for arg in activity.args)
+        thing, way = self._aimed_at(activity), to.value(activity.args[1])
         behind = to.into_temporary(Op.CELL_BESIDE, thing, self._turned_round(way))
         elsewhere, done = Label(), Label()
         block.test(Op.IF_SAME_CELL, constant(self.entity), behind, elsewhere)
@@ -205,23 +237,31 @@ class Activities:
         if activity.name == "perform":
             block.test(Op.IF_LE, constant(len(_elements(activity))), self.clock, otherwise)
         elif activity.name == "push":
-            self._unless_pushed(activity.args[0], otherwise)
+            self._unless_pushed(activity, self._goal(activity, nothing), otherwise)
         elif activity.name == "use":
             last = entity_register(self.entity, Field.LAST)
-            goal = to.value(activity.args[0])
+            goal = self._goal(activity, nothing)
             block.test(Op.IF_EQ, last, constant(Body.TOGGLE), otherwise)
             block.test(Op.IF_FACES, own, goal, otherwise)
         else:
             op = Op.IF_NEXT_TO if activity.name == "go_next_to" else Op.IF_SAME_CELL
-            block.test(op, own, to.value(activity.args[0]), otherwise)
+            block.test(op, own, self._goal(activity, nothing), otherwise)
         to.failed = None
         block.release(mark)
 
-    def _unless_pushed(self, goal: Term, otherwise: Label) -> None:
+    def _goal(self, activity: Activity, nothing: Label) -> int:
+        """What the activity of this turn was about; without a note of it what it is about now."""
+        to, goal = self.to, activity.args[0]
+        if self.aim is None:
+            return to.value(goal)
+        noted = to.into_temporary(Op.LOAD, self.aim)
+        to.block.test(Op.IF_LE, constant(goal.type.low), noted, nothing)
+        return to.into_temporary(Op.MAX, noted, constant(goal.type.low))
+
+    def _unless_pushed(self, activity: Activity, thing: int, otherwise: Label) -> None:
         """Pushed: the last step forward led into it, and it is as a push leaves it."""
         to, block = self.to, self.to.block
-        thing = to.value(goal)
-        after = frozenset(_kind_of(self.checked, goal).pushed.values())
+        after = frozenset(_kind_of(self.checked, activity.args[0]).pushed.values())
         block.test(Op.IF_EQ, entity_register(self.entity, Field.LAST), constant(Body.FORWARD), otherwise)
         block.test(Op.IF_FACES, constant(self.entity), thing, otherwise)
         to.one_of(Op.IF_EQ, to.into_temporary(Op.FIELD, thing, Field.STATUS), after, otherwise)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from socialai_dsl.compiler.activities import GOING, Activities
+from socialai_dsl.compiler.activities import GOING, NOTHING, Activities, has_aim
 from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Sites, constant
 from socialai_dsl.compiler.beliefs import perceive
 from socialai_dsl.compiler.classes import Classes
@@ -18,7 +18,7 @@ from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.registers import Registers, state_names
 from socialai_dsl.program import Op
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.terms import BOOL, Checked, FramePlan, RulePlan, StepPlan
+from socialai_dsl.semantics.terms import BOOL, Checked, FramePlan, RulePlan, StepPlan, Type
 
 FOR_EVER = -1
 
@@ -75,8 +75,16 @@ class _FrameCompiler:
             for rule in (*state.first, *state.then)
             if rule.once
         }
+        self.aims = {
+            k: shared.registers.add(f"{frame.member}.aim[{k}]", self._range_of_aim(step.activity))
+            for k, step in enumerate(frame.steps)
+            if has_aim(step.activity) and step.until is None and step.duration is None
+        }
         self.speaker = shared.checked.entities[frame.entity]
         self.later = Deferred(frame, self.speaker, shared.registers, shared.lines)
+
+    def _range_of_aim(self, activity: terms.Activity) -> Type:
+        return Type("int", NOTHING, self.shared.registers.cut(activity.args[0].type).high)
 
     def _names(self) -> list[str]:
         if self.frame.steps:
@@ -124,7 +132,7 @@ class _FrameCompiler:
     ) -> list[int]:
         where = f"{self.frame.member}.{self.frame.frame}.{self.states[k]}"
         return [
-            self._activity(activity, where),
+            self._activity(activity, where, self.aims.get(k)),
             *self._by_class(first, f"{where}.first"),
             *self._by_class(then, f"{where}.then"),
         ]
@@ -144,16 +152,16 @@ class _FrameCompiler:
         to.facts = facts
         return to
 
-    def _activity(self, activity: terms.Activity | None, label: str) -> int:
+    def _activity(self, activity: terms.Activity | None, label: str, aim: int | None) -> int:
         if activity is None or activity.name == "stay":
             return 0
         to = self._expressions(Facts())
-        self._activities(to).emit(activity)
+        self._activities(to, aim).emit(activity)
         return self.shared.code.add(to.block, f"{label}.do")
 
-    def _activities(self, to: Expressions) -> Activities:
+    def _activities(self, to: Expressions, aim: int | None = None) -> Activities:
         shared = self.shared
-        return Activities(to, shared.checked, shared.lines, self.frame.entity, self.clock)
+        return Activities(to, shared.checked, shared.lines, self.frame.entity, self.clock, aim)
 
     def _idle_row(self) -> list[int]:
         return [0] * (1 + 2 * (self.shared.classes.count + 1))
@@ -288,7 +296,7 @@ class _FrameCompiler:
             block.halt()
             return
         elif step.duration is None:
-            self._activities(to).unless_finished(step.activity, running, ended)
+            self._activities(to, self.aims.get(k)).unless_finished(step.activity, running, ended)
         block.bind(ended)
         self._effects(to).emit(step, self.counters[step.name], running, self.speaker)
         block.emit(Op.GOTO, self.number, self._next(k))

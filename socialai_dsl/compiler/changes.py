@@ -30,12 +30,28 @@ class Changes:
         self.entities = checked.entities
         self.occlusion = checked.room.occlusion
         self.written = {path for plan in plans(checked) for path, _ in plan.sets}
+        self.changed = {
+            number
+            for plan in plans(checked)
+            for effect in plan.causes
+            for entity in effect.entities
+            for number in numbers_of(entity)
+        }
         self.written |= {item.path for item in checked.remembered}
         self.written |= {belief.path for belief in checked.beliefs}
         self.written |= {f"{frame.member}.{part}" for frame in checked.frames for part in ("frame", "clock")}
         mobility = Mobility(checked)
         self.vanishing, self.turning, self.walking = mobility.vanishing, mobility.turning, mobility.walking
         self.objects_move = any(checked.entities[number].role == "object" for number in self.walking)
+
+    def touched(self, number: int) -> bool:
+        """Whether something else than its own condition can change the status of an object."""
+        thing = self.entities[number]
+        assert thing.type is not None, "internal: only objects have a status"
+        linked = any(number in (*other.unlocks, *other.opens) for other in self.entities)
+        return bool(
+            thing.type.toggled or thing.type.pushed or thing.timer or linked or number in self.changed
+        )
 
     def of(self, term: Term) -> When:
         """When the value of a term can change."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from socialai_dsl.compiler.assembler import Label, constant
-from socialai_dsl.program import Op
+from socialai_dsl.compiler.registers import entity_register
+from socialai_dsl.program import Field, Op
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.terms import Const
 
@@ -116,6 +117,7 @@ def nearest_thing(to: Expressions, term: terms.Quantified) -> int:
         following = Label()
         mark = block.taken
         to.condition(to.instance(term, item), following)
+        block.test(Op.IF_EQ, entity_register(item.value, Field.GONE), constant(0), following)
         distance = to.into_temporary(Op.DISTANCE, constant(item.value), goal)
         block.test(Op.IF_LT, distance, least, following)
         block.emit(Op.LOAD, least, distance)

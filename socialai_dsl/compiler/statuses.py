@@ -16,8 +16,9 @@ class ComputedStatuses:
     def __init__(self, checked: Checked) -> None:
         changes = Changes(checked)
         whens = [(item, changes.of(item.condition.term)) for item in checked.computed]
-        self.fixed = tuple(item for item, when in whens if when == When.NEVER)
-        self.settled = tuple(item for item, when in whens if when != When.NEVER)
+        for_good = [when == When.NEVER and not changes.touched(item.entity) for item, when in whens]
+        self.fixed = tuple(item for (item, _), fixed in zip(whens, for_good, strict=True) if fixed)
+        self.settled = tuple(item for (item, _), fixed in zip(whens, for_good, strict=True) if not fixed)
         self.settle_always = any(when == When.ANY_TIME for _, when in whens)
 
     def fix(self, to: Expressions) -> None:
