@@ -26,7 +26,7 @@ from socialai_dsl.engine.state import (
     empty_state,
     no_pins,
 )
-from socialai_dsl.program import VIEW, EntityColumn, Flag, Header, LineColumn, Op, TypeColumn
+from socialai_dsl.program import VIEW, EntityColumn, Flag, FrameColumn, Header, LineColumn, Op, TypeColumn
 
 _ROWS_WORTH_A_THREAD: Final = 64
 _PLAIN_CHANNELS: Final = 4
@@ -287,6 +287,10 @@ def _traits(words: NDArray[np.int32]) -> int:
     status = np.arange(rows) - starts[np.searchsorted(starts, np.arange(rows), "right") - 1]
     if (types[:, TypeColumn.PUSHED] != status).any():
         traits |= Trait.PUSHED
+    first, rows = int(words[Header.FRAME_AT]), int(words[Header.FRAMES])
+    frames = words[first : first + rows * FrameColumn.COLUMNS].reshape(rows, FrameColumn.COLUMNS)
+    if frames[:, [FrameColumn.PERCEIVE, FrameColumn.DEFERRED]].any():
+        traits |= Trait.APART
     first, rows = int(words[Header.CODE_AT]), int(words[Header.INSTRUCTIONS])
     if words[Header.EACH_STEP] or (words[first : first + 4 * rows : 4] == Op.REWARD).any():
         traits |= Trait.REWARDS

@@ -42,7 +42,7 @@ def _play(row: Row, link: int) -> None:
     if program[Header.FLAGS] & Flag.AGENT_FRAME:
         frame = program[Header.FRAME_AT]
         heard = inbox_class(row, program[frame + FrameColumn.INBOX])
-        chosen = notice(row, frame, heard)
+        chosen = notice(row, frame, heard, program[Header.FLAGS])
         body = row.registers[Register.LAST_TURN] if chosen else act(row, frame)
         row.registers[Register.ACTION] = body
         move_agent(row, body)
@@ -51,7 +51,7 @@ def _play(row: Row, link: int) -> None:
             compute_statuses(row, go_by_itself(row) or changed)
         else:
             settle(row)
-        conclude(row, frame, heard, chosen)
+        conclude(row, frame, heard, chosen, program[Header.FLAGS])
         line = row.registers[Register.SAID_LINE]
     action = row.action
     action[1] = 0

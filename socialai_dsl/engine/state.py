@@ -80,6 +80,7 @@ class Trait(IntEnum):
     PUSHED = 1 << 21  # some object takes another status when it is pushed
     GESTURES = 1 << 22  # pictures of the batch have channels 5 and 6
     REWARDS = 1 << 23  # there are rewards besides that of an outcome
+    APART = 1 << 24  # some frame has code for what it perceives, or for the rest of a rule of `first`
 
 
 class Book(IntEnum):

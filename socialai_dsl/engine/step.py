@@ -81,7 +81,7 @@ def step_row(row: Row, link: int, book: Any, number: int) -> float:
     chosen = False
     if flags & Flag.AGENT_FRAME:
         heard = inbox_class(row, program[frame + FrameColumn.INBOX])
-        chosen = notice(row, frame, heard)
+        chosen = notice(row, frame, heard, flags)
     move_agent(row, registers[Register.ACTION])
     if flags & (Flag.PICTURE_BEFORE_NPCS | Trait.GOES_BY_ITSELF):
         changed = follow_links(row)
@@ -94,7 +94,7 @@ def step_row(row: Row, link: int, book: Any, number: int) -> float:
         settle(row)
     say_as_agent(row)
     if flags & Flag.AGENT_FRAME:
-        conclude(row, frame, heard, chosen)
+        conclude(row, frame, heard, chosen, flags)
         empty_inbox(row, program[frame + FrameColumn.INBOX])
         registers[Register.SAID_LINE] = 0
 

@@ -154,9 +154,9 @@ def _run_apart(row: Row, pc: int) -> None:
 
 
 @inline
-def notice(row: Row, frame: int, heard: int) -> bool:
+def notice(row: Row, frame: int, heard: int, flags: int) -> bool:
     """What a frame perceives, and does before the body action (`first`); whether it has chosen that action."""
-    if row.program[frame + FrameColumn.PERCEIVE] != 0:
+    if flags & Trait.APART and row.program[frame + FrameColumn.PERCEIVE] != 0:
         _run_apart(row, row.program[frame + FrameColumn.PERCEIVE])
     row.registers[Register.LAST_TURN] = -1
     pc = row.program[_state_table(row, frame) + 1 + heard]
@@ -176,22 +176,22 @@ def act(row: Row, frame: int) -> int:
 
 
 @inline
-def conclude(row: Row, frame: int, heard: int, chosen: bool) -> None:
+def conclude(row: Row, frame: int, heard: int, chosen: bool, flags: int) -> None:
     """The clock ticks, then what is done after the body action: `then`, or the rest of a rule of `first` that acted."""
     row.registers[row.program[frame + FrameColumn.CLOCK]] += 1
-    if chosen:
-        pc = row.program[frame + FrameColumn.DEFERRED]
-    else:
+    if not chosen:
         pc = row.program[_state_table(row, frame) + 2 + row.program[Header.CLASSES] + heard]
-    if pc != 0:
-        run(row, pc)
+        if pc != 0:
+            run(row, pc)
+    elif flags & Trait.APART and row.program[frame + FrameColumn.DEFERRED] != 0:
+        _run_apart(row, row.program[frame + FrameColumn.DEFERRED])
 
 
 @inline
-def _follow(row: Row, frame: int, npc: int) -> None:
+def _follow(row: Row, frame: int, npc: int, flags: int) -> None:
     """One turn of one frame of an NPC; it ends at once if the NPC makes itself vanish before it moves."""
     heard = inbox_class(row, row.program[frame + FrameColumn.INBOX])
-    chosen = notice(row, frame, heard)
+    chosen = notice(row, frame, heard, flags)
     if not is_present(row, npc):
         return
     action = row.registers[Register.LAST_TURN]
@@ -201,16 +201,17 @@ def _follow(row: Row, frame: int, npc: int) -> None:
         move_npc(row, npc, action)
         set_field(row, npc, Field.LAST, action)
     settle(row)
-    conclude(row, frame, heard, chosen)
+    conclude(row, frame, heard, chosen, flags)
 
 
 @inline
 def take_turns(row: Row) -> None:
     """Every NPC takes its turn, in the order of the cast; what it says is heard when its turn ends."""
+    flags = row.program[Header.FLAGS]
     frames = row.program[Header.FRAMES]
     frame = row.program[Header.FRAME_AT]
     number = 0
-    if row.program[Header.FLAGS] & Flag.AGENT_FRAME:
+    if flags & Flag.AGENT_FRAME:
         number = 1
         frame += FrameColumn.COLUMNS
     last = NOTHING
@@ -220,7 +221,7 @@ def take_turns(row: Row) -> None:
             set_field(row, npc, Field.LAST, STILL)
             last = npc
         if is_present(row, npc):
-            _follow(row, frame, npc)
+            _follow(row, frame, npc, flags)
         number += 1
         inbox = row.program[frame + FrameColumn.INBOX]
         frame += FrameColumn.COLUMNS
