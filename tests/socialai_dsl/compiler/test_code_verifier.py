@@ -15,12 +15,15 @@ from socialai_dsl.program import (
     ENTITY_FIELDS,
     FIRST_ENTITY,
     TEMPORARY,
+    Body,
     EntityColumn,
     Field,
+    FrameColumn,
     Header,
     Op,
     Program,
     Register,
+    TypeColumn,
 )
 from socialai_dsl.semantics.terms import Compare, Type
 from tests.socialai_dsl.compiler.workbench import DIE, GUIDE, compiled, number, sited, with_let, workbench
@@ -120,6 +123,19 @@ SOUND: dict[str, tuple[Header, Code]] = {
             (Op.IF_EQ, temp(5), const(3), 0),
         ],
     ),
+    "a cell beside a cell": (
+        RULES,
+        [(Op.CELL_BESIDE, temp(0), cell(6, 6), const(3)), (Op.CELL_BESIDE, temp(1), temp(0), const(0))],
+    ),
+    "a thing on a cell": (RULES, [(Op.PLACE, const(4), cell(3, 3)), (Op.PLACE, const(1), const(CELL - 1))]),
+    "a thing in another": (RULES, [(Op.SET_FIELD, const(4), Field.INSIDE, const(3))]),
+    "the statue points": (RULES, [(Op.POINT, const(2), const(3)), (Op.BODY, const(Body.STOP_POINTING))]),
+    "what lies in another": (
+        RULES,
+        [(Op.FIELD, temp(0), const(4), Field.INSIDE), (Op.IF_NEXT_TO, temp(0), const(0), 0)],
+    ),
+    "a reward": (RULES, [(Op.REWARD, const(-100))]),
+    "an end with a share": (RULES, [(Op.END_GRADED, 0, const(2000))]),
     "acceptance": (REQUIRE, [(Op.LOAD, Register.ACCEPTED, const(1))]),
 }
 
@@ -243,6 +259,25 @@ REFUSED: dict[str, tuple[Header, Code]] = {
         RULES,
         [FILL, (*EACH, 1), (Op.DROP_CELL,), (Op.END_EACH,), (Op.IF_NEXT_TO, temp(2), const(0), 0)],
     ),
+    "the cell beside nothing": (RULES, [(Op.CELL_BESIDE, temp(0), const(7), const(0))]),
+    "the cell beside in no direction": (RULES, [(Op.CELL_BESIDE, temp(0), const(1), const(4))]),
+    "nothing put on a cell": (RULES, [(Op.PLACE, const(7), cell(1, 1))]),
+    "a cell put on a cell": (RULES, [(Op.PLACE, cell(1, 1), cell(1, 1))]),
+    "a thing put beside the canvas": (RULES, [(Op.PLACE, const(1), cell(7, 6))]),
+    "a thing in what does not exist": (RULES, [(Op.SET_FIELD, const(4), Field.INSIDE, const(7))]),
+    "a thing in a cell": (RULES, [(Op.SET_FIELD, const(4), Field.INSIDE, cell(1, 1))]),
+    "a fifth direction to point": (RULES, [(Op.SET_FIELD, const(1), Field.POINTING, const(5))]),
+    "a place set like any field": (RULES, [(Op.SET_FIELD, const(1), Field.X, const(1))]),
+    "presence set like any field": (RULES, [(Op.SET_FIELD, const(1), Field.GONE, const(0))]),
+    "a thing that points": (RULES, [(Op.POINT, const(3), const(0))]),
+    "the agent points": (RULES, [(Op.POINT, const(0), const(0))]),
+    "pointing nowhere": (RULES, [(Op.POINT, const(1), const(4))]),
+    "pointing without a direction": (RULES, [(Op.BODY, const(Body.POINT))]),
+    "a reward beyond all": (RULES, [(Op.REWARD, const(101))]),
+    "a reward that nobody knows": (RULES, [(Op.REWARD, Register.OUTCOME)]),
+    "an end that does not exist": (RULES, [(Op.END_GRADED, 1, const(5))]),
+    "an end with a share that nobody knows": (RULES, [(Op.END_GRADED, 0, temp(9))]),
+    "who said it where nobody notes it": (RULES, [(Op.HEARD_FROM, temp(0), "inbox", 0)]),
     "acceptance by a rule": (RULES, [(Op.LOAD, Register.ACCEPTED, const(1))]),
     "acceptance by the reset": (RESET, [(Op.LOAD, Register.ACCEPTED, const(1))]),
     "a number written while a room is judged": (REQUIRE, [(Op.LOAD, "n", const(1))]),
@@ -281,6 +316,13 @@ def test_unsound_code_is_refused(name: str, program: Program) -> None:
         verify(with_code(program, entry, filled_in(program, code)))
 
 
+def type_row(program: Program, number: int) -> int:
+    """Where the first row of an entity's type is."""
+    h = program.header
+    row = int(program.words[h(Header.ENTITY_AT) + EntityColumn.COLUMNS * number + EntityColumn.TYPE])
+    return h(Header.TYPE_AT) + TypeColumn.COLUMNS * row
+
+
 TABLES: dict[str, Callable[[Program], tuple[int, int]]] = {
     "an NPC with a status code beyond the picture": lambda p: (
         p.header(Header.ENTITY_AT) + EntityColumn.COLUMNS * GUIDE + EntityColumn.KIND,
@@ -290,6 +332,24 @@ TABLES: dict[str, Callable[[Program], tuple[int, int]]] = {
     "code for links outside of the table": lambda p: (Header.LINKS_PC, 5000),
     "code before steps outside of the table": lambda p: (Header.BEFORE_PC, -1),
     "code for required rooms outside of the table": lambda p: (Header.REQUIRE_PC, 5000),
+    "code for timers outside of the table": lambda p: (Header.TICK_PC, 5000),
+    "code for beliefs outside of the table": lambda p: (
+        p.header(Header.FRAME_AT) + FrameColumn.PERCEIVE,
+        5000,
+    ),
+    "code after the body action outside of the table": lambda p: (
+        p.header(Header.FRAME_AT) + FrameColumn.DEFERRED,
+        -1,
+    ),
+    "a push by what is neither body nor ball": lambda p: (
+        p.header(Header.ENTITY_AT) + EntityColumn.COLUMNS * 4 + EntityColumn.PUSHED_BY,
+        2,
+    ),
+    "a push to no status": lambda p: (type_row(p, 3) + TypeColumn.PUSHED, 3),
+    "a stop in no status": lambda p: (type_row(p, 3) + TypeColumn.ROLLS, 4),
+    "five channels": lambda p: (Header.CHANNELS, 5),
+    "more lost than there is": lambda p: (Header.SLOPE, 1001),
+    "a set of classes that is cut off": lambda p: (Header.CLASS_SETS, 30_000),
 }
 
 

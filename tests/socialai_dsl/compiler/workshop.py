@@ -1,8 +1,8 @@
 """A resolved scenario full of things that can be used, for tests of what they do to each other.
 
 The room is 9 by 7. The agent stands at (1, 3) and looks right; guide, who plays a frame, at (7, 5) looks up. Two shut
-chests at (2, 3) and (4, 3), an apple at (6, 1), two levers in the wall at (1, 0) and (3, 0), a still marble at (5, 5), an
-idle generator at (1, 5) and a closed remote door in the wall at (8, 3).
+chests at (2, 3) and (4, 3), an apple at (6, 1), two levers in the wall at (1, 0) and (3, 0), a marble at (5, 5),
+a generator at (1, 5) and a closed remote door in the wall at (8, 3).
 """
 
 from __future__ import annotations

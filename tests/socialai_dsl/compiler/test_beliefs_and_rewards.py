@@ -1,0 +1,179 @@
+"""What members take for true, and what is earned."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from socialai_dsl.program import FrameColumn, Header, Op
+from socialai_dsl.semantics.terms import (
+    CELL,
+    DIRECTION,
+    BeliefPlan,
+    CellBeside,
+    CellOf,
+    Checked,
+    Compare,
+    Const,
+    Drawn,
+    FieldOf,
+    OutcomePlan,
+    Quantified,
+    Read,
+    RulePlan,
+    Sees,
+    Type,
+    World,
+)
+from tests.socialai_dsl.compiler.workbench import (
+    AGENT,
+    BOX,
+    DOOR,
+    GUIDE,
+    SPAN,
+    cell,
+    code,
+    compiled,
+    entity,
+    number,
+    sited,
+    start,
+    step,
+    with_let,
+    workbench,
+    worth,
+    x_of,
+    y_of,
+)
+
+NOW = World(Type("int", 0, 20), "t")
+COLUMN = Type("int", -1, 6)
+
+
+# --- beliefs ---
+
+
+def believing(when: Any, value: Any, type_: Type = COLUMN) -> Checked:
+    checked = workbench()
+    drawn = Drawn("guide.believes.it", type_, sited(value, "guide.believes.it"))
+    belief = BeliefPlan("guide", "guide.believes.it", sited(value), None if when is None else sited(when))
+    return replace(checked, setup=(*checked.setup, drawn), beliefs=(belief,))
+
+
+def belief(env: Any) -> Any:
+    return env.describe()["let"]["guide.believes.it"]
+
+
+def test_a_belief_follows_what_is_seen() -> None:
+    """Guide looks left from (4, 3): it sees where the agent is while that is in front of it."""
+    seen = Sees(entity(GUIDE), entity(AGENT))
+    env = start(
+        believing(seen, FieldOf(COLUMN, entity(AGENT), "x")), {"agent": {"at": [3, 4], "facing": "right"}}
+    )
+    assert belief(env) == 3
+    for _ in range(3):
+        step(env, "forward")
+    # It stands behind the guide now, who takes it to be where it was seen last.
+    assert env.describe()["agent"]["at"] == [5, 4]
+    assert belief(env) == 4
+
+
+def test_a_belief_without_a_condition_always_follows() -> None:
+    env = start(
+        believing(None, FieldOf(COLUMN, entity(AGENT), "x")), {"agent": {"at": [3, 4], "facing": "right"}}
+    )
+    step(env, "forward")
+    assert belief(env) == 4
+
+
+def test_a_belief_that_finds_nothing_stays() -> None:
+    things = Type("entity", DOOR, BOX)
+    late = Compare("<", number(1), NOW)
+    which = Quantified(things, "first", "v", (Const(things, DOOR), Const(things, BOX)), late)
+    checked = believing(None, which, things)
+    start_value = Drawn("guide.believes.it", things, sited(Const(things, BOX), "guide.believes.it"))
+    env = start(replace(checked, setup=(*checked.setup[:-1], start_value)))
+    step(env)
+    assert belief(env) == "box"
+    step(env)
+    assert belief(env) == "door"
+
+
+def test_only_who_believes_perceives() -> None:
+    def perceive(checked: Checked) -> int:
+        program = compiled(checked)
+        return int(program.words[program.header(Header.FRAME_AT) + FrameColumn.PERCEIVE])
+
+    assert perceive(workbench()) == 0
+    assert perceive(believing(None, number(1))) > 0
+    assert "LOAD" in code(compiled(believing(None, number(1))), "guide.believes")
+
+
+# --- cells beside ---
+
+
+@pytest.mark.parametrize(("way", "x", "y"), [(0, 4, 3), (1, 3, 4), (2, 2, 3), (3, 3, 2)])
+def test_the_cell_beside_a_thing(way: int, x: int, y: int) -> None:
+    beside = CellBeside(CELL, entity(BOX), Const(DIRECTION, way))
+    assert (worth(x_of(beside)), worth(y_of(beside))) == (x, y)
+
+
+def test_the_cell_beside_a_cell() -> None:
+    beside = CellBeside(CELL, CellBeside(CELL, cell(2, 2), Const(DIRECTION, 0)), Const(DIRECTION, 1))
+    assert worth(Compare("==", beside, cell(3, 3)))
+
+
+def test_beside_the_edge_there_is_no_cell() -> None:
+    beside = CellBeside(CELL, cell(6, 2), Const(DIRECTION, 0))
+    assert worth(Compare("==", beside, CellOf(CELL, entity(BOX)))) is False
+    assert worth(beside) == CELL.low - 1
+
+
+# --- rewards ---
+
+
+def earned(checked: Checked, steps: int = 1) -> list[float]:
+    env = start(checked)
+    return [float(env.step(_still(env))[1]) for _ in range(steps)]
+
+
+def _still(env: Any) -> Any:
+    return np.array([len(env.program.actions), 0, 0, 0])
+
+
+def ending(graded: Any, success: bool = True) -> Checked:
+    over = sited(Compare("<=", number(2), NOW))
+    plan = OutcomePlan("end", success, 100, over, None if graded is None else sited(graded))
+    return replace(workbench(), outcomes=(plan,), slope=0)
+
+
+@pytest.mark.parametrize(("per_cent", "share"), [(50, 0.5), (130, 1.0), (-3, 0.0)])
+def test_a_graded_outcome_is_computed_at_the_end(per_cent: int, share: float) -> None:
+    checked = with_let(
+        ending(Read(Type("int", -9, 200), "let.grade")), "let.grade", number(per_cent), Type("int", -9, 200)
+    )
+    assert earned(checked, 2) == [0.0, pytest.approx(share)]
+
+
+def test_a_graded_failure_earns_nothing() -> None:
+    assert earned(ending(number(50), success=False), 2) == [0.0, 0.0]
+    assert Op.END_GRADED not in {row[0] for row in compiled(ending(number(50), success=False)).code.tolist()}
+
+
+def test_the_slope_of_the_reward() -> None:
+    full = ending(None)
+    assert earned(replace(full, slope=500), 2) == [0.0, pytest.approx(1 - 0.5 * 2 / 20)]
+
+
+def test_every_step_and_rules_add_to_the_reward() -> None:
+    bonus = RulePlan("bonus", "rules[0]", SPAN, when=sited(Compare("==", NOW, number(2))), reward=-25)
+    checked = replace(workbench(), each_step=-10_000, rules=(bonus,))
+    assert earned(checked, 3) == [pytest.approx(-0.01), pytest.approx(-0.26), pytest.approx(-0.01)]
+
+
+@pytest.mark.parametrize("channels", [4, 6])
+def test_channels(channels: int) -> None:
+    assert compiled(replace(workbench(), channels=channels)).header(Header.CHANNELS) == channels
