@@ -12,7 +12,14 @@ from socialai_dsl.program import Program, RegisterName
 _ELEMENT: Final = re.compile(r"(let|memory)\.(\w+)\[(\d+)\]\.(move|utterance)")
 _FILLED: Final = re.compile(r"memory\.(\w+)\.filled")
 _FLEETING: Final = re.compile(r"prev\..*|memory\.\w+\.open")
-_OF_ENTITY: Final = {"name": "name", "clock": "clock", "frame": "state", "initial": "initial"}
+_BELIEF: Final = re.compile(r"(.+)\.believes\.(\w+)")
+_OF_ENTITY: Final = {
+    "name": "name",
+    "clock": "clock",
+    "frame": "state",
+    "initial": "initial",
+    "timer": "timer",
+}
 
 
 @dataclass
@@ -39,6 +46,7 @@ class Addresses:
 
     Attributes:
         sequences: those of `let`. memories: by name, with `filled`, the number of elements each holds.
+        world: those of `state`, by name. beliefs: cast member -> key -> register.
         one_of: cast member -> which file it is. owned: (entity, key) -> register, e.g. ("wizard", "state").
         plain: all others by their key under `let`; what is worked out anew at the start of a step is left out.
     """
@@ -49,6 +57,8 @@ class Addresses:
         self.filled: dict[str, RegisterName] = {}
         self.one_of: dict[str, RegisterName] = {}
         self.owned: dict[tuple[str, str], RegisterName] = {}
+        self.world: dict[str, RegisterName] = {}
+        self.beliefs: dict[str, dict[str, RegisterName]] = {}
         self.plain: dict[str, RegisterName] = {}
         entities = {str(entity) for entity in program.entities}
         for name in program.registers:
@@ -62,6 +72,10 @@ class Addresses:
             (acts.moves if part == "move" else acts.utterances)[int(index)] = name
         elif filled := _FILLED.fullmatch(name.path):
             self.filled[filled.group(1)] = name
+        elif name.path.startswith("state."):
+            self.world[name.path.removeprefix("state.")] = name
+        elif belief := _BELIEF.fullmatch(name.path):
+            self.beliefs.setdefault(belief.group(1), {})[belief.group(2)] = name
         elif rest == "one_of":
             self.one_of[owner] = name
         elif owner in entities and rest in _OF_ENTITY:

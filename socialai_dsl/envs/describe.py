@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.envs.addresses import Acts, Addresses, addresses_of
-from socialai_dsl.envs.values import shown, utterance_text
+from socialai_dsl.envs.values import TURN_WORDS, entry_words, shown, utterance_text
 from socialai_dsl.program import (
     BODY_WORDS,
     COLORS,
     DIRECTIONS,
     ENTITY_FIELDS,
     FIRST_ENTITY,
+    Body,
     Field,
     FrameColumn,
     Header,
@@ -29,9 +30,10 @@ Row = NDArray[np.int16]
 def describe(program: Program, registers: Row) -> dict[str, Any]:
     """Everything that decides how the episode goes on, from the registers, int16 (R,), of one environment.
 
-    Keys: `t`, `room`, one for each cast member and object, `one_of` (which file was drawn), `let`, `memory` (what it
-    holds, oldest first), `last` (what the agent did in the last step), `heard` (lines since the reset), and `pending`:
-    for NPCs, what was said near them since their last turn, as utterance classes.
+    Keys: `t`, `room`, one for each cast member and object, `one_of` (which file was drawn), `let`, `state` (registers
+    of the world), `memory` (what it holds, oldest first), `last` (what the agent did in the last step), `heard` (lines
+    since the reset), and `pending`: for NPCs, what was said near them since their last turn, as utterance classes, or
+    as [class, speaker, noun] where rules ask who spoke.
     """
     addresses = addresses_of(program)
     state: dict[str, Any] = {
@@ -40,10 +42,12 @@ def describe(program: Program, registers: Row) -> dict[str, Any]:
     }
     for number, entity in enumerate(program.entities):
         described = _entity(program, registers, number)
-        for key in ("name", "state", "clock", "initial"):
+        for key in ("name", "state", "clock", "initial", "timer"):
             owned = addresses.owned.get((str(entity), key))
             if owned is not None:
                 described[key] = _value(program, registers, owned)
+        if beliefs := addresses.beliefs.get(str(entity)):
+            described["believes"] = {key: _value(program, registers, name) for key, name in beliefs.items()}
         if entity.index is None:
             state[entity.key] = described
         else:
@@ -53,6 +57,8 @@ def describe(program: Program, registers: Row) -> dict[str, Any]:
     state["let"] = {key: _value(program, registers, name) for key, name in addresses.plain.items()}
     for key, acts in addresses.sequences.items():
         state["let"][key] = [_act(program, registers, acts, k) for k in range(acts.length)]
+    if addresses.world:
+        state["state"] = {key: _value(program, registers, name) for key, name in addresses.world.items()}
     if addresses.memories:
         state["memory"] = _memories(program, registers, addresses)
     if state["t"]:
@@ -80,10 +86,16 @@ def _entity(program: Program, registers: Row, number: int) -> dict[str, Any]:
         described["gone"] = True
     if entity.role == "object":
         described["state"] = entity.states[field[Field.STATUS]]
-    else:
+    if entity.role != "object" or field[Field.DIR]:
         described["facing"] = DIRECTIONS[field[Field.DIR]]
     if entity.role == "npc":
         described["poked"] = bool(field[Field.POKED])
+        if field[Field.LAST] != Body.NONE:
+            described["last"] = TURN_WORDS[field[Field.LAST]]
+        if field[Field.POINTING]:
+            described["pointing"] = DIRECTIONS[field[Field.POINTING] - 1]
+    if field[Field.INSIDE]:
+        described["inside"] = str(program.entities[field[Field.INSIDE]])
     return described
 
 
@@ -114,13 +126,20 @@ def _last(program: Program, registers: Row) -> dict[str, Any]:
     }
 
 
-def _pending(program: Program, registers: Row) -> dict[str, list[int]]:
+def _pending(program: Program, registers: Row) -> dict[str, list[Any]]:
     start, rows = program.header(Header.FRAME_AT), program.header(Header.FRAMES)
     table = program.words[start : start + rows * FrameColumn.COLUMNS].reshape(rows, FrameColumn.COLUMNS)
-    pending = {}
+    words = entry_words(program)
+    pending: dict[str, list[Any]] = {}
     for row in table.tolist():
         inbox = row[FrameColumn.INBOX]
         if count := int(registers[inbox]):
-            heard = registers[inbox + 1 : inbox + 1 + count]
-            pending[str(program.entities[row[FrameColumn.ENTITY]])] = [int(number) for number in heard]
+            heard = registers[inbox + 1 : inbox + 1 + words * count].reshape(count, words).tolist()
+            entries = [entry[0] if words == 1 else _heard_entry(program, *entry) for entry in heard]
+            pending[str(program.entities[row[FrameColumn.ENTITY]])] = entries
     return pending
+
+
+def _heard_entry(program: Program, number: int, speaker: int, noun: int) -> list[Any]:
+    """An utterance in an inbox: its class, who said it, and the noun that was heard in it."""
+    return [number, str(program.entities[speaker]), program.nouns[noun] if noun >= 0 else None]

@@ -8,18 +8,26 @@ from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
+from socialai_dsl.checking import LoadedSuite
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.envs.scenario_env import ScenarioEnv
+from socialai_dsl.envs.starts import check_starts
 from socialai_dsl.envs.vector_env import ScenarioVectorEnv
 from socialai_dsl.frontend import load
-from socialai_dsl.program_suite import Playable
+from socialai_dsl.program_suite import Playable, ProgramSuite
 
 Scenario = str | Path | Playable
 
 
 def playable_of(scenario: Scenario) -> Playable:
     """The program of a scenario, or the programs of a suite, given by name or path, or itself."""
-    return scenario if isinstance(scenario, Playable) else compile_loaded(load(scenario))
+    if isinstance(scenario, Playable):
+        return scenario
+    loaded = load(scenario)
+    playable = compile_loaded(loaded)
+    if isinstance(loaded, LoadedSuite) and isinstance(playable, ProgramSuite):
+        check_starts(loaded, playable)
+    return playable
 
 
 def make(scenario: Scenario, render_mode: str | None = None) -> ScenarioEnv:

@@ -10,7 +10,17 @@ from numpy.typing import NDArray
 
 from socialai_dsl.engine.state import PIN_NONE
 from socialai_dsl.envs.addresses import Acts, addresses_of
-from socialai_dsl.envs.values import cell_pair, meant, read, utterance_number, whole_number, word
+from socialai_dsl.envs.sharing import may_lie_over
+from socialai_dsl.envs.values import (
+    TURN_WORDS,
+    cell_pair,
+    entry_words,
+    meant,
+    read,
+    utterance_number,
+    whole_number,
+    word,
+)
 from socialai_dsl.program import (
     BODY_WORDS,
     COLORS,
@@ -30,11 +40,23 @@ _WORDS: dict[str, tuple[Field, Sequence[str]]] = {
     "color": (Field.COLOR, COLORS),
 }
 _KEYS = {
-    "agent": ("at", "clock", "color", "facing", "gone", "name", "state"),
-    "npc": ("at", "clock", "color", "facing", "gone", "name", "poked", "state"),
-    "object": ("at", "color", "gone", "initial", "state"),
+    "agent": ("at", "believes", "clock", "color", "facing", "gone", "name", "state"),
+    "npc": (
+        "at",
+        "believes",
+        "clock",
+        "color",
+        "facing",
+        "gone",
+        "last",
+        "name",
+        "pointing",
+        "poked",
+        "state",
+    ),
+    "object": ("at", "color", "facing", "gone", "initial", "inside", "state", "timer"),
 }
-_OTHER_KEYS = ("t", "room", "one_of", "let", "memory", "last", "heard", "pending")
+_OTHER_KEYS = ("t", "room", "one_of", "let", "state", "memory", "last", "heard", "pending")
 
 
 def pinned_member(given: Any, members: Sequence[str]) -> int:
@@ -63,7 +85,7 @@ class _Layout:
         self.program = program
         self.row = np.full(program.header(Header.REGISTERS), PIN_NONE, np.int16)
         self.addresses = addresses_of(program)
-        self.others = ("member", *_OTHER_KEYS) if in_suite else _OTHER_KEYS
+        self.others = ("member", "spoiled", *_OTHER_KEYS) if in_suite else _OTHER_KEYS
         self.groups: dict[str, list[int]] = {}
         for number, entity in enumerate(program.entities):
             self.groups.setdefault(entity.key, []).append(number)
@@ -80,6 +102,7 @@ class _Layout:
             self._group(key, numbers, layout.get(key))
         self._one_of(layout.get("one_of"))
         self._let(layout.get("let"))
+        self._world(layout.get("state"))
         self._memory(layout.get("memory"))
         self._last(layout.get("last"))
         self._heard(layout.get("heard"))
@@ -133,16 +156,41 @@ class _Layout:
             self._start_with(key, given)
         elif given.get("state") is not None:
             self._owned(key, "state", given["state"])
-        for name in ("name", "clock", "initial"):
+        for name in ("name", "clock", "initial", "timer"):
             if given.get(name) is not None:
                 self._owned(key, name, given[name])
-        if given.get("poked"):
-            self._set(number, Field.POKED, 1)
-        if given.get("gone"):
+        self._gestures(key, number, given)
+        self._believes(key, given.get("believes"))
+        inside = given.get("inside")
+        if inside is not None:
+            entities = [str(entity) for entity in self.program.entities]
+            self._set(number, Field.INSIDE, word(f"{key}.inside", inside, entities))
+        if given.get("gone") or (inside is not None and given.get("at") is None):
             for field, value in ((Field.X, -1), (Field.Y, -1), (Field.GONE, 1)):
                 self._set(number, field, value)
         elif given.get("at") is not None:
             self._at(key, number, given["at"])
+
+    def _gestures(self, key: str, number: int, given: Mapping[str, Any]) -> None:
+        """What an NPC did last, where it points, and whether it was poked."""
+        if given.get("poked"):
+            self._set(number, Field.POKED, 1)
+        if given.get("last") is not None:
+            self._set(number, Field.LAST, word(f"{key}.last", given["last"], TURN_WORDS))
+        if given.get("pointing") is not None:
+            self._set(number, Field.POINTING, 1 + word(f"{key}.pointing", given["pointing"], DIRECTIONS))
+
+    def _believes(self, owner: str, given: Any) -> None:
+        """What a member of the cast takes for true."""
+        if not given:
+            return
+        self._mapping(f"{owner}.believes", given)
+        known = self.addresses.beliefs.get(owner, {})
+        for key, value in given.items():
+            if key not in known:
+                raise ValueError(f"{owner}.believes: there is no {key!r}{meant(key, known)}")
+            if value is not None:
+                self._pin(known[key], value, f"{owner}.believes.{key}")
 
     def _set(self, number: int, field: Field, value: int) -> None:
         self.row[FIRST_ENTITY + ENTITY_FIELDS * number + field] = value
@@ -178,7 +226,8 @@ class _Layout:
             if other == number or (self.row[base], self.row[base + 1]) != (x, y):
                 continue
             both_may = {0} & {number, other} and not own_sort and self._npcs_are_hidden()
-            if (self.program.entities[other].role == "object") == own_sort and not both_may:
+            over = own_sort and {number, other} & may_lie_over(self.program)
+            if (self.program.entities[other].role == "object") == own_sort and not both_may and not over:
                 return other
         return None
 
@@ -226,6 +275,17 @@ class _Layout:
                     if act is not None:
                         self._act(acts, k, act, f"let.{key}[{k}]")
 
+    def _world(self, given: Any) -> None:
+        """The registers of the scenario's `state`."""
+        if not given:
+            return
+        self._mapping("state", given)
+        for key, value in given.items():
+            if key not in self.addresses.world:
+                raise ValueError(f"state: there is no {key!r}{meant(key, self.addresses.world)}")
+            if value is not None:
+                self._pin(self.addresses.world[key], value, f"state.{key}")
+
     def _memory(self, given: Any) -> None:
         """What memories hold, oldest first; the latest act has the last place."""
         if not given:
@@ -262,6 +322,7 @@ class _Layout:
         _only("last", given, ("action", "said", "poked"))
         if given.get("action") is not None:
             self.row[Register.ACTION] = word("last.action", given["action"], BODY_WORDS)
+            self._set(0, Field.LAST, int(self.row[Register.ACTION]))
         if given.get("said") is not None:
             self._said(utterance_number(self.program, given["said"], "last.said"))
         if given.get("poked") is not None:
@@ -310,9 +371,25 @@ class _Layout:
             if not isinstance(classes, Sequence) or isinstance(classes, str) or len(classes) > size:
                 raise ValueError(f"pending.{key}: got {classes!r}; expected a list of at most {size}")
             self.row[inboxes[key]] = len(classes)
-            for i, number in enumerate(classes):
-                highest = self.program.header(Header.CLASSES) - 1
-                self.row[inboxes[key] + 1 + i] = whole_number(f"pending.{key}[{i}]", number, 1, highest)
+            words = entry_words(self.program)
+            for i, entry in enumerate(classes):
+                first = inboxes[key] + 1 + words * i
+                self.row[first : first + words] = self._entry(f"pending.{key}[{i}]", entry, words)
+
+    def _entry(self, key: str, given: Any, words: int) -> list[int]:
+        """An utterance in an inbox: its class, or [class, speaker, noun]."""
+        highest = self.program.header(Header.CLASSES) - 1
+        if words == 1:
+            return [whole_number(key, given, 1, highest)]
+        if not isinstance(given, Sequence) or isinstance(given, str) or len(given) != words:
+            raise ValueError(f"{key}: got {given!r}; expected [class, speaker, noun]")
+        number, speaker, noun = given
+        entities = [str(entity) for entity in self.program.entities]
+        return [
+            whole_number(f"{key}[0]", number, 1, highest),
+            word(f"{key}[1]", speaker, entities),
+            -1 if noun is None else word(f"{key}[2]", noun, self.program.nouns),
+        ]
 
 
 def _only(key: str, given: Mapping[str, Any], allowed: Sequence[str]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces
 
 from socialai_dsl.engine.batch import Part
-from socialai_dsl.program import BODY_WORDS, VIEW, Body, EntityColumn, Header, Program, TypeColumn
+from socialai_dsl.program import BODY_WORDS, NO_GESTURE, VIEW, Body, EntityColumn, Header, Program, TypeColumn
 from socialai_dsl.program_suite import Playable, ProgramSuite, mixture, prefixed
 
 
@@ -24,7 +24,7 @@ class Merged:
         outcomes: every way an episode can end: its name and whether it is a success.
         length: tokens in a history, L.
         parts: the programs as the engine takes them.
-        highest: greatest value of each channel of the picture.
+        highest: greatest value of each channel of the picture, which has six if one of the programs shows six.
     """
 
     playable: Playable
@@ -34,7 +34,7 @@ class Merged:
     outcomes: tuple[tuple[str, bool], ...]
     length: int
     parts: tuple[Part, ...]
-    highest: tuple[int, int, int, int]
+    highest: tuple[int, ...]
 
     @classmethod
     def of(cls, playables: Sequence[Playable]) -> Merged:
@@ -44,9 +44,9 @@ class Merged:
         outcomes = tuple((outcome.name, outcome.success) for outcome in playable.outcome_table)
         parts = _parts(suite, [name for name, _ in outcomes], playable)
         length = max(program.header(Header.TOKENS) for program in suite.programs)
-        kinds, colors, statuses, orientations = np.max(
-            [_highest_codes(program) for program in suite.programs], axis=0
-        ).tolist()
+        highest = np.max([_highest_codes(program) for program in suite.programs], axis=0).tolist()
+        if any(program.header(Header.CHANNELS) > len(highest) for program in suite.programs):
+            highest += [NO_GESTURE, NO_GESTURE]
         return cls(
             playable,
             suite.programs,
@@ -55,7 +55,7 @@ class Merged:
             outcomes,
             length,
             parts,
-            (kinds, colors, statuses, orientations),
+            tuple(highest),
         )
 
     @property
@@ -69,8 +69,8 @@ class Merged:
         return spaces.MultiDiscrete([len(words.actions) + 1, 2, len(words.templates), len(words.nouns)])
 
     def observation_space(self) -> spaces.Dict:
-        """Image uint8 (7, 7, 4) and tokens int16 (L,), both with true bounds."""
-        high = np.broadcast_to(np.array(self.highest, np.uint8), (VIEW, VIEW, 4)).copy()
+        """Image uint8 (7, 7, 4 or 6) and tokens int16 (L,), both with true bounds."""
+        high = np.broadcast_to(np.array(self.highest, np.uint8), (VIEW, VIEW, len(self.highest))).copy()
         return spaces.Dict(
             {
                 "image": spaces.Box(np.zeros_like(high), high, dtype=np.uint8),
@@ -100,6 +100,7 @@ def _parts(suite: ProgramSuite, outcomes: Sequence[str], playable: Playable) -> 
             nouns=list(nouns),
             tokens=[token[word] for word in program.vocabulary],
             name=program.name,
+            successes=[outcome.success for outcome in program.outcome_table],
         )
         for member, program, templates, nouns in zip(
             suite.members, suite.programs, suite.template_maps, suite.noun_maps, strict=True

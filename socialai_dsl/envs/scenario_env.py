@@ -27,10 +27,10 @@ _HEARD = int(Register.HEARD)  # members of an enumeration are slow indices
 class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
     """One environment.
 
-    Observation: `image` uint8 (7, 7, 4), `tokens` int16 (L,). Action: int64 (4,): body action (the last is no
-    movement), speak or not, template, noun; the last two are ignored in silence. Info: `utterance` (what is heard
-    now, one line for each speaker, "NA" in silence), `history` (all lines since the reset), of a suite `member` (which
-    scenario this episode plays), and at the end `success` and `outcome`.
+    Observation: `image` uint8 (7, 7, 4), or (7, 7, 6) if gestures are shown, `tokens` int16 (L,). Action: int64 (4,):
+    body action (the last is no movement), speak or not, template, noun; the last two are ignored in silence. Info:
+    `utterance` (what is heard now, one line for each speaker, "NA" in silence), `history` (all lines since the reset),
+    of a suite `member` (which scenario is played), and at the end `success` and `outcome`.
 
     Args:
         program: what `socialai_dsl.compile` returns, for a scenario or a suite.
@@ -54,6 +54,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._registers = self._table.state.registers[0]
         self._action = self._table.batch.ports.actions[0]
         self._reward = self._table.batch.ports.reward
+        self._spoiled = self._table.batch.ports.spoiled
         self._history = ""
         self._ended = True
         self._playing = self._table.program(0)
@@ -73,7 +74,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._history = "\n".join(self._table.history(0))
         if self.render_mode == "human":
             self.render()
-        self._begin()
+        self._look_up()
         return self._observation(), {"utterance": SILENCE, "history": self._history, **self._always}
 
     def step(
@@ -86,11 +87,12 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         if given.shape != (4,) or given.dtype.kind not in "iu":
             raise self._refusal(action)
         self._action[:] = given
-        ended = self._table.batch.step(Task.STEP_ONLY)
+        ended = self._table.play(Task.STEP_ONLY)
         if ended == BAD_ACTION:
             raise self._refusal(action)
         info: dict[str, Any] = {"utterance": SILENCE, "history": self._history}
         if self._suite:
+            self._look_up()  # an act may have followed another
             info |= self._always
         if self._registers.item(_HEARD):
             self._history = "\n".join(self._table.history(0))
@@ -102,14 +104,14 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
             terminated = not truncated
             outcome = self._registers.item(Register.OUTCOME)
             info |= {
-                "success": self._playing.outcome_table[outcome].success,
+                "success": self._playing.outcome_table[outcome].success and not self._spoiled.item(0),
                 "outcome": self._playing.outcomes[outcome],
             }
         if self.render_mode == "human":
             self.render()
         return self._observation(), self._reward.item(), terminated, truncated, info
 
-    def _begin(self) -> None:
+    def _look_up(self) -> None:
         """Look up which program this episode plays."""
         self._playing = self._table.program(0)
         self._always = {"member": self._table.member(0)} if self._suite else {}
@@ -141,7 +143,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
     def restore(self, data: bytes) -> None:
         """Put back a snapshot of this scenario. Raises ValueError for any other."""
         self._table.restore(data)
-        self._begin()
+        self._look_up()
         self._ended = bool(self._registers[Register.ENDED])
         self._history = "\n".join(self._table.history(0))
 

@@ -14,13 +14,14 @@ from socialai_dsl.engine.kernel import BAD_ACTION, Task
 from socialai_dsl.engine.state import PIN_NONE, Key
 from socialai_dsl.envs import snapshot
 from socialai_dsl.envs.audit import first_unsound
+from socialai_dsl.envs.channels import Channels
 from socialai_dsl.envs.describe import describe
 from socialai_dsl.envs.layout import pinned_member, pins_of
 from socialai_dsl.envs.merge import Merged
 from socialai_dsl.envs.seats import check_options, choose_episodes
+from socialai_dsl.envs.starts import Starts
 from socialai_dsl.program import (
     FIRST_ENTITY,
-    VIEW,
     Field,
     Flag,
     Header,
@@ -45,7 +46,7 @@ class Table:
     """Rows of environments: row i plays `playables[i modulo their number]`, of a suite one member each episode.
 
     Attributes:
-        image: uint8 (E, 7, 7, 4), tokens: int16 (E, L): the engine's own buffers.
+        image: uint8 (E, 7, 7, 4 or 6), tokens: int16 (E, L): buffers that every call writes to.
     """
 
     def __init__(self, playables: Sequence[Playable], rows: int, threads: int) -> None:
@@ -54,17 +55,28 @@ class Table:
         self.programs = self.merged.programs
         number = {id(playable): i for i, playable in enumerate(different)}
         self.pool_of = np.array([number[id(playables[row % len(playables)])] for row in range(rows)])
+        self._plays_acts = [isinstance(p, ProgramSuite) and p.in_sequence for p in different]
         self.batch = Batch(
-            self.merged.parts, self.merged.pools, self.pool_of.tolist(), self.merged.length, threads
+            self.merged.parts,
+            self.merged.pools,
+            self.pool_of.tolist(),
+            self.merged.length,
+            threads,
+            [number for number, in_acts in enumerate(self._plays_acts) if in_acts],
         )
         self.state, self.rows = self.batch.state, rows
-        self.image = self.state.image.view(np.uint8).reshape(rows, VIEW, VIEW, 4)
+        self._channels = Channels(self.state.image, self.state.extra)
+        self.image = self._channels.values
         self.tokens = self.state.tokens
         self.fresh = True
         self._number_at = {offset: i for i, offset in enumerate(self.batch.offsets)}
         self._texts = [_numbers_of_texts(program.lines) for program in self.programs]
         # Of each pool: what the suite calls its members; None if it is a scenario that plays alone.
         self._called = [p.members if isinstance(p, ProgramSuite) else None for p in different]
+        self._starts = Starts(different, self.programs, self.state.registers.shape[1])
+        for pool, playable in enumerate(different):
+            if isinstance(playable, ProgramSuite) and playable.weights and not playable.in_sequence:
+                self.batch.set_weights(pool, playable.weights)
 
     # --- playing ---
 
@@ -82,6 +94,11 @@ class Table:
         ports.chosen[:] = chosen
         ports.layout[:] = rows
         self.batch.reset(pins)
+        layout = given.get("layout")
+        for row in np.flatnonzero(chosen & (rows != 0)).tolist():
+            self.state.keys[row, Key.SPOILED] = self._is_spoiled(layout, row)
+        self._begin(chosen & (rows == 0))
+        self._channels.refresh()
 
     def step(self, task: Task, actions: Any) -> int:
         """Step all rows, int64 (E, 4); how many episodes ended. Raises ValueError for a bad action."""
@@ -93,7 +110,7 @@ class Table:
                 f"step: got actions of shape {given.shape} and type {given.dtype}; expected integers ({self.rows}, 4)"
             )
         self.batch.ports.actions[:] = given
-        ended = self.batch.step(task)
+        ended = self.play(task)
         if ended == BAD_ACTION:
             space = self.merged.action_space()
             row = next(i for i, action in enumerate(given) if not space.contains(action.astype(space.dtype)))
@@ -101,6 +118,26 @@ class Table:
                 f"step: got the action {given[row].tolist()} in row {row}; expected one of {space}"
             )
         return ended
+
+    def play(self, task: Task) -> int:
+        """Step all rows with the actions in the ports; how many episodes ended, or BAD_ACTION and nothing happened."""
+        if self._starts:
+            episodes = self.state.keys[:, Key.EPISODE].copy()
+            ended = self.batch.step(task)
+            self._begin(self.state.keys[:, Key.EPISODE] != episodes)
+        else:
+            ended = self.batch.step(task)
+        self._channels.refresh()
+        return ended
+
+    def _begin(self, fresh: NDArray[np.bool_]) -> None:
+        """Let those rows whose episode was just drawn start as their members do."""
+        layouts = self._starts.rows[self.batch.program_numbers()]
+        fresh = fresh & (layouts != 0)
+        if fresh.any():
+            self.batch.ports.chosen[:] = fresh
+            self.batch.ports.layout[:] = layouts
+            self.batch.reset(self._starts.pins)
 
     def _mask(self, mask: Any) -> NDArray[np.bool_]:
         if mask is None:
@@ -150,8 +187,33 @@ class Table:
         named = layout.get("member") if isinstance(layout, Mapping) else None
         if named is not None:
             return pinned_member(named, members)
+        if self._plays_acts[pool]:
+            return 0
         seed, index, episode = (int(key[word]) for word in (Key.SEED, Key.INDEX, Key.EPISODE))
-        return below(draw(episode_key(seed, index, episode), site("member"), 0, 0), len(members))
+        summed = np.cumsum(self.batch.weights(pool))
+        drawn = below(draw(episode_key(seed, index, episode), site("member"), 0, 0), int(summed[-1]))
+        return int(np.searchsorted(summed, drawn, side="right"))
+
+    def _is_spoiled(self, layout: Any, row: int) -> bool:
+        """Whether a layout says that an act before the one it is for was no success."""
+        own = layout if isinstance(layout, Mapping) else layout[row] if layout is not None else None
+        return (
+            bool(own.get("spoiled"))
+            if own is not None and self._plays_acts[self.pool_of.item(row)]
+            else False
+        )
+
+    def set_member_weights(self, weights: Sequence[int]) -> None:
+        """Let later episodes draw the suite's members as they weigh.
+
+        Raises:
+            ValueError: no suite is played whose members are drawn, or the weights are not right.
+        """
+        if len(self._called) != 1 or self._called[0] is None or self._plays_acts[0]:
+            raise ValueError(
+                "set_member_weights: got weights, but these environments play no suite that draws members"
+            )
+        self.batch.set_weights(0, weights)
 
     def scripted_actions(self) -> NDArray[np.int64]:
         """What the agents' frames would do now, int64 (E, 4); nothing changes."""
@@ -196,7 +258,10 @@ class Table:
         """The state of a row in the scenario's own names; a superset of a layout."""
         member = self.member(row)
         described = describe(self.program(row), self.state.registers[row])
-        return described if member is None else {"member": member, **described}
+        if member is None:
+            return described
+        spoiled = {"spoiled": True} if self.state.keys[row, Key.SPOILED] else {}
+        return {"member": member, **spoiled, **described}
 
     def cells(self, row: int) -> tuple[NDArray[np.uint8], tuple[int, int, int]]:
         """The canvas as it looks, uint8 (H, W, 4), and the agent's x, y, direction."""
@@ -279,16 +344,27 @@ class Table:
         self.batch.ports.counters[:] = 0
         self.batch.ports.counters[0] = counters
         self.fresh = False
+        self._channels.refresh()
 
     def _check(self, read: Mapping[str, NDArray[Any]]) -> None:
         """The engine trusts its state, so what comes from outside must be a state that it can be in."""
         played = self._played(read["keys"])
+        self._check_weights(read["weights"])
         if read["tokens"].min(initial=0) < 0 or read["tokens"].max(initial=0) >= len(self.merged.vocabulary):
             raise ValueError("the snapshot is damaged: a token is outside the vocabulary")
         for number, program in enumerate(self.programs):
             wrong = first_unsound(program, read["registers"][played == number])
             if wrong:
                 raise ValueError(f"the snapshot is damaged: {wrong}")
+
+    def _check_weights(self, summed: NDArray[np.int64]) -> None:
+        """Whether the weights of every pool, added up, are ones that can be drawn by."""
+        start = 0
+        for pool in self.merged.pools:
+            own = summed[start : start + len(pool)]
+            if own[0] < 0 or (np.diff(own) < 0).any() or not 1 <= own[-1] < 1 << 32:
+                raise ValueError("the snapshot is damaged: members cannot be drawn by its weights")
+            start += len(pool)
 
     def _played(self, keys: NDArray[np.uint64]) -> NDArray[np.intp]:
         """Which program each row plays by keys from outside, (E,)."""
@@ -302,7 +378,11 @@ class Table:
         return np.array(numbers)
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
-        return {**self.state._asdict(), "counters": self.batch.ports.counters.sum(axis=0)}
+        return {
+            **self.state._asdict(),
+            "counters": self.batch.ports.counters.sum(axis=0),
+            "weights": self.batch.tables.weights,
+        }
 
     def _identity(self) -> dict[str, Any]:
         return {"programs": [program.sha256 for program in self.programs], "rows": self.rows}

@@ -11,9 +11,10 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from socialai_dsl.engine.kernel import Task
+from socialai_dsl.envs.channels import joined
 from socialai_dsl.envs.picture import frame
 from socialai_dsl.envs.table import Table
-from socialai_dsl.program import VIEW, Program
+from socialai_dsl.program import Program
 from socialai_dsl.program_suite import Playable
 
 _TASKS = {
@@ -29,10 +30,10 @@ Observation = dict[str, NDArray[Any]]
 class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]]):
     """Environments of one scenario or suite, or of several in turn (environment i plays number i modulo their number).
 
-    Observation: `image` uint8 (E, 7, 7, 4), `tokens` int16 (E, L). Action: int64 (E, 4): body action (the last is no
-    movement), speak or not, template, noun. Infos, only in steps that end episodes: `success` bool (E,), `outcome` int
-    (E,) (an index into `outcomes`), with masks `_success` and `_outcome`; in same-step mode also `final_obs`
-    (arrays as in an observation) and `final_info`.
+    Observation: `image` uint8 (E, 7, 7, 4), or (E, 7, 7, 6) if a scenario shows gestures, `tokens` int16 (E, L).
+    Action: int64 (E, 4): body action (the last is no movement), speak or not, template, noun. Infos, only in steps
+    that end episodes: `success` bool (E,), `outcome` int (E,) (an index into `outcomes`), with masks `_success` and
+    `_outcome`; in same-step mode also `final_obs` (arrays as in an observation) and `final_info`.
 
     Args:
         playables: at least one program or suite of programs; of a suite every episode plays a member, drawn anew.
@@ -139,7 +140,7 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
         ports = self._table.batch.ports
         ended = ports.terminated | ports.truncated
         outcome = ports.outcome.copy()
-        success = ended & self._successes[outcome]
+        success = ended & self._successes[outcome] & ~ports.spoiled
         infos: dict[str, Any] = {
             "success": success,
             "_success": ended,
@@ -147,7 +148,7 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
             "_outcome": ended,
         }
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
-            image = ports.final_image.view(np.uint8).reshape(self.num_envs, VIEW, VIEW, 4)
+            image = joined(ports.final_image, ports.final_extra)
             final: Observation = {"image": image, "tokens": ports.final_tokens}
             infos["final_info"], infos["_final_info"] = dict(infos), ended
             infos["final_obs"] = {k: v.copy() for k, v in final.items()} if self._copy else final
@@ -167,6 +168,17 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
     def members(self) -> list[str | None]:
         """What a suite calls the scenario that each environment plays in this episode; None without a suite."""
         return [self._table.member(row) for row in range(self.num_envs)]
+
+    def set_member_weights(self, weights: Sequence[int]) -> None:
+        """Let later episodes draw the members of the suite, or the leaves of its tree, in proportion to their weights.
+
+        Args:
+            weights: a whole number from 0 on for each of `program.members`, not all 0.
+
+        Raises:
+            ValueError: they are not that, or no suite is played whose members are drawn.
+        """
+        self._table.set_member_weights(weights)
 
     def describe(self, index: int) -> dict[str, Any]:
         """The state of one environment in the scenario's own names; can be put back as a layout."""
