@@ -119,6 +119,8 @@ class _FrameCompiler:
             self._go(to, rule, follow=False)
             to.block.bind(following)
             to.block.release(mark)
+        if self.later.rules:
+            to.block.halt()  # where none of them is pending
         return self.shared.code.add(to.block, f"{self.frame.member}.{self.frame.frame}.deferred")
 
     # --- shared by both forms ---
