@@ -148,16 +148,24 @@ def _state_table(row: Row, frame: int) -> int:
 
 
 @outline
-def _run_apart(row: Row, pc: int) -> None:
+def _perceive(row: Row, frame: int) -> None:
     stay_outline()
-    run(row, pc)
+    if row.program[frame + FrameColumn.PERCEIVE] != 0:
+        run(row, row.program[frame + FrameColumn.PERCEIVE])
+
+
+@outline
+def _do_the_rest(row: Row, frame: int) -> None:
+    stay_outline()
+    if row.program[frame + FrameColumn.DEFERRED] != 0:
+        run(row, row.program[frame + FrameColumn.DEFERRED])
 
 
 @inline
 def notice(row: Row, frame: int, heard: int, flags: int) -> bool:
     """What a frame perceives, and does before the body action (`first`); whether it has chosen that action."""
-    if flags & Trait.APART and row.program[frame + FrameColumn.PERCEIVE] != 0:
-        _run_apart(row, row.program[frame + FrameColumn.PERCEIVE])
+    if flags & Trait.APART:
+        _perceive(row, frame)
     row.registers[Register.LAST_TURN] = -1
     pc = row.program[_state_table(row, frame) + 1 + heard]
     if pc != 0:
@@ -183,8 +191,8 @@ def conclude(row: Row, frame: int, heard: int, chosen: bool, flags: int) -> None
         pc = row.program[_state_table(row, frame) + 2 + row.program[Header.CLASSES] + heard]
         if pc != 0:
             run(row, pc)
-    elif flags & Trait.APART and row.program[frame + FrameColumn.DEFERRED] != 0:
-        _run_apart(row, row.program[frame + FrameColumn.DEFERRED])
+    elif flags & Trait.APART:
+        _do_the_rest(row, frame)
 
 
 @inline
