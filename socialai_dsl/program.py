@@ -27,6 +27,7 @@ only rules that what was heard can fire.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -417,6 +418,14 @@ class RegisterName:
     low: int = 0
     high: int = 0
     kind: str = "int"
+
+    @property
+    def fleeting(self) -> bool:
+        """Whether it is written in every step before it is read, so that it tells nothing between steps."""
+        return _FLEETING.fullmatch(self.path) is not None
+
+
+_FLEETING = re.compile(r"prev\..*|memory\.\w+\.open|.*\.(pending|said|(kept|aim)\[\d+\])")
 
 
 @dataclass(frozen=True, slots=True)
