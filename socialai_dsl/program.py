@@ -224,7 +224,7 @@ class TypeColumn(IntEnum):
     PUSHED = (
         6  # status after a push: a body or something rolling tried to enter its cell (its own index: nothing)
     )
-    ROLLS = 7  # 1: in this status it moves one cell a step in the direction of the push, until something is in its way
+    ROLLS = 7  # 0, or: it moves one cell a step the way it was pushed; then 1 + its status when something is in its way
     COLUMNS = 8
 
 
