@@ -11,7 +11,6 @@ from socialai_dsl.program import Program, RegisterName
 
 _ELEMENT: Final = re.compile(r"(let|memory)\.(\w+)\[(\d+)\]\.(move|utterance)")
 _FILLED: Final = re.compile(r"memory\.(\w+)\.filled")
-_FLEETING: Final = re.compile(r"prev\..*|memory\.\w+\.open")
 _BELIEF: Final = re.compile(r"(.+)\.believes\.(\w+)")
 _OF_ENTITY: Final = {
     "name": "name",
@@ -80,5 +79,5 @@ class Addresses:
             self.one_of[owner] = name
         elif owner in entities and rest in _OF_ENTITY:
             self.owned[owner, _OF_ENTITY[rest]] = name
-        elif not _FLEETING.fullmatch(name.path):
+        elif not name.fleeting:
             self.plain[name.path.removeprefix("let.")] = name
