@@ -102,6 +102,7 @@ class Relevance:
         ignored: set[int] = {register for register in _OF_ONE_STEP if register not in read_before} | set(
             _RECORDS
         )
+        ignored |= {name.register for name in program.registers if name.fleeting} - read_before
         ignored |= {register for register in (Register.T, *_clocks(program)) if register not in limits}
         ignored |= {register for register in _lasts(program) if register not in limits}
         h = program.header

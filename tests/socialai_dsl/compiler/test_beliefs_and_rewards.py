@@ -64,7 +64,7 @@ def believing(when: Any, value: Any, type_: Type = COLUMN) -> Checked:
 
 
 def belief(env: Any) -> Any:
-    return env.describe()["let"]["guide.believes.it"]
+    return env.describe()["guide"]["believes"]["it"]
 
 
 def test_a_belief_follows_what_is_seen() -> None:

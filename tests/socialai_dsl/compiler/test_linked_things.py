@@ -119,7 +119,7 @@ def test_an_active_status_expires(steps: int) -> None:
         step(env)
         seen.append(env.describe()["levers"][0]["state"])
     assert seen == ["up"] * (steps - 1) + ["spent"] * 2
-    assert env.describe()["let"]["levers[0].timer"] == 0
+    assert env.describe()["levers"][0]["timer"] == 0
 
 
 def test_a_timer_starts_anew_with_each_activation() -> None:
@@ -132,7 +132,7 @@ def test_a_timer_starts_anew_with_each_activation() -> None:
     timers = []
     for word in ("toggle", "none", "none", "toggle", "none"):
         step(env, word)
-        timers.append(env.describe()["let"]["levers[0].timer"])
+        timers.append(env.describe()["levers"][0]["timer"])
     assert timers == [1, 2, 0, 1, 2]
 
 
