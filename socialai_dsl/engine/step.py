@@ -11,6 +11,7 @@ from socialai_dsl.engine.picture import take_picture
 from socialai_dsl.engine.speech import empty_inbox, inbox_class
 from socialai_dsl.engine.state import AGENT, Link, Row, Trait
 from socialai_dsl.engine.turns import (
+    act,
     compute_statuses,
     conclude,
     follow_links,
@@ -82,6 +83,8 @@ def step_row(row: Row, link: int, book: Any, number: int) -> float:
     if flags & Flag.AGENT_FRAME:
         heard = inbox_class(row, program[frame + FrameColumn.INBOX])
         chosen = notice(row, frame, heard, flags)
+        if not chosen:
+            act(row, frame)  # for what it notes; the caller decides what the agent does
     move_agent(row, registers[Register.ACTION])
     if flags & (Flag.PICTURE_BEFORE_NPCS | Trait.GOES_BY_ITSELF):
         changed = follow_links(row)
