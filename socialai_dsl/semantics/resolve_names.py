@@ -87,7 +87,9 @@ def _own(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope
     word, frame = node.id, scope.frame
     if word == "it" and scope.it is not None:
         return scope.it
-    if word in ("self", "it") and scope.member is not None:
+    if word == "it" and scope.member is not None and resolver.symbols.group_of(scope.member) is not None:
+        return entity(resolver.symbols.numbers[scope.member])
+    if word == "self" and scope.member is not None:
         return entity(resolver.symbols.numbers[scope.member])
     if frame is None:
         return None
