@@ -69,6 +69,12 @@ class TrainConfig(BaseModel):
     net: str = Field(
         "fast", min_length=1, description="fast, paper, paper-reference, or my.module:MyNet of the user's"
     )
+    curriculum: str = Field(
+        "none",
+        min_length=1,
+        description="who chooses members of a suite: none, expert, progress, reverse, a .yaml file of phases, or "
+        "my.module:MyCurriculum",
+    )
     device: str = Field("cpu", min_length=1, description="torch device the network runs on")
     threads: int = Field(
         0,

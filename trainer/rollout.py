@@ -14,6 +14,7 @@ from trainer import actions as heads
 from trainer.actor import Actor
 from trainer.bonus import Bonus
 from trainer.config import TrainConfig
+from trainer.curricula import Tutor
 from trainer.distinct import Int64
 from trainer.errors import TrainingStopped
 
@@ -119,6 +120,7 @@ def collect(
     config: TrainConfig,
     generator: torch.Generator,
     bonus: Bonus | None,
+    tutor: Tutor | None = None,
 ) -> Rollout:
     """Play `config.horizon` steps in every environment; `state` is advanced in place.
 
@@ -142,7 +144,7 @@ def collect(
             state.memory = net.memory.step(features, state.memory)
             logits[t], rollout.values[t] = net.heads(state.memory[0])
             rollout.actions[t] = heads.choose(logits[t] + noise[t], sizes)
-            observation = _step(actor, envs, state, config, bonus, rollout, t)
+            observation = _step(actor, envs, state, config, bonus, tutor, rollout, t)
             rows, features = actor.see(observation["image"], observation["tokens"], _ids(envs))
         state.image, state.tokens = observation["image"].copy(), observation["tokens"].copy()
         kept = torch.from_numpy(~state.starts).to(actor.device)[:, None]
@@ -184,6 +186,7 @@ def _step(
     state: RolloutState,
     config: TrainConfig,
     bonus: Bonus | None,
+    tutor: Tutor | None,
     rollout: Rollout,
     t: int,
 ) -> dict[str, NDArray[Any]]:
@@ -200,6 +203,8 @@ def _step(
         rollout.bootstrap[t, which] = _value(actor, final_observation(infos, which), state.memory[:, which])
     if ended.any():
         _count(rollout.tally, state, ended, cut, infos)
+        if tutor is not None:
+            tutor.step(ended, ended_info(infos, "success", ended & False).astype(np.bool_))
     if bonus is not None:
         paid = bonus.step(envs, observation["image"], ended)
         rollout.rewards[t] += paid

@@ -14,6 +14,7 @@ from trainer.actor import Actor
 from trainer.bonus import Bonus
 from trainer.checkpoint import Checkpoint, CheckpointMeta
 from trainer.config import RESUMABLE_FIELDS, TrainConfig
+from trainer.curricula import Leaves, Tutor, build_curriculum
 from trainer.errors import CheckpointError
 from trainer.nets import NetSpec, build_net
 from trainer.rollout import RolloutState
@@ -37,6 +38,7 @@ class Session:
     state: RolloutState
     generator: torch.Generator
     bonus: Bonus | None
+    tutor: Tutor | None = None
     update: int = 0
 
     @property
@@ -55,7 +57,12 @@ class Session:
             raise ValueError(f"envs: got {envs.num_envs} environments, expected num_envs = {config.num_envs}")
         spec = net_spec(envs)
         net = build_net(config.net, spec, config.seed).to(config.device)
+        tutor = None
+        if config.curriculum != "none":
+            tutor = Tutor(build_curriculum(config.curriculum, Leaves.of(envs)), envs)
         observation, _ = envs.reset(seed=config.seed)
+        if tutor is not None:
+            tutor.begin()
         return cls(
             config,
             envs,
@@ -64,6 +71,7 @@ class Session:
             RolloutState.initial(observation, net.memory.initial(config.num_envs)),
             torch.Generator().manual_seed(config.seed),
             Bonus(config, config.num_envs) if config.explo != "none" else None,
+            tutor,
         )
 
     def checkpoint(self) -> Checkpoint:
@@ -79,6 +87,8 @@ class Session:
         if self.bonus is not None:
             for name, array in self.bonus.state().items():
                 tensors[f"bonus.{name}"] = torch.from_numpy(array)
+        if self.tutor is not None:
+            tensors["curriculum"] = torch.from_numpy(self.tutor.state())
         tensors["rng"] = self.generator.get_state()
         tensors["envs"] = torch.frombuffer(bytearray(self.envs.snapshot()), dtype=torch.uint8)
         return Checkpoint(self._meta(), tensors)
@@ -116,6 +126,8 @@ class Session:
                 )
             self.generator.set_state(checkpoint.tensors["rng"])
             self.envs.restore(checkpoint.tensors["envs"].numpy().tobytes())
+            if self.tutor is not None:
+                self.tutor.load_state(checkpoint.tensors["curriculum"].numpy())
         except (KeyError, ValueError, TypeError, RuntimeError) as error:
             raise CheckpointError(f"checkpoint cannot continue this run: {error}") from error
         self.update = checkpoint.meta.update

@@ -97,7 +97,15 @@ def _loop(
     counted, then = envs.counters(), began
     while session.update < config.updates:
         with _explained(session, folder):
-            rollout = collect(session.actor, envs, session.state, config, session.generator, session.bonus)
+            rollout = collect(
+                session.actor,
+                envs,
+                session.state,
+                config,
+                session.generator,
+                session.bonus,
+                session.tutor,
+            )
             losses = update(session.actor, session.optimizer, rollout, config, session.generator, crew)
             session.update += 1
             before, counted = counted, envs.counters()

@@ -86,6 +86,7 @@ def train_config(settings: "Settings") -> "TrainConfig":
             net=settings.net,
             explo=settings.explo,
             explo_c=settings.explo_c,
+            curriculum=settings.curriculum,
             device=settings.device,
         )
     except ValidationError as error:

@@ -58,6 +58,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="none",
         help="exploration bonus (default: none); auto: the paper's choice for this scenario",
     )
+    parser.add_argument(
+        "--curriculum",
+        default="none",
+        metavar="NAME",
+        help="who chooses the members of a suite while training: expert, progress, reverse, a .yaml file of phases, or "
+        "my.module:MyCurriculum (default: none)",
+    )
     parser.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help="default: auto")
     parser.add_argument(
         "--eval-episodes", type=_positive, default=500, metavar="N", help="of the test set (default: 500)"
@@ -160,6 +167,8 @@ def _started(arguments: argparse.Namespace) -> Settings:
         raise UsageError(f"--agent: expected {known} or the path of a checkpoint, got {arguments.agent!r}")
     if not trains and arguments.frames is not None:
         raise UsageError(f"--frames: the agent {arguments.agent!r} is not trained")
+    if not trains and arguments.curriculum != "none":
+        raise UsageError(f"--curriculum: the agent {arguments.agent!r} is not trained")
     if arguments.agent == "human" and arguments.json:
         raise UsageError("--json: the agent 'human' plays on standard output")
     explo, explo_c = resolve_exploration(arguments.explo, arguments.scenario)
@@ -174,6 +183,7 @@ def _started(arguments: argparse.Namespace) -> Settings:
         explo_c=explo_c,
         device=resolve_device(arguments.device),
         eval_episodes=arguments.eval_episodes,
+        curriculum=arguments.curriculum,
     )
 
 

@@ -169,6 +169,10 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
         """What a suite calls the scenario that each environment plays in this episode; None without a suite."""
         return [self._table.member(row) for row in range(self.num_envs)]
 
+    def member_ids(self) -> NDArray[np.int64]:
+        """Which of `program.members` each environment plays in this episode, (E,); 0 without a suite."""
+        return self._table.batch.program_numbers().astype(np.int64)
+
     def set_member_weights(self, weights: Sequence[int]) -> None:
         """Let later episodes draw the members of the suite, or the leaves of its tree, in proportion to their weights.
 

@@ -1,0 +1,107 @@
+"""This module states what a curriculum is, and lets one choose what the environments play."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Leaves:
+    """The members of a suite, in order.
+
+    Attributes:
+        names: what the suite calls them.
+        labels: of leaves of a tree, and of members that were swept over, parameter -> value; else empty.
+        weights: how likely an episode plays each where nobody chooses, in proportion.
+    """
+
+    names: tuple[str, ...]
+    labels: tuple[Mapping[str, str], ...]
+    weights: tuple[int, ...]
+
+    @classmethod
+    def of(cls, envs: Any) -> Leaves:
+        """Those of the suite that vector environments play.
+
+        Raises:
+            ValueError: they play no suite.
+        """
+        suite = envs.program
+        names = tuple(getattr(suite, "members", ()))
+        if not names:
+            raise ValueError("curriculum: got a scenario, expected a suite, whose members can be chosen")
+        labels: tuple[Mapping[str, str], ...] = tuple(suite.labels) or ({},) * len(names)
+        return cls(names, labels, tuple(suite.weights) or (1,) * len(names))
+
+
+@runtime_checkable
+class Curriculum(Protocol):
+    """Chooses members by success so far. What it does depends on nothing but what it observed, in that order."""
+
+    def observe(self, member: int, success: bool) -> None:
+        """An episode of this member, by number, has ended."""
+
+    def weights(self) -> Sequence[int]:
+        """How likely later episodes play each member, in proportion: whole numbers from 0 on, not all 0."""
+
+    def state(self) -> dict[str, Any]:
+        """All it remembers, as JSON data."""
+
+    def load_state(self, state: dict[str, Any]) -> None:
+        """Go on from `state()` of an equal one. Raises ValueError (KeyError, TypeError) for any other."""
+
+
+class Tutor:
+    """Tells a curriculum how episodes ended, and the environments what it chooses."""
+
+    def __init__(self, curriculum: Curriculum, envs: Any) -> None:
+        """The first episodes are chosen as well, so this comes before the environments' reset.
+
+        Raises:
+            ValueError: the environments do not draw members, or the weights are not right.
+        """
+        self.curriculum, self._envs = curriculum, envs
+        self._weights: list[int] = []
+        self._playing: NDArray[np.int64] = np.zeros(0, np.int64)
+        self._choose()
+
+    def begin(self) -> None:
+        """Note what is played; after a reset, or after a snapshot was put back."""
+        self._playing = self._envs.member_ids()
+
+    def step(self, ended: NDArray[np.bool_], success: NDArray[np.bool_]) -> None:
+        """Take in the episodes that ended in a step, bool (E,) each, in the order of the environments."""
+        for row in np.flatnonzero(ended).tolist():
+            self.curriculum.observe(int(self._playing[row]), bool(success[row]))
+        self._choose()
+        self._playing = self._envs.member_ids()
+
+    def _choose(self) -> None:
+        weights = [int(weight) for weight in self.curriculum.weights()]
+        if weights != self._weights:
+            self._envs.set_member_weights(weights)
+            self._weights = weights
+
+    def state(self) -> NDArray[np.uint8]:
+        """What the curriculum remembers, as the bytes of JSON text."""
+        return np.frombuffer(json.dumps(self.curriculum.state()).encode(), np.uint8).copy()
+
+    def load_state(self, state: NDArray[np.uint8]) -> None:
+        """Go on from `state()`; the environments must have been restored before.
+
+        Raises:
+            ValueError: it is not the state of such a curriculum.
+        """
+        try:
+            self.curriculum.load_state(json.loads(state.tobytes()))
+        except (KeyError, TypeError) as error:
+            raise ValueError(f"curriculum: the state is of another one ({error!r})") from error
+        self._weights = []
+        self._choose()
+        self.begin()
