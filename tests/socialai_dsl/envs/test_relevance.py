@@ -6,7 +6,7 @@ import pytest
 
 import socialai_dsl
 from socialai_dsl.envs.relevance import Relevance
-from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Field, Header, Program, Register
+from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Field, Header, Op, Program, Register
 
 SCENARIO = """
 scenario: small
@@ -96,3 +96,17 @@ def test_the_whole_utterance_counts_where_its_parts_are_compared(tmp_path: Path)
     assert not Relevance.of(program(tmp_path, success='agent.said("Say <wanted>")')).whole_utterance
     comparing = program(tmp_path, rule="hears: Say <noun>, when: noun == wanted, goto: free")
     assert Relevance.of(comparing).whole_utterance
+
+
+def test_what_an_npc_does_with_the_noun_it_heard_depends_on_the_whole_utterance(tmp_path: Path) -> None:
+    echo = program(tmp_path, rule="hears: Say <noun>, say: Say <noun>, goto: free")
+    assert any(op == Op.HEARD_NOUN for op in echo.code[:, 0])
+    assert Relevance.of(echo).whole_utterance
+    assert not Relevance.of(program(tmp_path)).whole_utterance
+
+
+def test_what_is_written_anew_in_every_step_does_not_count(tmp_path: Path) -> None:
+    pending = program(tmp_path, activity="stay, first: [{do: forward, goto: free}]")
+    fleeting = {name.register for name in pending.registers if name.fleeting}
+    assert fleeting
+    assert not fleeting & set(Relevance.of(pending).registers.tolist())
