@@ -49,6 +49,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self.observation_space = self._table.merged.observation_space()  # type: ignore[assignment]
         self.action_space = self._table.merged.action_space()
         self._suite = isinstance(program, ProgramSuite)
+        self._acts = isinstance(program, ProgramSuite) and program.in_sequence
         # One row of each array, so that a step makes no views.
         self._image, self._tokens = self._table.image[0], self._table.tokens[0]
         self._registers = self._table.state.registers[0]
@@ -90,10 +91,10 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         ended = self._table.play(Task.STEP_ONLY)
         if ended == BAD_ACTION:
             raise self._refusal(action)
-        info: dict[str, Any] = {"utterance": SILENCE, "history": self._history}
-        if self._suite:
-            self._look_up()  # an act may have followed another
-            info |= self._always
+        if self._acts:  # another one may have begun
+            self._look_up()
+            self._history = "\n".join(self._table.history(0))
+        info: dict[str, Any] = {"utterance": SILENCE, "history": self._history, **self._always}
         if self._registers.item(_HEARD):
             self._history = "\n".join(self._table.history(0))
             info |= {"utterance": "\n".join(self._table.heard(0)), "history": self._history}
