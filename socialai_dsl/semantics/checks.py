@@ -11,7 +11,7 @@ from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.entities import frames_of
 from socialai_dsl.semantics.findings import Findings
-from socialai_dsl.semantics.terms import Chance, FramePlan, Logic, Quantified, RulePlan, Term
+from socialai_dsl.semantics.terms import Chance, Const, FramePlan, Logic, Quantified, RulePlan, Term
 
 GRAMMAR_CODE = "S104"
 """The code of a template that cannot be filled."""
@@ -178,6 +178,8 @@ def _asks_less(above: RulePlan, below: RulePlan) -> bool:
         return True
     if below.when is None or _draws(above.when.term):
         return False
+    if isinstance(above.when.term, Const) and not above.when.term.value:
+        return False  # a parameter has switched it off
     return set(_conjuncts(above.when.term)) <= set(_conjuncts(below.when.term))
 
 
