@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,7 @@ class Result:
     terminated: bool = False
     truncated: bool = False
     heard: tuple[str, ...] = ()
+    words: list[str] = field(default_factory=list)  # of the tokens
     outcome: int | str | None = None  # its id, else its place in `outcome`; deadly, timeout
 
 
@@ -49,7 +50,7 @@ class Reference:
             max(sizes(self.scenario, self.sources, "width")),
             max(sizes(self.scenario, self.sources, "height")),
         )
-        self.history: list[list[int]] = []
+        self.history: list[list[str]] = []  # the words of each line
         self.world = World(0)
         self.rooms_refused = 0
 
@@ -159,7 +160,8 @@ class Reference:
         result.reward += world.bonus / 100 + self.scenario.reward.each_step
         # Step 9: the observation.
         result.image = early if self.scenario.observe.image == "before_npcs" else picture(world, self.canvas)
-        result.tokens = [token for line in self.history for token in line]
+        result.words = [word for line in self.history for word in line]
+        result.tokens = self.vocabulary.tokens(result.words)
         result.heard = tuple(self.line(speaker, text) for speaker, text in world.lines)
         return result
 
@@ -223,9 +225,7 @@ class Reference:
 
     def remember(self) -> None:
         """Adds what was heard to the history; beyond its length the oldest whole utterances are dropped."""
-        self.history += [
-            self.vocabulary.tokens(self.line(speaker, text)) for speaker, text in self.world.lines
-        ]
+        self.history += [speech.words(self.line(speaker, text)) for speaker, text in self.world.lines]
         while sum(map(len, self.history)) > self.vocabulary.length:
             self.history.pop(0)
 
@@ -344,6 +344,7 @@ class Reference:
             "state": self.state_name(member),
             "clock": member.clock,
             "registers": {name: plain(value) for name, value in member.registers.items()},
+            "believes": {name: plain(value) for name, value in member.believes.items()},
             "gone": member.gone,
             "was_poked": member.was_poked,
             "once": sorted(member.fired_once),

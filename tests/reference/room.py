@@ -21,6 +21,7 @@ from tests.reference.world import (
     Recall,
     World,
     as_list,
+    default_name,
     quadrant,
     where,
 )
@@ -401,7 +402,7 @@ class Setup:
             return
         written = self.members[member.key].name
         if written is None:
-            member.name = member.key.capitalize()
+            member.name = default_name(member.key)
             return
         value = self.sources.name(f"cast.{member.key}.name", written)
         found = evaluate(value, self.context(member))

@@ -287,6 +287,12 @@ class World:
         return any(type_ is not None and TYPES[type_].deadly for type_ in here)
 
 
+def default_name(key: str) -> str:
+    """What a member is called that has no name: its key; those of a group are counted from 1."""
+    word, _, number = key.rstrip("]").partition("[")
+    return f"{word.capitalize()} {int(number) + 1}" if number else word.capitalize()
+
+
 def as_list(value: Any) -> list[Any]:
     """A group as it is, a single thing as a group of one."""
     return value if isinstance(value, list) else [value]
