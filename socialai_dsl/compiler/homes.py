@@ -26,7 +26,7 @@ class Home:
 
 
 class Homes:
-    """Makes room for what a `reset` may put back: `NAME.home`, the cell, and `NAME.home.gone`, `.facing`, `.inside`."""
+    """Makes room for what a `reset` may put back: `NAME.reset.home`, the cell, then `.gone`, `.facing`, `.inside`."""
 
     def __init__(self, checked: Checked, registers: Registers) -> None:
         self.checked = checked
@@ -102,7 +102,7 @@ def _named(checked: Checked) -> Iterator[int]:
 
 
 def _reserve(thing: Entity, mobility: Mobility, registers: Registers, entities: int) -> Home:
-    number, path = thing.number, f"{label(thing)}.home"
+    number, path = thing.number, f"{label(thing)}.reset.home"
 
     def room(suffix: str, type_: Type, changes: bool) -> int | None:
         return registers.add(path + suffix, type_) if changes else None

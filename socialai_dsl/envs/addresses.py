@@ -47,7 +47,7 @@ class Addresses:
         sequences: those of `let`. memories: by name, with `filled`, the number of elements each holds.
         world: those of `state`, by name. beliefs: cast member -> key -> register.
         one_of: cast member -> which file it is. owned: (entity, key) -> register, e.g. ("wizard", "state").
-        plain: all others by their key under `let`; what is worked out anew at the start of a step is left out.
+        plain: all others by their key under `let`; what tells nothing between steps is left out.
     """
 
     def __init__(self, program: Program) -> None:

@@ -192,7 +192,7 @@ def test_reset_keeps_only_what_can_change() -> None:
     assert not [name.path for name in compiled(checked).registers if ".home" in name.path]
     vanishing = with_rules(checked, *checked.rules, rule(None, effect("vanish", APPLE)))
     paths = [name.path for name in compiled(vanishing).registers if ".home" in name.path]
-    assert paths == ["apple.home", "apple.home.gone"]
+    assert paths == ["apple.reset.home", "apple.reset.home.gone"]
 
 
 def test_reset_of_one_of_several(filled: Checked) -> None:

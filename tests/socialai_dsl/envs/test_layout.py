@@ -52,11 +52,7 @@ def differences(one: ScenarioEnv, other: ScenarioEnv) -> list[str]:
     # Lines of one text have several numbers, and `describe` tells texts.
     for start, size in ((Header.HEARD, Header.HEARD_SIZE), (Header.LOG, Header.LOG_SIZE)):
         fleeting |= set(range(program.header(start), program.header(start) + program.header(size)))
-    fleeting |= {
-        name.register
-        for name in program.registers
-        if name.path.startswith("prev.") or name.path.endswith(".open")
-    }
+    fleeting |= {name.register for name in program.registers if name.fleeting}
     for number in range(len(program.entities)):
         base = FIRST_ENTITY + ENTITY_FIELDS * number
         fleeting.add(base + Field.LAST)
