@@ -151,6 +151,8 @@ def _state_of_env(env: ScenarioEnv) -> dict[str, Any]:
         else:
             member = state[entity.key] if entity.index is None else state[entity.key][entity.index]
             common["cast"][str(entity)] = _member(member)
+            for name, value in member.get("believes", {}).items():
+                common["cast"][str(entity)].setdefault("registers", {})[f"believes.{name}"] = value
     for name, value in state["let"].items():
         owner, dot, register = name.partition(".")
         if not dot:

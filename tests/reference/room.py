@@ -277,12 +277,13 @@ class Setup:
             return
         if holder.at is not None:
             cells = [self.exact_cell(path, holder.at, entity)]
-            cells = [cell for cell in cells if self.world.inside(cell) and not self.taken(cell, holder)]
+            cells = [cell for cell in cells if self.world.inside(cell) and not self.shared(cell, holder)]
         else:
             written = leaves(f"{path}.place", holder.place) or [(f"{path}.place", "anywhere")]
             _, source = written[entity.index % len(written)]
             value = self.sources.expression(f"{site_of(entity)}.place", source)
-            cells = [cell for cell in region(value, self.context(entity)) if not self.taken(cell, holder)]
+            found = region(value, self.context(entity, it=entity))
+            cells = [c for c in found if c not in self.world.terrain and not self.shared(c, holder)]
         if cells:
             entity.cell = cells[self.draw(f"{path}.cell", number_of(entity), len(cells))]
 
@@ -299,11 +300,11 @@ class Setup:
         )
         return x, y
 
-    def taken(self, cell: Cell, holder: Group | Member) -> bool:
-        """Whether fixed things stand there, or something was put there that must not be shared."""
+    def shared(self, cell: Cell, holder: Group | Member) -> bool:
+        """Whether it would share a cell that is not to be shared."""
         if isinstance(holder, Group) and holder.overlap:
-            return cell in self.world.terrain
-        return cell in self.world.terrain or any(entity.cell == cell for entity in self.world.entities())
+            return False
+        return any(entity.cell == cell for entity in self.world.entities())
 
     # -- what is drawn or computed once --------------------------------------------------------------------
 
