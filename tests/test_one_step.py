@@ -820,10 +820,10 @@ def test_4_25_an_entry_without_activity_stays_for_one_turn(play: Folder) -> None
     assert run.step().facing("ann") == "up"
 
 
-@pytest.mark.parametrize("goal", ["go_next_to(door)", "go_to(self.cell)", "enter(inside)"])
+@pytest.mark.parametrize("goal", ["go_next_to(door)", "go_to(self.cell)", "enter(gate)"])
 def test_4_26_what_is_fulfilled_before_it_begins_takes_no_turn(play: Folder, goal: str) -> None:
     text = """
-        objects: {{door: {{type: door, at: [3, 6]}}, inside: {{type: door, at: [3, 5], state: open}}}}
+        objects: {{door: {{type: door, at: [3, 6]}}, gate: {{type: door, at: [3, 5], state: open}}}}
         frames: {{go: {{steps: [{{do: {goal}{effect}}}, {{do: left}}]}}}}
         cast: {{ann: {{at: [3, 5], facing: right, frame: go}}}}
     """

@@ -10,7 +10,7 @@ def test_codes_of_the_view():
     codes = {name: type_.code for name, type_ in prelude().types.items()}
     assert codes == {
         "wall": 2, "floor": 3, "door": 4, "ball": 6, "box": 7, "lava": 9, "switch": 12, "apple": 13,
-        "lever": 14, "platform": 17, "fence": 18, "remote_door": 19,
+        "lever": 14, "generator": 15, "marble": 16, "platform": 17, "fence": 18, "remote_door": 19,
     }  # fmt: skip
 
 
