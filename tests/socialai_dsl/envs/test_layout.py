@@ -15,7 +15,9 @@ from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Field, Flag, Heade
 DATA = Path(__file__).parents[2] / "data"
 WORKSHOP = f"{DATA}/workshop.yaml"
 LANGUAGE = sorted(str(path) for path in (DATA / "agreement").glob("*.yaml"))
-NAMES = [*shipped_names(), *LANGUAGE, WORKSHOP, f"{DATA}/suites/pair.yaml"]
+PLAYROOM = f"{DATA}/playroom.yaml"
+SUITES = [f"{DATA}/suites/{name}.yaml" for name in ("pair", "school", "acts")]
+NAMES = [*shipped_names(), *LANGUAGE, WORKSHOP, PLAYROOM, *SUITES]
 FLEETING = {
     Register.HEARD,
     Register.SAID_LINE,
@@ -241,3 +243,56 @@ def test_the_example_of_the_documentation() -> None:
     assert state["honest"]["name"] == "John"
     assert state["doors"][2]["state"] == "open"
     assert state["let"]["exit"] == "doors[0]"
+
+
+def test_gestures_beliefs_contents_and_registers_of_the_world_are_given_by_name() -> None:
+    state = started(
+        PLAYROOM,
+        peers=[{"at": [1, 1], "pointing": "left", "last": "point"}, {"at": [2, 2]}],
+        child={"believes": {"where": "boxes[1]"}},
+        toy={"inside": "boxes[1]"},
+        lever={"state": "up", "timer": 2},
+        state={"asked": 3},
+        let={"peers[1].given": 2},
+    )
+    assert state["peers"][0]["pointing"] == "left"
+    assert state["peers"][0]["last"] == "point"
+    assert state["child"]["believes"] == {"where": "boxes[1]"}
+    assert (state["toy"]["inside"], state["toy"]["gone"]) == ("boxes[1]", True)
+    assert (state["lever"]["state"], state["lever"]["timer"]) == ("up", 2)
+    assert state["state"] == {"asked": 3, "opened_first": False}
+    assert state["let"]["peers[1].given"] == 2
+    assert state["gate"]["state"] == "open"
+
+
+def test_what_was_taken_out_of_something_lies_where_it_is_put() -> None:
+    state = started(PLAYROOM, toy={"inside": "boxes[0]", "at": [4, 4]}, boxes=[{"gone": True}])
+    assert state["toy"]["at"] == [4, 4]
+    assert "gone" not in state["toy"]
+
+
+@pytest.mark.parametrize(
+    ("layout", "message"),
+    [
+        (
+            {"peers": [{"pointing": "north"}]},
+            r"peers\[0\].pointing: got 'north'; expected one of right, down",
+        ),
+        ({"peers": [{"last": "sing"}]}, r"peers\[0\].last: got 'sing'; expected one of left"),
+        ({"child": {"believes": {"who": "toy"}}}, "child.believes: there is no 'who'; expected one of where"),
+        ({"agent": {"believes": {"who": "toy"}}}, "agent.believes: there is no 'who'"),
+        ({"toy": {"inside": "bag"}}, "toy.inside: got 'bag'"),
+        ({"lever": {"timer": 9}}, "lever.timer: got 9; expected a number from 0 to 4"),
+        ({"state": {"aksed": 1}}, "state: there is no 'aksed'; did you mean 'asked'"),
+        ({"state": {"asked": 9}}, "state.asked: got 9; expected a number from 0 to 5"),
+        (
+            {"pending": {"peers[0]": [2]}},
+            r"pending.peers\[0\]\[0\]: got 2; expected \[class, speaker, noun\]",
+        ),
+        ({"pending": {"peers[0]": [[2, "nobody", None]]}}, r"pending.peers\[0\]\[0\]\[1\]: got 'nobody'"),
+        ({"pending": {"peers[0]": [[2, "agent", "pink"]]}}, r"pending.peers\[0\]\[0\]\[2\]: got 'pink'"),
+    ],
+)
+def test_what_does_not_fit_in_a_playroom_is_named(layout: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        started(PLAYROOM, **layout)

@@ -1,0 +1,37 @@
+"""Networks take the number of channels from the space, and checkpoints do not move between numbers."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import socialai_dsl as sd
+from trainer.checkpoint import read, restore_net
+from trainer.config import TrainConfig
+from trainer.errors import CheckpointError
+from trainer.session import net_spec
+from trainer.train import train
+
+PLAYROOM = str(Path(__file__).parents[1] / "data" / "playroom.yaml")
+
+
+def config(net: str) -> TrainConfig:
+    values: dict[str, Any] = {"frames": 64, "num_envs": 4, "horizon": 8, "minibatches": 2, "epochs": 1}
+    return TrainConfig(net=net, tensorboard=False, threads=1, **values)
+
+
+@pytest.mark.parametrize("net", ["fast", "paper", "paper-reference"])
+def test_six_channels_can_be_learned_from(net: str, tmp_path: Path) -> None:
+    envs = sd.make_vec(PLAYROOM, 4, autoreset_mode="SameStep")
+    spec = net_spec(envs)
+    assert spec.image_shape == (7, 7, 6)
+    assert spec.image_high[4:] == (255, 255)
+    checkpoint = read(train(config(net), envs, tmp_path))
+    assert checkpoint.meta.image_shape == (7, 7, 6)
+    other = sd.make_vec("talkitout", 4)
+    spec_of_sizes = net_spec(other)
+    actions = type(spec_of_sizes)(
+        spec.action_sizes, spec_of_sizes.image_shape, spec_of_sizes.image_high, spec.vocabulary_size
+    )
+    with pytest.raises(CheckpointError, match=r"for images \(7, 7, 6\), but the scenario has \(7, 7, 4\)"):
+        restore_net(checkpoint, actions, list(envs.program.vocabulary))
