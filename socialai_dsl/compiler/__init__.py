@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -34,6 +35,7 @@ def compile_scenario(checked: Checked) -> Program:
 
     Raises AssertionError("internal: ...") for our own mistakes only: an author's are found before.
     """
+    checked = replace(checked, properties=())  # so that nothing they ask about is part of a program
     registers = Registers.of(checked)
     classes = Classes(checked)
     sites = Sites()

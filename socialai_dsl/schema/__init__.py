@@ -14,6 +14,7 @@ from socialai_dsl.schema.behaviour import (
     ThenRule,
     WorldRule,
 )
+from socialai_dsl.schema.properties import OnlyThrough, Property
 from socialai_dsl.schema.scenario import PRIMITIVES, Memory, Outcome, Parameter, Reward, Scenario, Sequence
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
 
@@ -27,8 +28,10 @@ __all__ = [
     "Npc",
     "ObjectGroup",
     "Observe",
+    "OnlyThrough",
     "Outcome",
     "Parameter",
+    "Property",
     "Ranged",
     "Reward",
     "Role",

@@ -22,6 +22,7 @@ from socialai_dsl.schema.behaviour import (
     WorldRule,
 )
 from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.schema.properties import OnlyThrough, Property
 from socialai_dsl.schema.scenario import Memory, Outcome, Parameter, Reward, Scenario, Sequence, SungWith
 from socialai_dsl.schema.suite import Entry, Split, Suite, Value, Values
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
@@ -48,6 +49,8 @@ CALLED: Final[dict[type, str]] = {
     Observe: "`observe`",
     UtteranceGrammar: "a grammar",
     Outcome: "an outcome",
+    Property: "a property of `check`",
+    OnlyThrough: "`only_through`",
     Parameter: "a parameter",
     Suite: "a suite",
     Split: "a split",

@@ -8,6 +8,7 @@ from pydantic import BeforeValidator, Field, StringConstraints
 
 from socialai_dsl.schema.base import Expression, Model, Word, _as_tuple
 from socialai_dsl.schema.behaviour import CastMember, Frame, Probability, Ranged, Role, WorldRule
+from socialai_dsl.schema.properties import Property
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
 
 Primitive = Literal["left", "right", "forward", "pickup", "drop", "toggle", "done"]
@@ -113,6 +114,9 @@ class Scenario(Model):
     observe: Observe = Observe()
     require: Annotated[tuple[Expression, ...], BeforeValidator(_as_tuple)] = Field(
         (), description="conditions on the drawn room, which is drawn again while one is false"
+    )
+    check: Annotated[tuple[Property, ...], BeforeValidator(_as_tuple)] = Field(
+        (), description="properties that `socialai check` verifies; playing never reads them"
     )
 
     def members(self) -> dict[str, CastMember]:

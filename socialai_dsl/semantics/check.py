@@ -16,6 +16,7 @@ from socialai_dsl.semantics.emptiness import check_placements
 from socialai_dsl.semantics.entities import AGENT, Prelude
 from socialai_dsl.semantics.findings import Findings, Scalar, surviving
 from socialai_dsl.semantics.inhabitants import entities_of
+from socialai_dsl.semantics.properties import properties
 from socialai_dsl.semantics.ranges import Ranges
 from socialai_dsl.semantics.resolve import Resolver
 from socialai_dsl.semantics.room import room_plan, room_sizes
@@ -132,6 +133,7 @@ class _Run:
         drawn = resolver.registers.drawn()
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)
         room = room_plan(resolver)
+        claimed = tuple(properties(resolver, outcomes, drawn))
         if findings.bag.has_errors:
             return None
         for plan in plans:
@@ -164,6 +166,7 @@ class _Run:
             beliefs=tuple(believed),
             channels=self._channels(),
             each_step=round(scenario.reward.each_step * 1_000_000),
+            properties=claimed,
         )
         check_placements(made, findings)
         return made

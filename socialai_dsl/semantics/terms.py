@@ -702,6 +702,29 @@ class MemoryPlan:
     open: Sited | None
 
 
+@dataclass(frozen=True, slots=True)
+class PropertyPlan:
+    """An entry of `check`. `text` is how it was written; `site` its address, `check[0]`.
+
+    `reachable` and `never` are about `condition` or, without one, the outcomes of the names in `goals`; `condition` may
+    read `remembered`, which belongs to it alone. `share`: the least share of rooms, of `oracle` that of successes;
+    None where none is given. `steps`: of `within`. `members`: of `needs` and `only_through`, as in the cast.
+    `draws`: the registers whose values are tried (`let.exit`), of which for `needs` one is enough.
+    """
+
+    kind: Literal["reachable", "never", "within", "oracle", "needs", "only_through"]
+    text: str
+    site: str
+    span: Span
+    condition: Sited | None = None
+    goals: tuple[str, ...] = ()
+    remembered: tuple[Drawn, ...] = ()
+    share: float | None = None
+    steps: int = 0
+    members: tuple[str, ...] = ()
+    draws: tuple[tuple[str, tuple[int, ...]], ...] = ()
+
+
 @dataclass(frozen=True)
 class Checked:
     """A scenario in which everything is resolved and nothing is wrong: the compiler's input.
@@ -716,6 +739,7 @@ class Checked:
         egocentric: the picture shows the directions of NPCs relative to the agent's.
         beliefs: what members take for true. slope: thousandths of the success reward that are lost by the horizon.
         each_step: millionths added to the reward of every step. channels: of the picture, 4 or 6.
+        properties: what the scenario claims about itself; no program contains it.
     """
 
     name: str
@@ -743,6 +767,7 @@ class Checked:
     slope: int = 900
     each_step: int = 0
     channels: int = 4
+    properties: tuple[PropertyPlan, ...] = ()
 
 
 TURN = Type("int", -1, 1, ("left", "none", "right"))

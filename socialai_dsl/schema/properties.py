@@ -1,0 +1,38 @@
+"""What a scenario claims about itself: the entries of `check`, which a tool verifies and playing never reads."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BeforeValidator, Field, StringConstraints
+
+from socialai_dsl.schema.base import Expression, Model, Word, _as_tuple, _one_or_many
+from socialai_dsl.schema.behaviour import Probability
+
+_Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\[\d+\])?$", max_length=40)]
+Names = Annotated[
+    tuple[_Name, ...], BeforeValidator(_as_tuple), BeforeValidator(_one_or_many), Field(min_length=1)
+]
+"""One member or group of the cast, or a list of them."""
+
+
+class OnlyThrough(Model):
+    """What was drawn shows only through these members."""
+
+    draw: Word = Field(description="a `let` whose values are tried against each other")
+    by: Names = Field(description="members of the cast whose cues may tell what was drawn")
+
+
+class Property(Model):
+    """One property: exactly one of `reachable`, `never`, `within`, `oracle`, `needs` and `only_through`."""
+
+    reachable: Expression | None = Field(None, description="a condition, or the name of an outcome")
+    never: Expression | None = Field(None, description="a condition, or the name of an outcome")
+    within: int | None = Field(None, ge=1, le=10_000, description="steps of a shortest success")
+    oracle: Probability | None = Field(None, description="share of rooms that the variant `oracle` solves")
+    needs: Names | None = Field(None, description="members without whom one can only guess")
+    only_through: OnlyThrough | None = Field(None, description="whose cues alone may show what was drawn")
+    share: Probability | None = Field(
+        None, description="least share of rooms, for `reachable`, `within` and `needs`"
+    )
+    draw: Word | None = Field(None, description="for `needs`: the `let` that has to be guessed")
