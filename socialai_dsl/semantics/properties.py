@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, get_args
 
 from socialai_dsl.diagnostics import did_you_mean
@@ -63,20 +64,24 @@ class _Entry:
         """The entry with everything resolved."""
         kind, entry = self._kind(), self._entry
         place = (*self._path, kind)
-        plan = _Unfilled(kind, dotted(self._path), self._findings.places.key_span(place))
+        plan = PropertyPlan(kind, "", dotted(self._path), self._findings.places.key_span(place))
         match kind:
             case "reachable" | "never":
                 raw = entry.reachable if kind == "reachable" else entry.never
                 assert raw is not None, "internal: there is a value for this key"
                 goals = _outcomes_called(str(raw), outcomes)
                 if goals:
-                    return plan.filled(str(raw), goals=goals, share=entry.share)
+                    return replace(plan, text=f"{kind}: {raw}", goals=goals, share=entry.share)
                 condition, remembered = self._condition(place, raw)
-                return plan.filled(str(raw), condition=condition, remembered=remembered, share=entry.share)
+                return replace(
+                    plan, text=f"{kind}: {raw}", condition=condition, remembered=remembered, share=entry.share
+                )
             case "within":
-                return plan.filled(str(entry.within), steps=entry.within or 0, share=entry.share)
+                return replace(
+                    plan, text=f"within: {entry.within}", steps=entry.within or 0, share=entry.share
+                )
             case "oracle":
-                return plan.filled(f"{entry.oracle:g}", share=entry.oracle)
+                return replace(plan, text=f"oracle: {entry.oracle:g}", share=entry.oracle)
             case "needs":
                 members = self._members(place, entry.needs or ())
                 tried = (
@@ -85,7 +90,9 @@ class _Entry:
                 found = tuple((path, values) for path in tried if len(set(values := _values(lets[path]))) > 1)
                 if entry.draw is not None and not found:
                     raise self._not_a_pick((*self._path, "draw"), entry.draw)
-                return plan.filled(", ".join(members), members=members, draws=found, share=entry.share)
+                return replace(
+                    plan, text=f"needs: {', '.join(members)}", members=members, draws=found, share=entry.share
+                )
             case "only_through":
                 assert entry.only_through is not None, "internal: there is a value for this key"
                 word, by = entry.only_through.draw, entry.only_through.by
@@ -93,9 +100,8 @@ class _Entry:
                 members = self._members((*place, "by"), by)
                 if len(set(values := _values(lets[path]))) < 2:
                     raise self._not_a_pick((*place, "draw"), word)
-                return plan.filled(
-                    f"{word} by {', '.join(members)}", members=members, draws=((path, values),)
-                )
+                text = f"only_through: {word} by {', '.join(members)}"
+                return replace(plan, text=text, members=members, draws=((path, values),))
 
     def _kind(self) -> _Kind:
         given = [kind for kind in KINDS if getattr(self._entry, kind) is not None]
@@ -153,18 +159,6 @@ class _Entry:
         return self._findings.fail("S204", message, self._findings.at(path), hint=hint)
 
 
-class _Unfilled:
-    """What all properties have."""
-
-    def __init__(self, kind: _Kind, site: str, span: object) -> None:
-        self._kind, self._site, self._span = kind, site, span
-
-    def filled(self, text: str, **more: object) -> PropertyPlan:
-        """The plan; `text` is what was written behind its key."""
-        shared = {"kind": self._kind, "text": f"{self._kind}: {text}", "site": self._site, "span": self._span}
-        return PropertyPlan(**shared, **more)  # type: ignore[arg-type]
-
-
 def _outcomes_called(word: str, outcomes: Sequence[OutcomePlan]) -> tuple[str, ...]:
     """The ways to end that a word names: `success`, `failure`, `deadly`, or an outcome's id."""
     match word.strip():
@@ -200,8 +194,8 @@ def _constant(term: Term, variables: dict[str, int]) -> int | None:
         case Variable(name=name):
             return variables.get(name)
         case Not(arg=arg):
-            value = _constant(arg, variables)
-            return None if value is None else int(not value)
+            truth = _constant(arg, variables)
+            return None if truth is None else int(not truth)
         case Logic(op=op, args=args):
             values = [_constant(arg, variables) for arg in args]
             if None in values:
