@@ -14,7 +14,7 @@ from socialai_dsl.frontend import LoadedScenario, load
 from socialai_dsl.program import Program
 from tests.reference.interpreter import Action, Reference, Result, plain
 
-BOOKKEEPING = ("pending", "kept", "aim")
+BOOKKEEPING = ("pending", "kept", "aim", "reset.")
 """Registers of the compiler's own: what a turn keeps until its end."""
 
 

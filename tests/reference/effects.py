@@ -65,7 +65,7 @@ def affect(world: World, target: Entity, verb: str, status: Any) -> None:
     elif verb == "move_into":
         target.cell, target.inside = None, status
     elif verb == "reveal":
-        reveal(target)
+        reveal(world, target)
     elif verb == "become":
         target.status = str(status)
     elif verb == "unlock":
@@ -94,12 +94,12 @@ def reset(world: World, target: Entity) -> None:
     target.cell, target.facing = cell, facing
 
 
-def reveal(content: Entity) -> None:
+def reveal(world: World, container: Entity) -> None:
     """What lies in something takes its cell."""
-    container = content.inside
-    if container is not None and content.gone and not container.gone:
-        content.cell = container.cell
-        vanish(container)
+    for content in world.things():
+        if content.inside is container and content.gone and not container.gone:
+            content.cell = container.cell
+            vanish(container)
 
 
 def vanish(target: Entity) -> None:

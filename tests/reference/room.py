@@ -294,10 +294,11 @@ class Setup:
             if isinstance(at[0], tuple)
             else (f"{path}.at", at)
         )
-        x, y = (
-            evaluate(self.sources.expression(f"{path}[{axis}]", source), self.context(entity))
-            for axis, source in enumerate(pair)
-        )
+        trees = [self.sources.expression(f"{path}[{axis}]", source).tree for axis, source in enumerate(pair)]
+        context = self.context(entity)
+        # One value with two parts: its draws are numbered through.
+        context.value = Value(f"{site_of(entity)}.at", ast.Alternatives(tuple(trees)))
+        x, y = (of(tree, context) for tree in trees)
         return x, y
 
     def shared(self, cell: Cell, holder: Group | Member) -> bool:
@@ -534,7 +535,7 @@ class Setup:
             if "range" in source:
                 numbers = evaluate(self.sources.expression(f"{path}.range", source["range"], frame), context)
                 holder.ranges[name] = (numbers[0], numbers[-1])
-            path, source = f"{path}.start", source["start"]
+            source = source["start"]
         if name not in holder.registers:
             holder.registers[name] = evaluate(self.sources.expression(path, source, frame), context)
 

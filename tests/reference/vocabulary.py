@@ -195,7 +195,7 @@ class Vocabulary:
                     if None in found
                     else list(dict.fromkeys(word for some in found for word in some or ()))
                 )
-            return None if tree.id in ("t", "W", "H") else [tree.id]
+            return None if tree.id in ("t", "W", "H") or tree.id in self.scenario.state else [tree.id]
         if isinstance(tree, ast.Number):
             return [str(tree.value)]
         if isinstance(tree, ast.Text):
