@@ -4,11 +4,14 @@ import argparse
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.cli.errors import Exit, UsageError, is_usage
 from socialai_dsl.cli.reporters import REPORTERS, Checked
-from socialai_dsl.diagnostics import ScenarioError
+from socialai_dsl.diagnostics import Diagnostic, ScenarioError
+
+if TYPE_CHECKING:
+    from socialai_dsl.frontend import CheckResult
 
 SUMMARY: Final = "check scenario files and folders of them"
 
@@ -66,4 +69,18 @@ def _check(name: str) -> Checked:
     result = frontend.check(name)
     if result.has_errors and is_usage(result.diagnostics):
         raise ScenarioError(result.diagnostics, result.sources)
-    return Checked(name, tuple(result.diagnostics), dict(result.sources))
+    found = (*result.diagnostics, *_misfits(result))
+    return Checked(name, found, dict(result.sources))
+
+
+def _misfits(result: "CheckResult") -> Iterator[Diagnostic]:
+    """What is wrong with the layouts of a suite, which only its compiled scenarios can tell."""
+    if result.suite is None or not any(result.suite.starts):
+        return
+    from socialai_dsl.compilation import compile_loaded
+    from socialai_dsl.envs.starts import check_starts
+
+    try:
+        check_starts(result.suite, compile_loaded(result.suite))
+    except ScenarioError as error:
+        yield from error.diagnostics

@@ -96,3 +96,50 @@ def test_a_room_that_cannot_be_is_the_authors_affair(capsys: Capture) -> None:
         said = capsys.readouterr().err
         assert said.startswith("socialai-run: impossible: none of 64 rooms was as `require` asks")
         assert "bug" not in said
+
+
+def test_a_run_with_a_curriculum_is_resumed_with_it(capsys: Capture) -> None:
+    plan = "curriculum: mine\nphases:\n- play: [{only: {help: told}}]\n  until: {episodes: 99000}\n- {}\n"
+    Path("plan.yaml").write_text(plan)
+    assert run_main(["school.yaml", *QUICK, "--curriculum", "plan.yaml", "--out", "run"]) == 0
+    rows = [json.loads(line) for line in Path("run/metrics.jsonl").read_text().splitlines()]
+    played = {name.partition(":")[0] for name, rate in rows[0]["outcomes"].items() if rate}
+    assert played
+    assert all("help=told" in name for name in played)
+    assert json.loads(Path("run/config.json").read_text())["curriculum"] == "plan.yaml"
+    assert run_main(["--resume", "run", "--frames", "3000"]) == 0
+    Path("plan.yaml").write_text(plan.replace("99000", "98000"))
+    assert run_main(["--resume", "run", "--frames", "6000"]) == 2
+    assert "its file has changed" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["school.yaml", "--curriculum", "expart"], "curriculum: got 'expart', expected expert, progress"),
+        (
+            ["school.yaml", "--curriculum", "expert"],
+            "got introduction: ask_eye_contact; the suite has ask, gaze, none",
+        ),
+        (["errands.yaml", "--curriculum", "progress"], "curriculum: got a scenario, expected a suite"),
+        (["acts.yaml", "--curriculum", "progress"], "no suite that draws members"),
+        (["pair.yaml", "--curriculum", "progress", "--agent", "random"], "the agent 'random' is not trained"),
+    ],
+)
+def test_curricula_that_do_not_fit(arguments: list[str], message: str, capsys: Capture) -> None:
+    assert run_main([*arguments[:1], "--out", "run", *arguments[1:]]) == 2
+    assert message in capsys.readouterr().err
+    assert not Path("run").exists()
+
+
+def test_acts_are_trained_on_and_evaluated(capsys: Capture) -> None:
+    assert run_main(["acts.yaml", *QUICK, "--out", "run", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["eval"]["success_rate"] <= result["eval"]["members"]["errands"]["success_rate"] + 1e-9
+
+
+def test_layouts_in_suites_are_checked(capsys: Capture) -> None:
+    assert main(["validate", "school.yaml"]) == 0
+    Path("school.yaml").write_text(Path("school.yaml").read_text().replace("secret: bread", "secret: broad"))
+    assert main(["validate", "school.yaml"]) == 1
+    assert "school.yaml:11:65: S204 let.secret: got 'broad'; expected one of" in capsys.readouterr().out
