@@ -7,7 +7,7 @@ first to be found is the earlier one, and with more time left nothing is lost.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final
@@ -48,12 +48,14 @@ class Finding:
         states: how many different states it looked at.
         plan: actions of a success, int64 (4,) each; None without one, or where it needs chance to fall otherwise.
         exact: False where chance may still open a way that was not drawn.
+        steps: length of the success that was found, whatever chance it needs; None without one.
     """
 
     verdict: Verdict
     states: int
     plan: tuple[NDArray[np.int64], ...] | None
     exact: bool
+    steps: int | None = None
 
 
 def search_rooms(envs: ScenarioVectorEnv, rows: list[int], states: int = STATES) -> Iterator[Finding]:
@@ -79,10 +81,22 @@ class _Layer:
 
 
 class Search:
-    """Searches rooms of one program."""
+    """Searches rooms of one program.
 
-    def __init__(self, program: Program) -> None:
+    Args:
+        program: what is played.
+        goals: names of the outcomes that are looked for; None: the successes.
+        witness: is shown the registers, int16 (S, R), that every round of steps leads to.
+    """
+
+    def __init__(
+        self,
+        program: Program,
+        goals: Collection[str] | None = None,
+        witness: Callable[[NDArray[np.int16]], None] | None = None,
+    ) -> None:
         self._program = program
+        self._witness = witness
         self._relevance = Relevance.of(program)
         actions = _useful_actions(program, self._relevance.whole_utterance)
         chances = _CHANCES if self._relevance.chance else 1
@@ -93,7 +107,8 @@ class Search:
         self._at_once = max(1, _ROWS // len(self._actions))
         self._table = Table([program], self._at_once * len(self._actions), 1)
         self._table.reset(0, None)
-        self._wins = np.array([outcome.success for outcome in program.outcome_table] + [False])
+        wanted = [o.success if goals is None else o.name in goals for o in program.outcome_table]
+        self._wins = np.array([*wanted, False])
         generator = np.random.default_rng(0)
         self._multipliers = generator.integers(
             0, 1 << 63, len(self._relevance.registers), np.uint64
@@ -125,7 +140,10 @@ class Search:
                 part = slice(first, first + self._at_once)
                 winner = self._expand(layer, part, following)
                 if winner is not None:
-                    return Finding(Verdict.SOLVABLE, len(self._parents), self._plan(*winner), True)
+                    chosen = self._choices_to(*winner)
+                    return Finding(
+                        Verdict.SOLVABLE, len(self._parents), self._plan(chosen), True, len(chosen)
+                    )
                 if len(self._parents) > states:
                     return Finding(Verdict.UNDECIDED, len(self._parents), None, False)
             layer = _joined(following, layer)
@@ -147,6 +165,8 @@ class Search:
         self._table.batch.step(Task.STEP_ONLY)
 
         reached = state.registers[:used]
+        if self._witness is not None:
+            self._witness(reached)
         ended = reached[:, Register.ENDED] != 0
         wins = np.flatnonzero(ended & self._wins[reached[:, Register.OUTCOME]])
         if len(wins):
@@ -183,14 +203,18 @@ class Search:
         digests: NDArray[np.uint64] = relevant.astype(np.int64).view(np.uint64) @ self._multipliers
         return digests
 
-    def _plan(self, node: int, choice: int) -> tuple[NDArray[np.int64], ...] | None:
+    def _choices_to(self, node: int, choice: int) -> list[int]:
+        """What was chosen from the start on."""
         choices = [choice]
         while self._parents[node] >= 0:
             choices.append(self._choices[node])
             node = self._parents[node]
+        return choices[::-1]
+
+    def _plan(self, choices: list[int]) -> tuple[NDArray[np.int64], ...] | None:
         if any(self._marks[one] != 0 for one in choices):
             return None
-        return tuple(self._actions[one].copy() for one in reversed(choices))
+        return tuple(self._actions[one].copy() for one in choices)
 
 
 def _useful_actions(program: Program, whole_utterance: bool) -> NDArray[np.int64]:

@@ -64,14 +64,16 @@ class _Entry:
         """The entry with everything resolved."""
         kind, entry = self._kind(), self._entry
         place = (*self._path, kind)
-        plan = PropertyPlan(kind, "", dotted(self._path), self._findings.places.key_span(place))
+        plan = PropertyPlan(
+            kind, "", dotted(self._path), self._findings.places.key_span(place), share=entry.share
+        )
         match kind:
             case "reachable" | "never":
                 raw = entry.reachable if kind == "reachable" else entry.never
                 assert raw is not None, "internal: there is a value for this key"
                 goals = _outcomes_called(str(raw), outcomes)
                 if goals:
-                    return replace(plan, text=f"{kind}: {raw}", goals=goals, share=entry.share)
+                    return replace(plan, text=f"{kind}: {raw}", goals=goals)
                 condition, remembered = self._condition(place, raw)
                 return replace(
                     plan, text=f"{kind}: {raw}", condition=condition, remembered=remembered, share=entry.share
