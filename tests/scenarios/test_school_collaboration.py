@@ -451,7 +451,7 @@ class TestObjects:
     def test_the_others_do_likewise(self, which: str, chosen: int, used: int) -> None:
         lefts, agent, act = {
             "switches": ([[2, 2], [2, 6]], {"at": [2, (3, 7)[used]], "facing": "up"}, "toggle"),
-            "generators": ([[0, 2], [0, 6]], {"at": [1, (2, 6)[used]], "facing": "left"}, "forward"),
+            "generators": ([[1, 2], [1, 6]], {"at": [2, (2, 6)[used]], "facing": "left"}, "forward"),
             "marbles": (
                 [[2, 0], [0, 4]],
                 ({"at": [2, 5], "facing": "up"}, {"at": [3, 4], "facing": "left"})[used],
@@ -467,7 +467,7 @@ class TestObjects:
             "agent": agent,
             "let": {"partner.favourite": f"rights[{chosen}]"},
         }
-        layout |= {"left_box": {"at": [3, 4]}} if which == "switches" else {"left_platform": {"at": [1, 7]}}
+        layout |= {"left_box": {"at": [3, 4]}} if which == "switches" else {"left_platform": {"at": [3, 7]}}
         episode = Episode(f"school/color_match_{which}", layout)
         while [thing["state"] for thing in episode.now()["rights"]].count("pressed") == 0:
             assert episode.act().ended is None
