@@ -153,12 +153,11 @@ def _state_of_env(env: ScenarioEnv) -> dict[str, Any]:
             common["cast"][str(entity)] = _member(member)
             for name, value in member.get("believes", {}).items():
                 common["cast"][str(entity)].setdefault("registers", {})[f"believes.{name}"] = value
+    common |= {"state": state.get("state", {})}
     for name, value in state["let"].items():
         owner, dot, register = name.partition(".")
         if not dot:
             common["let"][name] = value
-        elif owner == "state":
-            common.setdefault("state", {})[register] = value
         elif owner in common["cast"] and not register.startswith(("fired.", *BOOKKEEPING)):
             common["cast"][owner].setdefault("registers", {})[register] = value
     return dict(_flatten(common))

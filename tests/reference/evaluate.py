@@ -216,7 +216,7 @@ def attribute(subject: Any, name: str, context: Context) -> Any:
         if context.setup:
             context.setup.compute_status(subject)
         assert name in TYPES[subject.type].states, f"{subject.type} has no {name}"
-        return not subject.gone and subject.status == name
+        return subject.status == name
     if name in subject.registers:
         return subject.registers[name]
     found, slot = _slot(name, replace(context, me=subject))

@@ -129,8 +129,8 @@ def joint_attention(world: World, a: Any, b: Any, x: Any = None) -> bool:
 
 @_some
 def points_at(world: World, a: Any, x: Any) -> bool:
-    """a points in the direction of the quadrant in which x lies."""
-    return a.pointing is not None and a.pointing == quadrant(where(a), where(x))  # type: ignore[arg-type]
+    """x lies straight in the direction in which a points."""
+    return in_line(world, a, x) and where(a) != where(x) and a.pointing == quadrant(where(a), where(x))  # type: ignore[arg-type]
 
 
 def distance(world: World, a: Any, x: Any) -> int:

@@ -27,9 +27,7 @@ def lit(world: World, eye: Cell, facing: str, view: int) -> set[tuple[int, int]]
         for side in (1, -1):
             for right in range(-half * side, half * side, side):
                 dark = (ahead, right) not in bright
-                if dark or not (
-                    (ahead, right) == (0, 0) or see_through(world, cell_in_view(eye, facing, ahead, right))
-                ):
+                if dark or not see_through(world, cell_in_view(eye, facing, ahead, right)):
                     continue
                 bright |= {(ahead, right + side), (ahead + 1, right), (ahead + 1, right + side)}
     return {(ahead, right) for ahead, right in bright if ahead < view}
