@@ -12,8 +12,11 @@ from tests.tiny import Folder, Play
 
 PAGE = Path(__file__).parents[1] / "docs" / "one_step.md"
 
-EMPTY, DOOR, NPC = 1, 4, 11
+EMPTY, DOOR, NPC, MARBLE = 1, 4, 11, 16
 """Codes of types in the picture."""
+
+BLUE = 2
+"""The code of a colour in the picture."""
 
 
 @pytest.fixture
@@ -217,7 +220,135 @@ def test_1_10_the_other_actions_change_nothing(play: Folder, action: str | None)
     assert {key: run.state[key] for key in ("agent", "door")} == before
 
 
-def test_1_11_then_the_world_is_settled(play: Folder) -> None:
+def test_1_11_push_walking_into_something_pushes_it(play: Folder) -> None:
+    run = play("""
+        objects: {marble: {type: marble, at: [1, 2]}, generator: {type: generator, at: [2, 1]}}
+    """).step("forward")
+    assert (run.at("agent"), run.status("generator")) == ([1, 1], "pressed")
+    run.step("right").step("forward")
+    assert (run.at("agent"), run.facing("marble"), run.status("marble")) == ([1, 1], "down", "rolling")
+
+
+@pytest.mark.parametrize(("kind", "use"), [("box", "toggle"), ("generator", "forward")])
+def test_1_12_held_back_by_another_of_its_group(play: Folder, kind: str, use: str) -> None:
+    run = play(f"objects: {{things: {{type: {kind}, at: [[2, 1], [1, 2]], exclusive: true}}}}")
+    before = run.state["things"][0]["state"]
+    run.step(use).step("right").step(use)
+    assert [thing["state"] == before for thing in run.state["things"]] == [False, True]
+
+
+def test_1_13_top_the_last_in_the_file_is_toggled_and_seen(play: Folder) -> None:
+    run = play("""
+        objects:
+          under: {type: door, at: [2, 1], color: red}
+          over: {type: door, at: [2, 1], color: blue, overlap: true}
+    """)
+    assert run.shown(1)[:2] == [DOOR, BLUE]
+    run.step("toggle")
+    assert (run.status("under"), run.status("over")) == ("closed", "open")
+
+
+def test_1_14_links_take_effect_before_anything_rolls(play: Folder) -> None:
+    text = """
+        objects:
+          lever: {type: lever, at: [2, 1], opens: gate}
+          gate: {type: remote_door, at: [4, 3]}
+          marble: {type: marble, at: [3, 3], state: rolling}
+    """
+    assert play(text).step("toggle").at("marble") == [4, 3], "through the gate that has just been opened"
+    assert play(text).step().at("marble") == [3, 3]
+
+
+# -- 2. what counts and rolls by itself ------------------------------------------------------------
+
+
+def test_2_1_counts_the_step_in_which_it_became_active(play: Folder) -> None:
+    run = play("objects: {lever: {type: lever, at: [2, 1], timer: 3}}")
+    assert [run.step().state["lever"]["timer"], run.step("toggle").state["lever"]["timer"]] == [0, 1]
+    late = play("""
+        objects: {lever: {type: lever, at: [4, 5], timer: 3}}
+        frames: {pull: {steps: [{do: toggle}]}}
+        cast: {ann: {at: [3, 5], facing: right, frame: pull}}
+    """).step()
+    assert (late.status("lever"), late.state["lever"]["timer"]) == ("up", 0), "an NPC's turn comes after"
+    assert late.step().state["lever"]["timer"] == 1
+
+
+def test_2_2_expires_when_all_its_steps_are_counted(play: Folder) -> None:
+    run = play(
+        "objects: {lever: {type: lever, at: [2, 1], timer: 2, opens: gate}, gate: {type: remote_door, at: [5, 0]}}"
+    )
+    run.step("toggle")
+    assert (run.status("lever"), run.status("gate")) == ("up", "open")
+    run.step()
+    assert (run.status("lever"), run.status("gate")) == ("spent", "closed")
+
+
+def test_2_3_zero_in_any_other_status(play: Folder) -> None:
+    run = play("""
+        objects: {lever: {type: lever, at: [2, 1], timer: 3}}
+        rules: [{when: t == 2, cause: [lever.become(down)]}]
+    """).step("toggle")
+    assert [run.step().state["lever"]["timer"] for _ in range(2)] == [2, 0]
+    assert run.step("toggle").state["lever"]["timer"] == 1
+
+
+@pytest.mark.parametrize(
+    ("order", "places"), [(("hind", "fore"), ([2, 3], [4, 3])), (("fore", "hind"), ([3, 3], [4, 3]))]
+)
+def test_2_4_rolls_one_cell_in_the_order_of_the_file(
+    play: Folder, order: tuple[str, str], places: tuple[list[int], list[int]]
+) -> None:
+    x = {"hind": 2, "fore": 3}
+    things = ", ".join(f"{name}: {{type: marble, at: [{x[name]}, 3], state: rolling}}" for name in order)
+    run = play(f"objects: {{{things}}}").step()
+    assert (run.at("hind"), run.at("fore")) == places
+
+
+def test_2_5_same_step_in_which_the_agent_pushed_it(play: Folder) -> None:
+    run = play("objects: {marble: {type: marble, at: [2, 1]}}")
+    assert [run.step(action).at("marble") for action in ("forward", None, None)] == [[3, 1], [4, 1], [5, 1]]
+
+
+@pytest.mark.parametrize(
+    "obstacle",
+    [
+        "objects: {door: {type: door, at: [4, 1]}}",
+        "room: {build: [{wall: column(4)}]}",
+        "room: {build: [{lava: column(4)}]}",
+        "cast: {ann: {at: [4, 1]}}",
+        "observe: {npcs: hidden}\n        cast: {ann: {at: [4, 1]}}",
+        "cast: {agent: {at: [4, 1]}}",
+    ],
+)
+def test_2_6_free_cells_are_what_it_rolls_on(play: Folder, obstacle: str) -> None:
+    thing = "objects: {marble: {type: marble, at: [3, 1], state: rolling}"
+    both = obstacle.replace("objects: {", thing + ", ")
+    text = both if both != obstacle else f"{thing}}}\n        {obstacle}"
+    run = play(f"""
+        {text}
+    """).step()
+    assert (run.at("marble"), run.status("marble")) == ([3, 1], "still")
+
+
+def test_2_7_stops_where_it_pushes_what_is_ahead(play: Folder) -> None:
+    run = play("""
+        objects: {marble: {type: marble, at: [3, 3], state: rolling}, generator: {type: generator, at: [4, 3]}}
+    """).step()
+    assert (run.at("marble"), run.status("marble"), run.status("generator")) == ([3, 3], "still", "pressed")
+
+
+def test_2_8_bodies_do_not_push_what_only_rolling_things_push(play: Folder) -> None:
+    run = play("""
+        objects:
+          near: {type: generator, at: [2, 1], pushed_by: marble}
+          far: {type: generator, at: [4, 3], pushed_by: marble}
+          marble: {type: marble, at: [3, 3], state: rolling}
+    """).step("forward")
+    assert (run.status("near"), run.status("far")) == ("idle", "pressed")
+
+
+def test_2_9_then_the_world_is_settled(play: Folder) -> None:
     run = play("""
         objects:
           switch: {type: switch, at: [2, 1], unlocks: linked}
@@ -233,12 +364,25 @@ def test_1_11_then_the_world_is_settled(play: Folder) -> None:
     assert (run.value("ann.a"), run.value("ann.b")) == (True, True)
     run.step("toggle")
     assert (run.value("ann.a"), run.value("ann.b")) == (False, False), "before anybody else has moved"
+    rolling = play("""
+        objects:
+          marble: {type: marble, at: [3, 3], state: rolling}
+          generator: {type: generator, at: [4, 3], opens: gate}
+          gate: {type: remote_door, at: [4, 0]}
+          computed: {type: door, at: [5, 0], locked: generator.pressed}
+        frames:
+          watch:
+            let: {a: false, b: false}
+            states: {s: {first: [{set: {a: gate.open, b: computed.locked}}]}}
+        cast: {ann: {at: [5, 5], frame: watch}}
+    """).step()
+    assert (rolling.value("ann.a"), rolling.value("ann.b")) == (True, True), "after it has rolled"
 
 
-# -- 2. how the world is settled -------------------------------------------------------------------
+# -- 3. how the world is settled -------------------------------------------------------------------
 
 
-def test_2_1_a_link_unlocks_what_is_locked(play: Folder) -> None:
+def test_3_1_a_link_unlocks_what_is_locked(play: Folder) -> None:
     run = play("""
         objects:
           switch: {type: switch, at: [2, 1], unlocks: shut | ajar}
@@ -250,7 +394,7 @@ def test_2_1_a_link_unlocks_what_is_locked(play: Folder) -> None:
     assert (run.status("shut"), run.status("ajar")) == ("closed", "open")
 
 
-def test_2_2_what_a_link_unlocks_cannot_be_locked_for_long(play: Folder) -> None:
+def test_3_2_what_a_link_unlocks_cannot_be_locked_for_long(play: Folder) -> None:
     run = play("""
         objects:
           switch: {type: switch, at: [1, 0], unlocks: door, pressed: true}
@@ -266,7 +410,7 @@ def test_2_2_what_a_link_unlocks_cannot_be_locked_for_long(play: Folder) -> None
     assert run.status("door") == "closed"
 
 
-def test_2_3_what_a_link_unlocked_stays_so(play: Folder) -> None:
+def test_3_3_what_a_link_unlocked_stays_so(play: Folder) -> None:
     run = play("""
         objects:
           switch: {type: switch, at: [2, 1], unlocks: door}
@@ -276,7 +420,7 @@ def test_2_3_what_a_link_unlocked_stays_so(play: Folder) -> None:
     assert (run.status("switch"), run.status("door")) == ("idle", "closed")
 
 
-def test_2_4_a_switch_that_has_vanished_unlocks_nothing(play: Folder) -> None:
+def test_3_4_a_switch_that_has_vanished_unlocks_nothing(play: Folder) -> None:
     run = play("""
         objects:
           switch: {type: switch, at: [2, 1], unlocks: door, pressed: true}
@@ -288,6 +432,49 @@ def test_2_4_a_switch_that_has_vanished_unlocks_nothing(play: Folder) -> None:
     assert [run.step().status("door") for _ in range(2)] == ["closed", "locked"]
 
 
+def test_3_5_opens_is_a_level(play: Folder) -> None:
+    run = play("""
+        objects:
+          one: {type: switch, at: [2, 1], opens: gate}
+          two: {type: switch, at: [1, 2], opens: gate}
+          gate: {type: remote_door, at: [5, 0], state: open}
+        rules: [{when: t == 6, cause: [two.vanish]}]
+    """)
+    assert run.status("gate") == "closed"
+    gates = [run.step(action).status("gate") for action in ("toggle", "right", "toggle", "left", "toggle")]
+    assert gates == ["open", "open", "open", "open", "open"]
+    assert run.status("one") == "idle"
+    assert run.step().status("gate") == "closed", "the other has vanished"
+
+
+def test_3_6_release_of_what_lies_inside(play: Folder) -> None:
+    run = play("objects: {box: {type: box, at: [2, 1]}, apple: {type: apple, inside: box}}")
+    assert (run.at("apple"), run.state["apple"]["inside"]) == (None, "box")
+    run.step("toggle")
+    assert (run.at("box"), run.at("apple")) == (None, [2, 1])
+    assert run.step("toggle").status("apple") == "eaten"
+
+
+def test_3_7_empty_things_stay(play: Folder) -> None:
+    run = play("""
+        objects: {box: {type: box, at: [2, 1]}, other: {type: box, at: [5, 5]}, apple: {type: apple, inside: other}}
+    """).step("toggle")
+    assert (run.at("box"), run.status("box")) == ([2, 1], "opened")
+
+
+def test_3_8_exclusive_holds_also_when_the_one_is_gone(play: Folder) -> None:
+    run = play(
+        """
+        objects: {boxes: {type: box, at: [[2, 1], [1, 2]], exclusive: true}, apple: {type: apple, inside: target}}
+        let: {target: pick(boxes)}
+        """,
+        {"let": {"target": "boxes[0]"}},
+    ).step("toggle")
+    assert run.state["boxes"][0].get("gone")
+    run.step("right").step("toggle")
+    assert run.state["boxes"][1]["state"] == "shut"
+
+
 COMPUTED = """
     objects:
       switch: {type: switch, at: [2, 1]}
@@ -295,30 +482,30 @@ COMPUTED = """
 """
 
 
-def test_2_5_a_computed_status_holds_while_its_condition_does(play: Folder) -> None:
+def test_3_9_a_computed_status_holds_while_its_condition_does(play: Folder) -> None:
     run = play(COMPUTED)
     assert run.status("door") == "open"
     assert run.step("toggle").status("door") == "locked"
 
 
-def test_2_6_what_was_locked_becomes_closed(play: Folder) -> None:
+def test_3_10_what_was_locked_becomes_closed(play: Folder) -> None:
     run = play(COMPUTED).step("toggle").step("toggle")
     assert run.status("door") == "closed"
 
 
-def test_2_7_any_other_status_is_left_alone(play: Folder) -> None:
+def test_3_11_any_other_status_is_left_alone(play: Folder) -> None:
     run = play(COMPUTED).step("right")
     assert run.facing("agent") == "down"
     assert [run.step("toggle").status("door") for _ in range(3)] == ["closed", "open", "closed"]
 
 
-def test_2_8_tagged_is_computed_likewise(play: Folder) -> None:
+def test_3_12_tagged_is_computed_likewise(play: Folder) -> None:
     run = play("objects: {ball: {type: ball, at: [3, 3], tagged: agent.in_line(it)}}")
     assert run.status("ball") == "plain"
     assert [run.step("forward").status("ball") for _ in range(3)] == ["plain", "tagged", "plain"]
 
 
-def test_2_9_a_computed_status_is_settled_after_those_it_reads(play: Folder) -> None:
+def test_3_13_a_computed_status_is_settled_after_those_it_reads(play: Folder) -> None:
     run = play("""
         objects:
           third: {type: door, at: [3, 0], locked: second.locked}
@@ -331,7 +518,7 @@ def test_2_9_a_computed_status_is_settled_after_those_it_reads(play: Folder) -> 
     assert (run.status("second"), run.status("third")) == ("locked", "locked")
 
 
-def test_2_10_computed_statuses_read_what_links_did(play: Folder) -> None:
+def test_3_14_computed_statuses_read_what_links_did(play: Folder) -> None:
     run = play("""
         objects:
           computed: {type: door, at: [3, 0], locked: linked.locked}
@@ -346,7 +533,7 @@ def test_2_10_computed_statuses_read_what_links_did(play: Folder) -> None:
     assert (run.status("linked"), run.status("computed")) == ("closed", "closed")
 
 
-def test_2_11_a_reset_ends_with_settling(play: Folder) -> None:
+def test_3_15_a_reset_ends_with_settling(play: Folder) -> None:
     run = play("""
         objects:
           switch: {type: switch, at: [2, 1], unlocks: linked, pressed: true}
@@ -357,7 +544,7 @@ def test_2_11_a_reset_ends_with_settling(play: Folder) -> None:
     assert (run.status("linked"), run.status("computed")) == ("closed", "locked")
 
 
-# -- 3. the agent's voice --------------------------------------------------------------------------
+# -- 4. the agent's voice --------------------------------------------------------------------------
 
 LISTENER = "ear: {let: {heard_at: 0}, states: {s: {then: [{hears: Say hello, set: {heard_at: t}}]}}}"
 """A frame that notes when it last heard a hello."""
@@ -366,7 +553,7 @@ EAR = f"frames: {{{LISTENER}}}"
 
 
 @pytest.mark.parametrize(("at", "hears"), [([3, 1], True), ([1, 2], False)])
-def test_3_1_earshot_is_measured_after_the_body_moved(play: Folder, at: list[int], hears: bool) -> None:
+def test_4_1_earshot_is_measured_after_the_body_moved(play: Folder, at: list[int], hears: bool) -> None:
     run = play(f"""
         earshot: next_to
         {EAR}
@@ -379,7 +566,7 @@ def test_3_1_earshot_is_measured_after_the_body_moved(play: Folder, at: list[int
 @pytest.mark.parametrize(
     ("earshot", "farthest"), [("next_to", 1), (1, 1), (2, 2), (3, 3), ("room", 4)], ids=str
 )
-def test_3_2_how_far_a_voice_carries(play: Folder, earshot: object, farthest: int) -> None:
+def test_4_2_how_far_a_voice_carries(play: Folder, earshot: object, farthest: int) -> None:
     run = play(f"""
         earshot: {earshot}
         {EAR}
@@ -394,7 +581,7 @@ def test_3_2_how_far_a_voice_carries(play: Folder, earshot: object, farthest: in
 
 
 @pytest.mark.parametrize(("earshot", "hears"), [("next_to", False), (1, True), ("room", True)])
-def test_3_3_hidden_npcs_hear_the_agent(play: Folder, earshot: object, hears: bool) -> None:
+def test_4_3_hidden_npcs_hear_the_agent(play: Folder, earshot: object, hears: bool) -> None:
     run = play(f"""
         earshot: {earshot}
         observe: {{npcs: hidden}}
@@ -405,7 +592,7 @@ def test_3_3_hidden_npcs_hear_the_agent(play: Folder, earshot: object, hears: bo
     assert (run.value("ann.heard_at") == 1) is hears, "on the agent's own cell"
 
 
-def test_3_4_in_a_suite_what_a_member_lacks_is_silence(play: Folder) -> None:
+def test_4_4_in_a_suite_what_a_member_lacks_is_silence(play: Folder) -> None:
     play.write("one", "outcome: [{failure: agent.spoke}]")
     play.write(
         "two",
@@ -421,7 +608,7 @@ def test_3_4_in_a_suite_what_a_member_lacks_is_silence(play: Folder) -> None:
     assert run.step(None, "Ask why").terminated
 
 
-def test_3_5_the_agent_hears_itself_first_if_at_all(play: Folder) -> None:
+def test_4_5_the_agent_hears_itself_first_if_at_all(play: Folder) -> None:
     text = """
         observe: {{own_voice: {}}}
         frames: {{talk: {{states: {{s: {{then: [{{say: Hi.}}]}}}}}}}}
@@ -432,7 +619,7 @@ def test_3_5_the_agent_hears_itself_first_if_at_all(play: Folder) -> None:
     assert play(text.format("false")).step(None, "Say hello").info["utterance"] == "Ann: Hi."
 
 
-def test_3_6_a_scripted_agent_reads_then_before_npcs_move(play: Folder) -> None:
+def test_4_6_a_scripted_agent_reads_then_before_npcs_move(play: Folder) -> None:
     run = play("""
         frames:
           script: {let: {own: 0, seen: 0}, states: {s: {then: [{after: 1, set: {own: self.x, seen: ann.x}}]}}}
@@ -446,13 +633,13 @@ def test_3_6_a_scripted_agent_reads_then_before_npcs_move(play: Folder) -> None:
     assert (run.value("agent.own"), run.value("agent.seen")) == (2, 5)
 
 
-# -- 4. the NPCs, one after the other --------------------------------------------------------------
+# -- 5. the NPCs, one after the other --------------------------------------------------------------
 
 WALK = "frames: {walk: {states: {s: {do: forward}}}}"
 
 
 @pytest.mark.parametrize(("order", "ends"), [(("ann", "bob"), [2, 4]), (("bob", "ann"), [3, 4])])
-def test_4_1_npcs_take_turns_in_the_order_of_the_cast(
+def test_5_1_npcs_take_turns_in_the_order_of_the_cast(
     play: Folder, order: tuple[str, str], ends: list[int]
 ) -> None:
     column = {"ann": 2, "bob": 3}
@@ -464,7 +651,7 @@ def test_4_1_npcs_take_turns_in_the_order_of_the_cast(
     assert [run.at("ann")[0], run.at("bob")[0]] == ends, "ann can follow only after bob has left his cell"
 
 
-def test_4_2_who_has_vanished_takes_no_turn(play: Folder) -> None:
+def test_5_2_who_has_vanished_takes_no_turn(play: Folder) -> None:
     run = play("""
         frames:
           leave:
@@ -481,7 +668,21 @@ def test_4_2_who_has_vanished_takes_no_turn(play: Folder) -> None:
     assert (run.at("ann"), run.value("ann.early"), run.value("ann.late")) == (None, 2, 2)
 
 
-def test_4_3_first_is_read_before_the_body_moves(play: Folder) -> None:
+NEAR = "beliefs: {column_of: {of: agent.x, when: agent.x < 3}}"
+"""Somebody who knows where the agent is as long as it is on the left."""
+
+
+def test_5_3_believes_come_before_first(play: Folder) -> None:
+    run = play(f"""
+        frames: {{watch: {{let: {{seen: 0}}, states: {{s: {{first: [{{set: {{seen: self.believes.column_of}}}}]}}}}}}}}
+        cast: {{ann: {{at: [5, 5], frame: watch, {NEAR}}}}}
+    """)
+    assert run.state["ann"]["believes"]["column_of"] == 1, "at first it is true"
+    assert [run.step("forward").value("ann.seen") for _ in range(2)] == [2, 2]
+    assert run.at("agent") == [3, 1]
+
+
+def test_5_4_first_is_read_before_the_body_moves(play: Folder) -> None:
     run = play("""
         frames:
           walk:
@@ -493,7 +694,7 @@ def test_4_3_first_is_read_before_the_body_moves(play: Folder) -> None:
 
 
 @pytest.mark.parametrize("where", ["first", "then"])
-def test_4_4_the_first_rule_that_holds_fires_alone(play: Folder, where: str) -> None:
+def test_5_5_the_first_rule_that_holds_fires_alone(play: Folder, where: str) -> None:
     run = play(f"""
         frames:
           list:
@@ -505,7 +706,7 @@ def test_4_4_the_first_rule_that_holds_fires_alone(play: Folder, where: str) -> 
     assert [run.value(f"ann.{name}") for name in "abc"] == [0, 1, 0]
 
 
-def test_4_5_a_rule_with_an_activity_takes_the_whole_turn(play: Folder) -> None:
+def test_5_6_a_rule_with_an_activity_takes_the_whole_turn(play: Folder) -> None:
     run = play("""
         frames:
           turn:
@@ -518,7 +719,41 @@ def test_4_5_a_rule_with_an_activity_takes_the_whole_turn(play: Folder) -> None:
     assert (run.at("ann"), run.value("ann.late")) == ([3, 4], 2)
 
 
-def test_4_6_a_goto_in_first_is_of_this_turn(play: Folder) -> None:
+def test_5_7_rest_of_a_rule_comes_after_the_body_action(play: Folder) -> None:
+    run = play("""
+        objects: {door: {type: door, at: [4, 5]}}
+        frames:
+          go:
+            let: {was: 0}
+            states:
+              s:
+                first:
+                  - {when: t == 1, do: forward, cause: [door.open]}
+                  - {do: forward, set: {was: self.x}, say: From <self.x>., goto: after_it}
+              after_it: {}
+        cast: {ann: {at: [3, 5], facing: right, frame: go}}
+    """).step()
+    assert (run.at("ann"), run.status("door")) == ([3, 5], "open"), "the door was closed when it went"
+    run.step()
+    assert (run.at("ann"), run.value("ann.was"), run.info["utterance"]) == ([4, 5], 3, "Ann: From 3.")
+    assert run.status("ann") == "after_it"
+
+
+def test_5_8_clock_of_the_new_state_is_0(play: Folder) -> None:
+    run = play("""
+        frames:
+          go:
+            let: {fired_at: 0}
+            states:
+              s: {first: [{do: left, goto: other}]}
+              other: {then: [{after: 2, once: true, set: {fired_at: t}}]}
+        cast: {ann: {at: [3, 5], frame: go}}
+    """).step()
+    assert run.state["ann"]["clock"] == 0
+    assert run.steps(3).value("ann.fired_at") == 3
+
+
+def test_5_9_a_goto_in_first_is_of_this_turn(play: Folder) -> None:
     run = play("""
         frames:
           change:
@@ -532,7 +767,7 @@ def test_4_6_a_goto_in_first_is_of_this_turn(play: Folder) -> None:
     assert (run.value("ann.old"), run.value("ann.new")) == (0, 1)
 
 
-def test_4_7_who_vanishes_in_first_does_nothing_more(play: Folder) -> None:
+def test_5_10_who_vanishes_in_first_does_nothing_more(play: Folder) -> None:
     run = play("""
         objects: {door: {type: door, at: [4, 5]}}
         frames:
@@ -545,7 +780,7 @@ def test_4_7_who_vanishes_in_first_does_nothing_more(play: Folder) -> None:
     assert run.info["utterance"] == "Ann: Bye."
 
 
-def test_4_8_one_body_action_a_turn(play: Folder) -> None:
+def test_5_11_one_body_action_a_turn(play: Folder) -> None:
     run = play("""
         objects: {switch: {type: switch, at: [5, 3]}}
         frames: {press: {states: {s: {do: use(switch)}}}}
@@ -571,7 +806,7 @@ def test_4_8_one_body_action_a_turn(play: Folder) -> None:
         ("observe: {npcs: hidden}", ", agent: {at: [4, 5]}"),
     ],
 )
-def test_4_9_npcs_do_not_enter_what_is_solid_deadly_or_taken(play: Folder, obstacle: str, cast: str) -> None:
+def test_5_12_npcs_do_not_enter_what_is_solid_deadly_or_taken(play: Folder, obstacle: str, cast: str) -> None:
     run = play(f"""
         {obstacle}
         {WALK}
@@ -580,7 +815,25 @@ def test_4_9_npcs_do_not_enter_what_is_solid_deadly_or_taken(play: Folder, obsta
     assert run.step().at("ann") == [3, 5]
 
 
-def test_4_10_the_toggle_of_an_npc_changes_the_object_and_pokes_nobody(play: Folder) -> None:
+PUSHER = """
+    objects: {marble: {type: marble, at: [4, 5]}}
+    frames: {push: {steps: [{do: forward}]}}
+    cast: {ann: {at: [3, 5], facing: right, frame: push}}
+"""
+
+
+def test_5_13_push_by_an_npc(play: Folder) -> None:
+    run = play(PUSHER).step()
+    assert (run.at("ann"), run.status("marble"), run.facing("ann")) == ([3, 5], "rolling", "right")
+
+
+def test_5_14_next_step_it_rolls(play: Folder) -> None:
+    run = play(PUSHER)
+    assert [run.step().at("marble") for _ in range(3)] == [[4, 5], [5, 5], [5, 5]]
+    assert run.status("marble") == "still"
+
+
+def test_5_15_the_toggle_of_an_npc_changes_the_object_and_pokes_nobody(play: Folder) -> None:
     run = play("""
         objects: {door: {type: door, at: [4, 5], state: open}}
         frames: {press: {states: {s: {do: toggle}}}}
@@ -593,7 +846,38 @@ def test_4_10_the_toggle_of_an_npc_changes_the_object_and_pokes_nobody(play: Fol
     assert run.state["last"]["poked"] is None
 
 
-def test_4_11_the_world_is_settled_after_the_body_action(play: Folder) -> None:
+def test_5_16_toggled_is_known_until_its_next_turn(play: Folder) -> None:
+    run = play(
+        """
+        objects: {door: {type: door, at: [4, 5]}}
+        frames:
+          press: {steps: [{do: toggle}]}
+          watch:
+            let: {by: 0, at_all: 0}
+            states:
+              s: {first: [{when: door.toggled_by(ann), set: {by: t}}], then: [{when: door.toggled, set: {at_all: t}}]}
+        cast:
+          bob: {at: [1, 5], frame: watch}
+          ann: {at: [3, 5], facing: right, frame: press}
+          cal: {at: [2, 5], frame: watch}
+    """.replace("at_all: door.toggled", "at_all: count(d in door | door where d.toggled)")
+    ).steps(4)
+    assert (run.value("cal.by"), run.value("bob.by")) == (1, 2)
+    assert (run.value("cal.at_all"), run.value("bob.at_all")) == (1, 2)
+
+
+def test_5_17_points_until_it_stops(play: Folder) -> None:
+    run = play("""
+        objects: {door: {type: door, at: [5, 5]}}
+        frames: {show: {steps: [{do: point(door)}, {do: left}, {do: forward}, {do: stop_pointing}]}}
+        cast: {ann: {at: [3, 5], facing: down, frame: show}}
+    """)
+    seen = [run.step().state["ann"].get("pointing") for _ in range(4)]
+    assert seen == ["right", "right", "right", None]
+    assert (run.facing("ann"), run.at("ann")) == ("right", [4, 5])
+
+
+def test_5_18_the_world_is_settled_after_the_body_action(play: Folder) -> None:
     run = play("""
         objects:
           switch: {type: switch, at: [4, 5], unlocks: linked}
@@ -617,7 +901,7 @@ CLOCK = """
 """
 
 
-def test_4_12_after_1_in_then_holds_in_the_first_turn(play: Folder) -> None:
+def test_5_19_after_1_in_then_holds_in_the_first_turn(play: Folder) -> None:
     run = play(CLOCK.format(where="then"))
     assert run.state["ann"]["clock"] == 0
     run.step()
@@ -625,11 +909,11 @@ def test_4_12_after_1_in_then_holds_in_the_first_turn(play: Folder) -> None:
     assert run.value("ann.fired_at") == 1
 
 
-def test_4_13_after_1_in_first_holds_in_the_second_turn(play: Folder) -> None:
+def test_5_20_after_1_in_first_holds_in_the_second_turn(play: Folder) -> None:
     assert play(CLOCK.format(where="first")).steps(3).value("ann.fired_at") == 2
 
 
-def test_4_14_a_rule_computes_before_it_acts(play: Folder) -> None:
+def test_5_21_a_rule_computes_before_it_acts(play: Folder) -> None:
     run = play("""
         frames:
           swap:
@@ -644,7 +928,7 @@ def test_4_14_a_rule_computes_before_it_acts(play: Folder) -> None:
 @pytest.mark.parametrize(
     ("effects", "status"), [("door.open, door.lock", "locked"), ("door.lock, door.open", "open")]
 )
-def test_4_15_effects_happen_in_the_order_listed(play: Folder, effects: str, status: str) -> None:
+def test_5_22_effects_happen_in_the_order_listed(play: Folder, effects: str, status: str) -> None:
     run = play(f"""
         objects: {{door: {{type: door, at: [5, 0]}}}}
         frames: {{act: {{states: {{s: {{then: [{{cause: [{effects}]}}]}}}}}}}}
@@ -653,7 +937,57 @@ def test_4_15_effects_happen_in_the_order_listed(play: Folder, effects: str, sta
     assert run.status("door") == status
 
 
-def test_4_16_what_then_changes_is_settled_later(play: Folder) -> None:
+@pytest.mark.parametrize(
+    ("place", "at"),
+    [("shut", [3, 5]), ("lava", [3, 5]), ("agent", [3, 5]), ("bob", [3, 5]), ("gate", [4, 4])],
+)
+def test_5_23_put_somebody_where_nobody_can_stand(play: Folder, place: str, at: list[int]) -> None:
+    run = play(f"""
+        objects:
+          shut: {{type: door, at: [2, 2]}}
+          lava: {{type: lava, at: [2, 3]}}
+          gate: {{type: door, at: [4, 4], state: open}}
+        cast: {{ann: {{at: [3, 5]}}, bob: {{at: [5, 5]}}}}
+        rules: [{{when: t == 1, cause: [ann.put({place})]}}]
+    """).step()
+    assert run.at("ann") == at
+
+
+def test_5_24_into_something(play: Folder) -> None:
+    run = play("""
+        objects:
+          one: {type: box, at: [4, 4]}
+          other: {type: box, at: [5, 4]}
+          toy: {type: ball, inside: one}
+        rules:
+          - {when: t == 1, cause: [one.reveal]}
+          - {when: t == 2, cause: [toy.move_into(other)]}
+          - {when: t == 3, cause: [other.reveal]}
+    """)
+    assert [run.step().at("toy") for _ in range(3)] == [[4, 4], None, [5, 4]]
+    assert run.state["toy"]["inside"] == "other", "it lay there last"
+
+
+def test_5_25_reset_of_things_and_people(play: Folder) -> None:
+    run = play("""
+        objects:
+          box: {type: box, at: [2, 1]}
+          apple: {type: apple, inside: box}
+          marble: {type: marble, at: [1, 2]}
+        frames: {walk: {states: {s: {do: choose(forward)}}}}
+        cast: {ann: {at: [3, 5], facing: right, frame: walk}}
+        rules: [{when: t == 3, cause: [objects.reset, ann.reset]}]
+    """)
+    before = {key: run.state[key] for key in ("box", "apple", "marble", "ann")}
+    run.step("toggle").step("right")
+    assert (run.at("apple"), run.at("ann")) == ([2, 1], [5, 5])
+    run.step("forward")
+    after = {key: run.state[key] for key in ("box", "apple", "marble")}
+    assert after == {key: before[key] for key in after}
+    assert (run.at("ann"), run.facing("ann")) == (before["ann"]["at"], before["ann"]["facing"])
+
+
+def test_5_26_what_then_changes_is_settled_later(play: Folder) -> None:
     run = play("""
         objects:
           switch: {type: switch, at: [4, 0], unlocks: door}
@@ -688,14 +1022,14 @@ GOING = """
 """
 
 
-def test_4_17_after_goto_the_new_state_begins_with_the_next_turn(play: Folder) -> None:
+def test_5_27_after_goto_the_new_state_begins_with_the_next_turn(play: Folder) -> None:
     run = play(GOING.format(go="goto")).step()
     assert (run.state["ann"]["state"], run.state["ann"]["clock"]) == ("after_it", 0)
     assert run.value("ann.fired_at") == 0
     assert run.step().value("ann.fired_at") == 9, "`first` of the next turn"
 
 
-def test_4_18_goto_now_reads_the_new_then_at_once(play: Folder) -> None:
+def test_5_28_goto_now_reads_the_new_then_at_once(play: Folder) -> None:
     run = play(GOING.format(go="goto_now")).step()
     assert (run.state["ann"]["state"], run.state["ann"]["clock"]) == ("after_it", 0)
     assert run.value("ann.fired_at") == 1
@@ -709,7 +1043,7 @@ CHOICES = [
 
 
 @pytest.mark.parametrize("choice", CHOICES)
-def test_4_19_a_condition_is_false_where_nothing_is_found(play: Folder, choice: str) -> None:
+def test_5_29_a_condition_is_false_where_nothing_is_found(play: Folder, choice: str) -> None:
     run = play(f"""
         objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]]}}}}
         frames:
@@ -730,7 +1064,7 @@ def test_4_19_a_condition_is_false_where_nothing_is_found(play: Folder, choice: 
 
 @pytest.mark.parametrize("choice", CHOICES)
 @pytest.mark.parametrize("effect", ['cause: ["{}.open"]', "say: I see <{}.color>", 'set: {{x0: "{}.x"}}'])
-def test_4_20_a_rule_does_not_fire_where_nothing_is_found(play: Folder, choice: str, effect: str) -> None:
+def test_5_30_a_rule_does_not_fire_where_nothing_is_found(play: Folder, choice: str, effect: str) -> None:
     text = """
         objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]], state: {}}}}}
         frames:
@@ -753,7 +1087,7 @@ def test_4_20_a_rule_does_not_fire_where_nothing_is_found(play: Folder, choice: 
 
 
 @pytest.mark.parametrize("choice", CHOICES)
-def test_4_21_an_activity_is_staying_where_nothing_is_found(play: Folder, choice: str) -> None:
+def test_5_31_an_activity_is_staying_where_nothing_is_found(play: Folder, choice: str) -> None:
     run = play(f"""
         objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]]}}}}
         frames:
@@ -767,7 +1101,7 @@ def test_4_21_an_activity_is_staying_where_nothing_is_found(play: Folder, choice
     assert run.step().facing("ann") == "up"
 
 
-def test_4_22_once_is_once_in_an_episode(play: Folder) -> None:
+def test_5_32_once_is_once_in_an_episode(play: Folder) -> None:
     run = play("""
         frames:
           talk:
@@ -786,7 +1120,7 @@ def test_4_22_once_is_once_in_an_episode(play: Folder) -> None:
     assert run.step().info["utterance"] == "Ann: First."
 
 
-def test_4_23_a_step_acts_when_it_ends_after_the_body(play: Folder) -> None:
+def test_5_33_a_step_acts_when_it_ends_after_the_body(play: Folder) -> None:
     run = play("""
         objects: {door: {type: door, at: [5, 0]}}
         frames:
@@ -802,7 +1136,7 @@ def test_4_23_a_step_acts_when_it_ends_after_the_body(play: Folder) -> None:
     assert run.value("ann.ended_at") == 4
 
 
-def test_4_24_the_next_entry_begins_with_the_next_turn(play: Folder) -> None:
+def test_5_34_the_next_entry_begins_with_the_next_turn(play: Folder) -> None:
     run = play("""
         frames: {go: {steps: [{do: left}, {do: forward}]}}
         cast: {ann: {at: [3, 5], facing: right, frame: go}}
@@ -811,7 +1145,7 @@ def test_4_24_the_next_entry_begins_with_the_next_turn(play: Folder) -> None:
     assert run.step().at("ann") == [3, 4]
 
 
-def test_4_25_an_entry_without_activity_stays_for_one_turn(play: Folder) -> None:
+def test_5_35_an_entry_without_activity_stays_for_one_turn(play: Folder) -> None:
     run = play("""
         frames: {go: {steps: [{say: Now.}, {do: left}]}}
         cast: {ann: {at: [3, 5], facing: right, frame: go}}
@@ -821,7 +1155,7 @@ def test_4_25_an_entry_without_activity_stays_for_one_turn(play: Folder) -> None
 
 
 @pytest.mark.parametrize("goal", ["go_next_to(door)", "go_to(self.cell)", "enter(gate)"])
-def test_4_26_what_is_fulfilled_before_it_begins_takes_no_turn(play: Folder, goal: str) -> None:
+def test_5_36_what_is_fulfilled_before_it_begins_takes_no_turn(play: Folder, goal: str) -> None:
     text = """
         objects: {{door: {{type: door, at: [3, 6]}}, gate: {{type: door, at: [3, 5], state: open}}}}
         frames: {{go: {{steps: [{{do: {goal}{effect}}}, {{do: left}}]}}}}
@@ -832,6 +1166,16 @@ def test_4_26_what_is_fulfilled_before_it_begins_takes_no_turn(play: Folder, goa
     assert (run.facing("ann"), run.info["utterance"]) == ("right", "Ann: There.")
 
 
+def test_5_37_aim_of_an_entry_is_that_of_its_turn(play: Folder) -> None:
+    run = play("""
+        objects: {doors: {type: door, at: [[4, 5], [3, 6]]}}
+        frames: {go: {steps: [{do: use(first(d in doors where d.closed))}, {do: left}]}}
+        cast: {ann: {at: [3, 5], facing: right, frame: go}}
+    """).steps(2)
+    assert [door["state"] for door in run.state["doors"]] == ["open", "closed"]
+    assert run.facing("ann") == "up", "the entry was over, though another door was closed"
+
+
 DANCE = """
     let: {{dance: {{sequence: 3, moves: [left, right, forward], utterance: {{chance: 0.5}}}}}}
     frames: {{dance: {frame}}}
@@ -840,7 +1184,7 @@ DANCE = """
 TURNS = {"let": {"dance": [["left", "Say hello"], ["right", None], ["forward", "Say bye"]]}}
 
 
-def test_4_27_perform_does_and_says_the_kth_element(play: Folder) -> None:
+def test_5_38_perform_does_and_says_the_kth_element(play: Folder) -> None:
     run = play(DANCE.format(frame="{steps: [{do: perform(dance)}]}", facing="right"), TURNS)
     seen = [(run.step().at("ann"), run.facing("ann"), run.info["utterance"]) for _ in range(3)]
     assert seen == [
@@ -850,14 +1194,14 @@ def test_4_27_perform_does_and_says_the_kth_element(play: Folder) -> None:
     ]
 
 
-def test_4_28_a_blocked_move_counts(play: Folder) -> None:
+def test_5_39_a_blocked_move_counts(play: Folder) -> None:
     blocked = {"let": {"dance": [["forward", None], ["forward", "Say bye"], ["left", None]]}}
     run = play(DANCE.format(frame="{steps: [{do: perform(dance)}]}", facing="down"), blocked)
     seen = [(run.step().at("ann"), run.facing("ann"), run.info["utterance"]) for _ in range(3)]
     assert seen == [([3, 5], "down", "NA"), ([3, 5], "down", "Ann: Say bye"), ([3, 5], "right", "NA")]
 
 
-def test_4_29_after_its_last_element_perform_is_finished(play: Folder) -> None:
+def test_5_40_after_its_last_element_perform_is_finished(play: Folder) -> None:
     run = play(
         DANCE.format(frame="{steps: [{do: perform(dance)}, {do: left}]}", facing="right"), TURNS
     ).steps(3)
@@ -869,7 +1213,7 @@ def test_4_29_after_its_last_element_perform_is_finished(play: Folder) -> None:
 
 
 @pytest.mark.parametrize(("facing", "heard"), [("left", "Ann: Say hello"), ("right", "NA")])
-def test_4_30_a_line_is_heard_where_the_turn_ends(play: Folder, facing: str, heard: str) -> None:
+def test_5_41_a_line_is_heard_where_the_turn_ends(play: Folder, facing: str, heard: str) -> None:
     start = {"left": 3, "right": 2}[facing]
     run = play(f"""
         earshot: next_to
@@ -879,7 +1223,7 @@ def test_4_30_a_line_is_heard_where_the_turn_ends(play: Folder, facing: str, hea
     assert run.info["utterance"] == heard
 
 
-def test_4_31_one_utterance_a_turn(play: Folder) -> None:
+def test_5_42_one_utterance_a_turn(play: Folder) -> None:
     run = play("""
         frames: {talk: {states: {s: {first: [{say: Early.}], then: [{say: Late.}]}}}}
         cast: {ann: {at: [5, 5], frame: talk}}
@@ -902,19 +1246,19 @@ def _listening(play: Folder, cast: str) -> Play:
     """)
 
 
-def test_4_32_an_npc_hears_those_before_it_in_this_step(play: Folder) -> None:
+def test_5_43_an_npc_hears_those_before_it_in_this_step(play: Folder) -> None:
     run = _listening(play, "ann: {at: [5, 5], frame: talk}, bob: {at: [4, 5], frame: ear}").steps(2)
     assert run.value("bob.heard_at") == 1
     run = _listening(play, "bob: {at: [4, 5], frame: ear}").step().step(None, "Say hello")
     assert run.value("bob.heard_at") == 2
 
 
-def test_4_33_an_npc_hears_those_after_it_a_step_later(play: Folder) -> None:
+def test_5_44_an_npc_hears_those_after_it_a_step_later(play: Folder) -> None:
     run = _listening(play, "bob: {at: [4, 5], frame: ear}, ann: {at: [5, 5], frame: talk}").steps(3)
     assert run.value("bob.heard_at") == 2
 
 
-def test_4_34_nobody_hears_himself(play: Folder) -> None:
+def test_5_45_nobody_hears_himself(play: Folder) -> None:
     run = (
         play("""
         frames:
@@ -932,7 +1276,7 @@ def test_4_34_nobody_hears_himself(play: Folder) -> None:
 
 
 @pytest.mark.parametrize(("order", "first"), [(("hello", "bye"), "hello"), (("bye", "hello"), "bye")])
-def test_4_35_the_first_matching_rule_fires(play: Folder, order: tuple[str, str], first: str) -> None:
+def test_5_46_the_first_matching_rule_fires(play: Folder, order: tuple[str, str], first: str) -> None:
     rules = ", ".join(f"{{hears: Say {word}, say: It was {word}.}}" for word in order)
     run = play(f"""
         frames:
@@ -943,7 +1287,48 @@ def test_4_35_the_first_matching_rule_fires(play: Folder, order: tuple[str, str]
     assert run.info["utterance"].splitlines()[-1] == f"Bob: It was {first}."
 
 
-def test_4_36_what_was_heard_is_forgotten_at_the_end_of_the_turn(play: Folder) -> None:
+def test_5_47_speaker_and_noun_are_those_of_the_first(play: Folder) -> None:
+    run = play("""
+        frames:
+          talk: {states: {s: {then: [{say: Say bye}]}}}
+          listen: {states: {s: {then: [{hears: Say <noun>, say: "<speaker.name> said <noun>"}]}}}
+        cast: {bob: {at: [4, 5], frame: talk}, ann: {at: [5, 5], frame: listen}}
+    """)
+    assert run.step().info["utterance"].splitlines()[-1] == "Ann: Bob said bye"
+    assert run.step(None, "Say hello").info["utterance"].splitlines()[-1] == "Ann: Agent said hello"
+
+
+def test_5_48_any_is_whatever_was_heard(play: Folder) -> None:
+    run = play("""
+        frames:
+          talk: {states: {s: {then: [{when: t == 2, say: Nice weather.}]}}}
+          listen: {let: {heard_at: 0}, states: {s: {then: [{hears: any, set: {heard_at: t}}]}}}
+        cast: {bob: {at: [4, 5], frame: talk}, ann: {at: [5, 5], frame: listen}}
+    """)
+    assert [run.step().value("ann.heard_at") for _ in range(3)] == [0, 2, 2]
+    assert run.step(None, "Say bye").value("ann.heard_at") == 4
+
+
+def test_5_49_said_is_known_to_the_end_of_the_step(play: Folder) -> None:
+    run = play("""
+        earshot: next_to
+        frames:
+          talk: {states: {s: {then: [{when: t == 2, say: Say hello}]}}}
+          watch:
+            let: {seen: 0}
+            states: {s: {then: [{when: ann.spoke and ann.said("Say hello"), set: {seen: t}}]}}
+        cast:
+          bob: {at: [1, 5], frame: watch}
+          ann: {at: [3, 5], frame: talk}
+          cal: {at: [5, 5], frame: watch}
+        outcome: [{success: ann.spoke}]
+    """).step()
+    assert not run.terminated
+    assert run.step().terminated
+    assert (run.value("bob.seen"), run.value("cal.seen")) == (0, 2)
+
+
+def test_5_50_what_was_heard_is_forgotten_at_the_end_of_the_turn(play: Folder) -> None:
     run = (
         play("""
         frames:
@@ -959,7 +1344,7 @@ def test_4_36_what_was_heard_is_forgotten_at_the_end_of_the_turn(play: Folder) -
 
 
 @pytest.mark.parametrize("text", ["Say hello", "say HELLO", "Say hello.", "Say hello!", "SAY hello?"])
-def test_4_37_case_and_the_final_mark_do_not_matter(play: Folder, text: str) -> None:
+def test_5_51_case_and_the_final_mark_do_not_matter(play: Folder, text: str) -> None:
     run = play(f"""
         frames:
           talk: {{states: {{s: {{then: [{{say: "{text}"}}]}}}}}}
@@ -969,7 +1354,7 @@ def test_4_37_case_and_the_final_mark_do_not_matter(play: Folder, text: str) -> 
     assert run.value("bob.heard_at") == 1
 
 
-def test_4_38_hidden_npcs_act_but_only_the_audible_are_heard(play: Folder) -> None:
+def test_5_52_hidden_npcs_act_but_only_the_audible_are_heard(play: Folder) -> None:
     run = play("""
         observe: {npcs: hidden}
         frames: {talk: {states: {s: {do: forward, then: [{say: Hi.}]}}}}
@@ -981,7 +1366,7 @@ def test_4_38_hidden_npcs_act_but_only_the_audible_are_heard(play: Folder) -> No
     assert run.info["utterance"] == "Bob: Hi."
 
 
-def test_4_39_on_one_cell_is_neither_next_to_nor_eye_contact(play: Folder) -> None:
+def test_5_53_on_one_cell_is_neither_next_to_nor_eye_contact(play: Folder) -> None:
     run = play("""
         observe: {npcs: hidden}
         frames:
@@ -996,10 +1381,10 @@ def test_4_39_on_one_cell_is_neither_next_to_nor_eye_contact(play: Folder) -> No
     assert (run.value("ann.beside"), run.value("ann.eyes")) == (False, False)
 
 
-# -- 5. memories -----------------------------------------------------------------------------------
+# -- 6. memories -----------------------------------------------------------------------------------
 
 
-def test_5_1_a_memory_takes_in_what_was_done_and_said(play: Folder) -> None:
+def test_6_1_a_memory_takes_in_what_was_done_and_said(play: Folder) -> None:
     run = (
         play("memory: {acts: {last: 3, of: agent.acts}}")
         .step("forward", "Say hello")
@@ -1009,18 +1394,18 @@ def test_5_1_a_memory_takes_in_what_was_done_and_said(play: Folder) -> None:
     assert run.state["memory"]["acts"] == [["forward", "Say hello"], ["none", "Say bye"], ["none", None]]
 
 
-def test_5_2_a_closed_memory_keeps_what_it_holds(play: Folder) -> None:
+def test_6_2_a_closed_memory_keeps_what_it_holds(play: Folder) -> None:
     run = play("memory: {acts: {last: 3, of: agent.acts, while: t != 1}}")
     run.step("left").step("forward").step("right")
     assert run.state["memory"]["acts"] == [["left", None], ["right", None]]
 
 
-def test_5_3_a_full_memory_forgets_the_oldest_act(play: Folder) -> None:
+def test_6_3_a_full_memory_forgets_the_oldest_act(play: Folder) -> None:
     run = play("memory: {acts: {last: 2, of: agent.acts}}").step("left").step("forward").step("right")
     assert run.state["memory"]["acts"] == [["forward", None], ["right", None]]
 
 
-def test_5_4_a_memory_that_is_not_full_equals_nothing(play: Folder) -> None:
+def test_6_4_a_memory_that_is_not_full_equals_nothing(play: Folder) -> None:
     text = """
         let: {dance: {sequence: 2, moves: [left, right]}}
         memory: {attempt: {last: 2, of: agent.acts}}
@@ -1034,10 +1419,10 @@ def test_5_4_a_memory_that_is_not_full_equals_nothing(play: Folder) -> None:
     assert not run.step("left").step("right", "Say bye").terminated, "words count as well"
 
 
-# -- 6. rules of the world -------------------------------------------------------------------------
+# -- 7. rules of the world -------------------------------------------------------------------------
 
 
-def test_6_1_rules_are_read_after_turns_and_memories(play: Folder) -> None:
+def test_7_1_rules_are_read_after_turns_and_memories(play: Folder) -> None:
     run = play("""
         let: {dance: {sequence: 1, moves: [left]}}
         memory: {attempt: {last: 1, of: agent.acts}}
@@ -1051,7 +1436,7 @@ def test_6_1_rules_are_read_after_turns_and_memories(play: Folder) -> None:
     assert (run.status("one"), run.status("two")) == ("open", "open")
 
 
-def test_6_2_every_rule_that_holds_takes_effect_in_order(play: Folder) -> None:
+def test_7_2_every_rule_that_holds_takes_effect_in_order(play: Folder) -> None:
     run = play("""
         objects: {a: {type: door, at: [4, 0]}, b: {type: door, at: [5, 0]}}
         rules:
@@ -1063,7 +1448,18 @@ def test_6_2_every_rule_that_holds_takes_effect_in_order(play: Folder) -> None:
     assert run.step().status("a") == "locked"
 
 
-def test_6_3_once_is_once_in_an_episode(play: Folder) -> None:
+def test_7_3_set_is_read_by_later_rules_and_then_by_all(play: Folder) -> None:
+    run = play("""
+        state: {level: 0}
+        frames: {watch: {let: {seen: 9}, states: {s: {then: [{set: {seen: level}}]}}}}
+        cast: {ann: {at: [5, 5], frame: watch}}
+        rules: [{when: level == 0, set: {level: 1}}, {when: level == 1, set: {level: 2}}]
+    """).step()
+    assert (run.state["state"]["level"], run.value("ann.seen")) == (2, 0)
+    assert run.step().value("ann.seen") == 2
+
+
+def test_7_4_once_is_once_in_an_episode(play: Folder) -> None:
     run = play("""
         objects: {door: {type: door, at: [1, 0]}}
         cast: {agent: {facing: up}}
@@ -1075,7 +1471,7 @@ def test_6_3_once_is_once_in_an_episode(play: Folder) -> None:
     assert run.step().status("door") == "open"
 
 
-def test_6_4_the_world_is_settled_after_its_rules(play: Folder) -> None:
+def test_7_5_the_world_is_settled_after_its_rules(play: Folder) -> None:
     run = play("""
         objects:
           switch: {type: switch, at: [3, 0], unlocks: linked}
@@ -1088,10 +1484,10 @@ def test_6_4_the_world_is_settled_after_its_rules(play: Folder) -> None:
     assert (run.status("linked"), run.status("computed")) == ("closed", "locked")
 
 
-# -- 7. the end ------------------------------------------------------------------------------------
+# -- 8. the end ------------------------------------------------------------------------------------
 
 
-def test_7_1_a_deadly_cell_comes_before_every_outcome(play: Folder) -> None:
+def test_8_1_a_deadly_cell_comes_before_every_outcome(play: Folder) -> None:
     run = play("""
         room: {build: [{lava: column(2)}]}
         outcome: [{success: agent.did(forward)}]
@@ -1103,7 +1499,7 @@ def test_7_1_a_deadly_cell_comes_before_every_outcome(play: Folder) -> None:
 @pytest.mark.parametrize(
     ("order", "success"), [(("success", "failure"), True), (("failure", "success"), False)]
 )
-def test_7_2_the_first_entry_that_holds_ends_the_episode(
+def test_8_2_the_first_entry_that_holds_ends_the_episode(
     play: Folder, order: tuple[str, str], success: bool
 ) -> None:
     entries = ", ".join(f"{{{kind}: agent.x == 3}}" for kind in order)
@@ -1113,7 +1509,7 @@ def test_7_2_the_first_entry_that_holds_ends_the_episode(
     assert (run.terminated, run.truncated, run.info["success"]) == (True, False, success)
 
 
-def test_7_3_outcomes_speak_of_the_state_in_the_end(play: Folder) -> None:
+def test_8_3_outcomes_speak_of_the_state_in_the_end(play: Folder) -> None:
     run = play("""
         objects: {door: {type: door, at: [5, 0]}, other: {type: door, at: [4, 0], locked: door.open}}
         frames: {walk: {states: {s: {do: forward}}}}
@@ -1127,20 +1523,48 @@ def test_7_3_outcomes_speak_of_the_state_in_the_end(play: Folder) -> None:
 @pytest.mark.parametrize(
     ("reward", "share"), [("", 1.0), (", reward: 100", 1.0), (", reward: 40", 0.4), (", reward: 0", 0.0)]
 )
-def test_7_4_what_a_success_pays(play: Folder, reward: str, share: float) -> None:
+def test_8_4_what_a_success_pays(play: Folder, reward: str, share: float) -> None:
     run = play(f"outcome: [{{success: agent.did(done){reward}}}]").steps(2).step("done")
     assert run.info["success"]
     assert run.reward == pytest.approx(share * (1 - 0.9 * 3 / 20))
 
 
-def test_7_5_a_failure_and_an_ordinary_step_pay_nothing(play: Folder) -> None:
+def test_8_5_slope_of_the_reward(play: Folder) -> None:
+    run = play("""
+        reward: {success: linear(0.5)}
+        outcome: [{success: agent.did(done), reward: 80}]
+    """).steps(2)
+    assert run.step("done").reward == pytest.approx(0.8 * (1 - 0.5 * 3 / 20))
+
+
+@pytest.mark.parametrize(
+    ("reward", "share"), [("20 * agent.x", 0.2), ("101 * agent.x", 1.0), ("agent.x - 9", 0.0)]
+)
+def test_8_6_graded_rewards_are_computed_in_the_end(play: Folder, reward: str, share: float) -> None:
+    run = play(f"outcome: [{{success: agent.did(done), reward: {reward}}}]").step("done")
+    assert run.reward == pytest.approx(share * (1 - 0.9 / 20))
+
+
+def test_8_7_a_failure_and_an_ordinary_step_pay_nothing(play: Folder) -> None:
     run = play("about: done is a failure").step("forward")
     assert (run.reward, run.terminated) == (0.0, False)
     run.step("done")
     assert (run.reward, run.terminated, run.info["success"]) == (0.0, True, False)
 
 
-def test_7_6_the_name_of_an_outcome(play: Folder) -> None:
+def test_8_8_bonus_and_each_step_are_added(play: Folder) -> None:
+    run = play("""
+        reward: {each_step: -0.01}
+        rules: [{when: t >= 2, reward: 20}, {when: t == 2, reward: -5}]
+        outcome: [{success: agent.did(done)}, {failure: agent.did(left)}]
+    """)
+    assert [run.step().reward for _ in range(2)] == pytest.approx([-0.01, -0.01 + 0.15])
+    assert run.step("done").reward == pytest.approx(-0.01 + 0.2 + 1 - 0.9 * 3 / 20)
+    run.env.reset(seed=0)
+    assert run.steps(2).step("left").reward == pytest.approx(-0.01 + 0.2)
+
+
+def test_8_9_the_name_of_an_outcome(play: Folder) -> None:
     text = """\
         outcome:
           - {success: agent.did(left), id: turned}
@@ -1151,7 +1575,7 @@ def test_7_6_the_name_of_an_outcome(play: Folder) -> None:
     assert names == ["turned", "failure@5", "success@6"]
 
 
-def test_7_7_when_time_is_up(play: Folder) -> None:
+def test_8_10_when_time_is_up(play: Folder) -> None:
     run = play("horizon: 3").steps(2)
     assert (run.terminated, run.truncated) == (False, False)
     run.step()
@@ -1159,7 +1583,7 @@ def test_7_7_when_time_is_up(play: Folder) -> None:
     assert (run.info["outcome"], run.info["success"]) == ("timeout", False)
 
 
-def test_7_8_an_outcome_in_the_last_step_is_terminated_only(play: Folder) -> None:
+def test_8_11_an_outcome_in_the_last_step_is_terminated_only(play: Folder) -> None:
     run = (
         play("""
         horizon: 3
@@ -1172,10 +1596,10 @@ def test_7_8_an_outcome_in_the_last_step_is_terminated_only(play: Folder) -> Non
     assert run.reward == pytest.approx(0.1)
 
 
-# -- 8. what the agent perceives -------------------------------------------------------------------
+# -- 9. what the agent perceives -------------------------------------------------------------------
 
 
-def test_8_1_the_picture_is_taken_last(play: Folder) -> None:
+def test_9_1_the_picture_is_taken_last(play: Folder) -> None:
     run = play("""
         objects: {door: {type: door, at: [3, 2]}}
         frames: {walk: {states: {s: {do: forward}}}}
@@ -1189,7 +1613,7 @@ def test_8_1_the_picture_is_taken_last(play: Folder) -> None:
     assert (run.shown(2, 1)[0], run.shown(2, 1)[2]) == (DOOR, 0)
 
 
-def test_8_2_the_picture_before_npcs_has_links_but_not_computed_statuses(play: Folder) -> None:
+def test_9_2_the_picture_before_npcs_has_links_but_not_computed_statuses(play: Folder) -> None:
     run = play("""
         observe: {image: before_npcs}
         objects:
@@ -1197,6 +1621,7 @@ def test_8_2_the_picture_before_npcs_has_links_but_not_computed_statuses(play: F
           linked: {type: door, at: [3, 2], state: locked}
           computed: {type: door, at: [4, 2], locked: switch.pressed}
           ruled: {type: door, at: [5, 2]}
+          marble: {type: marble, at: [3, 3], state: rolling}
         frames: {walk: {let: {seen: false}, states: {s: {first: [{set: {seen: computed.locked}}], do: forward}}}}
         cast: {ann: {at: [5, 1], facing: left, frame: walk}}
         rules: [{cause: [ruled.open]}]
@@ -1204,6 +1629,7 @@ def test_8_2_the_picture_before_npcs_has_links_but_not_computed_statuses(play: F
     assert run.value("ann.seen"), "settled before anybody else has moved"
     assert [run.shown(ahead, 1)[:3:2] for ahead in (2, 3, 4)] == [[DOOR, 1], [DOOR, 1], [DOOR, 1]]
     assert [run.status(name) for name in ("linked", "computed", "ruled")] == ["closed", "locked", "open"]
+    assert (run.at("marble"), run.shown(2, 2)[0], run.shown(3, 2)[0]) == ([4, 3], MARBLE, EMPTY)
     assert (run.shown(1)[0], run.shown(1)[2]) == (12, 1), "the switch that the agent has just pressed"
     assert (run.shown(4)[0], run.shown(3)[0]) == (NPC, EMPTY), "Ann as she stood before her turn"
     run.step("left").step("right")
@@ -1211,7 +1637,7 @@ def test_8_2_the_picture_before_npcs_has_links_but_not_computed_statuses(play: F
 
 
 @pytest.mark.parametrize("image", ["end", "before_npcs"])
-def test_8_3_what_was_said_is_in_the_words_of_this_step(play: Folder, image: str) -> None:
+def test_9_3_what_was_said_is_in_the_words_of_this_step(play: Folder, image: str) -> None:
     run = play(f"""
         observe: {{image: {image}}}
         frames: {{talk: {{states: {{s: {{then: [{{say: Say hello}}]}}}}}}}}
@@ -1222,7 +1648,7 @@ def test_8_3_what_was_said_is_in_the_words_of_this_step(play: Folder, image: str
     assert run.info["utterance"] == "Ann: Say hello"
 
 
-def test_8_4_a_line_for_each_thing_heard(play: Folder) -> None:
+def test_9_4_a_line_for_each_thing_heard(play: Folder) -> None:
     run = play("""
         frames: {talk: {states: {s: {then: [{when: t == 1, say: I am <self.name>.}]}}}}
         cast: {bob: {at: [4, 5], frame: talk}, ann: {at: [5, 5], frame: talk}}
@@ -1232,7 +1658,7 @@ def test_8_4_a_line_for_each_thing_heard(play: Folder) -> None:
     assert run.step().info["utterance"] == "NA"
 
 
-def test_8_5_the_history_has_all_lines(play: Folder) -> None:
+def test_9_5_the_history_has_all_lines(play: Folder) -> None:
     run = play("""
         frames: {talk: {states: {s: {then: [{when: t != 2, say: I am <self.name>.}]}}}}
         cast: {ann: {at: [5, 5], frame: talk}}
@@ -1241,7 +1667,7 @@ def test_8_5_the_history_has_all_lines(play: Folder) -> None:
     assert run.steps(3).info["history"] == "Ann: I am Ann.\nAnn: I am Ann."
 
 
-def test_8_6_lines_without_names(play: Folder) -> None:
+def test_9_6_lines_without_names(play: Folder) -> None:
     run = play("""
         observe: {names: hidden}
         frames: {talk: {states: {s: {then: [{say: Say hello}]}}}}
@@ -1250,7 +1676,7 @@ def test_8_6_lines_without_names(play: Folder) -> None:
     assert run.info["utterance"] == "Say hello"
 
 
-def test_8_7_hidden_npcs_are_not_in_the_picture(play: Folder) -> None:
+def test_9_7_hidden_npcs_are_not_in_the_picture(play: Folder) -> None:
     text = """
         observe: {{npcs: {}}}
         objects: {{door: {{type: door, at: [2, 1], state: open}}}}
