@@ -25,6 +25,7 @@ FLEETING = {
     Register.CHANGED,
     Register.ACCEPTED,
     Register.ATTEMPT,
+    Register.BONUS,
 }
 
 
