@@ -176,3 +176,18 @@ def test_acts_in_a_vector() -> None:
     *_, infos = envs.step(acts)
     assert infos["_success"].tolist() == [True, True, False, False]
     assert not infos["success"].any()
+
+
+def test_a_tree_beside_a_scenario_keeps_its_weights_and_starts() -> None:
+    envs = sd.make_vec(["talkitout", SCHOOL, ACTS], 900, autoreset_mode="SameStep")
+    envs.reset(seed=2)
+    members = envs.members()
+    assert set(members[::3]) == {None}
+    assert set(members[2::3]) == {"lesson"}
+    assert np.mean([str(member).startswith("problem=shopping") for member in members[1::3]]) == pytest.approx(
+        0.5, abs=0.1
+    )
+    told = [row for row in range(1, 900, 3) if str(members[row]).endswith("help=told")]
+    assert all(envs.describe(row)["heard"] == ["Tea: Open bread"] for row in told)
+    with pytest.raises(ValueError, match="no suite that draws members"):
+        envs.set_member_weights([1])
