@@ -380,7 +380,7 @@ class Setup:
         if source is None or thing.inside is not None:
             return
         found = evaluate(
-            self.sources.expression(f"{site_of(thing)}.inside", source), self.context(thing, it=thing)
+            self.sources.expression(f"objects.{thing.key}.inside", source), self.context(thing, it=thing)
         )
         thing.inside = found[thing.index] if isinstance(found, list) else found
 
