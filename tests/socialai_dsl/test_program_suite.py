@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import socialai_dsl as sd
@@ -69,3 +70,19 @@ def test_a_mixture_shares_texts_but_keeps_each_members_own_pairs() -> None:
 def test_equal_names_in_a_mixture_are_numbered() -> None:
     one, other = program("talkitout"), program("talkitout")
     assert mixture([one, other]).members == ("talkitout", "talkitout #2")
+
+
+def test_the_digest_knows_chances_starts_and_acts() -> None:
+    school, acts = suite("school.yaml"), suite("acts.yaml")
+    alike = replace(school, weights=(1,) * 8)
+    drawn = replace(school, starts=(None,) * 8)
+    assert len({one.sha256 for one in (school, alike, drawn)}) == 3
+    assert replace(alike, weights=()).sha256 == alike.sha256
+    assert replace(acts, in_sequence=False).sha256 != acts.sha256
+
+
+def test_a_suite_keeps_what_its_leaves_are() -> None:
+    school = suite("school.yaml")
+    assert school.labels[3] == {"problem": "password", "introduction": "ask", "help": "told"}
+    assert school.weights == (1, 1, 1, 1, 1, 1, 3, 3)
+    assert [start is not None for start in school.starts] == [False, True] * 3 + [False, False]
