@@ -95,11 +95,12 @@ def reset(world: World, target: Entity) -> None:
 
 
 def reveal(world: World, container: Entity) -> None:
-    """What lies in something takes its cell."""
-    for content in world.things():
-        if content.inside is container and content.gone and not container.gone:
+    """What lies in something takes its cell, as if that was opened."""
+    contents = [one for one in world.things() if one.gone and one.inside is container]
+    if contents and not container.gone:
+        for content in contents:
             content.cell = container.cell
-            vanish(container)
+        vanish(container)
 
 
 def vanish(target: Entity) -> None:

@@ -52,12 +52,13 @@ class Settling:
         self.block()
 
     def release_contents(self) -> None:
-        """What lies in a box that is opened takes its place."""
+        """All that lies in a box that is opened takes its place."""
         for box in self.world.things():
-            for content in self.world.things():
-                if not box.gone and box.status == "opened" and content.gone and content.inside is box:
+            contents = [one for one in self.world.things() if one.gone and one.inside is box]
+            if not box.gone and box.status == "opened" and contents:
+                for content in contents:
                     content.cell = box.cell
-                    vanish(box)
+                vanish(box)
 
     def open(self) -> None:
         """A remote door is open while something that opens it is active, and closed otherwise."""
