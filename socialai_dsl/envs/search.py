@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ STATES: Final = 300_000
 """How many different states a search looks at before it gives up."""
 
 _ROWS: Final = 4096
-_CHANCES: Final = 6
+CHANCES: Final = 6
 """How many draws are tried of each step in which something is drawn; the first is the episode's own."""
 
 
@@ -98,21 +98,20 @@ class Search:
         self._program = program
         self._witness = witness
         self._relevance = Relevance.of(program)
-        actions = _useful_actions(program, self._relevance.whole_utterance)
-        chances = _CHANCES if self._relevance.chance else 1
+        actions = useful_actions(program, self._relevance.whole_utterance)
+        chances = CHANCES if self._relevance.chance else 1
         self._actions = np.repeat(actions, chances, axis=0)
-        self._marks = np.tile(
-            np.array([mix(k * GOLDEN) & MASK if k else 0 for k in range(chances)], np.uint64), len(actions)
-        )
+        self._marks = np.tile(marks(chances), len(actions))
         self._at_once = max(1, _ROWS // len(self._actions))
         self._table = Table([program], self._at_once * len(self._actions), 1)
         self._table.reset(0, None)
         wanted = [o.success if goals is None else o.name in goals for o in program.outcome_table]
         self._wins = np.array([*wanted, False])
-        generator = np.random.default_rng(0)
-        self._multipliers = generator.integers(
-            0, 1 << 63, len(self._relevance.registers), np.uint64
-        ) * np.uint64(2) + np.uint64(1)
+        self._multipliers = multipliers(len(self._relevance.registers))
+
+    def counters(self) -> dict[str, Any]:
+        """How often each outcome and rule happened in all that was searched, as `Table.counters`."""
+        return self._table.counters()
 
     def solve(
         self,
@@ -217,7 +216,18 @@ class Search:
         return tuple(self._actions[one].copy() for one in choices)
 
 
-def _useful_actions(program: Program, whole_utterance: bool) -> NDArray[np.int64]:
+def marks(chances: int) -> NDArray[np.uint64]:
+    """What to change an episode's key by for other draws of the same step, (chances,); the first changes nothing."""
+    return np.array([mix(k * GOLDEN) & MASK if k else 0 for k in range(chances)], np.uint64)
+
+
+def multipliers(count: int) -> NDArray[np.uint64]:
+    """Odd numbers that digests are summed up with."""
+    drawn = np.random.default_rng(0).integers(0, 1 << 63, count, np.uint64)
+    return drawn * np.uint64(2) + np.uint64(1)
+
+
+def useful_actions(program: Program, whole_utterance: bool) -> NDArray[np.int64]:
     """Every body action with silence and with one utterance of each class, or with every one, int64 (A, 4)."""
     h = program.header
     start, nouns = h(Header.CLASS_AT), h(Header.NOUNS)
