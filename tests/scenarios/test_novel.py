@@ -1,0 +1,253 @@
+"""The scenarios beyond the paper: that they can be solved, what is drawn, who knows what, what is paid."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import pytest
+
+from tests.scenarios.playing import FORWARD, Episode, beside, check_shares, distance, evenly, made, rooms
+
+NAMES = (
+    "culprit",
+    "gaze_following",
+    "haggling",
+    "interpreter",
+    "sally_anne",
+    "shop",
+    "turn_taking",
+    "whisper",
+)
+# A shop whose keeper's mood is known, the agent beside the keeper.
+SHOP: dict[str, Any] = {
+    "room": {"width": 5, "height": 5},
+    "agent": {"at": [2, 2], "facing": "up"},
+    "keeper": {"at": [2, 3]},
+}
+
+
+def played(name: str, seed: int) -> tuple[dict[str, Any], dict[str, Any], float]:
+    """The end of an episode of the scripted agent: the state, the info and the reward."""
+    env = made(name)
+    env.reset(seed=seed)
+    while True:
+        _, reward, terminated, truncated, info = env.step(env.scripted_action())
+        if terminated or truncated:
+            return env.describe(), info, float(reward)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_rooms_can_be_solved(name: str) -> None:
+    """The way to the apple of `culprit` can be barred for the whole time, in one room of a thousand."""
+    solved = sum(bool(played(f"novel/{name}+oracle", seed)[1]["success"]) for seed in range(300))
+    assert solved >= (298 if name == "culprit" else 300)
+
+
+class TestWhisper:
+    def test_one_of_four_words(self) -> None:
+        drawn = (room["let"]["secret"] for room in rooms("novel/whisper", 1500))
+        check_shares(drawn, evenly(["saffron", "juniper", "clover", "thistle"]))
+
+    def test_only_those_beside_hear_it(self) -> None:
+        layout = {
+            "room": {"width": 8, "height": 8},
+            "agent": {"at": [3, 3], "facing": "right"},
+            "elder": {"at": [5, 3]},
+            "guard": {"at": [3, 5]},
+            "exit": {"at": [4, 0]},
+            "let": {"secret": "clover"},
+        }
+        episode = Episode("novel/whisper", layout)
+        assert episode.act(say="What is the password").heard == ""
+        assert episode.act(say="The password is thistle").ended is None, "the guard is two cells away"
+        assert episode.act("forward", "What is the password").heard == "Elder: The password is clover"
+        assert episode.now()["exit"]["state"] == "locked", "nor did the guard hear the elder"
+
+
+class TestCulprit:
+    def test_anybody_at_any_moment(self) -> None:
+        drawn = list(rooms("novel/culprit", 1500))
+        check_shares((room["let"]["culprit"] for room in drawn), evenly(f"people[{k}]" for k in range(3)))
+        check_shares((room["let"]["moment"] for room in drawn), evenly(range(3, 9)))
+        assert all(len({one["color"] for one in room["people"]}) == 3 for room in drawn)
+
+    def test_only_the_culprit_takes_it_and_not_before_the_moment(self) -> None:
+        for seed in range(100):
+            episode = Episode("novel/culprit", seed=seed)
+            chosen = int(episode.now()["let"]["culprit"][-2])
+            for t in range(1, 40):
+                heard = episode.act().heard
+                now = episode.now()
+                stealing = [k for k, one in enumerate(now["people"]) if one["state"] == "stealing"]
+                assert stealing in ([], [chosen])
+                assert not (stealing and t < now["let"]["moment"])
+                assert (heard != "") == (heard == "Sheriff: The apple is gone! Who was it?")
+                if heard:
+                    assert now["apple"]["gone"]
+                    break
+
+
+class TestInterpreter:
+    def test_another_language_in_every_episode(self) -> None:
+        languages = Counter(
+            tuple(room["let"][f"tables.dar[{k}]"] for k in range(6))
+            for room in rooms("novel/interpreter", 800)
+        )
+        assert all(sorted(language) == list(range(6)) for language in languages)
+        assert len(languages) > 400, "of 720"
+
+    def test_the_interpreter_translates_back(self) -> None:
+        words = ["ana", "bel", "cor", "dol", "ers", "fit"]
+        layout = {
+            "room": {"width": 7, "height": 7},
+            "agent": {"at": [3, 3]},
+            "stranger": {"at": [2, 3]},
+            "interpreter": {"at": [4, 3]},
+        }
+        for seed in range(10):
+            episode = Episode("novel/interpreter", layout, seed)
+            room = episode.now()
+            color = room["doors"][int(room["let"]["exit"][-2])]["color"]
+            _, word, _ = episode.act(say="Where is the exit").heard.split()
+            assert episode.act(say=f"What means {word}").heard == f"Interpreter: {word} is {color}"
+            meanings = {episode.act(say=f"What means {one}").heard.split()[-1] for one in words}
+            assert meanings == {"red", "green", "blue", "purple", "yellow", "grey"}
+
+
+class TestShop:
+    def test_moods(self) -> None:
+        check_shares((room["let"]["keeper.mood"] for room in rooms("novel/shop", 1500)), evenly(range(3)))
+
+    @pytest.mark.parametrize("mood", range(3))
+    @pytest.mark.parametrize("greetings", range(4))
+    def test_each_of_three_greetings_takes_one_off_the_price(self, mood: int, greetings: int) -> None:
+        episode = Episode("novel/shop", {**SHOP, "let": {"keeper.mood": mood}})
+        episode.act()
+        for _ in range(greetings):
+            assert episode.act(say="Good day").heard == "Keeper: Good day to you"
+        price = 6 - mood - greetings
+        assert episode.act(say="Give me bread").heard == f"Keeper: It costs {price}"
+        step = episode.act(say=f"I pay {price}")
+        paid = (100 - 15 * (price - 1)) / 100 * (1 - 0.9 * (greetings + 3) / 40)
+        assert (step.ended, step.reward) == ("success", pytest.approx(paid))
+
+    def test_a_wrong_price_spoils_the_mood(self) -> None:
+        episode = Episode("novel/shop", {**SHOP, "let": {"keeper.mood": 2}})
+        episode.act()
+        for price in (5, 6):
+            assert episode.act(say="I pay 1").heard == "Keeper: That is not the price"
+            assert episode.act(say="Give me bread").heard == f"Keeper: It costs {price}"
+        step = episode.act(say="I pay 1")
+        assert (step.heard, step.ended) == ("Keeper: We are closed", "failure")
+
+
+class TestHaggling:
+    @pytest.mark.parametrize("reserve", [2, 3, 4, 5])
+    def test_the_scripted_agent_pays_the_least_that_is_taken(self, reserve: int) -> None:
+        found = 0
+        for seed in range(60):
+            room, info, reward = played("novel/haggling+oracle", seed)
+            if room["let"]["reserve"] == reserve:
+                found += 1
+                assert info["success"]
+                assert room["let"]["seller.ask"] == reserve
+                assert reward == pytest.approx(1 - 0.9 * room["t"] / 30)
+        assert found > 5
+
+    def test_who_pays_more_earns_less(self) -> None:
+        layout = {
+            "room": {"width": 5, "height": 5},
+            "agent": {"at": [2, 2], "facing": "down"},
+            "seller": {"at": [2, 3], "facing": "up"},
+            "let": {"reserve": 4, "seller.least": 4},
+        }
+        episode = Episode("novel/haggling", layout)
+        assert episode.act().heard == "Sam: It costs 9"
+        step = episode.act(say="I offer 9")
+        assert step.heard == "Sam: Sold"
+        assert step.reward == pytest.approx(100 * 1 // 6 / 100 * (1 - 0.9 * 2 / 30))
+
+
+class TestSallyAnne:
+    @pytest.mark.parametrize(("moves", "share"), [("control", 0.0), ("mixed", 0.5), ("false_belief", 1.0)])
+    def test_she_believes_it_where_she_has_put_it(self, moves: str, share: float) -> None:
+        moved = []
+        for seed in range(300):
+            room, info, _ = played(f"novel/sally_anne+oracle?moves={moves}", seed)
+            assert info["success"]
+            assert room["sally"]["believes"]["toy_in"] == room["let"]["home"]
+            assert room["toy"]["inside"] in (room["let"]["home"], room["let"]["other"])
+            moved.append(room["toy"]["inside"] == room["let"]["other"])
+        if share in (0.0, 1.0):
+            assert set(moved) == {bool(share)}
+        else:
+            check_shares(moved, evenly([False, True]))
+
+    def test_she_would_know_if_she_saw_it(self) -> None:
+        # Sally looks at both boxes; Anne, beside the other one, is about to move the ball.
+        layout = {
+            "room": {"width": 8, "height": 8},
+            "agent": {"at": [1, 1]},
+            "experimenter": {"at": [6, 1]},
+            "boxes": [{"at": [2, 4]}, {"at": [5, 4]}],
+            "sally": {"at": [3, 2], "facing": "down", "state": "step2", "believes": {"toy_in": "boxes[0]"}},
+            "anne": {"at": [5, 5], "facing": "up", "state": "moving"},
+            "toy": {"inside": "boxes[0]"},
+            "let": {"home": "boxes[0]", "other": "boxes[1]"},
+        }
+        episode = Episode("novel/sally_anne", layout)
+        episode.acts(None, None)
+        assert episode.now()["toy"]["inside"] == "boxes[1]"
+        assert episode.now()["sally"]["believes"]["toy_in"] == "boxes[1]"
+
+
+class TestGazeFollowing:
+    def test_her_gaze_leads_to_the_box_and_to_no_other(self) -> None:
+        for seed in range(100):
+            episode = Episode("novel/gaze_following", seed=seed)
+            room = episode.now()
+            target = int(room["let"]["target"][-2])
+            start = room["peer"]["at"]
+            on_gaze = {
+                way
+                for way in FORWARD
+                for k in range(1, 9)
+                if beside(start, way, k) == tuple(room["boxes"][target]["at"])
+            }
+            assert len(on_gaze) == 1
+            for k, box in enumerate(room["boxes"]):
+                in_line = box["at"][0] == start[0] or box["at"][1] == start[1]
+                assert in_line == (k == target)
+            assert distance(start, room["boxes"][target]["at"]) > 1
+
+    def test_she_looks_at_the_agent_until_their_eyes_meet(self) -> None:
+        layout = {
+            "room": {"width": 8, "height": 8},
+            "agent": {"at": [3, 5], "facing": "up"},
+            "peer": {"at": [5, 5], "facing": "down"},
+            "boxes": [{"at": [0, 2]}, {"at": [7, 3]}, {"at": [5, 0]}],
+            "let": {"target": "boxes[2]", "peer.referent": "boxes[2]"},
+        }
+        episode = Episode("novel/gaze_following", layout)
+        assert episode.hears(*[None] * 5) == [""] * 5
+        assert episode.now()["peer"]["facing"] == "left"
+        assert episode.act("right").heard == "Ann: Look"
+        episode.acts(None, None, None)
+        assert episode.now()["peer"]["facing"] == "up"
+
+
+class TestTurnTaking:
+    @pytest.mark.parametrize("patience", [1, 2, 3])
+    def test_the_partner_takes_its_time(self, patience: int) -> None:
+        layout = {"let": {"patience": patience}}
+        episode = Episode("novel/turn_taking", layout)
+        for number in (1, 3, 5, 7):
+            assert episode.hears(*[None] * patience) == [*[""] * (patience - 1), f"Pat: Now {number}"]
+            step = episode.act(say=f"Now {number + 1}")
+            assert step.ended == ("success" if number == 7 else None)
+
+    def test_patience_is_drawn(self) -> None:
+        check_shares(
+            (room["let"]["patience"] for room in rooms("novel/turn_taking", 1500)), evenly([1, 2, 3])
+        )
