@@ -12,17 +12,30 @@ from socialai_dsl.loader import resolve, shipped_names
 from tests.agreement import agree
 
 SAMPLES = sorted(str(path) for path in (Path(__file__).parent / "data" / "agreement").glob("*.yaml"))
+SCENARIOS = Path(__file__).parent.parent / "scenarios"
+FOLDERS = [f"{path.parent.name}/{path.stem}" for path in sorted(SCENARIOS.glob("[ns]*/*.yaml"))]
+CUES = ("+color", "+pointing", "+feedback", "+emulation", "+scaffolding")
 VARIANTS = ("+unsocial", "+oracle", "+as_coded", "+as_coded+unsocial")
 
 
 def shipped() -> Iterator[str]:
     """Every shipped scenario, alone, with its variants, and with each value of its parameters."""
-    for name in shipped_names():
-        if resolve(name).kind != "scenario" or name.endswith(("_oracle", "_as_coded")):
+    for name in (*shipped_names(), *FOLDERS):
+        if not alone(name) or name.endswith(("_oracle", "_as_coded")):
             continue
         yield name
-        yield from (name + variants for variants in VARIANTS if exists(name + variants))
+        variants = ("+oracle", *CUES) if name in FOLDERS else VARIANTS
+        yield from (name + variant for variant in variants if exists(name + variant))
         yield from (f"{name}?{choice}" for choice in choices(resolve(name).data.get("params", {})))  # type: ignore[union-attr]
+
+
+def alone(name: str) -> bool:
+    """Whether it is a scenario that can be played, not what others are built on."""
+    try:
+        found = resolve(name)
+    except ScenarioError:
+        return False
+    return found.kind == "scenario" and not found.data.get("abstract")  # type: ignore[union-attr]
 
 
 def exists(name: str) -> bool:
@@ -39,11 +52,13 @@ def choices(params: dict) -> Iterator[str]:
     for name, declared in params.items():
         for value in declared.get("values", ()) if isinstance(declared, dict) else ():
             if str(value) != str(declared["default"]):
-                yield f"{name}={value}"
+                yield f"{name}={str(value).lower() if isinstance(value, bool) else value}"
 
 
 def episodes(name: str) -> int:
     """How many are played: changes of a scenario share most of what it does."""
+    if name.partition("+")[0].partition("?")[0] in FOLDERS:
+        return 10
     return 60 if name in shipped_names() or name in SAMPLES else 25
 
 
