@@ -9,6 +9,7 @@ from typing import Final
 
 from socialai_dsl.cli import (
     bench,
+    check,
     evaluate,
     fidelity,
     new,
@@ -35,6 +36,7 @@ _COMMANDS: Final = {
     "bench": bench,
     "fidelity": fidelity,
     "oracles": oracles,
+    "check": check,
     "sheets": sheets,
 }
 

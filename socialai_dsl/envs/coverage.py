@@ -101,12 +101,12 @@ _Key = tuple[str, int] | str
 
 def _parts(checked: Checked) -> Iterator[tuple[_Key, Part]]:
     for frame in checked.frames:
-        for number, state in enumerate((*frame.states, *frame.steps)):
-            name = f"{frame.member}.{frame.frame}.{state.name}" if frame.states else state.name
-            yield (
-                (f"{frame.member}.frame", number),
-                Part("state" if frame.states else "step", name, state.span),
-            )
+        for number, step in enumerate(frame.steps):
+            if step.duration != 0:  # else it is left out
+                yield (f"{frame.member}.frame", number), Part("step", step.name, step.span)
+        for number, state in enumerate(frame.states):
+            name = f"{frame.member}.{frame.frame}.{state.name}"
+            yield (f"{frame.member}.frame", number), Part("state", name, state.span)
         for plan in frame.states:
             for rule in (*plan.first, *plan.then):
                 yield f"rules {rule.name}", Part("rule", rule.name, rule.span)
