@@ -11,6 +11,7 @@ from socialai_dsl.schema.positions import DataPath, Positions
 from socialai_dsl.source import Span
 
 MOST: Final = 16
+_AGENT: Final = "agent"
 _ONE_EACH: Final = ("name", "color", "place", "facing", "at")
 """Keys of a group whose lists give one value each."""
 
@@ -51,11 +52,11 @@ def spread(
             message = f"`{name}` is not a name"
             hint = "a group is written once, with `count:`"
             bag.error("S104", message, places.key_span(("cast", name)), hint=hint)
-        if not isinstance(member, dict) or "count" not in member:
-            written[name] = member
+        if not isinstance(member, dict) or "count" not in member or name == _AGENT:
+            written[name] = _alone(name, member, places, bag)
             continue
         count = _count(name, member["count"], places, bag)
-        for i in range(count):
+        for i in range(count or 1):
             written[f"{name}[{i}]"] = _one(name, member, i, count, places, bag, origins)
             origins[("cast", f"{name}[{i}]")] = ("cast", name)
     if not origins:
@@ -65,19 +66,37 @@ def spread(
     return Spread({**data, "cast": written}, spread_places, paths | moved)
 
 
-def _count(name: str, count: object, places: Positions, bag: DiagnosticBag) -> int:
+def _alone(name: str, member: object, places: Positions, bag: DiagnosticBag) -> object:
+    """A member that is no group: it has no `count`, and no lists of one value for each."""
+    if not isinstance(member, dict):
+        return member
+    if "count" in member:
+        message = "there is one agent, so it has no `count`"
+        bag.error("S101", message, places.key_span(("cast", name, "count")))
+    made = {key: value for key, value in member.items() if key != "count"}
+    for key in _ONE_EACH[:-1]:
+        if isinstance(made.get(key), list):
+            message = f"a list gives one `{key}` to each of a group; `{name}` is only one"
+            hint = None if name == _AGENT else "a group has a `count`; alternatives are drawn by pick(a | b)"
+            bag.error("S104", message, places.value_span(("cast", name, key)), hint=hint)
+            del made[key]
+    return made
+
+
+def _count(name: str, count: object, places: Positions, bag: DiagnosticBag) -> int | None:
+    """How many a group has; None if that is not known."""
     if isinstance(count, int) and not isinstance(count, bool) and 1 <= count <= MOST:
         return count
     message = f"`count` is a number of members from 1 to {MOST}"
     bag.error("S106", message, places.value_span(("cast", name, "count")))
-    return 1
+    return None
 
 
 def _one(
     name: str,
     member: Mapping[str, Any],
     index: int,
-    count: int,
+    count: int | None,
     places: Positions,
     bag: DiagnosticBag,
     origins: dict[DataPath, DataPath],
@@ -94,7 +113,7 @@ def _one(
             made[key] = value
             continue
         if len(value) != count:
-            if index == 0:
+            if index == 0 and count is not None:
                 message = f"{len(value)} given for {count}: a list has one for each member of the group"
                 bag.error("S106", message, places.value_span(("cast", name, key)))
             continue

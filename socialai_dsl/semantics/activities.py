@@ -9,6 +9,7 @@ from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import contents, resolve_groups
+from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.resolve_attributes import ENTITY, somewhere, status_of
 from socialai_dsl.semantics.scope import Scope
@@ -26,7 +27,7 @@ from socialai_dsl.semantics.terms import (
     Term,
     Type,
 )
-from socialai_dsl.semantics.wording import described, quoted, wrong_count
+from socialai_dsl.semantics.wording import described, quoted, with_article, wrong_count
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
@@ -53,6 +54,7 @@ def activity(resolver: Resolver, path: DataPath, raw: str | None, scope: Scope) 
         raise _unknown(resolver, name, args, node, scope)
     if len(args) != len(signature.takes):
         raise resolver.fail("S211", wrong_count(signature, len(args)), node, scope)
+    _check_mover(resolver, name, node, scope)
     if name == "wander":
         actions = tuple(Const(ACTION, ACTION.words.index(word)) for word in _WANDERING)
         return Activity("choose", actions, site, span, (1, 1, 1), scope.draws.number())
@@ -65,6 +67,13 @@ def activity(resolver: Resolver, path: DataPath, raw: str | None, scope: Scope) 
     expected = {"direction": DIRECTION, "turn": TURN}.get(signature.takes[0], ENTITY) if args else None
     terms = tuple(_argument(resolver, name, arg, expected, scope) for arg in args)
     return Activity(cast(Any, name), terms, site, span)
+
+
+def _check_mover(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> None:
+    """The agent has no arm to point with, so a frame that it follows cannot either."""
+    looked_at = scope.frame is not None and scope.frame.looked_at
+    if name in ("point", "stop_pointing") and scope.member == AGENT and not looked_at:
+        raise resolver.fail("S204", "the agent cannot point; only NPCs do", node, scope)
 
 
 def _at_something(
@@ -119,7 +128,8 @@ def _unknown(
 def _argument(resolver: Resolver, name: str, node: ast.Expr, expected: Any, scope: Scope) -> Term:
     if expected is ENTITY and resolve_groups.is_group(resolver, node, scope):
         group = quoted(node)
-        hint = f"`{name}(nearest(d in {group} to self))`, or draw one in `let` with `pick({group})`"
+        more = ", ..." if len(ACTIVITIES[name].takes) > 1 else ""
+        hint = f"`{name}(nearest(d in {group} to self){more})`, or draw one in `let` with `pick({group})`"
         raise resolver.fail("S204", f"`{group}` is a group: say which of them", node, scope, hint=hint)
     if name in _TO_CELLS:
         return somewhere(resolver, node, scope)
@@ -139,7 +149,7 @@ def _check_entrance(resolver: Resolver, term: Term, node: ast.Expr, scope: Scope
     objects = resolver.symbols.object_of(term.type.low)
     assert objects is not None, "internal: what has a status is an object"
     if not objects.type.walkable:
-        raise resolver.fail("S204", f"a {objects.type.name} can never be entered", node, scope)
+        raise resolver.fail("S204", f"{with_article(objects.type.name)} can never be entered", node, scope)
 
 
 def _choice(resolver: Resolver, path: DataPath, node: ast.Expr, scope: Scope) -> Activity:

@@ -76,6 +76,23 @@ def _text(resolver: Resolver, member: str, terms: Sequence[Term]) -> Term:
     )
 
 
+def of_each(who: Term, values: Sequence[Term]) -> Term:
+    """The value that belongs to whichever entity is meant; `values` in the order of those it can be."""
+    numbers = [who.value] if isinstance(who, Const) else range(who.type.low, who.type.high + 1)
+    cases = [
+        (Compare("==", who, Const(who.type, number)), value)
+        for number, value in zip(numbers, values, strict=True)
+    ]
+    if len(set(values)) == 1:
+        return values[0]
+    if values[0].type.kind == "text":
+        return text_of(cases)
+    low, high = min(v.type.low for v in values), max(v.type.high for v in values)
+    *others, (_, last) = cases
+    conditions, chosen = tuple(c for c, _ in others), tuple(v for _, v in others)
+    return Select(replace(last.type, low=low, high=high), conditions, chosen, last)
+
+
 def text_of(cases: Sequence[tuple[Term, Term]]) -> Term:
     """The text beside the condition that holds (one does), of one type that has the words of all."""
     words: dict[str, None] = {}

@@ -8,13 +8,17 @@ from typing import TYPE_CHECKING
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics.alternatives import of_each
 from socialai_dsl.semantics.findings import surviving
 from socialai_dsl.semantics.registers import Declaration
 from socialai_dsl.semantics.scope import Scope, at_every_step, reset_scope
-from socialai_dsl.semantics.terms import BOOL, BeliefPlan, Sited, Term
+from socialai_dsl.semantics.terms import BOOL, BeliefPlan, Sited, Term, Type
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
+
+
+_ENTITY = Type("entity", 0, 0)
 
 
 def register_of(member: str, key: str) -> str:
@@ -56,16 +60,22 @@ def beliefs(resolver: Resolver) -> Iterator[BeliefPlan]:
 
 
 def believed(resolver: Resolver, owner: ast.Attribute, node: ast.Attribute, scope: Scope) -> Term:
-    """`sally.believes.toy_in`."""
-    subject = owner.subject
-    member = subject.id if isinstance(subject, ast.Name) else ""
-    member = scope.member if member == "self" and scope.member else resolver.symbols.roles.get(member, member)
-    if member not in resolver.symbols.cast:
+    """`sally.believes.toy_in`; of several members, what the one believes who is meant."""
+    who = resolver.value(owner.subject, _ENTITY, scope)
+    members = [resolver.symbols.member_of(number) for number in range(who.type.low, who.type.high + 1)]
+    if None in members:
         raise resolver.fail("S211", "only a member of the cast believes something", owner, scope)
-    known = resolver.symbols.cast[member].beliefs
-    if node.name not in known:
-        near = did_you_mean(node.name, known)
-        hint = None if near else f"declare it: `beliefs: {{{node.name}: {{of: ..., when: sees(...)}}}}`"
-        message = f"`{member}` has no belief `{node.name}`"
-        raise resolver.fail("S201", message, node, scope, suggestion=near, hint=hint)
-    return resolver.registers.read(register_of(member, node.name))
+    for member in map(str, members):
+        known = resolver.symbols.cast[member].beliefs
+        if node.name not in known:
+            near = did_you_mean(node.name, known)
+            hint = None if near else f"declare it: `beliefs: {{{node.name}: {{of: ..., when: sees(...)}}}}`"
+            called = (resolver.symbols.group_of(member) or (member, 0))[0]
+            message = f"`{called}` has no belief `{node.name}`"
+            raise resolver.fail("S201", message, node, scope, suggestion=near, hint=hint)
+    return of_each(who, [resolver.registers.read(register_of(str(m), node.name)) for m in members])
+
+
+def unnamed(subject: str) -> str:
+    """What to say of `sally.believes` without the name of a belief."""
+    return f"`believes` needs the name of a belief after a dot: `{subject}.believes.where_it_is`"

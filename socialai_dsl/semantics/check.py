@@ -11,7 +11,17 @@ from socialai_dsl.schema import PRIMITIVES, Scenario
 from socialai_dsl.schema.base import Expression
 from socialai_dsl.schema.positions import DataPath, Positions
 from socialai_dsl.schema.world import CHANNELS
-from socialai_dsl.semantics import behaviour, beliefs, checks, entities, sequences, setup, statuses, world
+from socialai_dsl.semantics import (
+    behaviour,
+    beliefs,
+    checks,
+    entities,
+    sequences,
+    setup,
+    statuses,
+    tables,
+    world,
+)
 from socialai_dsl.semantics.emptiness import check_placements
 from socialai_dsl.semantics.entities import AGENT, Prelude
 from socialai_dsl.semantics.findings import Findings, Scalar, surviving
@@ -74,14 +84,20 @@ def check_meaning(
             for path in ranges.unbounded:
                 run.report_growth(path)
             break
-    bag.extend(_without_consequences(found))
+    bag.extend(_without_consequences(found, scenario))
     return None if found.has_errors else checked
 
 
-def _without_consequences(found: DiagnosticBag) -> Iterator[Diagnostic]:
-    """What is wrong with the grammar makes many a text impossible to say; that need not be said as well."""
-    wrong_grammar = any(d.code == checks.GRAMMAR_CODE for d in found)
-    return (d for d in found if not (wrong_grammar and d.code in ("S401", "S402")))
+def _without_consequences(found: DiagnosticBag, scenario: Scenario) -> Iterator[Diagnostic]:
+    """What is wrong with the grammar makes many a text impossible to say, and a name that means two things makes many
+    an expression senseless; that need not be said as well.
+    """
+    follow: set[str] = set()
+    if any(d.code == checks.GRAMMAR_CODE for d in found):
+        follow |= {"S401", "S402"}
+    if entities.mean_two_things(scenario):
+        follow |= {"S204", "S211"}
+    return (d for d in found if d.code not in follow)
 
 
 @dataclass(frozen=True)
@@ -124,6 +140,7 @@ class _Run:
         outcomes = tuple(self._outcomes())
         plans = tuple(self._plans(spoken))
         self._look_at_unused()
+        tables.look_at_all(resolver)
         placed = setup.placings(resolver)
         colors, turned = list(setup.colorings(resolver)), list(setup.facings(resolver))
         computed, rules = statuses.computed(resolver), tuple(world.rules(resolver))
@@ -197,7 +214,9 @@ class _Run:
     def _look_at_unused(self) -> None:
         """Frames that nobody plays are checked as if somebody did, so that no mistake waits for its first use."""
         played = {frame.name for frame in self._played.values()}
-        npc = next((name for name in self._symbols.cast if name != AGENT), AGENT)
+        npcs = [name for name in self._symbols.cast if name != AGENT]
+        # `it` means something only to one of a group, so such a member looks at what nobody plays.
+        npc = next((name for name in npcs if self._symbols.group_of(name)), next(iter(npcs), AGENT))
         for name in self._scenario.frames:
             if name not in played:
                 path: DataPath = ("frames", name)
@@ -249,7 +268,8 @@ class _Run:
         if not isinstance(term, Const):
             return 100, Sited(term, scope.draws.site, span)
         if not 0 <= term.value <= 100:
-            raise self._findings.fail("S106", f"`{term.value}` is not a per cent of the success reward", span)
+            message = f"`{term.value}` is not a per cent of the success reward"
+            raise self._findings.fail("S106", message, span, hint="from 0 to 100")
         return term.value, None
 
     def _channels(self) -> int:

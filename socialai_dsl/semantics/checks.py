@@ -9,8 +9,8 @@ from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.schema import Frame, Scenario, State
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.build import walk
-from socialai_dsl.semantics.entities import frames_of
 from socialai_dsl.semantics.findings import Findings
+from socialai_dsl.semantics.scope import frames_of
 from socialai_dsl.semantics.terms import Chance, Const, FramePlan, Logic, Quantified, RulePlan, Term
 
 GRAMMAR_CODE = "S104"

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from socialai_dsl.grammar import ast
+from socialai_dsl.schema import Scenario
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.findings import surviving
-from socialai_dsl.semantics.scope import Objects, Scope, object_scope
+from socialai_dsl.semantics.scope import Objects, Scope, frames_of, object_scope
 from socialai_dsl.semantics.terms import FieldOf, Term, Type
 from socialai_dsl.semantics.wording import quoted
 
@@ -63,8 +66,24 @@ def container(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Te
 
 
 def can_lie_inside(resolver: Resolver, objects: Objects) -> bool:
-    """Whether objects of this name ever lie in others."""
-    return resolver.symbols.scenario.objects[objects.name].inside is not None
+    """Whether objects of this name ever lie in others: at first, or because an effect moves them there."""
+    scenario = resolver.symbols.scenario
+    if scenario.objects[objects.name].inside is not None:
+        return True
+    moved = re.compile(rf"\s*{re.escape(objects.name)}\s*\.\s*move_into\b")
+    return any(moved.match(str(effect)) for effect in _effects(scenario))
+
+
+def _effects(scenario: Scenario) -> Iterator[object]:
+    """Every effect as it is written."""
+    for rule in scenario.rules:
+        yield from rule.cause
+    for _, frame in frames_of(scenario):
+        for step in frame.steps or ():
+            yield from step.cause
+        for state in (frame.states or {}).values():
+            for entry in (*state.first, *state.then):
+                yield from entry.cause
 
 
 def contained(resolver: Resolver) -> dict[int, tuple[int, ...]]:

@@ -25,6 +25,7 @@ from socialai_dsl.semantics.scope import (
     Scope,
     Symbols,
     at_every_step,
+    frames_of,
     parse_define,
     reset_scope,
 )
@@ -193,15 +194,6 @@ def _check_names(scenario: Scenario, findings: Findings) -> None:
         taken.setdefault(name, kind)
     for path, frame in frames_of(scenario):
         _check_frame_names(path, frame, findings)
-
-
-def frames_of(scenario: Scenario) -> Iterator[tuple[DataPath, Frame]]:
-    """Every frame with the place where it is written; of the files of a `one_of`, which share theirs, the first's."""
-    for name, frame in scenario.frames.items():
-        yield ("frames", name), frame
-    for member, described in scenario.cast.items():
-        for name, frame in described.one_of[0].frames.items() if described.one_of else ():
-            yield ("cast", member, "one_of", 0, "frames", name), frame
 
 
 def _check_frame_names(path: DataPath, frame: Frame, findings: Findings) -> None:

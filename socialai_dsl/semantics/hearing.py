@@ -1,26 +1,51 @@
-"""Who said what a rule hears, and which noun was in it."""
+"""Who said something: what a rule hears, which noun was in it, and what members of the cast have said."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics.build import changed
+from socialai_dsl.semantics import resolve_attributes
+from socialai_dsl.semantics.build import all_of, any_of, changed
+from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.scope import Scope
-from socialai_dsl.semantics.terms import Const, HeardNoun, Pattern, RulePlan, Speaker, Term, Type, World
+from socialai_dsl.semantics.signatures import VALUES
+from socialai_dsl.semantics.terms import (
+    Compare,
+    Const,
+    HeardNoun,
+    Pattern,
+    RulePlan,
+    Said,
+    SaidBy,
+    Speaker,
+    Spoke,
+    Term,
+    Type,
+    World,
+)
+from socialai_dsl.semantics.utterances import normal
+from socialai_dsl.semantics.wording import quoted
+from socialai_dsl.source import Span
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
+
+_MOST_LISTED = 4
+"""So many texts are listed in a message."""
 
 
 def speaker(resolver: Resolver, node: ast.Name, scope: Scope) -> Term:
     """`speaker` in a rule; which patterns it is about is filled in once they are known (`bound`)."""
     if not scope.hearing:
-        message = "`speaker` is who said what a rule `hears`; there is nothing heard here"
-        raise resolver.fail(
-            "S211", message, node, scope, hint="add `hears:` to the rule; `hears: any` is anything"
-        )
+        message = "`speaker` is who said what a rule `hears`; nothing is heard here"
+        in_rule = scope.frame is not None and any(part in ("first", "then") for part in scope.path)
+        hint = "add `hears:` to the rule; `hears: any` is anything"
+        if not in_rule:
+            hint = "elsewhere ask `agent.said(...)`, or the same of an NPC"
+        raise resolver.fail("S211", message, node, scope, hint=hint)
     return Speaker(Type("entity", 0, len(resolver.symbols.numbers) - 1), ())
 
 
@@ -28,6 +53,94 @@ def noun(resolver: Resolver, scope: Scope) -> Term:
     """`noun`: of what the rule heard, else of what the agent said in this step."""
     nouns = resolver.symbols.nouns
     return HeardNoun(nouns, ()) if scope.hearing else World(nouns, "noun")
+
+
+def spoke(resolver: Resolver, node: ast.Call | ast.Attribute | ast.Name, scope: Scope) -> Term:
+    """`x.spoke`: whether a member of the cast said anything in this step."""
+    said = []
+    for member, condition in speakers(resolver, node, scope):
+        number = resolver.symbols.numbers[member]
+        said.append(all_of([*condition, SaidBy(number, None) if number else Spoke()]))
+    return any_of(said)
+
+
+def said(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
+    """`x.said("...")`: whether a member of the cast said one of the texts in this step."""
+    (argument,) = node.args
+    members = dict(speakers(resolver, node, scope))
+    if [*members] == ["agent"]:
+        return resolver.utterances.said(argument, scope)
+    span = resolver.findings.node(scope.path, argument)
+    found: list[Term] = []
+    for text, drawn in resolver.utterances.texts(argument, scope):
+        if text.plain is not None:
+            _check_said(resolver, text, members, span)
+        for pattern, given in resolver.utterances.patterns(text, scope, span, True):
+            conditions = [condition for condition in (drawn, given) if condition is not None]
+            for member, meant in members.items():
+                found += [all_of([*meant, one, *conditions]) for one in _has_said(resolver, member, pattern)]
+    if not found:
+        raise _never_said(resolver, quoted(argument), members, span)
+    return any_of(found)
+
+
+def _has_said(resolver: Resolver, member: str, pattern: Pattern) -> Iterator[Term]:
+    """That a member said what a pattern matches; nothing if it never says that."""
+    if member == "agent" and pattern.pairs:
+        yield Said(pattern)
+    elif pattern.said_by_npcs & resolver.said_by.get(member, {}).keys():
+        yield SaidBy(resolver.symbols.numbers[member], pattern)
+
+
+def _check_said(resolver: Resolver, text: ast.Text, members: Iterable[str], span: Span) -> None:
+    """Report a text that none of some members ever says."""
+    own = {normal(said) for said in _sayable(resolver, members)}
+    if normal(text.plain or "") not in own:
+        raise _never_said(resolver, quoted(text), members, span)
+
+
+def _sayable(resolver: Resolver, members: Iterable[str]) -> list[str]:
+    """Every text that one of some members can say."""
+    texts: dict[str, None] = {}
+    for member in members:
+        own = resolver.utterances.all_texts() if member == "agent" else resolver.said_by.get(member, {})
+        texts |= dict.fromkeys(own)
+    return list(texts)
+
+
+def _never_said(resolver: Resolver, said: str, members: Iterable[str], span: Span) -> FailedError:
+    texts, names = _sayable(resolver, members), [f"`{member}`" for member in members]
+    near = did_you_mean(said.strip('"'), texts)
+    hint = "what somebody can say stands in the `say` of its frame"
+    if 0 < len(texts) <= _MOST_LISTED:
+        hint = "what is said: " + ", ".join(f'"{text}"' for text in texts)
+    message = f"{' and '.join(names)} never {'says' if len(names) == 1 else 'say'} {said}"
+    return resolver.findings.fail(
+        "S401", message, span, suggestion=f'"{near}"' if near else None, hint=None if near else hint
+    )
+
+
+def speakers(
+    resolver: Resolver, node: ast.Call | ast.Attribute | ast.Name, scope: Scope
+) -> list[tuple[str, list[Term]]]:
+    """The members of the cast that can stand before the dot, each with the conditions on which it is the one."""
+    subject = None if isinstance(node, ast.Name) else node.subject
+    if subject is None:
+        resolve_attributes.must_be_agent(resolver, node, scope)
+        return [("agent", [])]
+    name = "" if isinstance(node, ast.Name) else node.name
+    who = resolve_attributes.subject_of(resolver, subject, VALUES[name], node, scope)
+    assert who is not None, "internal: a cell says nothing"
+    numbers = [who.value] if isinstance(who, Const) else range(who.type.low, who.type.high + 1)
+    members = [resolver.symbols.member_of(number) for number in numbers]
+    if None in members:
+        raise resolver.fail("S211", "only a member of the cast says something", node, scope)
+    if len(members) == 1:
+        return [(str(members[0]), [])]
+    return [
+        (str(member), [Compare("==", who, Const(who.type, number))])
+        for number, member in zip(numbers, members, strict=True)
+    ]
 
 
 def bound(plan: RulePlan, patterns: Sequence[Pattern]) -> RulePlan:

@@ -17,6 +17,7 @@ from socialai_dsl.semantics.places import lies_in_wall
 from socialai_dsl.semantics.scope import Objects, reset_scope
 from socialai_dsl.semantics.statuses import initial
 from socialai_dsl.semantics.terms import Const, Entity, Placing, Read, Term, Type
+from socialai_dsl.semantics.wording import with_article
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
@@ -98,6 +99,7 @@ def _objects(
     described = resolver.symbols.scenario.objects[objects.name]
     holding, rolled = contents.contained(resolver), _pushed_by_rolling(resolver, objects)
     _check_timer(resolver, objects)
+    _check_exclusive(resolver, objects)
     for index, number in enumerate(objects.numbers):
         status = statuses.get(number, objects.type.initial)
         yield Entity(
@@ -128,7 +130,9 @@ def _pushed_by_rolling(resolver: Resolver, objects: Objects) -> bool:
     findings, types = resolver.findings, resolver.symbols.types
     span = findings.at(path, 0, len(pusher))
     if not objects.type.pushed:
-        findings.error("S204", f"a {objects.type.name} cannot be pushed", findings.places.key_span(path))
+        findings.error(
+            "S204", f"{with_article(objects.type.name)} cannot be pushed", findings.places.key_span(path)
+        )
     elif pusher not in types or not types[pusher].rolls:
         rolling = [name for name, type_ in types.items() if type_.rolls]
         message = f"`{pusher}` does not roll, so it pushes nothing"
@@ -143,8 +147,15 @@ def _check_timer(resolver: Resolver, objects: Objects) -> None:
     if described.timer is not None and not objects.type.expired:
         able = [name for name, type_ in resolver.symbols.types.items() if type_.expired]
         span = resolver.findings.places.key_span(("objects", objects.name, "timer"))
-        message = f"nothing of a {objects.type.name} runs out after some time"
-        resolver.findings.error("S204", message, span, hint="a timer is for: " + ", ".join(able))
+        message = f"a timer ends no status of {with_article(objects.type.name)}"
+        resolver.findings.error("S204", message, span, hint="what has one that ends: " + ", ".join(able))
+
+
+def _check_exclusive(resolver: Resolver, objects: Objects) -> None:
+    if objects.single and resolver.symbols.scenario.objects[objects.name].exclusive:
+        span = resolver.findings.places.key_span(("objects", objects.name, "exclusive"))
+        message = "`exclusive` is for a group, of which one is used: give `count`"
+        resolver.findings.error("S204", message, span)
 
 
 def _voice(resolver: Resolver, name: str, member: CastMember) -> tuple[int, int]:

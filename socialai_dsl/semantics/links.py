@@ -12,7 +12,7 @@ from socialai_dsl.semantics.build import arithmetic, number
 from socialai_dsl.semantics.findings import FailedError, surviving
 from socialai_dsl.semantics.scope import Objects, Scope, reset_scope
 from socialai_dsl.semantics.terms import Compare, Const, Select, Term, Type
-from socialai_dsl.semantics.wording import quoted
+from socialai_dsl.semantics.wording import quoted, with_article
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
@@ -28,7 +28,7 @@ class _Kind:
     lack: str
 
 
-_UNLOCKS = _Kind("unlocks", "unlock", frozenset({"locked", "closed"}), "has no lock")
+_UNLOCKS = _Kind("unlocks", "unlock", frozenset({"locked"}), "has no lock")
 _OPENS = _Kind("opens", "open", frozenset({"open", "closed"}), "cannot be opened")
 
 
@@ -58,7 +58,7 @@ def _links_of(resolver: Resolver, objects: Objects, kind: _Kind) -> dict[int, tu
     findings, scope = resolver.findings, reset_scope(path)
     node = findings.expression(path, raw)
     if not objects.type.active:
-        message = f"a {objects.type.name} cannot {kind.verb} anything"
+        message = f"{with_article(objects.type.name)} cannot {kind.verb} anything"
         able = [name for name, type_ in resolver.symbols.types.items() if type_.active]
         raise resolver.fail("S204", message, node, scope, hint="what can: " + ", ".join(able))
     targets = _objects_at(resolver, node, scope)
@@ -66,7 +66,7 @@ def _links_of(resolver: Resolver, objects: Objects, kind: _Kind) -> dict[int, tu
         type_ = resolver.symbols.object_of(target)
         assert type_ is not None, "internal: a target is an object"
         if not kind.needs <= set(type_.type.states):
-            message = f"a {type_.type.name} {kind.lack}: it is {' or '.join(type_.type.states)}"
+            message = f"{with_article(type_.type.name)} {kind.lack}: it is {' or '.join(type_.type.states)}"
             raise resolver.fail("S204", message, node, scope)
     numbers = list(objects.numbers)
     if len(numbers) == len(targets):

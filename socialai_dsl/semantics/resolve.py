@@ -167,6 +167,9 @@ class Resolver:
             hint = "write `true` or `false`"
         elif expected.words and expected.kind not in ("noun", "bool"):
             hint = f"one of {words_of(expected)}"
+        elif expected.kind == "int" and term.type.kind == "noun":
+            other = next(word for word in term.type.words if not is_number(word))
+            hint = f"it is a number only if every noun is one; `{other}` is none"
         raise self.fail("S204", message, node, scope, hint=hint)
 
     def _as_text(self, text: str, expected: Type | None, node: ast.Expr, scope: Scope) -> Term:
@@ -319,10 +322,15 @@ def _turned(op: str, direction: Term, turn: Term) -> Term:
     return Operation(DIRECTION, "turn", (direction, change))
 
 
+def is_number(word: str) -> bool:
+    """Whether a word is a whole number."""
+    return word.removeprefix("-").isdecimal()
+
+
 def _number_of(noun: Term) -> Term | None:
     """A noun as the number that it is; None if some noun is none."""
     words = noun.type.words
-    if not all(word.lstrip("-").isdigit() for word in words):
+    if not all(map(is_number, words)):
         return None
     values = [int(word) for word in words]
     type_ = Type("int", min(values), max(values))

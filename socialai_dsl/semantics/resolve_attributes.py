@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics import contents, links, resolve_groups, resolve_names
-from socialai_dsl.semantics.alternatives import text_of
+from socialai_dsl.semantics import beliefs, contents, hearing, links, resolve_groups, resolve_names
+from socialai_dsl.semantics.alternatives import of_each
 from socialai_dsl.semantics.build import all_of, any_of, arithmetic, number
 from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.scope import Scope
@@ -25,14 +25,12 @@ from socialai_dsl.semantics.terms import (
     FieldOf,
     Here,
     PokedNow,
-    SaidBy,
-    Spoke,
     Term,
     Test,
     Type,
     World,
 )
-from socialai_dsl.semantics.wording import quoted, usage
+from socialai_dsl.semantics.wording import quoted, usage, with_article
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
@@ -55,6 +53,21 @@ def toggled_by(who: Const, what: Term) -> Term:
     return all_of([Compare("==", FieldOf(ACTION, who, "last"), toggle), Test("faces", who, what)])
 
 
+def check_points(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: Scope) -> None:
+    """Report what cannot point: an object, and the agent, which has no arm to do it with."""
+    if who.type.high >= len(resolver.symbols.numbers):
+        raise resolver.fail("S204", f"only NPCs point, so only they have `{name}`", node, scope)
+    if who.type.high == 0:
+        raise resolver.fail("S204", "the agent never points; only NPCs do", node, scope)
+
+
+def check_toggled(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: Scope) -> None:
+    """Report what nobody uses."""
+    if who.type.low < len(resolver.symbols.numbers):
+        message = f"only objects are toggled, so only they have `{name}`"
+        raise resolver.fail("S204", message, node, scope, hint="an NPC is poked: `anna.poked`")
+
+
 def check_moment(resolver: Resolver, signature: Signature, node: ast.Expr, scope: Scope) -> None:
     """Report what speaks of a step where there is none yet."""
     if signature.momentary and scope.at_reset:
@@ -62,6 +75,8 @@ def check_moment(resolver: Resolver, signature: Signature, node: ast.Expr, scope
             f"`{signature.name}` speaks of a step, but this value is computed once, before the first step"
         )
         hint = "a `define` is recomputed at every use" if "let" in scope.path else None
+        if "beliefs" in scope.path:
+            hint = "a belief is there from the start, so it is about something that is true before the first step"
         raise resolver.fail("S204", message, node, scope, hint=hint)
 
 
@@ -104,15 +119,6 @@ def somewhere(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
     return term if term.type.kind == "cell" else resolver.fit(term, ENTITY, node, scope)
 
 
-def member_named(resolver: Resolver, node: ast.Call | ast.Attribute | ast.Name, scope: Scope) -> str | None:
-    """The NPC that stands before the dot; None if it is somebody or something else."""
-    subject = None if isinstance(node, ast.Name) else node.subject
-    if not isinstance(subject, ast.Name) or subject.id in scope.variables:
-        return None
-    member = resolver.symbols.roles.get(subject.id, subject.id)
-    return member if member in resolver.symbols.cast and member != "agent" else None
-
-
 def must_be_agent(resolver: Resolver, node: ast.Call | ast.Attribute | ast.Name, scope: Scope) -> None:
     """Report what is known of the agent only, asked of somebody else."""
     subject = None if isinstance(node, ast.Name) else node.subject
@@ -140,9 +146,8 @@ def without_arguments(
     check_moment(resolver, signature, node, scope)
     if signature.subject == "agent":
         assert isinstance(node, ast.Call | ast.Attribute | ast.Name), "internal: an attribute has a name"
-        speaker = member_named(resolver, node, scope)
-        if name == "spoke" and speaker is not None:
-            return SaidBy(resolver.symbols.numbers[speaker], None)
+        if name == "spoke":
+            return hearing.spoke(resolver, node, scope)
         must_be_agent(resolver, node, scope)
         return _of_the_agent(resolver, name)
     who = subject_of(resolver, subject, signature, node, scope)
@@ -167,6 +172,8 @@ def _unknown_attribute(
         return resolver.fail(
             "S211", f"`{name}` needs something in brackets: `{usage(signature)}`", node, scope
         )
+    if name == "believes" and isinstance(node, ast.Attribute):
+        return resolver.fail("S211", beliefs.unnamed(quoted(node.subject)), node, scope)
     synonym = VALUE_SYNONYMS.get(name)
     if synonym:
         return resolver.fail(
@@ -187,8 +194,6 @@ def _of_frame(resolver: Resolver, node: ast.Expr) -> list[str]:
 
 def _of_the_agent(resolver: Resolver, name: str) -> Term:
     match name:
-        case "spoke":
-            return Spoke()
         case "noun":
             return World(resolver.symbols.nouns, "noun")
     assert name == "action", f"internal: the agent has no `{name}`"
@@ -225,10 +230,12 @@ def _attribute(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: 
         case "cell":
             return CellOf(CELL, who)
         case "pointing":
+            check_points(resolver, name, who, node, scope)
             return Compare("!=", FieldOf(_POINTING, who, "pointing"), Const(_POINTING, 0))
         case "inside":
             return contents.container(resolver, who, node, scope)
         case "toggled":
+            check_toggled(resolver, name, who, node, scope)
             everybody = range(len(resolver.symbols.numbers))
             return any_of(toggled_by(resolve_names.entity(number), who) for number in everybody)
         case "kind":
@@ -243,11 +250,7 @@ def _name(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
     names = [resolver.registers.read(f"{member}.name") for member in members if member is not None]
     if len(names) < len(members):
         raise resolver.fail("S204", "only a member of the cast has a name", node, scope)
-    cases = [
-        (Compare("==", who, Const(who.type, number)), name)
-        for number, name in zip(numbers, names, strict=True)
-    ]
-    return text_of(cases)
+    return of_each(who, names)
 
 
 def _kind(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
@@ -295,7 +298,7 @@ def _status(resolver: Resolver, status: str, who: Term, node: ast.Expr, scope: S
     if status not in field.type.words:
         what = resolver.symbols.object_of(who.type.low)
         assert what is not None, "internal: a status belongs to an object"
-        message = f"a {what.type.name} is never `{status}`; it is {' or '.join(field.type.words)}"
+        message = f"{with_article(what.type.name)} is never `{status}`; it is {' or '.join(field.type.words)}"
         raise resolver.fail("S204", message, node, scope, suggestion=did_you_mean(status, field.type.words))
     return Compare("==", field, Const(field.type, field.type.words.index(status)))
 

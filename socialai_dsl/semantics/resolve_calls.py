@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any, cast
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics import resolve_groups, resolve_names, tables
+from socialai_dsl.semantics import beliefs, hearing, resolve_groups, resolve_names, tables
 from socialai_dsl.semantics.build import all_of, any_of, arithmetic, draws, number, one_of, walk
 from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.resolve_attributes import (
     ENTITY,
     check_moment,
-    member_named,
+    check_points,
+    check_toggled,
     must_be_agent,
     somewhere,
     subject_of,
@@ -46,7 +47,6 @@ from socialai_dsl.semantics.terms import (
     Term,
     Test,
     Type,
-    Variable,
     World,
 )
 from socialai_dsl.semantics.wording import quoted, usage, wrong_count
@@ -82,11 +82,8 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
     check_moment(resolver, signature, node, scope)
     argument = node.args[0]
     match node.name:
-        case "said" if (speaker := member_named(resolver, node, scope)) is not None:
-            return resolver.utterances.said_by(speaker, argument, scope)
         case "said":
-            must_be_agent(resolver, node, scope)
-            return resolver.utterances.said(argument, scope)
+            return hearing.said(resolver, node, scope)
         case "heard":
             _listener(resolver, node, scope)
             return resolver.utterances.heard(argument, scope)
@@ -140,7 +137,14 @@ def _unknown(resolver: Resolver, node: ast.Call, scope: Scope) -> FailedError:
         return resolver.fail(
             "S205", f"unknown verb `{node.name}`; write `{usage(VALUES[synonym])}`", node, scope
         )
+    if node.name == "permuted":
+        message = "`permuted` makes a table of another table, or the colours of a group of those of another"
+        hint = "`tables: {dar: permuted(words)}`, `color: permuted(doors.color)`"
+        return resolver.fail("S204", message, node, scope, hint=hint)
+    if node.name == "believes" and node.subject is not None:
+        return resolver.fail("S211", beliefs.unnamed(quoted(node.subject)), node, scope)
     candidates = [*VALUES, *resolver.symbols.defines, *(scope.frame.defines if scope.frame else ())]
+    candidates += resolver.symbols.scenario.tables if node.subject is None else ()
     near = did_you_mean(node.name, candidates)
     kind = "word" if node.subject is None else "verb"
     return resolver.fail("S205", f"unknown {kind} `{node.name}`", node, scope, suggestion=near)
@@ -220,13 +224,20 @@ def _attention(resolver: Resolver, name: str, subject: Term, node: ast.Call, sco
     """What two look at, what somebody points at, who toggled at something."""
     first, *rest = node.args
     if name == "toggled_by":
+        check_toggled(resolver, name, subject, node, scope)
         who = resolver.value(first, ENTITY, scope)
         if not isinstance(who, Const) or resolver.symbols.member_of(who.value) is None:
             raise resolver.fail("S211", "`toggled_by` takes a member of the cast", first, scope)
         return toggled_by(who, subject)
     if name == "points_at":
+        check_points(resolver, name, subject, node, scope)
         return _each(resolver, first, scope, lambda other: _points_at(subject, other))
     other = resolver.value(first, ENTITY, scope)
+    if max(subject.type.high, other.type.high) >= len(resolver.symbols.numbers):
+        message = "only members of the cast attend to something together"
+        at = node if subject.type.high > other.type.high else first
+        hint = "`a.joint_attention(b, x)` is whether a and b both look at x"
+        raise resolver.fail("S204", message, at, scope, hint=hint)
 
     def both_look(what: Term) -> Term:
         return all_of([Test("looks_at", subject, what), Test("looks_at", other, what)])
@@ -274,9 +285,10 @@ def _did(resolver: Resolver, argument: ast.Expr, scope: Scope) -> Term:
 
 def _is_in_state(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
     """`dancer.is(watching)`: the state is a bare word, looked up in the member's frame."""
-    if isinstance(node.subject, ast.Name) and isinstance(scope.variables.get(node.subject.id), Variable):
-        return _is_each_in_state(resolver, cast(Variable, scope.variables[node.subject.id]), node, scope)
-    member = _member(resolver, node.subject, node, scope)
+    who = resolver.value(node.subject, ENTITY, scope) if node.subject is not None else None
+    if who is not None and not isinstance(who, Const):
+        return _is_each_in_state(resolver, who, node, scope)
+    member = _member(resolver, who, node, scope)
     argument = node.args[0]
     own = scope.frame is not None and node.subject is None
     frame = scope.frame if own else resolver.frames.get(member)
@@ -298,11 +310,11 @@ def _is_in_state(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
     return InState(member, frame.name, argument.id)
 
 
-def _is_each_in_state(resolver: Resolver, who: Variable, node: ast.Call, scope: Scope) -> Term:
-    """`any(p in peers where p.is(ready))`: of whoever is meant."""
+def _is_each_in_state(resolver: Resolver, who: Term, node: ast.Call, scope: Scope) -> Term:
+    """`any(p in peers where p.is(ready))`, `leader.is(ready)`: of whoever is meant."""
     members = [resolver.symbols.member_of(number) for number in range(who.type.low, who.type.high + 1)]
     named = [member for member in members if member is not None]
-    if who.type.kind != "entity" or len(named) < len(members):
+    if len(named) < len(members):
         raise resolver.fail("S211", "a member of the cast is needed before the dot", node, scope)
     cases = []
     for i, member in enumerate(named):
@@ -312,12 +324,8 @@ def _is_each_in_state(resolver: Resolver, who: Variable, node: ast.Call, scope: 
     return any_of(cases)
 
 
-def _member(resolver: Resolver, subject: ast.Expr | None, node: ast.Expr, scope: Scope) -> str:
-    if subject is None and scope.member is not None:
-        return scope.member
-    if subject is not None:
-        term = resolver.value(subject, ENTITY, scope)
-        member = resolver.symbols.member_of(term.value) if isinstance(term, Const) else None
-        if member is not None:
-            return member
+def _member(resolver: Resolver, who: Const | None, node: ast.Expr, scope: Scope) -> str:
+    member = scope.member if who is None else resolver.symbols.member_of(who.value)
+    if member is not None:
+        return member
     raise resolver.fail("S211", "a member of the cast is needed before the dot", node, scope)

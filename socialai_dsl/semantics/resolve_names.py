@@ -12,7 +12,7 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.schema import Sequence
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import beliefs, hearing, resolve_attributes
-from socialai_dsl.semantics.alternatives import by_value, drawn
+from socialai_dsl.semantics.alternatives import by_value, drawn, of_each
 from socialai_dsl.semantics.build import FALSE, all_of, any_of
 from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.scope import Define, Draws, Macro, PlayedFrame, Scope
@@ -24,10 +24,8 @@ from socialai_dsl.semantics.terms import (
     DIRECTION,
     SIDE,
     TURN,
-    Compare,
     Const,
     Here,
-    Select,
     Term,
     Type,
     Variable,
@@ -76,9 +74,7 @@ def _variable(resolver: Resolver, bound: Term | Macro, expected: Type | None, sc
     if not isinstance(bound, Macro):
         return bound
     # An argument is resolved where it is used, but means what it meant to the caller.
-    inner = replace(
-        bound.scope, draws=scope.draws, outer=scope.outer, nested=scope.nested, within=scope.within
-    )
+    inner = replace(bound.scope, draws=scope.draws, outer=scope.outer, nested=scope.nested)
     return resolver.value(bound.node, expected, inner)
 
 
@@ -212,7 +208,7 @@ def _language(resolver: Resolver, node: ast.Name, scope: Scope) -> Term | None:
             return _size("height", symbols.height)
         case "noun" if scope.frame is not None and not scope.at_reset:
             return hearing.noun(resolver, scope)
-        case "speaker" if scope.frame is not None and not scope.at_reset:
+        case "speaker":
             return hearing.speaker(resolver, node, scope)
     return None
 
@@ -252,6 +248,8 @@ def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: S
         return resolver.fail(
             "S211", f"`{word}` needs something in brackets: `{usage(VALUES[word])}`", node, scope
         )
+    if word in resolver.symbols.scenario.tables:
+        return resolver.fail("S211", f"`{word}` is a table: write `{word}(key)`", node, scope)
     near, place = suggestion(resolver, word, expected, scope)
     message, hint = f"unknown name `{word}`", None
     if expected is not None and expected.words and expected.kind not in ("bool", "noun"):
@@ -302,6 +300,12 @@ def _register_of(resolver: Resolver, node: ast.Name, scope: Scope) -> str | None
     return f"let.{node.id}" if node.id in resolver.symbols.scenario.let else None
 
 
+def means_nothing(resolver: Resolver, word: str, scope: Scope) -> bool:
+    """Whether a word is neither declared nor of the language: where a text is expected, it is one."""
+    known = any(word in type_.words for type_ in _VOCABULARIES) or word in WORDS or word in VALUES
+    return not known and not _names_something(resolver, word, scope)
+
+
 def _names_something(resolver: Resolver, word: str, scope: Scope) -> bool:
     frame = scope.frame
     if (
@@ -347,6 +351,14 @@ def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
             found = _of_each(resolver, several, node.name)
             if found is not None:
                 return found
+        if (
+            owner not in scope.variables
+            and owner in resolver.symbols.scenario.let
+            and node.name not in VALUES
+        ):
+            found = _of_each(resolver, resolver.value(node.subject, None, scope), node.name)
+            if found is not None:
+                return found
         if owner not in scope.variables and node.name not in VALUES:
             owner = resolver.symbols.roles.get(owner, owner)
             register, played = f"{owner}.{node.name}", resolver.frames.get(owner)
@@ -357,7 +369,7 @@ def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
     return resolve_attributes.without_arguments(resolver, node.name, node.subject, node, scope)
 
 
-def _of_each(resolver: Resolver, who: Variable, name: str) -> Term | None:
+def _of_each(resolver: Resolver, who: Term, name: str) -> Term | None:
     """A register that each of several members has in its frame: that of the one who is meant. None if some lack it."""
     if who.type.kind != "entity" or who.type.high >= len(resolver.symbols.numbers):
         return None
@@ -365,10 +377,7 @@ def _of_each(resolver: Resolver, who: Variable, name: str) -> Term | None:
     if not all(f"{member}.{name}" in resolver.registers for member in members):
         return None
     values = [resolver.registers.read(f"{member}.{name}") for member in members]
-    *others, last = values
-    low, high = min(v.type.low for v in values), max(v.type.high for v in values)
-    cases = [Compare("==", who, Const(who.type, who.type.low + i)) for i in range(len(others))]
-    return Select(replace(last.type, low=low, high=high), tuple(cases), tuple(others), last)
+    return of_each(who, values) if len({value.type.kind for value in values}) == 1 else None
 
 
 def _statuses(resolver: Resolver) -> set[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from socialai_dsl.grammar import ast
@@ -266,3 +266,12 @@ def parse_define(key: str) -> tuple[str, tuple[str, ...]] | None:
         return None
     parameters = match.group(2)
     return match.group(1), tuple(p.strip() for p in parameters.split(",")) if parameters else ()
+
+
+def frames_of(scenario: Scenario) -> Iterator[tuple[DataPath, Frame]]:
+    """Every frame with the place where it is written; of the files of a `one_of`, which share theirs, the first's."""
+    for name, frame in scenario.frames.items():
+        yield ("frames", name), frame
+    for member, described in scenario.cast.items():
+        for name, frame in described.one_of[0].frames.items() if described.one_of else ():
+            yield ("cast", member, "one_of", 0, "frames", name), frame

@@ -22,6 +22,7 @@ from socialai_dsl.semantics.terms import (
     Term,
     Type,
 )
+from socialai_dsl.semantics.wording import with_article
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
@@ -82,7 +83,7 @@ def _status(
         return states.index(status)
     findings = resolver.findings
     span = findings.at(written, 0, len(status)) if written else findings.places.key_span(key or ())
-    message = f"a {objects.type.name} is never `{status}`; it is {' or '.join(states)}"
+    message = f"{with_article(objects.type.name)} is never `{status}`; it is {' or '.join(states)}"
     raise findings.fail("S204", message, span, suggestion=did_you_mean(status, states) if written else None)
 
 

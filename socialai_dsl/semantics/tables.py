@@ -8,16 +8,27 @@ from typing import TYPE_CHECKING
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics import resolve_names
 from socialai_dsl.semantics.build import all_of
+from socialai_dsl.semantics.findings import FailedError, surviving
 from socialai_dsl.semantics.scope import Scope, reset_scope
 from socialai_dsl.semantics.terms import Compare, Const, Quantified, Read, Select, Sited, Term, Type, Variable
-from socialai_dsl.semantics.wording import spoken
+from socialai_dsl.semantics.wording import described, quoted, spoken
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
 
 _PERMUTED = "permuted"
 _ANY_TEXT = Type("text", 0, -1)
+_NO_KEYS = ("entity", "cell", "bool", "utterance")
+"""Kinds of values that no words stand for."""
+
+
+def look_at_all(resolver: Resolver) -> None:
+    """Report what is wrong with a table, though nothing may be looked up in it."""
+    for name in resolver.symbols.scenario.tables:
+        with surviving():
+            resolver.table(name)
 
 
 def looked_up(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
@@ -26,21 +37,49 @@ def looked_up(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
     keys, values = resolver.table(name)
     if len(node.args) != 1:
         raise resolver.fail("S211", f"`{name}` is a table: it takes one key", node, scope)
-    key = resolver.value(node.args[0], None, scope)
+    key = _key(resolver, name, node.args[0], scope)
     known = [key.value] if isinstance(key, Const) else range(key.type.low, key.type.high + 1)
     cases: list[tuple[Term, Term]] = []
     for value in known:
         word = spoken(key.type, value)
         if word not in keys:
-            message = f"the table `{name}` has no `{word}`"
-            near = did_you_mean(word, keys)
-            hint = None if near else "it has " + ", ".join(keys)
-            raise resolver.fail("S402", message, node, scope, suggestion=near, hint=hint)
+            raise _no_key(resolver, name, keys, word, key, node.args[0], scope)
         if isinstance(key, Const):
             return values[keys.index(word)]
         cases.append((Compare("==", key, Const(key.type, value)), values[keys.index(word)]))
     *others, (_, default) = cases
     return Select(default.type, tuple(c for c, _ in others), tuple(v for _, v in others), default)
+
+
+def _key(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> Term:
+    """What is looked up: something that words stand for. A word that means nothing else is itself looked up."""
+    means_nothing = isinstance(node, ast.Name) and resolve_names.means_nothing(resolver, node.id, scope)
+    key = resolver.value(node, _ANY_TEXT if means_nothing else None, scope)
+    if key.type.kind in _NO_KEYS:
+        message = f"`{quoted(node)}` is {described(key.type)}; the keys of the table `{name}` are words"
+        hint = f"look up its colour: `{name}({quoted(node)}.color)`" if key.type.kind == "entity" else None
+        raise resolver.fail("S204", message, node, scope, hint=hint)
+    return key
+
+
+def _no_key(
+    resolver: Resolver,
+    name: str,
+    keys: Sequence[str],
+    word: str,
+    key: Term,
+    node: ast.Expr,
+    scope: Scope,
+) -> FailedError:
+    """What is looked up, or what it can be, is not in the table."""
+    near = did_you_mean(word, keys)
+    if isinstance(key, Const):
+        hint = None if near else "it has " + ", ".join(keys)
+        message = f"the table `{name}` has no `{word}`"
+        return resolver.fail("S402", message, node, scope, suggestion=near, hint=hint)
+    message = f"`{quoted(node)}` can be {word}, which the table `{name}` does not have"
+    hint = f"it has `{near}`; is that meant?" if near else "it has " + ", ".join(keys)
+    return resolver.fail("S402", message, node, scope, hint=hint)
 
 
 def resolved(resolver: Resolver, name: str) -> tuple[tuple[str, ...], tuple[Term, ...]]:
@@ -71,7 +110,7 @@ def _word(resolver: Resolver, path: DataPath, raw: object) -> str:
 
 def _as_values(words: Sequence[str]) -> tuple[Term, ...]:
     """The words as values of one type: numbers if all are, else texts."""
-    if all(word.lstrip("-").isdigit() for word in words):
+    if all(word.removeprefix("-").isdecimal() for word in words):
         numbers = [int(word) for word in words]
         type_ = Type("int", min(numbers), max(numbers))
         return tuple(Const(type_, value) for value in numbers)
@@ -95,9 +134,8 @@ def _permuted(
     if other not in known or isinstance(known[other], str):
         near = did_you_mean(other, [key for key, value in known.items() if not isinstance(value, str)])
         message = f"`{other}` is not a table that is written out"
-        raise resolver.findings.fail(
-            "S201", message, resolver.findings.node(path, node.args[0]), suggestion=near
-        )
+        span = resolver.findings.node(path, node.args[0])
+        raise resolver.findings.fail("S201", message, span, suggestion=near)
     keys, values = resolver.table(other)
     order = permutation(resolver, f"tables.{name}", len(keys), path)
     type_ = values[0].type

@@ -586,6 +586,7 @@ class ObjectType:
     transparent: frozenset[int]
     toggled: dict[int, int] = field(hash=False)
     deadly: bool = False
+
     active: frozenset[int] = frozenset()
     """Statuses in which it works on what it is linked to (`unlocks`, `opens`)."""
     pushed: dict[int, int] = field(default_factory=dict, hash=False)
@@ -595,6 +596,11 @@ class ObjectType:
     expired: dict[int, int] = field(default_factory=dict, hash=False)
     """Active status -> the status it has when its timer has run out."""
     shown: dict[int, tuple[int, int]] = field(default_factory=dict, hash=False)
+
+    @property
+    def unlocked(self) -> int:
+        """What becomes of it when it is unlocked: closed, if it can be, else as it is at first."""
+        return self.states.index("closed") if "closed" in self.states else self.initial
 
 
 @dataclass(frozen=True, slots=True)

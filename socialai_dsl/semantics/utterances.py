@@ -24,7 +24,6 @@ from socialai_dsl.semantics.terms import (
     Pattern,
     Read,
     Said,
-    SaidBy,
     Term,
     Type,
 )
@@ -62,7 +61,7 @@ class Utterances:
         span = self._resolver.findings.node(scope.path, node)
         return any_of(
             all_of([Said(pattern), *_given(drawn), *_given(given)])
-            for text, drawn in self._texts(node, scope)
+            for text, drawn in self.texts(node, scope)
             for pattern, given in self.patterns(text, scope, span, False)
         )
 
@@ -71,11 +70,11 @@ class Utterances:
         span = self._resolver.findings.node(scope.path, node)
         return any_of(
             all_of([Heard((pattern,)), *_given(drawn), *_given(given)])
-            for text, drawn in self._texts(node, scope)
+            for text, drawn in self.texts(node, scope)
             for pattern, given in self.patterns(text, scope, span, True)
         )
 
-    def _texts(self, node: ast.Expr, scope: Scope) -> list[tuple[ast.Text, Term | None]]:
+    def texts(self, node: ast.Expr, scope: Scope) -> list[tuple[ast.Text, Term | None]]:
         """The texts that an argument names, each with the condition on what `one_of` drew."""
         resolver = self._resolver
         options = node.options if isinstance(node, ast.Alternatives) else (node,)
@@ -180,6 +179,9 @@ class Utterances:
             return part
         if isinstance(part, ast.Name) and part.id == "noun" and "noun" not in scope.variables:
             return None
+        if isinstance(part, ast.Name) and part.id == "nouns":
+            message = "`nouns` are all of them; any one of them is `<noun>`"
+            raise self._resolver.fail("S402", message, part, scope)
         return sayable(self._resolver, part, scope)
 
     def _choices(self, part: str | Term | None) -> list[tuple[str, Term | None]]:
@@ -243,24 +245,6 @@ class Utterances:
         """Every utterance as text."""
         for t, n in product(range(len(self._grammar.templates)), range(len(self._grammar.nouns))):
             yield self._grammar.utterance(t, n)
-
-    def said_by(self, member: str, node: ast.Expr, scope: Scope) -> Term:
-        """Whether an NPC said one of the texts at `node` in this step."""
-        resolver = self._resolver
-        span, own = resolver.findings.node(scope.path, node), resolver.said_by.get(member, {})
-        found = [
-            all_of([SaidBy(resolver.symbols.numbers[member], pattern), *_given(drawn), *_given(given)])
-            for text, drawn in self._texts(node, scope)
-            for pattern, given in self.patterns(text, scope, span, True)
-            if pattern.said_by_npcs & own.keys()
-        ]
-        if not found:
-            near = did_you_mean(quoted(node).strip('"'), own)
-            hint = None if near else "what somebody can say stands in the `say` of its frame"
-            suggestion = f'"{near}"' if near else None
-            message = f"`{member}` never says {quoted(node)}"
-            raise resolver.findings.fail("S401", message, span, suggestion=suggestion, hint=hint)
-        return any_of(found)
 
     # -- lines -----------------------------------------------------------------------------------------------
 

@@ -45,14 +45,21 @@ def usage(signature: Signature) -> str:
     """How an instruction is written: `next_to(x)`."""
     if not signature.takes:
         return signature.name
-    return f"{signature.name}({', '.join(_PLACEHOLDERS[kind] for kind in signature.takes)})"
+    least = len(signature.takes) - signature.optional
+    return f"{signature.name}({', '.join(_PLACEHOLDERS[kind] for kind in signature.takes[: least or None])})"
 
 
 def wrong_count(signature: Signature, given: int) -> str:
     """What to say when an instruction has too few or too many values in brackets."""
-    many = len(signature.takes)
-    takes = "nothing in brackets" if not many else f"{many} value{'s' if many > 1 else ''} in brackets"
+    many, least = len(signature.takes), len(signature.takes) - signature.optional
+    number = f"{least} or {many}" if least < many else f"{many}"
+    takes = "nothing in brackets" if not many else f"{number} value{'s' if many > 1 else ''} in brackets"
     return f"`{signature.name}` takes {takes}: `{usage(signature)}`; {given} given"
+
+
+def with_article(name: str) -> str:
+    """What something is called, with its article: `an apple`, `a remote door`."""
+    return f"{'an' if name[:1] in 'aeiou' else 'a'} {name.replace('_', ' ')}"
 
 
 def described(type_: Type) -> str:

@@ -11,7 +11,7 @@ from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.activities import effect
 from socialai_dsl.semantics.behaviour import assigned
 from socialai_dsl.semantics.build import draws
-from socialai_dsl.semantics.findings import dotted, surviving
+from socialai_dsl.semantics.findings import FailedError, dotted, surviving
 from socialai_dsl.semantics.scope import Scope, at_every_step, reset_scope
 from socialai_dsl.semantics.terms import BOOL, Effect, RulePlan, Sited
 
@@ -58,13 +58,26 @@ def _sets(resolver: Resolver, rule: WorldRule, path: DataPath, name: str) -> Ite
         place = (*path, word)
         with surviving():
             if word not in known:
-                near = did_you_mean(word, known)
-                hint = None if near else f"declare it: `state: {{{word}: 0}}`"
-                span = resolver.findings.places.key_span(place)
-                message = f"`{word}` is not declared in `state`"
-                raise resolver.findings.fail("S305", message, span, suggestion=near, hint=hint)
+                raise _not_of_the_world(resolver, word, place)
             register = f"state.{word}"
             yield register, assigned(resolver, register, raw, place, _scope(place, f"{name}.set.{word}"))
+
+
+def _not_of_the_world(resolver: Resolver, word: str, path: DataPath) -> FailedError:
+    """Rules of the world set registers of `state`, and nothing else."""
+    scenario, span = resolver.symbols.scenario, resolver.findings.places.key_span(path)
+    frame = next((name for name, frame in scenario.frames.items() if word in frame.let), None)
+    cure = "a rule of the world sets what is declared in `state`"
+    if word in scenario.let:
+        message = f"`{word}` is drawn once per episode and cannot be set"
+        return resolver.findings.fail("S305", message, span, hint=cure)
+    if frame is not None:
+        message = f"`{word}` is a register of the frame `{frame}`, which only the frame itself sets"
+        return resolver.findings.fail("S305", message, span, hint=cure)
+    near = did_you_mean(word, scenario.state)
+    hint = None if near or word in resolver.symbols.declared() else f"declare it: `state: {{{word}: 0}}`"
+    message = f"`{word}` is not declared in `state`"
+    return resolver.findings.fail("S305", message, span, suggestion=near, hint=hint)
 
 
 def _scope(path: DataPath, site: str) -> Scope:

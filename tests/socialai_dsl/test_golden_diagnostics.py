@@ -51,6 +51,6 @@ def test_every_code_has_a_case():
     assert not seen & set(NOT_FROM_ONE_FILE), "these codes have a file now: take them off the list"
 
 
-@pytest.mark.parametrize("name", ["small.yaml", "rich.yaml", "rich.yaml?count=2&length=4"])
+@pytest.mark.parametrize("name", ["small.yaml", "rich.yaml", "town.yaml", "rich.yaml?count=2&length=4"])
 def test_the_files_that_the_mistakes_were_made_in_are_right(name):
     assert check(name).diagnostics == ()

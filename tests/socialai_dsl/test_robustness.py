@@ -6,14 +6,17 @@ import copy
 import random
 import re
 import shutil
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 import yaml
 
-from socialai_dsl.diagnostics import render_text
+from socialai_dsl.compiler import compile_scenario
+from socialai_dsl.diagnostics import ScenarioError, render_text
 from socialai_dsl.frontend import check
 from socialai_dsl.loader.names import shipped_folder
+from socialai_dsl.loader.reader import read_document
 
 SMALL = (Path(__file__).parent.parent / "diagnostics" / "small.yaml").read_text()
 PIECES = [
@@ -69,10 +72,11 @@ def test_a_mutilated_file_is_a_finding_or_a_scenario(seed, tmp_path):
         assert result.diagnostics or result.checked, text
 
 
-# -- the scenarios that are shipped, and one with everything in it ---------------------------------------------------
+# -- the scenarios that are shipped, and two with everything in them ------------------------------------------------
 
 DIAGNOSTICS = Path(__file__).parent.parent / "diagnostics"
 SHIPPED = sorted(str(path.relative_to(shipped_folder())) for path in shipped_folder().rglob("*.yaml"))
+WHOLE = ("rich.yaml", "town.yaml")
 VALUES = [
     *(0, -1, 3, True, None, "", [], {}, 0.5, [1, 2], {"sequence": 2, "moves": ["left"]}),
     *(
@@ -86,7 +90,14 @@ VALUES = [
         "prev(t)",
         "attempt == dance",
         "locked",
+        "peers",
+        "toy.inside",
+        "keeper.believes.toy_in",
+        "dar(red)",
+        "speaker",
+        "1..3",
     ),
+    {"start": 3, "range": "0..5"},
 ]
 
 
@@ -131,34 +142,45 @@ def rebuilt(data, other, rng):
 
 @pytest.fixture
 def scenarios(tmp_path, monkeypatch):
-    """A copy of the shipped scenarios beside the one with everything in it, in which we work."""
+    """A copy of the shipped scenarios beside those with everything in them, in which we work."""
     folder = tmp_path / "scenarios"
     shutil.copytree(shipped_folder(), folder)
     shutil.copytree(DIAGNOSTICS / "guides", folder / "guides")
-    shutil.copy(DIAGNOSTICS / "rich.yaml", folder)
+    for name in WHOLE:
+        shutil.copy(DIAGNOSTICS / name, folder)
     monkeypatch.chdir(folder)
     return folder
 
 
-@pytest.mark.parametrize("seed", range(8))
-def test_a_mutilated_scenario_is_a_finding_or_a_scenario(seed, scenarios):
+def data_of(file):
+    """A file as plain data, as the language reads it: other readers of YAML take less."""
+    return copy.deepcopy(read_document(file).data)
+
+
+def mutilated(file, scenarios, rng):
+    """The text of a scenario with a few parts changed, or a few words."""
+    changes = rng.choice((1, 1, 2, 3))
+    if rng.random() < 0.6:
+        data, other = data_of(file), data_of(scenarios / rng.choice([*SHIPPED, *WHOLE]))
+        for _ in range(changes):
+            rebuilt(data, other, rng)
+            if not data:
+                break
+        return yaml.dump(data, Dumper=Plainly, sort_keys=False)
+    text = file.read_text(encoding="utf-8")
+    for _ in range(changes):
+        text = mutated(text, rng)
+    return text
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_mutilated_scenario_is_a_finding_or_a_program(seed, scenarios):
     rng = random.Random(seed)
     for _ in range(40):
-        name = rng.choice([*SHIPPED, *["rich.yaml"] * 6])
+        name = rng.choice([*SHIPPED, *WHOLE * 8])
         file = scenarios / name
         whole = file.read_text(encoding="utf-8")
-        text = whole
-        if rng.random() < 0.6:
-            data = yaml.safe_load(whole)
-            other = yaml.safe_load((scenarios / rng.choice(SHIPPED)).read_text(encoding="utf-8"))
-            for _ in range(rng.choice((1, 1, 2, 3))):
-                rebuilt(data, other, rng)
-                if not data:
-                    break
-            text = yaml.dump(data, Dumper=Plainly, sort_keys=False)
-        else:
-            for _ in range(rng.choice((1, 1, 2, 3))):
-                text = mutated(text, rng)
+        text = mutilated(file, scenarios, rng)
         file.write_text(text, encoding="utf-8")
         result = check("diverse_exit.yaml" if name.startswith("diverse_exit/") else name)
         needs_no_meaning = result.resolved is not None and (
@@ -166,4 +188,7 @@ def test_a_mutilated_scenario_is_a_finding_or_a_scenario(seed, scenarios):
         )
         assert result.diagnostics or result.checked or needs_no_meaning, text
         assert bool(render_text(result.diagnostics, result.sources)) == bool(result.diagnostics)
+        if result.checked is not None:
+            with suppress(ScenarioError):  # the size of the room, for instance, is looked at only there
+                compile_scenario(result.checked)
         file.write_text(whole, encoding="utf-8")
