@@ -196,6 +196,12 @@ def _check_names(scenario: Scenario, findings: Findings) -> None:
         _check_frame_names(path, frame, findings)
 
 
+def mean_two_things(scenario: Scenario) -> bool:
+    """Whether a name is declared twice."""
+    names = [name for _, _, name in _names(scenario)]
+    return len(set(names)) < len(names)
+
+
 def _check_frame_names(path: DataPath, frame: Frame, findings: Findings) -> None:
     own: dict[str, str] = {}
     for kind, section in (("slot", frame.slots), ("register", frame.let), ("definition", frame.define)):

@@ -109,12 +109,13 @@ class _Entry:
         given = [kind for kind in KINDS if getattr(self._entry, kind) is not None]
         if len(given) != 1:
             listed = ", ".join(f"`{kind}`" for kind in KINDS)
-            message = f"a property has one of {listed}, not {'several' if given else 'none'} of them"
+            message = f"a property has {'only one' if given else 'one'} of {listed}"
             span = self._findings.places.value_span(self._path)
             raise self._findings.fail("S107" if given else "S105", message, span)
         for key, kinds in _WITH.items():
             if getattr(self._entry, key) is not None and given[0] not in kinds:
-                message = f"`{key}` says nothing about `{given[0]}`; it belongs to {' and '.join(kinds)}"
+                listed = ", ".join(f"`{kind}`" for kind in kinds)
+                message = f"`{key}` says nothing about `{given[0]}`; it goes with {listed}"
                 raise self._findings.fail("S107", message, self._findings.places.key_span((*self._path, key)))
         return given[0]
 
@@ -144,7 +145,9 @@ class _Entry:
                 place = (*path, i) if self._findings.is_list(path) else path
                 near = did_you_mean(name, [*npcs, *symbols.groups])
                 message = f"`{name}` is no NPC of the cast"
-                raise self._findings.fail("S201", message, self._findings.at(place), suggestion=near)
+                raise self._findings.fail(
+                    "S201", message, self._findings.at(place, width=len(name)), suggestion=near
+                )
             members += symbols.groups.get(name, (name,))
         return tuple(dict.fromkeys(members))
 
@@ -152,13 +155,15 @@ class _Entry:
         if f"let.{word}" not in lets:
             near = did_you_mean(word, [known.removeprefix("let.") for known in lets])
             message = f"`{word}` is not drawn in `let`"
-            raise self._findings.fail("S201", message, self._findings.at(path), suggestion=near)
+            raise self._findings.fail(
+                "S201", message, self._findings.at(path, width=len(word)), suggestion=near
+            )
         return f"let.{word}"
 
     def _not_a_pick(self, path: DataPath, word: str) -> Exception:
         message = f"`{word}` is no free choice of several values"
         hint = "name a `let` that is a pick whose condition, if any, reads nothing that is drawn"
-        return self._findings.fail("S204", message, self._findings.at(path), hint=hint)
+        return self._findings.fail("S204", message, self._findings.at(path, width=len(word)), hint=hint)
 
 
 def _outcomes_called(word: str, outcomes: Sequence[OutcomePlan]) -> tuple[str, ...]:
