@@ -138,6 +138,8 @@ def _name(node: ast.Name, context: Context) -> Any:
         return words[word]()
     if me is not None and word in ("poked", "was_poked", "gone", "spoke", "action", "pointing"):
         return attribute(me, word, context)
+    if me is not None and context.in_frame and word in ("facing", "cell", "x", "y"):
+        return attribute(me, word, context)
     return word
 
 
