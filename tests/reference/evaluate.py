@@ -129,7 +129,7 @@ def _name(node: ast.Name, context: Context) -> Any:
         "H": lambda: world.height,
         "self": lambda: me,
         "objects": world.things,
-        "cells": world.interior,
+        "cells": lambda: [cell for cell in world.interior() if cell not in world.terrain],
         "colors": lambda: list(COLORS),
         "directions": lambda: list(DIRECTIONS),
         "nouns": lambda: speech.noun_values(world),
