@@ -16,11 +16,17 @@ GOING = ("go_to", "go_next_to", "enter")
 
 NOTHING = -1
 """In the register of an aim: the activity found nothing to be about."""
+ACTS = ("use", "push")
+"""Activities that end with the act itself, which may move or replace what it is done to."""
+GETTING_THERE, ACTING = 0, 1
+"""In the register of the aim of such an activity: what this turn was for."""
 
 
 def has_aim(activity: Activity) -> bool:
     """Whether what an activity is about is computed anew in each turn, so that its end must know what it was."""
-    return activity.name in (*GOING, "use", "push") and not isinstance(activity.args[0], Const)
+    if activity.name in ACTS:
+        return True
+    return activity.name in GOING and not isinstance(activity.args[0], Const)
 
 
 class Activities:
@@ -79,7 +85,8 @@ class Activities:
             case "go_next_to":
                 block.emit(Op.GO_NEXT_TO, own, self._aimed_at(activity), self.turn)
             case "use":
-                self._use(self._aimed_at(activity))
+                self._note(GETTING_THERE)
+                self._use(to.value(activity.args[0]), noting=True)
             case "enter":
                 self._enter(activity)
             case "push":
@@ -123,13 +130,15 @@ class Activities:
         block.emit(Op.BODY, constant(Body.NONE))
         block.bind(done)
 
-    def _use(self, goal: int) -> None:
+    def _use(self, goal: int, noting: bool = False) -> None:
         """Go next to the goal, face it, toggle."""
         block = self.to.block
         own = constant(self.entity)
         away, aside, done = Label(), Label(), Label()
         block.test(Op.IF_NEXT_TO, own, goal, away)
         block.test(Op.IF_FACES, own, goal, aside)
+        if noting:
+            self._note(ACTING)
         block.emit(Op.BODY, constant(Body.TOGGLE))
         block.skip(done)
         block.bind(aside)
@@ -164,11 +173,12 @@ class Activities:
     def _push(self, activity: Activity) -> None:
         """Go behind the thing, face the way it is to go, walk into it."""
         to, block = self.to, self.to.block
-        thing, way = self._aimed_at(activity), to.value(activity.args[1])
+        thing, way = (to.value(arg) for arg in activity.args)
+        self._note(GETTING_THERE)
         behind = to.into_temporary(Op.CELL_BESIDE, thing, self._turned_round(way))
         elsewhere, done = Label(), Label()
         block.test(Op.IF_SAME_CELL, constant(self.entity), behind, elsewhere)
-        self._walk(way)
+        self._walk(way, pushing=True)
         block.skip(done)
         block.bind(elsewhere)
         block.emit(Op.GO_TO, constant(self.entity), behind, self.turn)
@@ -178,11 +188,17 @@ class Activities:
         to = self.to
         return to.into_temporary(Op.MOD, to.into_temporary(Op.ADD, way, constant(2)), constant(4))
 
-    def _walk(self, way: int) -> None:
+    def _note(self, number: int) -> None:
+        if self.aim is not None:
+            self.to.block.emit(Op.LOAD, self.aim, constant(number))
+
+    def _walk(self, way: int, pushing: bool = False) -> None:
         """Turn until it faces that way, then go forward."""
         block = self.to.block
         aside, done = Label(), Label()
         block.test(Op.IF_EQ, entity_register(self.entity, Field.DIR), way, aside)
+        if pushing:
+            self._note(ACTING)
         block.emit(Op.BODY, constant(Body.FORWARD))
         block.skip(done)
         block.bind(aside)
@@ -236,13 +252,10 @@ class Activities:
         to.failed = nothing
         if activity.name == "perform":
             block.test(Op.IF_LE, constant(len(_elements(activity))), self.clock, otherwise)
-        elif activity.name == "push":
-            self._unless_pushed(activity, self._goal(activity, nothing), otherwise)
-        elif activity.name == "use":
-            last = entity_register(self.entity, Field.LAST)
-            goal = self._goal(activity, nothing)
-            block.test(Op.IF_EQ, last, constant(Body.TOGGLE), otherwise)
-            block.test(Op.IF_FACES, own, goal, otherwise)
+        elif activity.name in ACTS:
+            assert self.aim is not None, "internal: the end of an act asks what was noted"
+            block.test(Op.IF_NE, self.aim, constant(NOTHING), nothing)
+            block.test(Op.IF_EQ, self.aim, constant(ACTING), otherwise)
         else:
             op = Op.IF_NEXT_TO if activity.name == "go_next_to" else Op.IF_SAME_CELL
             block.test(op, own, self._goal(activity, nothing), otherwise)
@@ -257,14 +270,6 @@ class Activities:
         noted = to.into_temporary(Op.LOAD, self.aim)
         to.block.test(Op.IF_LE, constant(goal.type.low), noted, nothing)
         return to.into_temporary(Op.MAX, noted, constant(goal.type.low))
-
-    def _unless_pushed(self, activity: Activity, thing: int, otherwise: Label) -> None:
-        """Pushed: the last step forward led into it, and it is as a push leaves it."""
-        to, block = self.to, self.to.block
-        after = frozenset(_kind_of(self.checked, activity.args[0]).pushed.values())
-        block.test(Op.IF_EQ, entity_register(self.entity, Field.LAST), constant(Body.FORWARD), otherwise)
-        block.test(Op.IF_FACES, constant(self.entity), thing, otherwise)
-        to.one_of(Op.IF_EQ, to.into_temporary(Op.FIELD, thing, Field.STATUS), after, otherwise)
 
 
 def _elements(activity: Activity) -> list[tuple[Term, Term]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from socialai_dsl.compiler.activities import GOING, NOTHING, Activities, has_aim
+from socialai_dsl.compiler.activities import ACTING, ACTS, GOING, NOTHING, Activities, has_aim
 from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Sites, constant
 from socialai_dsl.compiler.beliefs import perceive
 from socialai_dsl.compiler.classes import Classes
@@ -84,7 +84,8 @@ class _FrameCompiler:
         self.later = Deferred(frame, self.speaker, shared.registers, shared.lines)
 
     def _range_of_aim(self, activity: terms.Activity) -> Type:
-        return Type("int", NOTHING, self.shared.registers.cut(activity.args[0].type).high)
+        highest = self.shared.registers.cut(activity.args[0].type).high
+        return Type("int", NOTHING, ACTING if activity.name in ACTS else highest)
 
     def _names(self) -> list[str]:
         if self.frame.steps:

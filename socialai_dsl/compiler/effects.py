@@ -14,7 +14,7 @@ from socialai_dsl.compiler.registers import Registers
 from socialai_dsl.program import TEMPORARY, Field, Op
 from socialai_dsl.semantics.terms import Effect, Entity, RulePlan, Sited, StepPlan, Term
 
-_TARGETS = {"open": "open", "close": "closed", "lock": "locked", "unlock": "closed", "reveal": "opened"}
+_TARGETS = {"open": "open", "close": "closed", "lock": "locked", "reveal": "opened"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,11 +112,13 @@ class Effects:
         thing = self.checked.entities[numbers_of(term)[0]]
         assert thing.type is not None, "internal: only objects have a status"
         states = thing.type.states
+        if effect.name != "unlock":
+            block.emit(Op.BECOME, entity, constant(states.index(_TARGETS[effect.name])))
+            return
         done = Label()
-        if effect.name == "unlock":
-            status = self.to.into_temporary(Op.FIELD, entity, Field.STATUS)
-            block.test(Op.IF_EQ, status, constant(states.index("locked")), done)
-        block.emit(Op.BECOME, entity, constant(states.index(_TARGETS[effect.name])))
+        status = self.to.into_temporary(Op.FIELD, entity, Field.STATUS)
+        block.test(Op.IF_EQ, status, constant(states.index("locked")), done)
+        block.emit(Op.BECOME, entity, constant(thing.type.unlocked))
         block.bind(done)
 
     def _reset(self, term: Term, entity: int) -> None:

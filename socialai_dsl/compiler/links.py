@@ -36,7 +36,8 @@ def _unlock(to: Expressions, switch: Entity) -> None:
     for target in lockable:
         left_alone = Label()
         to.block.test(Op.IF_EQ, _status(target), constant(_state(target, "locked")), left_alone)
-        to.block.emit(Op.BECOME, constant(target.number), constant(_state(target, "closed")))
+        assert target.type is not None, "internal: only objects can be locked"
+        to.block.emit(Op.BECOME, constant(target.number), constant(target.type.unlocked))
         to.block.bind(left_alone)
     to.block.bind(following)
 

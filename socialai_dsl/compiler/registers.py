@@ -81,7 +81,7 @@ def label(entity: Entity) -> str:
 
 def said_path(speaker: Entity) -> str:
     """The register of what an NPC has said in this step: 1 + the line, 0 nothing."""
-    return f"{speaker.key}.said"
+    return f"{label(speaker)}.said"
 
 
 def state_names(frame: FramePlan) -> tuple[str, ...]:
