@@ -83,12 +83,12 @@ def remember(entity: Entity) -> None:
 
 
 def reset(world: World, target: Entity) -> None:
-    """As at the end of the reset of this episode; an NPC only goes back if its place is free."""
+    """As at the end of the reset of this episode; an NPC turns back, and goes back if its place is free."""
     status, cell, facing, blocked, inside = target.at_reset
     if target.sort == "object":
         target.status, target.blocked, target.inside = status, blocked, inside
     else:
-        target.pointing = None
+        target.pointing, target.facing = None, facing
         if cell is None or not geometry.free(world, cell, target):
             return
     target.cell, target.facing = cell, facing
