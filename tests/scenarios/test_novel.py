@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+import socialai_dsl as sd
 from tests.scenarios.playing import FORWARD, Episode, beside, check_shares, distance, evenly, made, rooms
 
 NAMES = (
@@ -42,6 +43,11 @@ def test_the_rooms_can_be_solved(name: str) -> None:
     """The way to the apple of `culprit` can be barred for the whole time, in one room of a thousand."""
     solved = sum(bool(played(f"novel/{name}+oracle", seed)[1]["success"]) for seed in range(300))
     assert solved >= (298 if name == "culprit" else 300)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_looks_odd(name: str) -> None:
+    assert sd.load(f"novel/{name}+oracle").warnings == ()
 
 
 class TestWhisper:

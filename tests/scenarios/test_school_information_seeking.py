@@ -384,6 +384,13 @@ def solved(name: str, number: int) -> int:
     return successes
 
 
+@pytest.mark.parametrize("misleading", ["false", "true"])
+@pytest.mark.parametrize("cue", CUES)
+@pytest.mark.parametrize("problem", PROBLEMS)
+def test_nothing_looks_odd(problem: str, cue: str, misleading: str) -> None:
+    assert sd.load(school(problem, f"{cue}+oracle", misleading=misleading)).warnings == ()
+
+
 @pytest.fixture(scope="module")
 def leaves() -> dict[str, set[str]]:
     """Split -> the leaves that are played."""
