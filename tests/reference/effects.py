@@ -65,7 +65,8 @@ def affect(world: World, target: Entity, verb: str, status: Any) -> None:
     elif verb == "move_into":
         target.cell, target.inside = None, status
     elif verb == "reveal":
-        reveal(world, target)
+        # What lies in it takes its place as the world settles.
+        target.status = "opened"
     elif verb == "become":
         target.status = str(status)
     elif verb == "unlock":
@@ -92,15 +93,6 @@ def reset(world: World, target: Entity) -> None:
         if cell is None or not geometry.free(world, cell, target):
             return
     target.cell, target.facing = cell, facing
-
-
-def reveal(world: World, container: Entity) -> None:
-    """What lies in something takes its cell, as if that was opened."""
-    contents = [one for one in world.things() if one.gone and one.inside is container]
-    if contents and not container.gone:
-        for content in contents:
-            content.cell = container.cell
-        vanish(container)
 
 
 def vanish(target: Entity) -> None:
