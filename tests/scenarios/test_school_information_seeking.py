@@ -8,6 +8,7 @@ import pytest
 
 import socialai_dsl as sd
 from tests.scenarios.playing import FORWARD, Episode, beside, check_shares, distance, evenly, made, rooms
+from trainer.curricula import Leaves, build_curriculum
 
 PROBLEMS = ("boxes", "switches", "generators", "marbles", "doors", "levers")
 CUES = ("color", "feedback", "pointing", "emulation", "scaffolding")
@@ -421,3 +422,16 @@ class TestSuite:
         envs = sd.make_vec("school/information_seeking+misleading", num_envs=50)
         envs.reset(seed=0)
         assert all("misleading=true" in leaf for leaf in envs.members())
+
+    def test_the_expert_curriculum_ends_with_the_hardest_introduction_alone(self) -> None:
+        leaves = Leaves.of(sd.make_vec("school/information_seeking", num_envs=1))
+        expert = build_curriculum("expert", leaves)
+        assert all(expert.weights())
+        for k in range(1500):
+            expert.observe(k % len(leaves.names), success=True)
+        left = {name for name, weight in zip(leaves.names, expert.weights(), strict=True) if weight}
+        assert left == {
+            name
+            for name in leaves.names
+            if "introduction=ask_eye_contact" in name and "scaffolding=false" in name
+        }
