@@ -12,7 +12,7 @@ from socialai_dsl.loader import read_document
 from socialai_dsl.schema import UtteranceGrammar
 from socialai_dsl.schema.base import Model, Word
 from socialai_dsl.semantics.entities import Prelude
-from socialai_dsl.semantics.terms import ObjectType
+from socialai_dsl.semantics.terms import COLOR, ObjectType
 
 _FOLDER = Path(__file__).parent / "prelude"
 
@@ -63,6 +63,7 @@ class ObjectTypeModel(Model):
             transparent=frozenset(map(number, self.transparent)),
             toggled={number(before): number(after) for before, after in self.toggled.items()},
             deadly=self.deadly,
+            color=COLOR.words.index(self.color) if self.color in COLOR.words else 0,
             active=frozenset(map(number, self.active)),
             pushed={number(before): number(after) for before, after in self.pushed.items()},
             rolls=frozenset(map(number, self.rolls)),

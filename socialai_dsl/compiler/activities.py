@@ -5,7 +5,7 @@ from __future__ import annotations
 from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.lines import Lines
-from socialai_dsl.compiler.registers import entity_register
+from socialai_dsl.compiler.registers import entity_register, label
 from socialai_dsl.program import Body, Field, Op
 from socialai_dsl.semantics.terms import Activity, Checked, Const, ObjectType, Term
 
@@ -48,7 +48,7 @@ class Activities:
     ) -> None:
         self.to, self.checked, self.lines, self.entity, self.clock = to, checked, lines, entity, clock
         self.aim = aim
-        self.turn = to.sites.row(f"cast.{checked.entities[entity].key}.turn")
+        self.turn = to.sites.row(f"cast.{label(checked.entities[entity])}.turn")
 
     def emit(self, activity: Activity) -> None:
         """Choose the body action; `stay` chooses none, and so does an activity whose argument finds nothing."""
@@ -256,6 +256,9 @@ class Activities:
             assert self.aim is not None, "internal: the end of an act asks what was noted"
             block.test(Op.IF_NE, self.aim, constant(NOTHING), nothing)
             block.test(Op.IF_EQ, self.aim, constant(ACTING), otherwise)
+            # A scripted agent's frame follows what the agent has really done.
+            act = Body.TOGGLE if activity.name == "use" else Body.FORWARD
+            block.test(Op.IF_EQ, entity_register(self.entity, Field.LAST), constant(act), otherwise)
         else:
             op = Op.IF_NEXT_TO if activity.name == "go_next_to" else Op.IF_SAME_CELL
             block.test(op, own, self._goal(activity, nothing), otherwise)

@@ -46,7 +46,7 @@ def _build(
     kind: ObjectType, x: int, y: int, cells: list[list[int]], solid: list[int], floor: list[int]
 ) -> None:
     shown = kind.shown.get(kind.initial, (kind.initial, 0))
-    cells[y][x] = pack_cell(kind.code, GREY if kind.name == "wall" else 0, *shown)
+    cells[y][x] = pack_cell(kind.code, kind.color, *shown)
     floor[y] &= ~(1 << x)
     solid[y] &= ~(1 << x)
     if kind.initial not in kind.walkable:

@@ -148,14 +148,20 @@ def is_in_inbox(row: Row, utterance: int, inbox: int) -> bool:
 
 @inline
 def first_heard(row: Row, inbox: int, classes: int, part: int) -> int:
-    """The speaker (part 1) or noun (part 2) of the first entry whose class is in a set of classes; -1 if none is."""
+    """The speaker (part 1) or noun (part 2) of an entry whose class is in a set of classes; -1 if there is none.
+
+    Of several it is that of the agent, then of who comes first in the cast, whenever they spoke.
+    """
     known = row.program[Header.CLASS_SET_AT] + row.program[Header.CLASS_SET_WORDS] * classes
+    found = NOTHING
     for i in range(row.registers[inbox]):
         place = inbox + 1 + 3 * i
         utterance = row.registers[place]
-        if (row.program[known + (utterance >> 5)] >> (utterance & 31)) & 1 == 1:
-            return row.registers[place + part]
-    return NOTHING
+        if (row.program[known + (utterance >> 5)] >> (utterance & 31)) & 1 == 1 and (
+            found == NOTHING or row.registers[place + 1] < row.registers[found + 1]
+        ):
+            found = place
+    return row.registers[found + part] if found != NOTHING else NOTHING
 
 
 @inline

@@ -12,7 +12,8 @@ from socialai_dsl.semantics.alternatives import of_each
 from socialai_dsl.semantics.findings import surviving
 from socialai_dsl.semantics.registers import Declaration
 from socialai_dsl.semantics.scope import Scope, at_every_step, reset_scope
-from socialai_dsl.semantics.terms import BOOL, BeliefPlan, Sited, Term, Type
+from socialai_dsl.semantics.terms import BOOL, Activity, BeliefPlan, FramePlan, Sited, StatePlan, Term, Type
+from socialai_dsl.source import Span
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
@@ -57,6 +58,12 @@ def beliefs(resolver: Resolver) -> Iterator[BeliefPlan]:
                     condition = Sited(term, asked.draws.site, resolver.findings.at(when))
                 noted = Sited(value, scope.draws.site, resolver.findings.at(of))
                 yield BeliefPlan(name, register, noted, condition)
+
+
+def watching(member: str, number: int, span: Span) -> FramePlan:
+    """What a member does who believes something but follows no frame: it stays, and looks."""
+    state = StatePlan("watching", (), Activity("stay", (), "", span), (), span)
+    return FramePlan(member, "watching", number, span, state.name, (state,))
 
 
 def believed(resolver: Resolver, owner: ast.Attribute, node: ast.Attribute, scope: Scope) -> Term:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from operator import itemgetter
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag
 from socialai_dsl.schema import PRIMITIVES, Scenario
@@ -208,8 +209,12 @@ class _Run:
 
     def _plans(self, spoken: _Spoken) -> Iterator[FramePlan]:
         # Members act in the order of their entities: the agent, then the cast as written.
-        for member in sorted(self._played, key=self._symbols.numbers.__getitem__):
-            yield behaviour.plan(self.resolver, self._played[member], spoken.frames[member])
+        for member, number in sorted(self._symbols.numbers.items(), key=itemgetter(1)):
+            if member in self._played:
+                yield behaviour.plan(self.resolver, self._played[member], spoken.frames[member])
+            elif self._symbols.cast[member].beliefs:
+                span = self._findings.places.key_span(("cast", member))
+                yield beliefs.watching(member, number, span)
 
     def _look_at_unused(self) -> None:
         """Frames that nobody plays are checked as if somebody did, so that no mistake waits for its first use."""
@@ -257,6 +262,9 @@ class _Run:
                 line = findings.places.key_span((*path, kind)).line
                 condition = Sited(term, scope.draws.site, span)
                 percent, graded = self._reward(outcome.reward, (*path, "reward"))
+                if kind == "failure" and "reward" in outcome.model_fields_set:
+                    place = findings.places.key_span((*path, "reward"))
+                    findings.error("S107", "a failure earns nothing, so it has no `reward`", place)
                 name = outcome.id or f"{kind}@{line}"
                 yield OutcomePlan(name, kind == "success", percent, condition, graded)
 

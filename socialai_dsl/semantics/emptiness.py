@@ -161,7 +161,7 @@ class _Room:
         if not isinstance(target, Const):
             raise _UnknownError
         own = next((p for p in self.placings if p.entity == target.value), None)
-        if own is None or own.nowhere:
+        if own is None or own.nowhere or own.inside is not None:
             raise _UnknownError
         homes = self._homes(own)
         return min((sum((x + dx, y + dy) in floor for dx, dy in _AROUND) for x, y in homes), default=0)

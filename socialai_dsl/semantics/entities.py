@@ -131,6 +131,12 @@ def _roles(scenario: Scenario, findings: Findings) -> dict[str, str]:
             near = did_you_mean(role, scenario.roles)
             hint = None if near else "roles are declared under `roles:`"
             findings.error("S201", f"unknown role `{role}`", span, suggestion=near, hint=hint)
+        elif name != name.partition("[")[0]:
+            message = f"a role is played by one member of the cast; `{name.partition('[')[0]}` is a group"
+            if name.endswith("[0]"):
+                findings.error(
+                    "S213", message, span, hint="give the group the `frame` and `place` of the role"
+                )
         elif role in played:
             message = f"`{played[role]}` plays the role `{role}` already"
             findings.error("S213", message, span, hint="a role is played by one member of the cast")
@@ -466,7 +472,7 @@ def _declare_register(
     )
 
 
-def _range(resolver: Resolver, path: DataPath, raw: str) -> Type:
+def _range(resolver: Resolver, path: DataPath, raw: Expression) -> Type:
     """`a..b` as a type."""
     node = resolver.findings.expression(path, raw)
     if isinstance(node, ast.Interval):

@@ -39,11 +39,13 @@ from socialai_dsl.semantics.terms import (
     Const,
     FieldOf,
     Heard,
+    HeardNoun,
     InState,
     Measure,
     Operation,
     Sees,
     Sited,
+    Speaker,
     Term,
     Test,
     Type,
@@ -93,6 +95,9 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
         case "is":
             return _is_in_state(resolver, node, scope)
     subject = subject_of(resolver, node.subject, signature, node, scope)
+    if node.name == "looks_at":
+        assert subject is not None, "internal: a cell looks at nothing"
+        _check_viewer(resolver, subject, node, scope)
     if node.name in _RELATIONS:
         return _relation(resolver, node.name, subject, argument, scope)
     if node.name in ("joint_attention", "points_at", "toggled_by"):
@@ -188,7 +193,7 @@ def _before(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Sc
         raise resolver.fail("S211", message, node, scope)
     check_moment(resolver, VALUES["prev"], node, scope)
     term = resolver.value(node.args[0], expected, scope)
-    if any(isinstance(part, Heard) for part in walk(term)):
+    if any(isinstance(part, Heard | HeardNoun | Speaker) for part in walk(term)):
         message = "what was heard is forgotten when a step ends; note it in a register of the frame"
         raise resolver.fail("S211", message, node, scope)
     if draws(term):
@@ -225,10 +230,7 @@ def _attention(resolver: Resolver, name: str, subject: Term, node: ast.Call, sco
     first, *rest = node.args
     if name == "toggled_by":
         check_toggled(resolver, name, subject, node, scope)
-        who = resolver.value(first, ENTITY, scope)
-        if not isinstance(who, Const) or resolver.symbols.member_of(who.value) is None:
-            raise resolver.fail("S211", "`toggled_by` takes a member of the cast", first, scope)
-        return toggled_by(who, subject)
+        return _toggled_by(resolver, subject, first, scope)
     if name == "points_at":
         check_points(resolver, name, subject, node, scope)
         return _each(resolver, first, scope, lambda other: _points_at(subject, other))
@@ -248,6 +250,19 @@ def _attention(resolver: Resolver, name: str, subject: Term, node: ast.Call, sco
     return any_of(both_look(resolve_names.entity(number)) for number in numbers)
 
 
+def _toggled_by(resolver: Resolver, what: Term, node: ast.Expr, scope: Scope) -> Term:
+    """Whether the member of the cast at `node`, whoever it is, toggled at something."""
+    who = resolver.value(node, ENTITY, scope)
+    if who.type.high >= len(resolver.symbols.numbers):
+        raise resolver.fail("S211", "`toggled_by` takes a member of the cast", node, scope)
+    if isinstance(who, Const):
+        return toggled_by(who, what)
+    cases = []
+    for one in (Const(who.type, value) for value in range(who.type.low, who.type.high + 1)):
+        cases.append(all_of([Compare("==", who, one), toggled_by(one, what)]))
+    return any_of(cases)
+
+
 def _points_at(subject: Term, other: Term) -> Term:
     ways = Type("int", 0, 4)
     way = arithmetic(
@@ -265,15 +280,18 @@ def _each(resolver: Resolver, node: ast.Expr, scope: Scope, relation: Callable[[
 
 def _sees(resolver: Resolver, viewer: Term, node: ast.Call, scope: Scope) -> Term:
     """`a.sees(x)`, `a.would_see(x, direction)`; of a group, any of it."""
-    if viewer.type.high >= len(resolver.symbols.numbers):
-        raise resolver.fail(
-            "S211", f"only a member of the cast has a view: `agent.{node.name}(...)`", node, scope
-        )
+    _check_viewer(resolver, viewer, node, scope)
     target, *rest = node.args
     facing = resolver.value(rest[0], DIRECTION, scope) if rest else None
     if resolve_groups.is_group(resolver, target, scope):
         return resolve_groups.any_member(resolver, target, scope, lambda other: Sees(viewer, other, facing))
     return Sees(viewer, somewhere(resolver, target, scope), facing)
+
+
+def _check_viewer(resolver: Resolver, viewer: Term, node: ast.Call, scope: Scope) -> None:
+    if viewer.type.high >= len(resolver.symbols.numbers):
+        message = f"only a member of the cast has a view: `agent.{node.name}(...)`"
+        raise resolver.fail("S211", message, node, scope)
 
 
 def _did(resolver: Resolver, argument: ast.Expr, scope: Scope) -> Term:
@@ -304,7 +322,8 @@ def _is_in_state(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
     if not isinstance(argument, ast.Name):
         raise resolver.fail("S211", "`is` takes the name of a state", argument, scope)
     if argument.id not in states:
-        message = f"`{member}` has no state `{argument.id}` (it plays `{frame.name}`: {', '.join(states)})"
+        called = (resolver.symbols.group_of(member) or (member, 0))[0]
+        message = f"`{called}` has no state `{argument.id}` (it plays `{frame.name}`: {', '.join(states)})"
         near = did_you_mean(argument.id, states)
         raise resolver.fail("S310", message, argument, scope, suggestion=near)
     return InState(member, frame.name, argument.id)

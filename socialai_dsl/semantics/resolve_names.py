@@ -341,6 +341,11 @@ def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
     """`subject.name`."""
     if isinstance(node.subject, ast.Attribute) and node.subject.name == "believes":
         return beliefs.believed(resolver, node.subject, node, scope)
+    if isinstance(node.subject, ast.Attribute) and node.name not in VALUES:
+        near = did_you_mean(node.subject.name, ["believes"])
+        if near is not None and node.subject.name not in VALUES:
+            message = f"nothing here has a `{node.subject.name}`"
+            raise resolver.fail("S205", message, node.subject, scope, suggestion=near)
     if isinstance(node.subject, ast.Name):
         owner = node.subject.id
         if owner == "here" and node.name in ("x", "y") and scope.here:

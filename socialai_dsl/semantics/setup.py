@@ -310,8 +310,11 @@ def _placement_order(resolver: Resolver) -> list[int]:
     """`order:` first, then objects, NPCs, the agent."""
     symbols = resolver.symbols
     numbers: dict[str, Sequence[int]] = {name: o.numbers for name, o in symbols.objects.items()}
-    numbers |= {name: (n,) for name, n in symbols.numbers.items() if n and symbols.group_of(name) is None}
-    numbers |= {name: [symbols.numbers[one] for one in members] for name, members in symbols.groups.items()}
+    for name, number in symbols.numbers.items():
+        group = symbols.group_of(name)
+        called = group[0] if group is not None else name
+        if number:
+            numbers[called] = [*numbers.get(called, ()), number]
     numbers["agent"] = (0,)
     first: list[str] = []
     for i, name in enumerate(symbols.scenario.order):

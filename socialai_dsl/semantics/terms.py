@@ -586,7 +586,8 @@ class ObjectType:
     transparent: frozenset[int]
     toggled: dict[int, int] = field(hash=False)
     deadly: bool = False
-
+    color: int = 0
+    """Of what is built of it; an object has a colour of its own."""
     active: frozenset[int] = frozenset()
     """Statuses in which it works on what it is linked to (`unlocks`, `opens`)."""
     pushed: dict[int, int] = field(default_factory=dict, hash=False)
