@@ -189,7 +189,8 @@ class Guessing:
     def _digests(self, layer: _Together) -> NDArray[np.uint64]:
         relevant = np.minimum(layer.registers[:, :, self._relevance.registers], self._relevance.limits)
         # Of a room that has ended nothing matters any more.
-        relevant = np.where(layer.going[:, :, None], relevant, 0).reshape(len(layer), -1)
-        parts = np.concatenate([relevant, layer.going, layer.won[:, None]], axis=1)
+        relevant = np.where(layer.going[:, :, None], relevant, 0)
+        flat = relevant.reshape(len(layer), relevant.shape[1] * relevant.shape[2])
+        parts = np.concatenate([flat, layer.going, layer.won[:, None]], axis=1)
         digests: NDArray[np.uint64] = parts.astype(np.int64).view(np.uint64) @ self._multipliers
         return digests

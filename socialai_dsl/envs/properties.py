@@ -114,7 +114,7 @@ def _reaching(loaded: LoadedScenario, plan: PropertyPlan, effort: Effort) -> Rep
         verdict = _by_share(len(reached), undecided, effort.rooms, plan.share)
         return Report(verdict, effort.rooms, len(reached), undecided, tuple(against[:_SHOWN]), said + exact)
     if reached:
-        said += f"; in room {reached[0]} after {findings[reached[0]].steps} steps"
+        said += f"; in room {reached[0]} after {_steps(findings[reached[0]].steps)}"
         exact = ""
     verdict = Verdict.FAILS if reached else Verdict.UNDECIDED if undecided else Verdict.HOLDS
     held = effort.rooms - len(reached) - undecided
@@ -132,7 +132,7 @@ def _within(loaded: LoadedScenario, plan: PropertyPlan, effort: Effort) -> Repor
         if finding.verdict is Searched.UNSOLVABLE or (finding.steps or 0) > plan.steps
     ]
     known = [length for length in lengths if length is not None]
-    said = f"a shortest success takes at most {plan.steps} steps in {held} of {effort.rooms} rooms"
+    said = f"a shortest success takes at most {_steps(plan.steps)} in {held} of {effort.rooms} rooms"
     if known:
         said += f", {max(known)} in the longest that can be solved"
     share = 1.0 if plan.share is None else plan.share
@@ -156,6 +156,10 @@ def _search(program: Program, goals: Sequence[str] | None, effort: Effort) -> It
     search, state = Search(program, goals), table.state
     for row in range(effort.rooms):
         yield search.solve(state.registers[row], state.boards[row], state.keys[row], effort.states)
+
+
+def _steps(count: int | None) -> str:
+    return f"{count} step" if count == 1 else f"{count} steps"
 
 
 def _by_share(held: int, undecided: int, rooms: int, share: float | None) -> Verdict:
@@ -224,7 +228,7 @@ def _told(compared: Sequence[Compared], effort: Effort) -> Report:
     against = tuple(dict.fromkeys(leak.index for leak in leaks))
     if leaks:
         leak = min(leaks, key=lambda one: one.step)
-        said += f"; room {leak.index} differs after {leak.step} steps between {leak.values[0]} and {leak.values[1]}"
+        said += f"; room {leak.index} differs after {_steps(leak.step)} between {leak.values[0]} and {leak.values[1]}"
     verdict = Verdict.FAILS if leaks else Verdict.HOLDS
     return Report(verdict, effort.rooms, effort.rooms - len(against), 0, against[:_SHOWN], said)
 

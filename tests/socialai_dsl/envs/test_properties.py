@@ -1,0 +1,173 @@
+"""What scenarios claim of themselves: what is so holds, what is not fails, and a leak is found where it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import socialai_dsl
+from socialai_dsl.envs.properties import Effort, Report, Verdict, check_property
+
+# One of two doors is right. Ada tells which to whoever asks and is in front of her.
+TOLD = """
+scenario: told
+horizon: 30
+earshot: room
+actions: [left, right, forward]
+grammar: {templates: [Where is <noun>, Open <noun>], nouns: [it, 0, 1]}
+room: {size: 5}
+objects:
+  doors: {type: door, count: 2, color: red, at: [[0, 2], [4, 2]]}
+let: {exit: pick(doors)}
+frames:
+  tell:
+    states:
+      waiting: {then: [{hears: Where is it, when: in_front_of_me, say: Number <exit.index>, goto: content}]}
+      content: {}
+    define: {in_front_of_me: agent.next_to(self)}
+cast:
+  ada: {name: Ada, at: [2, 2], facing: down, color: red, frame: tell}
+  bob: {name: Bob, at: [3, 3], facing: up, color: red}
+  agent: {at: [1, 1], facing: down}
+outcome:
+  - {success: agent.said("Open <exit.index>"), id: out}
+  - failure: agent.spoke and not agent.said("Where is it")
+"""
+SCRIPT = """
+variant: told_oracle
+of: told.yaml
+set:
+  cast.agent.frame: oracle
+  frames.oracle:
+    steps: [{do: go_next_to(ada)}, {say: Where is it}, {say: Open <exit.index>}]
+"""
+ROOMS = 12
+
+Trying = Callable[..., Report]
+
+
+@pytest.fixture
+def tried(tmp_path: Path) -> Trying:
+    """What is found out about a property of the scenario, in which some pieces of text may be replaced."""
+
+    def trying(entry: str, *changes: tuple[str, str], states: int = 20_000) -> Report:
+        text = TOLD
+        for old, new in changes:
+            assert old in text, "nothing would change"
+            text = text.replace(old, new)
+        (tmp_path / "told.yaml").write_text(f"{text}check: [{entry}]\n")
+        (tmp_path / "told_oracle.yaml").write_text(SCRIPT)
+        loaded = socialai_dsl.load(tmp_path / "told.yaml")
+        scripted = socialai_dsl.load(f"{tmp_path / 'told.yaml'}+oracle")
+        assert isinstance(loaded, socialai_dsl.LoadedScenario)
+        assert isinstance(scripted, socialai_dsl.LoadedScenario)
+        (plan,) = loaded.checked.properties
+        return check_property(loaded, plan, Effort(ROOMS, 1, states), scripted)
+
+    return trying
+
+
+def test_what_can_come_about_is_reachable_in_every_room(tried: Trying) -> None:
+    for condition in ("success", "out", "ada.is(content)", "ada.is(content) and agent.y == 3"):
+        report = tried(f"{{reachable: {condition}, share: 1}}")
+        assert (report.verdict, report.held, report.against) == (Verdict.HOLDS, ROOMS, ())
+
+
+def test_what_cannot_come_about_is_not(tried: Trying) -> None:
+    report = tried("{reachable: agent.at(exit)}")
+    assert (report.verdict, report.held, report.against) == (Verdict.FAILS, 0, (0, 1, 2, 3, 4))
+    report = tried("{never: agent.at(exit)}")
+    assert (report.verdict, report.held) == (Verdict.HOLDS, ROOMS)
+
+
+def test_never_names_a_room_and_the_steps(tried: Trying) -> None:
+    report = tried("{never: ada.is(content)}")
+    assert (report.verdict, report.held) == (Verdict.FAILS, 0)
+    assert "in room 0 after 1 step" in report.said, (
+        "one step down is next to her, and that is far enough to ask"
+    )
+
+
+def test_a_condition_is_looked_at_in_the_step_that_ends_the_episode(tried: Trying) -> None:
+    assert tried('{reachable: agent.said("Open it")}').verdict is Verdict.HOLDS
+
+
+def test_what_was_before_can_be_asked(tried: Trying) -> None:
+    turned = "prev(agent.facing == right) and agent.facing"
+    assert tried(f'{{never: "{turned} == left"}}').verdict is Verdict.HOLDS
+    assert tried(f'{{never: "{turned} == up"}}').verdict is Verdict.FAILS
+
+
+def test_a_search_that_gives_up_is_undecided(tried: Trying) -> None:
+    report = tried("{never: agent.at(exit)}", states=3)
+    assert (report.verdict, report.undecided) == (Verdict.UNDECIDED, ROOMS)
+    assert tried("{reachable: agent.at(exit)}", states=3).verdict is Verdict.UNDECIDED
+
+
+def test_the_length_of_a_shortest_success(tried: Trying) -> None:
+    late = ("agent.spoke and not", "t < 4 or agent.spoke and not")
+    assert tried("{within: 1}").verdict is Verdict.HOLDS, "a guess may be right at once"
+    last = ('success: agent.said("Open <exit.index>")', "success: ada.is(content) and agent.y == 3")
+    assert tried("{within: 2}", last).verdict is Verdict.HOLDS
+    report = tried("{within: 1}", last)
+    assert (report.verdict, report.held) == (Verdict.FAILS, 0)
+    assert tried("{within: 30}", last, late).verdict is Verdict.FAILS, "whoever lives cannot win"
+
+
+def test_the_script_is_played(tried: Trying) -> None:
+    assert tried("{oracle: 1}").verdict is Verdict.HOLDS
+    away = ("agent: {at: [1, 1], facing: down}", "agent: {at: [1, 1], facing: up}")
+    report = tried("{oracle: 0.5}", away, ("horizon: 30", "horizon: 3"))
+    assert (report.verdict, report.held) == (Verdict.FAILS, 0)
+
+
+def test_without_the_one_who_knows_there_is_only_guessing(tried: Trying) -> None:
+    report = tried("{needs: ada}")
+    assert (report.verdict, report.held) == (Verdict.HOLDS, ROOMS)
+    assert "chance" not in report.said, "nothing is drawn after the reset"
+
+
+def test_with_the_one_who_knows_rooms_are_told_apart(tried: Trying) -> None:
+    report = tried("{needs: bob}")
+    assert (report.verdict, report.held, report.undecided) == (Verdict.UNDECIDED, 0, ROOMS)
+
+
+def test_who_may_try_again_needs_nobody(tried: Trying) -> None:
+    patient = ("  - failure: agent.spoke", "  - failure: t > 28 and agent.spoke")
+    report = tried("{needs: ada}", patient)
+    assert (report.verdict, report.held) == (Verdict.FAILS, 0)
+    assert "it can be known without" in report.said
+
+
+def test_who_shows_it_without_knowing_is_no_help(tried: Trying) -> None:
+    at_the_exit = ("bob: {name: Bob, at: [3, 3]", "bob: {name: Bob, place: next_to(exit)")
+    report = tried("{needs: ada}", at_the_exit)
+    assert (report.verdict, report.held) == (Verdict.UNDECIDED, 0), "the rooms look different"
+
+
+def test_cues_of_those_who_may_tell_are_no_leaks(tried: Trying) -> None:
+    report = tried("{only_through: {draw: exit, by: [ada]}}")
+    assert report.verdict is Verdict.HOLDS
+    assert "0 in something else" in report.said
+    assert not report.said.startswith(f"of {2 * ROOMS} pairs of episodes 0 "), "the script asks her"
+
+
+def test_cues_of_others_are_leaks(tried: Trying) -> None:
+    report = tried("{only_through: {draw: exit, by: [bob]}}")
+    assert report.verdict is Verdict.FAILS
+    assert len(report.against) == 5
+
+
+def test_a_door_that_looks_different_is_a_leak(tried: Trying) -> None:
+    leaky = ("color: red, at: [[", "color: red, locked: it == exit, at: [[")
+    report = tried("{only_through: {draw: exit, by: [ada]}}", leaky)
+    assert (report.verdict, report.held) == (Verdict.FAILS, 0)
+    assert " after " in report.said
+
+
+def test_turning_in_view_is_a_cue(tried: Trying) -> None:
+    turning = ("waiting: {then", "waiting: {do: face(exit), then")
+    assert tried("{only_through: {draw: exit, by: [ada]}}", turning).verdict is Verdict.HOLDS
+    assert tried("{only_through: {draw: exit, by: [bob]}}", turning).verdict is Verdict.FAILS
