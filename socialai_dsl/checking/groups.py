@@ -6,12 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from socialai_dsl.diagnostics import DiagnosticBag
+from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
+from socialai_dsl.schema import CastMember
 from socialai_dsl.schema.positions import DataPath, Positions
 from socialai_dsl.source import Span
 
 MOST: Final = 16
 _AGENT: Final = "agent"
+_KEYS: Final = frozenset(field.alias or name for name, field in CastMember.model_fields.items())
 _ONE_EACH: Final = ("name", "color", "place", "facing", "at")
 """Keys of a group whose lists give one value each."""
 
@@ -59,7 +61,7 @@ def spread(
         for i in range(count or 1):
             written[f"{name}[{i}]"] = _one(name, member, i, count, places, bag, origins)
             origins[("cast", f"{name}[{i}]")] = ("cast", name)
-    if not origins:
+    if written == cast:
         return Spread(data, places, paths)
     spread_places = _SpreadPlaces(places, origins)
     moved = {copy for copy in _all_paths(written) if spread_places.written(copy) in paths}
@@ -74,6 +76,10 @@ def _alone(name: str, member: object, places: Positions, bag: DiagnosticBag) -> 
         message = "there is one agent, so it has no `count`"
         bag.error("S101", message, places.key_span(("cast", name, "count")))
     made = {key: value for key, value in member.items() if key != "count"}
+    for key in [key for key in made if did_you_mean(str(key), [*_KEYS, "count"]) == "count"]:
+        message = f"unknown key `{key}` in a member of the cast"
+        bag.error("S101", message, places.key_span(("cast", name, key)), suggestion="count")
+        del made[key]
     for key in _ONE_EACH[:-1]:
         if isinstance(made.get(key), list):
             message = f"a list gives one `{key}` to each of a group; `{name}` is only one"
@@ -106,19 +112,19 @@ def _one(
     for key, value in member.items():
         if key == "count":
             continue
-        listed = isinstance(value, list) and (
-            key in _ONE_EACH[:-1] or (key == "at" and any(isinstance(cell, list) for cell in value))
-        )
-        if not listed:
+        if key not in _ONE_EACH or not isinstance(value, list):
             made[key] = value
             continue
-        if len(value) != count:
+        one_cell = key == "at" and not any(isinstance(cell, list) for cell in value)
+        given = [value] if one_cell else value
+        if len(given) != count:
             if index == 0 and count is not None:
-                message = f"{len(value)} given for {count}: a list has one for each member of the group"
+                message = f"{len(given)} given for {count}: a list has one for each member of the group"
                 bag.error("S106", message, places.value_span(("cast", name, key)))
             continue
-        made[key] = value[index]
-        origins[("cast", f"{name}[{index}]", key)] = ("cast", name, key, index)
+        made[key] = given[index]
+        if not one_cell:
+            origins[("cast", f"{name}[{index}]", key)] = ("cast", name, key, index)
     return made
 
 

@@ -241,7 +241,14 @@ def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
     return ParseProblem("S210", f"did not expect `{token}` here", offset, hint)
 
 
+_NUMBERED = re.compile(r"(?<=\w)\[\s*\d+\s*\]")
+"""`doors[0]`"""
+
+
 def _wrong_symbol(text: str, offset: int) -> ParseProblem:
+    if _NUMBERED.match(text, offset):
+        cure = "one of a group is found by `first(d in doors where d.index == 0)`"
+        return ParseProblem("S203", f"`[` is not used here: {cure}", offset, cure)
     for symbol, cure in _SYMBOLS.items():
         if text.startswith(symbol, offset):
             return ParseProblem("S203", f"`{symbol}` is not used here: {cure}", offset, cure)

@@ -84,7 +84,7 @@ class Ranged(Model):
     """A register with a range, in which it stays whatever it is set to."""
 
     start: Expression
-    range: str = Field(description="a..b")
+    range: Expression = Field(description="a..b")
 
 
 class Frame(Model):

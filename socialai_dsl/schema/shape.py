@@ -273,6 +273,8 @@ def _length(finding: _Finding) -> str:
 
 
 def _cure(value: object) -> str | None:
+    if isinstance(value, list) and len(value) == 2 and all(type(item) is int for item in value):
+        return f"a range is written {value[0]}..{value[1]}"
     if isinstance(value, list):
         return "conditions are joined with `and` or `or`, alternatives are written a | b"
     if isinstance(value, dict):

@@ -196,7 +196,7 @@ def effect(resolver: Resolver, path: DataPath, raw: object, scope: Scope) -> Eff
         raise resolver.fail("S211", wrong_count(signature, len(args)), node, scope)
     entities = _entities(resolver, subject, scope)
     if name == "vanish" and any(entity.type.low == 0 for entity in entities):
-        raise resolver.fail("S204", "the agent cannot vanish", node, scope)
+        raise resolver.fail("S204", _not_the_agent(subject, entities, "vanish"), node, scope)
     value = None
     if name in ("put", "move_into"):
         value = _target(resolver, name, subject, entities, args[0], scope)
@@ -225,6 +225,9 @@ def _target(
     resolver: Resolver, name: str, subject: ast.Expr, entities: tuple[Term, ...], node: ast.Expr, scope: Scope
 ) -> Term:
     """Where something is put: a cell or what is on it; an object that can hold it."""
+    if name == "put" and isinstance(node, ast.Name) and node.id == "nowhere":
+        message = f"what is taken out of the room vanishes: `{quoted(subject)}.vanish`"
+        raise resolver.fail("S204", message, node, scope)
     if name == "put":
         return somewhere(resolver, node, scope)
     holder = resolver.value(node, ENTITY, scope)
@@ -237,7 +240,13 @@ def _target(
 def _check_objects(resolver: Resolver, node: ast.Expr, entities: tuple[Term, ...], scope: Scope) -> None:
     """The agent cannot be put back to where it started."""
     if any(entity.type.low == 0 for entity in entities):
-        raise resolver.fail("S211", "only objects and NPCs can be reset", node, scope)
+        raise resolver.fail("S211", _not_the_agent(node, entities, "be reset"), node, scope)
+
+
+def _not_the_agent(node: ast.Expr, entities: tuple[Term, ...], what: str) -> str:
+    if all(isinstance(entity, Const) for entity in entities):
+        return f"the agent cannot {what}"
+    return f"`{quoted(node)}` may be the agent, which cannot {what}"
 
 
 def _new_status(

@@ -195,7 +195,9 @@ class _Planner:
             term = resolver.written(place, rule.after, _INT, self._scope(place, f"{address}.after"))
         if isinstance(term, Const):
             if term.value < 0:
-                resolver.findings.error("S106", "`after` is a number of turns", resolver.findings.at(place))
+                resolver.findings.error(
+                    "S106", "`after` is a number of turns, at least 0", resolver.findings.at(place)
+                )
             return max(0, term.value), when
         clock = Read(Type("int", 0, resolver.symbols.scenario.horizon), f"{self.played.member}.clock")
         late = Compare("<=", term, clock)

@@ -281,7 +281,7 @@ def _index(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
         )
     objects = resolver.symbols.object_of(who.type.low)
     if objects is None or who.type.high not in objects.numbers:
-        raise resolver.fail("S204", "only a member of one group of objects has an `index`", node, scope)
+        raise resolver.fail("S204", "only one of a group has an `index`, its place in it", node, scope)
     first = objects.numbers[0]
     if isinstance(who, Const):
         return number(who.value - first)

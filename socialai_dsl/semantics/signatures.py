@@ -196,7 +196,7 @@ VALUE_SYNONYMS: Final = {
     "content": "inside", "contains": "inside", "holds": "inside", "in": "inside", "points_to": "points_at",
     "says": "said", "say": "said", "hears": "heard", "colour": "color", "direction": "facing", "dir": "facing",
     "type": "kind", "disappeared": "gone", "vanished": "gone", "does": "did", "in_state": "is", "state": "is",
-    "number": "index", "dist": "distance", "distance_to": "distance",
+    "number": "index", "dist": "distance", "distance_to": "distance", "toward": "dir_to",
 }  # fmt: skip
 """What authors write for a condition or value -> what it is called here."""
 

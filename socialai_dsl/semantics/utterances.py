@@ -182,6 +182,9 @@ class Utterances:
         if isinstance(part, ast.Name) and part.id == "nouns":
             message = "`nouns` are all of them; any one of them is `<noun>`"
             raise self._resolver.fail("S402", message, part, scope)
+        if isinstance(part, ast.Name) and part.id == "any":
+            message = "any noun is `<noun>`; anything at all is `hears: any`"
+            raise self._resolver.fail("S402", message, part, scope)
         return sayable(self._resolver, part, scope)
 
     def _choices(self, part: str | Term | None) -> list[tuple[str, Term | None]]:
