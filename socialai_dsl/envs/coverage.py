@@ -123,7 +123,8 @@ def _missing(parts: list[tuple[_Key, Part]], seen: _Seen) -> list[Part]:
         for key, part in parts
         if (key in seen.names if isinstance(key, str) else key[1] in seen.states.get(key[0], ()))
     }
-    return list({part.span: part for _, part in reversed(parts) if part.span not in happened}.values())[::-1]
+    missing = {part.span: part for _, part in reversed(parts) if part.span not in happened}
+    return sorted(missing.values(), key=lambda part: (part.span.file, part.span.line, part.span.column))
 
 
 def _play_at_random(program: Program, seen: _Seen, effort: Effort) -> None:

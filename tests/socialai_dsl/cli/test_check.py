@@ -1,0 +1,128 @@
+"""`socialai check`: what is printed about properties, and what counts as a failure."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from socialai_dsl.cli.main import main
+
+Capture = pytest.CaptureFixture[str]
+ROOT = Path(__file__).parents[3]
+
+# The gate stands open in front of the agent; the guard watches, and never gets tired of it.
+GATE = """
+scenario: gate
+horizon: 10
+actions: [left, right, forward, done]
+grammar: {templates: [Say <noun>], nouns: [please]}
+room: {size: 5}
+objects: {gate: {type: door, state: open, at: [4, 2]}}
+frames:
+  watch:
+    states:
+      awake: {then: [{hears: Say please, say: Go on}, {when: agent.spoke and t < 0, goto: asleep}]}
+      asleep: {}
+cast:
+  guard: {at: [3, 3], facing: up, frame: watch}
+  agent: {at: [1, 2], facing: right}
+outcome:
+  - {success: agent.at(gate), id: out}
+  - {failure: agent.did(done), id: gave_up}
+"""
+
+
+@pytest.fixture
+def gate(tmp_path: Path) -> Path:
+    file = tmp_path / "gate.yaml"
+    file.write_text(GATE)
+    return file
+
+
+def claiming(file: Path, *entries: str) -> str:
+    file.write_text(GATE + "check:\n" + "".join(f"  - {entry}\n" for entry in entries))
+    return str(file)
+
+
+def test_what_holds_is_no_failure(gate: Path, capsys: Capture) -> None:
+    name = claiming(gate, "{reachable: out, share: 1}", "{within: 3}")
+    assert main(["check", name, "--rooms", "3", "--seed", "4"]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        f"{name}: 3 rooms of seed 4",
+        "  holds: `reachable: out`: it can come about in 3 of 3 rooms",
+        "  holds: `within: 3`: a shortest success takes at most 3 steps in 3 of 3 rooms, 3 in the longest that can be "
+        "solved",
+    ]
+
+
+def test_what_fails_is_named_with_its_place_and_rooms(gate: Path, capsys: Capture) -> None:
+    name = claiming(gate, "{reachable: out}", "{never: gave_up}")
+    assert main(["check", name, "--rooms", "2"]) == 1
+    *_, said, place = capsys.readouterr().out.splitlines()
+    assert said == "  fails: `never: gave_up`: it can come about in 2 of 2 rooms; in room 0 after 1 step"
+    assert (
+        place
+        == f"    at {name}:{1 + gate.read_text()[: gate.read_text().index('{never')].count(chr(10))}:6; rooms 0, 1"
+    )
+
+
+def test_what_is_undecided_fails_only_when_strict(gate: Path, capsys: Capture) -> None:
+    name = claiming(gate, "{never: guard.is(asleep)}")
+    assert main(["check", name, "--rooms", "2", "--states", "3"]) == 0
+    assert "  undecided: " in capsys.readouterr().out
+    assert main(["check", name, "--rooms", "2", "--states", "3", "--strict"]) == 1
+    assert main(["check", name, "--rooms", "2", "--strict"]) == 0, "with enough states it is decided"
+
+
+def test_without_a_script_an_oracle_fails(gate: Path, capsys: Capture) -> None:
+    assert main(["check", claiming(gate, "{oracle: 0.1}"), "--rooms", "2"]) == 1
+    assert "there is no variant `oracle`" in capsys.readouterr().out
+
+
+def test_without_properties_it_is_said_what_never_happens(gate: Path, capsys: Capture) -> None:
+    assert main(["check", str(gate), "--rooms", "2"]) == 0
+    _, happened, *warnings = capsys.readouterr().out.splitlines()
+    assert happened == "  4 of 6 states, steps, rules and outcomes happen in some room"
+    assert [re.sub(r".*gate.yaml:", "", warning) for warning in warnings] == [
+        "11:55: warning: the rule `guard.watch.awake.then[1]` happens in none of these rooms",
+        "12:7: warning: the state `guard.watch.asleep` happens in none of these rooms",
+    ]
+    assert main(["check", str(gate), "--rooms", "2", "--strict"]) == 1
+
+
+def test_json_has_the_same(gate: Path, capsys: Capture) -> None:
+    name = claiming(gate, "{never: gave_up}")
+    assert main(["check", name, "--rooms", "2", "--format", "json"]) == 1
+    (report,) = json.loads(capsys.readouterr().out)
+    assert (report["scenario"], report["rooms"], report["seed"]) == (name, 2, 0)
+    assert report["never_happens"] == []
+    (found,) = report["properties"]
+    assert found["property"] == "never: gave_up"
+    assert (found["verdict"], found["held"], found["against"], found["file"]) == ("fails", 0, [0, 1], name)
+
+
+def test_every_member_of_a_suite_is_checked(capsys: Capture) -> None:
+    assert main(["check", "social_env", "--rooms", "1"]) == 0
+    named = [line.split(":")[0] for line in capsys.readouterr().out.splitlines() if not line.startswith(" ")]
+    assert named[:3] == ["talkitout", "dance", "cointhief"]
+    assert len(named) == 6
+
+
+@pytest.mark.parametrize("option", ["--rooms", "--states"])
+def test_numbers_are_at_least_one(gate: Path, option: str, capsys: Capture) -> None:
+    assert main(["check", str(gate), option, "0"]) == 2
+    assert f"{option}: got 0, expected at least 1" in capsys.readouterr().err
+
+
+def test_the_example_of_the_page_holds(tmp_path: Path, capsys: Capture) -> None:
+    page = (ROOT / "docs" / "checks.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"^```yaml\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    grammar = "grammar: {templates: [Where is <noun>, Open <noun>], nouns: [the exit, sesame]}"
+    head = f"scenario: page\nroom: {{size: 6}}\n{grammar}\n"
+    file = tmp_path / "page.yaml"
+    file.write_text(head + example.replace("cast:\n", "cast:\n  agent: {}\n"))
+    assert main(["check", str(file), "--rooms", "3", "--strict"]) == 0, capsys.readouterr().out
+    assert capsys.readouterr().out.count("  holds: ") == 6
