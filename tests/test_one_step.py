@@ -385,13 +385,14 @@ def test_2_9_then_the_world_is_settled(play: Folder) -> None:
 def test_3_1_a_link_unlocks_what_is_locked(play: Folder) -> None:
     run = play("""
         objects:
-          switch: {type: switch, at: [2, 1], unlocks: shut | ajar}
-          shut: {type: door, at: [4, 0], state: locked}
+          switch: {type: switch, at: [2, 1], unlocks: barred | ajar | chest}
+          barred: {type: door, at: [4, 0], state: locked}
           ajar: {type: door, at: [5, 0], state: open}
+          chest: {type: box, at: [5, 5], state: locked}
     """)
-    assert run.status("shut") == "locked"
+    assert (run.status("barred"), run.status("chest")) == ("locked", "locked")
     run.step("toggle")
-    assert (run.status("shut"), run.status("ajar")) == ("closed", "open")
+    assert [run.status(name) for name in ("barred", "ajar", "chest")] == ["closed", "open", "shut"]
 
 
 def test_3_2_what_a_link_unlocks_cannot_be_locked_for_long(play: Folder) -> None:
@@ -491,6 +492,8 @@ def test_3_9_a_computed_status_holds_while_its_condition_does(play: Folder) -> N
 def test_3_10_what_was_locked_becomes_closed(play: Folder) -> None:
     run = play(COMPUTED).step("toggle").step("toggle")
     assert run.status("door") == "closed"
+    chest = play("objects: {chest: {type: box, at: [5, 5], locked: agent.x == 1}}")
+    assert (chest.status("chest"), chest.step("forward").status("chest")) == ("locked", "shut")
 
 
 def test_3_11_any_other_status_is_left_alone(play: Folder) -> None:
