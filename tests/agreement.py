@@ -173,6 +173,8 @@ def _object(described: dict[str, Any]) -> dict[str, Any]:
 def _member(described: dict[str, Any]) -> dict[str, Any]:
     """A cast member; what does not vary (a fixed name) the engine does not hold."""
     kept = ("at", "color", "facing", "clock", "name", "state")
+    if described.get("state") == "watching":  # the frame that the checker gives to who only believes
+        kept = ("at", "color", "facing", "name")
     gone = described.get("gone", False)
     return {key: described[key] for key in kept if key in described and not (gone and key == "clock")} | {
         "gone": gone
@@ -196,6 +198,8 @@ def _state_of_reference(env: ScenarioEnv, reference: Reference) -> dict[str, Any
         for key, path in (("name", "name"), ("clock", "clock"), ("state", "frame")):
             if f"{name}.{path}" not in held or (key == "clock" and member["gone"]):
                 del member[key]
+        if member.get("state", "") is None:
+            member.pop("state"), member.pop("clock", None)
         if isinstance(member.get("state"), int):
             member["state"] = f"step{member['state']}"
         slots = {k: plain(v) for k, v in reference.world.cast[name].slots.items()}

@@ -185,7 +185,8 @@ class Reference:
         self.world.lines = []
         self.world.bonus = 0
         for member in self.world.cast.values():
-            member.utterance, member.action, member.poked, member.pair = None, "none", False, 0
+            member.utterance, member.noun, member.pair = None, None, 0
+            member.action, member.poked = "none", False
             member.bumped = False
         for thing in self.world.things():
             thing.toggled_by, thing.poked = [], False

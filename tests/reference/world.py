@@ -145,7 +145,7 @@ class Entity:
     fired_once: set[str] = field(default_factory=set)
     inbox: list[Heard] = field(default_factory=list)
     utterance: str | None = None  # in this step
-    noun: str | int | None = None  # of the last utterance
+    noun: str | int | None = None  # of what it said in this step
     pair: int = 0  # the number of the agent's utterance in this step, 0 for silence
     action: str = "none"  # in this step
     last_act: str = "none"  # of its last turn, as it is seen

@@ -114,8 +114,8 @@ def test_what_an_npc_says_is_heard_in_the_next_turn() -> None:
 def test_the_first_of_several_counts() -> None:
     env = start(talking(rule("statue", "then[0]", say=said("Go down"), once=True)))
     step(env)
-    step(env, "none", 0)  # Go up: the statue came first
-    assert noted(env) == ("statue", "down")
+    step(env, "none", 0)  # Go up: the statue spoke first, but the agent comes first
+    assert noted(env) == ("agent", "up")
 
 
 def test_without_a_noun_the_rule_is_false() -> None:
