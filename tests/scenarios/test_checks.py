@@ -1,0 +1,49 @@
+"""What the shipped scenarios claim about themselves is so."""
+
+from __future__ import annotations
+
+import pytest
+
+import socialai_dsl
+from socialai_dsl.cli.check import check_scenario
+from socialai_dsl.cli.shipped import shipped_scenarios
+from socialai_dsl.envs.properties import Effort
+
+CLAIMING = {
+    "talkitout": 2,
+    "talkitout+no_liar": 2,
+    "talkitout+unsocial": 2,
+    "diverse_exit": 1,
+    "help": 1,
+    "help+as_helper": 1,
+}
+NOVEL = {"culprit": 2, "haggling": 2, "interpreter": 1, "turn_taking": 1, "whisper": 2}
+
+
+def verdicts(name: str, rooms: int, states: int = 20_000) -> dict[str, str]:
+    loaded = socialai_dsl.load(name)
+    assert isinstance(loaded, socialai_dsl.LoadedScenario)
+    report = check_scenario(loaded, name, Effort(rooms, 0, states))
+    return {plan.text: f"{found.verdict.value}: {found.said}" for plan, found in report.tried}
+
+
+@pytest.mark.parametrize("name", CLAIMING)
+def test_claims_hold_in_some_rooms(name: str) -> None:
+    found = verdicts(name, 6)
+    assert len(found) == CLAIMING[name]
+    assert [said for said in found.values() if not said.startswith("holds")] == []
+
+
+def test_no_claiming_scenario_is_left_out() -> None:
+    for name in shipped_scenarios():
+        loaded = socialai_dsl.load(name)
+        if isinstance(loaded, socialai_dsl.LoadedScenario) and loaded.checked.properties:
+            assert name in CLAIMING or name.removeprefix("novel/") in NOVEL, f"{name} is not tried here"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*CLAIMING, *NOVEL])
+def test_claims_hold_in_many_rooms(name: str) -> None:
+    found = verdicts(f"scenarios/novel/{name}.yaml" if name in NOVEL else name, 60)
+    assert len(found) == (CLAIMING | NOVEL)[name]
+    assert [said for said in found.values() if not said.startswith("holds")] == []
