@@ -14,7 +14,7 @@ import socialai_dsl
 from socialai_dsl import frontend
 from socialai_dsl.cli import main
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, ObjectTypeModel, prelude, shared_grammars
-from socialai_dsl.program import COLORS, DIRECTIONS
+from socialai_dsl.program import COLORS, DIRECTIONS, Field, Flag, FrameColumn, Header, Op, TypeColumn
 from socialai_dsl.schema import PRIMITIVES
 from socialai_dsl.schema.annotations import CALLED, keys_of
 from socialai_dsl.schema.behaviour import SlotType
@@ -95,6 +95,15 @@ def test_readme_names_every_scenario_that_ships() -> None:
     assert alone - named == set()
     for name in ("unsocial", "as_coded", "oracle"):
         assert f"`+{name}`" in text
+    in_folders = [path for path in (ROOT / "scenarios").glob("*/*.yaml") if _can_be_played(path)]
+    assert len(in_folders) > 20
+    assert {path.stem for path in in_folders} - named == set()
+
+
+def _can_be_played(path: Path) -> bool:
+    """Whether a file is a scenario or suite of its own, and no base of others."""
+    text = path.read_text(encoding="utf-8")
+    return text.startswith(("scenario:", "suite:")) and "\nabstract: true" not in text
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
@@ -204,6 +213,33 @@ def test_the_reference_has_every_word() -> None:
     vocabularies = [*PRIMITIVES, *COLORS, *DIRECTIONS, *get_args(SlotType), *shared_grammars()]
     types = [*prelude().types, *(state for type_ in prelude().types.values() for state in type_.states)]
     assert {*WORDS, *vocabularies, *types} - written == set()
+
+
+def _constructs() -> set[str]:
+    """Every word that stands in code on the page of constructs."""
+    text = (ROOT / "docs" / "constructs.md").read_text(encoding="utf-8")
+    return {
+        word
+        for code in re.findall(r"`([^`\n]+)`", text)
+        for word in re.findall(r"[A-Za-z_][\w./]*\w|\w", code)
+    }
+
+
+def test_constructs_have_every_instruction() -> None:
+    """Every one of the language, and every one of the engine that it is lowered to."""
+    words = _constructs()
+    assert {signature.name for signature in SIGNATURES} - words == set()
+    assert {op.name for op in Op} - words == set()
+
+
+def test_constructs_name_what_there_is() -> None:
+    known = {name for kind in (Op, Header, Flag, Field, TypeColumn, FrameColumn) for name in kind.__members__}
+    known |= {name.removesuffix("_AT") for name in known} | {f"Flag.{flag.name}" for flag in Flag} | {"FILE"}
+    words = _constructs()
+    assert {word for word in words if word.removeprefix("Flag.").isupper() and len(word) > 1} - known == set()
+    files = [word for word in words if word.endswith(".py")]
+    roots = (ROOT, ROOT / "socialai_dsl")
+    assert [file for file in files if not any((root / file).exists() for root in roots)] == []
 
 
 def test_architecture_names_files_that_exist() -> None:
