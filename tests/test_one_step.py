@@ -685,7 +685,13 @@ def test_5_3_believes_come_before_first(play: Folder) -> None:
     assert run.at("agent") == [3, 1]
 
 
-def test_5_4_first_is_read_before_the_body_moves(play: Folder) -> None:
+def test_5_4_members_without_a_frame_believe_as_well(play: Folder) -> None:
+    run = play(f"cast: {{ann: {{at: [5, 5], {NEAR}}}}}")
+    seen = [run.step("forward").state["ann"]["believes"]["column_of"] for _ in range(2)]
+    assert (seen, run.at("ann")) == ([2, 2], [5, 5])
+
+
+def test_5_5_first_is_read_before_the_body_moves(play: Folder) -> None:
     run = play("""
         frames:
           walk:
@@ -697,7 +703,7 @@ def test_5_4_first_is_read_before_the_body_moves(play: Folder) -> None:
 
 
 @pytest.mark.parametrize("where", ["first", "then"])
-def test_5_5_the_first_rule_that_holds_fires_alone(play: Folder, where: str) -> None:
+def test_5_6_the_first_rule_that_holds_fires_alone(play: Folder, where: str) -> None:
     run = play(f"""
         frames:
           list:
@@ -709,7 +715,7 @@ def test_5_5_the_first_rule_that_holds_fires_alone(play: Folder, where: str) -> 
     assert [run.value(f"ann.{name}") for name in "abc"] == [0, 1, 0]
 
 
-def test_5_6_a_rule_with_an_activity_takes_the_whole_turn(play: Folder) -> None:
+def test_5_7_a_rule_with_an_activity_takes_the_whole_turn(play: Folder) -> None:
     run = play("""
         frames:
           turn:
@@ -722,7 +728,7 @@ def test_5_6_a_rule_with_an_activity_takes_the_whole_turn(play: Folder) -> None:
     assert (run.at("ann"), run.value("ann.late")) == ([3, 4], 2)
 
 
-def test_5_7_rest_of_a_rule_comes_after_the_body_action(play: Folder) -> None:
+def test_5_8_rest_of_a_rule_comes_after_the_body_action(play: Folder) -> None:
     run = play("""
         objects: {door: {type: door, at: [4, 5]}}
         frames:
@@ -742,7 +748,7 @@ def test_5_7_rest_of_a_rule_comes_after_the_body_action(play: Folder) -> None:
     assert run.status("ann") == "after_it"
 
 
-def test_5_8_clock_of_the_new_state_is_0(play: Folder) -> None:
+def test_5_9_clock_of_the_new_state_is_0(play: Folder) -> None:
     run = play("""
         frames:
           go:
@@ -756,7 +762,7 @@ def test_5_8_clock_of_the_new_state_is_0(play: Folder) -> None:
     assert run.steps(3).value("ann.fired_at") == 3
 
 
-def test_5_9_a_goto_in_first_is_of_this_turn(play: Folder) -> None:
+def test_5_10_a_goto_in_first_is_of_this_turn(play: Folder) -> None:
     run = play("""
         frames:
           change:
@@ -770,7 +776,7 @@ def test_5_9_a_goto_in_first_is_of_this_turn(play: Folder) -> None:
     assert (run.value("ann.old"), run.value("ann.new")) == (0, 1)
 
 
-def test_5_10_who_vanishes_in_first_does_nothing_more(play: Folder) -> None:
+def test_5_11_who_vanishes_in_first_does_nothing_more(play: Folder) -> None:
     run = play("""
         objects: {door: {type: door, at: [4, 5]}}
         frames:
@@ -783,7 +789,7 @@ def test_5_10_who_vanishes_in_first_does_nothing_more(play: Folder) -> None:
     assert run.info["utterance"] == "Ann: Bye."
 
 
-def test_5_11_one_body_action_a_turn(play: Folder) -> None:
+def test_5_12_one_body_action_a_turn(play: Folder) -> None:
     run = play("""
         objects: {switch: {type: switch, at: [5, 3]}}
         frames: {press: {states: {s: {do: use(switch)}}}}
@@ -809,7 +815,7 @@ def test_5_11_one_body_action_a_turn(play: Folder) -> None:
         ("observe: {npcs: hidden}", ", agent: {at: [4, 5]}"),
     ],
 )
-def test_5_12_npcs_do_not_enter_what_is_solid_deadly_or_taken(play: Folder, obstacle: str, cast: str) -> None:
+def test_5_13_npcs_do_not_enter_what_is_solid_deadly_or_taken(play: Folder, obstacle: str, cast: str) -> None:
     run = play(f"""
         {obstacle}
         {WALK}
@@ -825,18 +831,18 @@ PUSHER = """
 """
 
 
-def test_5_13_push_by_an_npc(play: Folder) -> None:
+def test_5_14_push_by_an_npc(play: Folder) -> None:
     run = play(PUSHER).step()
     assert (run.at("ann"), run.status("marble"), run.facing("ann")) == ([3, 5], "rolling", "right")
 
 
-def test_5_14_next_step_it_rolls(play: Folder) -> None:
+def test_5_15_next_step_it_rolls(play: Folder) -> None:
     run = play(PUSHER)
     assert [run.step().at("marble") for _ in range(3)] == [[4, 5], [5, 5], [5, 5]]
     assert run.status("marble") == "still"
 
 
-def test_5_15_the_toggle_of_an_npc_changes_the_object_and_pokes_nobody(play: Folder) -> None:
+def test_5_16_the_toggle_of_an_npc_changes_the_object_and_pokes_nobody(play: Folder) -> None:
     run = play("""
         objects: {door: {type: door, at: [4, 5], state: open}}
         frames: {press: {states: {s: {do: toggle}}}}
@@ -849,7 +855,7 @@ def test_5_15_the_toggle_of_an_npc_changes_the_object_and_pokes_nobody(play: Fol
     assert run.state["last"]["poked"] is None
 
 
-def test_5_16_toggled_is_known_until_its_next_turn(play: Folder) -> None:
+def test_5_17_toggled_is_known_until_its_next_turn(play: Folder) -> None:
     run = play(
         """
         objects: {door: {type: door, at: [4, 5]}}
@@ -869,7 +875,7 @@ def test_5_16_toggled_is_known_until_its_next_turn(play: Folder) -> None:
     assert (run.value("cal.at_all"), run.value("bob.at_all")) == (1, 2)
 
 
-def test_5_17_points_until_it_stops(play: Folder) -> None:
+def test_5_18_points_until_it_stops(play: Folder) -> None:
     run = play("""
         objects: {door: {type: door, at: [5, 5]}}
         frames: {show: {steps: [{do: point(door)}, {do: left}, {do: forward}, {do: stop_pointing}]}}
@@ -880,7 +886,7 @@ def test_5_17_points_until_it_stops(play: Folder) -> None:
     assert (run.facing("ann"), run.at("ann")) == ("right", [4, 5])
 
 
-def test_5_18_the_world_is_settled_after_the_body_action(play: Folder) -> None:
+def test_5_19_the_world_is_settled_after_the_body_action(play: Folder) -> None:
     run = play("""
         objects:
           switch: {type: switch, at: [4, 5], unlocks: linked}
@@ -904,7 +910,7 @@ CLOCK = """
 """
 
 
-def test_5_19_after_1_in_then_holds_in_the_first_turn(play: Folder) -> None:
+def test_5_20_after_1_in_then_holds_in_the_first_turn(play: Folder) -> None:
     run = play(CLOCK.format(where="then"))
     assert run.state["ann"]["clock"] == 0
     run.step()
@@ -912,11 +918,11 @@ def test_5_19_after_1_in_then_holds_in_the_first_turn(play: Folder) -> None:
     assert run.value("ann.fired_at") == 1
 
 
-def test_5_20_after_1_in_first_holds_in_the_second_turn(play: Folder) -> None:
+def test_5_21_after_1_in_first_holds_in_the_second_turn(play: Folder) -> None:
     assert play(CLOCK.format(where="first")).steps(3).value("ann.fired_at") == 2
 
 
-def test_5_21_a_rule_computes_before_it_acts(play: Folder) -> None:
+def test_5_22_a_rule_computes_before_it_acts(play: Folder) -> None:
     run = play("""
         frames:
           swap:
@@ -931,7 +937,7 @@ def test_5_21_a_rule_computes_before_it_acts(play: Folder) -> None:
 @pytest.mark.parametrize(
     ("effects", "status"), [("door.open, door.lock", "locked"), ("door.lock, door.open", "open")]
 )
-def test_5_22_effects_happen_in_the_order_listed(play: Folder, effects: str, status: str) -> None:
+def test_5_23_effects_happen_in_the_order_listed(play: Folder, effects: str, status: str) -> None:
     run = play(f"""
         objects: {{door: {{type: door, at: [5, 0]}}}}
         frames: {{act: {{states: {{s: {{then: [{{cause: [{effects}]}}]}}}}}}}}
@@ -944,7 +950,7 @@ def test_5_22_effects_happen_in_the_order_listed(play: Folder, effects: str, sta
     ("place", "at"),
     [("shut", [3, 5]), ("lava", [3, 5]), ("agent", [3, 5]), ("bob", [3, 5]), ("gate", [4, 4])],
 )
-def test_5_23_put_somebody_where_nobody_can_stand(play: Folder, place: str, at: list[int]) -> None:
+def test_5_24_put_somebody_where_nobody_can_stand(play: Folder, place: str, at: list[int]) -> None:
     run = play(f"""
         objects:
           shut: {{type: door, at: [2, 2]}}
@@ -956,7 +962,7 @@ def test_5_23_put_somebody_where_nobody_can_stand(play: Folder, place: str, at: 
     assert run.at("ann") == at
 
 
-def test_5_24_into_something(play: Folder) -> None:
+def test_5_25_into_something(play: Folder) -> None:
     run = play("""
         objects:
           one: {type: box, at: [4, 4]}
@@ -971,7 +977,7 @@ def test_5_24_into_something(play: Folder) -> None:
     assert run.state["toy"]["inside"] == "other", "it lay there last"
 
 
-def test_5_25_reset_of_things_and_people(play: Folder) -> None:
+def test_5_26_reset_of_things_and_people(play: Folder) -> None:
     run = play("""
         objects:
           box: {type: box, at: [2, 1]}
@@ -990,7 +996,7 @@ def test_5_25_reset_of_things_and_people(play: Folder) -> None:
     assert (run.at("ann"), run.facing("ann")) == (before["ann"]["at"], before["ann"]["facing"])
 
 
-def test_5_26_what_then_changes_is_settled_later(play: Folder) -> None:
+def test_5_27_what_then_changes_is_settled_later(play: Folder) -> None:
     run = play("""
         objects:
           switch: {type: switch, at: [4, 0], unlocks: door}
@@ -1025,14 +1031,14 @@ GOING = """
 """
 
 
-def test_5_27_after_goto_the_new_state_begins_with_the_next_turn(play: Folder) -> None:
+def test_5_28_after_goto_the_new_state_begins_with_the_next_turn(play: Folder) -> None:
     run = play(GOING.format(go="goto")).step()
     assert (run.state["ann"]["state"], run.state["ann"]["clock"]) == ("after_it", 0)
     assert run.value("ann.fired_at") == 0
     assert run.step().value("ann.fired_at") == 9, "`first` of the next turn"
 
 
-def test_5_28_goto_now_reads_the_new_then_at_once(play: Folder) -> None:
+def test_5_29_goto_now_reads_the_new_then_at_once(play: Folder) -> None:
     run = play(GOING.format(go="goto_now")).step()
     assert (run.state["ann"]["state"], run.state["ann"]["clock"]) == ("after_it", 0)
     assert run.value("ann.fired_at") == 1
@@ -1046,7 +1052,7 @@ CHOICES = [
 
 
 @pytest.mark.parametrize("choice", CHOICES)
-def test_5_29_a_condition_is_false_where_nothing_is_found(play: Folder, choice: str) -> None:
+def test_5_30_a_condition_is_false_where_nothing_is_found(play: Folder, choice: str) -> None:
     run = play(f"""
         objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]]}}}}
         frames:
@@ -1067,7 +1073,7 @@ def test_5_29_a_condition_is_false_where_nothing_is_found(play: Folder, choice: 
 
 @pytest.mark.parametrize("choice", CHOICES)
 @pytest.mark.parametrize("effect", ['cause: ["{}.open"]', "say: I see <{}.color>", 'set: {{x0: "{}.x"}}'])
-def test_5_30_a_rule_does_not_fire_where_nothing_is_found(play: Folder, choice: str, effect: str) -> None:
+def test_5_31_a_rule_does_not_fire_where_nothing_is_found(play: Folder, choice: str, effect: str) -> None:
     text = """
         objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]], state: {}}}}}
         frames:
@@ -1090,7 +1096,7 @@ def test_5_30_a_rule_does_not_fire_where_nothing_is_found(play: Folder, choice: 
 
 
 @pytest.mark.parametrize("choice", CHOICES)
-def test_5_31_an_activity_is_staying_where_nothing_is_found(play: Folder, choice: str) -> None:
+def test_5_32_an_activity_is_staying_where_nothing_is_found(play: Folder, choice: str) -> None:
     run = play(f"""
         objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]]}}}}
         frames:
@@ -1104,7 +1110,7 @@ def test_5_31_an_activity_is_staying_where_nothing_is_found(play: Folder, choice
     assert run.step().facing("ann") == "up"
 
 
-def test_5_32_once_is_once_in_an_episode(play: Folder) -> None:
+def test_5_33_once_is_once_in_an_episode(play: Folder) -> None:
     run = play("""
         frames:
           talk:
@@ -1123,7 +1129,7 @@ def test_5_32_once_is_once_in_an_episode(play: Folder) -> None:
     assert run.step().info["utterance"] == "Ann: First."
 
 
-def test_5_33_a_step_acts_when_it_ends_after_the_body(play: Folder) -> None:
+def test_5_34_a_step_acts_when_it_ends_after_the_body(play: Folder) -> None:
     run = play("""
         objects: {door: {type: door, at: [5, 0]}}
         frames:
@@ -1139,7 +1145,7 @@ def test_5_33_a_step_acts_when_it_ends_after_the_body(play: Folder) -> None:
     assert run.value("ann.ended_at") == 4
 
 
-def test_5_34_the_next_entry_begins_with_the_next_turn(play: Folder) -> None:
+def test_5_35_the_next_entry_begins_with_the_next_turn(play: Folder) -> None:
     run = play("""
         frames: {go: {steps: [{do: left}, {do: forward}]}}
         cast: {ann: {at: [3, 5], facing: right, frame: go}}
@@ -1148,7 +1154,7 @@ def test_5_34_the_next_entry_begins_with_the_next_turn(play: Folder) -> None:
     assert run.step().at("ann") == [3, 4]
 
 
-def test_5_35_an_entry_without_activity_stays_for_one_turn(play: Folder) -> None:
+def test_5_36_an_entry_without_activity_stays_for_one_turn(play: Folder) -> None:
     run = play("""
         frames: {go: {steps: [{say: Now.}, {do: left}]}}
         cast: {ann: {at: [3, 5], facing: right, frame: go}}
@@ -1158,7 +1164,7 @@ def test_5_35_an_entry_without_activity_stays_for_one_turn(play: Folder) -> None
 
 
 @pytest.mark.parametrize("goal", ["go_next_to(door)", "go_to(self.cell)", "enter(gate)"])
-def test_5_36_what_is_fulfilled_before_it_begins_takes_no_turn(play: Folder, goal: str) -> None:
+def test_5_37_what_is_fulfilled_before_it_begins_takes_no_turn(play: Folder, goal: str) -> None:
     text = """
         objects: {{door: {{type: door, at: [3, 6]}}, gate: {{type: door, at: [3, 5], state: open}}}}
         frames: {{go: {{steps: [{{do: {goal}{effect}}}, {{do: left}}]}}}}
@@ -1169,7 +1175,7 @@ def test_5_36_what_is_fulfilled_before_it_begins_takes_no_turn(play: Folder, goa
     assert (run.facing("ann"), run.info["utterance"]) == ("right", "Ann: There.")
 
 
-def test_5_37_aim_of_an_entry_is_that_of_its_turn(play: Folder) -> None:
+def test_5_38_aim_of_an_entry_is_that_of_its_turn(play: Folder) -> None:
     run = play("""
         objects: {doors: {type: door, at: [[4, 5], [3, 6]]}}
         frames: {go: {steps: [{do: use(first(d in doors where d.closed))}, {do: left}]}}
@@ -1187,7 +1193,7 @@ DANCE = """
 TURNS = {"let": {"dance": [["left", "Say hello"], ["right", None], ["forward", "Say bye"]]}}
 
 
-def test_5_38_perform_does_and_says_the_kth_element(play: Folder) -> None:
+def test_5_39_perform_does_and_says_the_kth_element(play: Folder) -> None:
     run = play(DANCE.format(frame="{steps: [{do: perform(dance)}]}", facing="right"), TURNS)
     seen = [(run.step().at("ann"), run.facing("ann"), run.info["utterance"]) for _ in range(3)]
     assert seen == [
@@ -1197,14 +1203,14 @@ def test_5_38_perform_does_and_says_the_kth_element(play: Folder) -> None:
     ]
 
 
-def test_5_39_a_blocked_move_counts(play: Folder) -> None:
+def test_5_40_a_blocked_move_counts(play: Folder) -> None:
     blocked = {"let": {"dance": [["forward", None], ["forward", "Say bye"], ["left", None]]}}
     run = play(DANCE.format(frame="{steps: [{do: perform(dance)}]}", facing="down"), blocked)
     seen = [(run.step().at("ann"), run.facing("ann"), run.info["utterance"]) for _ in range(3)]
     assert seen == [([3, 5], "down", "NA"), ([3, 5], "down", "Ann: Say bye"), ([3, 5], "right", "NA")]
 
 
-def test_5_40_after_its_last_element_perform_is_finished(play: Folder) -> None:
+def test_5_41_after_its_last_element_perform_is_finished(play: Folder) -> None:
     run = play(
         DANCE.format(frame="{steps: [{do: perform(dance)}, {do: left}]}", facing="right"), TURNS
     ).steps(3)
@@ -1216,7 +1222,7 @@ def test_5_40_after_its_last_element_perform_is_finished(play: Folder) -> None:
 
 
 @pytest.mark.parametrize(("facing", "heard"), [("left", "Ann: Say hello"), ("right", "NA")])
-def test_5_41_a_line_is_heard_where_the_turn_ends(play: Folder, facing: str, heard: str) -> None:
+def test_5_42_a_line_is_heard_where_the_turn_ends(play: Folder, facing: str, heard: str) -> None:
     start = {"left": 3, "right": 2}[facing]
     run = play(f"""
         earshot: next_to
@@ -1226,7 +1232,7 @@ def test_5_41_a_line_is_heard_where_the_turn_ends(play: Folder, facing: str, hea
     assert run.info["utterance"] == heard
 
 
-def test_5_42_one_utterance_a_turn(play: Folder) -> None:
+def test_5_43_one_utterance_a_turn(play: Folder) -> None:
     run = play("""
         frames: {talk: {states: {s: {first: [{say: Early.}], then: [{say: Late.}]}}}}
         cast: {ann: {at: [5, 5], frame: talk}}
@@ -1249,19 +1255,19 @@ def _listening(play: Folder, cast: str) -> Play:
     """)
 
 
-def test_5_43_an_npc_hears_those_before_it_in_this_step(play: Folder) -> None:
+def test_5_44_an_npc_hears_those_before_it_in_this_step(play: Folder) -> None:
     run = _listening(play, "ann: {at: [5, 5], frame: talk}, bob: {at: [4, 5], frame: ear}").steps(2)
     assert run.value("bob.heard_at") == 1
     run = _listening(play, "bob: {at: [4, 5], frame: ear}").step().step(None, "Say hello")
     assert run.value("bob.heard_at") == 2
 
 
-def test_5_44_an_npc_hears_those_after_it_a_step_later(play: Folder) -> None:
+def test_5_45_an_npc_hears_those_after_it_a_step_later(play: Folder) -> None:
     run = _listening(play, "bob: {at: [4, 5], frame: ear}, ann: {at: [5, 5], frame: talk}").steps(3)
     assert run.value("bob.heard_at") == 2
 
 
-def test_5_45_nobody_hears_himself(play: Folder) -> None:
+def test_5_46_nobody_hears_himself(play: Folder) -> None:
     run = (
         play("""
         frames:
@@ -1279,7 +1285,7 @@ def test_5_45_nobody_hears_himself(play: Folder) -> None:
 
 
 @pytest.mark.parametrize(("order", "first"), [(("hello", "bye"), "hello"), (("bye", "hello"), "bye")])
-def test_5_46_the_first_matching_rule_fires(play: Folder, order: tuple[str, str], first: str) -> None:
+def test_5_47_the_first_matching_rule_fires(play: Folder, order: tuple[str, str], first: str) -> None:
     rules = ", ".join(f"{{hears: Say {word}, say: It was {word}.}}" for word in order)
     run = play(f"""
         frames:
@@ -1290,7 +1296,7 @@ def test_5_46_the_first_matching_rule_fires(play: Folder, order: tuple[str, str]
     assert run.info["utterance"].splitlines()[-1] == f"Bob: It was {first}."
 
 
-def test_5_47_speaker_and_noun_are_those_of_the_first(play: Folder) -> None:
+def test_5_48_speaker_and_noun_are_those_of_the_first(play: Folder) -> None:
     run = play("""
         frames:
           talk: {states: {s: {then: [{say: Say bye}]}}}
@@ -1301,7 +1307,7 @@ def test_5_47_speaker_and_noun_are_those_of_the_first(play: Folder) -> None:
     assert run.step(None, "Say hello").info["utterance"].splitlines()[-1] == "Ann: Agent said hello"
 
 
-def test_5_48_any_is_whatever_was_heard(play: Folder) -> None:
+def test_5_49_any_is_whatever_was_heard(play: Folder) -> None:
     run = play("""
         frames:
           talk: {states: {s: {then: [{when: t == 2, say: Nice weather.}]}}}
@@ -1312,7 +1318,7 @@ def test_5_48_any_is_whatever_was_heard(play: Folder) -> None:
     assert run.step(None, "Say bye").value("ann.heard_at") == 4
 
 
-def test_5_49_said_is_known_to_the_end_of_the_step(play: Folder) -> None:
+def test_5_50_said_is_known_to_the_end_of_the_step(play: Folder) -> None:
     run = play("""
         earshot: next_to
         frames:
@@ -1331,7 +1337,7 @@ def test_5_49_said_is_known_to_the_end_of_the_step(play: Folder) -> None:
     assert (run.value("bob.seen"), run.value("cal.seen")) == (0, 2)
 
 
-def test_5_50_what_was_heard_is_forgotten_at_the_end_of_the_turn(play: Folder) -> None:
+def test_5_51_what_was_heard_is_forgotten_at_the_end_of_the_turn(play: Folder) -> None:
     run = (
         play("""
         frames:
@@ -1347,7 +1353,7 @@ def test_5_50_what_was_heard_is_forgotten_at_the_end_of_the_turn(play: Folder) -
 
 
 @pytest.mark.parametrize("text", ["Say hello", "say HELLO", "Say hello.", "Say hello!", "SAY hello?"])
-def test_5_51_case_and_the_final_mark_do_not_matter(play: Folder, text: str) -> None:
+def test_5_52_case_and_the_final_mark_do_not_matter(play: Folder, text: str) -> None:
     run = play(f"""
         frames:
           talk: {{states: {{s: {{then: [{{say: "{text}"}}]}}}}}}
@@ -1357,7 +1363,7 @@ def test_5_51_case_and_the_final_mark_do_not_matter(play: Folder, text: str) -> 
     assert run.value("bob.heard_at") == 1
 
 
-def test_5_52_hidden_npcs_act_but_only_the_audible_are_heard(play: Folder) -> None:
+def test_5_53_hidden_npcs_act_but_only_the_audible_are_heard(play: Folder) -> None:
     run = play("""
         observe: {npcs: hidden}
         frames: {talk: {states: {s: {do: forward, then: [{say: Hi.}]}}}}
@@ -1369,7 +1375,7 @@ def test_5_52_hidden_npcs_act_but_only_the_audible_are_heard(play: Folder) -> No
     assert run.info["utterance"] == "Bob: Hi."
 
 
-def test_5_53_on_one_cell_is_neither_next_to_nor_eye_contact(play: Folder) -> None:
+def test_5_54_on_one_cell_is_neither_next_to_nor_eye_contact(play: Folder) -> None:
     run = play("""
         observe: {npcs: hidden}
         frames:
