@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
 
 
+_DOES = ("cause", "set", "reward")
+"""Keys of a rule of the world that say what it does."""
+
+
 def rules(resolver: Resolver) -> Iterator[RulePlan]:
     """The rules of the world, in the order written."""
     for i, rule in enumerate(resolver.symbols.scenario.rules):
@@ -27,8 +31,10 @@ def rules(resolver: Resolver) -> Iterator[RulePlan]:
 
 def _rule(resolver: Resolver, rule: WorldRule, path: DataPath) -> RulePlan:
     name = f"rules[{rule.id}]" if rule.id else dotted(path)
-    if not (rule.cause or rule.set or rule.reward):
-        span = resolver.findings.places.value_span(path)
+    span = resolver.findings.places.value_span(path)
+    # One of them that was written wrongly, which has been reported, still stands in the file.
+    written = any(resolver.findings.places.value_span((*path, key)) != span for key in _DOES)
+    if not (rule.cause or rule.set or rule.reward or written):
         resolver.findings.error(
             "S105", "a rule of the world needs `cause`, `set` or `reward`: what it does", span
         )
@@ -41,7 +47,7 @@ def _rule(resolver: Resolver, rule: WorldRule, path: DataPath) -> RulePlan:
     return RulePlan(
         name=rule.id or name,
         site=name,
-        span=resolver.findings.places.value_span(path),
+        span=span,
         when=when,
         chance=rule.chance,
         once=rule.once,
