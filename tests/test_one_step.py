@@ -1296,15 +1296,20 @@ def test_5_47_the_first_matching_rule_fires(play: Folder, order: tuple[str, str]
     assert run.info["utterance"].splitlines()[-1] == f"Bob: It was {first}."
 
 
-def test_5_48_speaker_and_noun_are_those_of_the_first(play: Folder) -> None:
+def test_5_48_speaker_and_noun_are_those_of_the_first_in_the_cast(play: Folder) -> None:
     run = play("""
         frames:
           talk: {states: {s: {then: [{say: Say bye}]}}}
+          greet: {states: {s: {then: [{say: Say hello}]}}}
           listen: {states: {s: {then: [{hears: Say <noun>, say: "<speaker.name> said <noun>"}]}}}
-        cast: {bob: {at: [4, 5], frame: talk}, ann: {at: [5, 5], frame: listen}}
+        cast:
+          bob: {at: [4, 5], frame: talk}
+          ann: {at: [5, 5], frame: listen}
+          zoe: {at: [3, 5], frame: greet}
     """)
-    assert run.step().info["utterance"].splitlines()[-1] == "Ann: Bob said bye"
-    assert run.step(None, "Say hello").info["utterance"].splitlines()[-1] == "Ann: Agent said hello"
+    assert run.step().info["utterance"].splitlines()[1] == "Ann: Bob said bye"
+    assert run.step().info["utterance"].splitlines()[1] == "Ann: Bob said bye", "Zoe spoke before him"
+    assert run.step(None, "Say hello").info["utterance"].splitlines()[1] == "Ann: Agent said hello"
 
 
 def test_5_49_any_is_whatever_was_heard(play: Folder) -> None:
