@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from socialai_dsl.engine.kernel import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.relevance import Relevance
-from socialai_dsl.envs.search import CHANCES, marks, multipliers, useful_actions
+from socialai_dsl.envs.search import CHANCES, Search, Verdict, marks, multipliers, useful_actions
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Header, Program, Register
 
@@ -28,7 +28,7 @@ class Answer(Enum):
 
     GUESSES = "guesses"  # no policy solves more of the rooms than a guess does
     KNOWS = "knows"  # some sequence of actions solves more of them
-    TELLS_APART = "tells apart"  # the rooms come to look different, and what follows was not tried
+    TELLS_APART = "tells apart"  # the rooms come to look different while more of them can be solved
     UNDECIDED = "undecided"  # too many states
 
 
@@ -83,6 +83,8 @@ class Guessing:
         self._at_once = max(1, _ROWS // (len(self._actions) * rooms))
         self._table = Table([program], self._at_once * len(self._actions) * rooms, 1)
         self._table.reset(0, None)
+        self._alone = Search(program)
+        self._solvable: dict[bytes, bool] = {}
         self._wins = np.array([outcome.success for outcome in program.outcome_table] + [False])
         self._multipliers = multipliers(len(self._relevance.registers) * rooms + rooms + 1)
         self._heard = slice(
@@ -109,6 +111,7 @@ class Guessing:
             np.ones((1, len(registers)), np.bool_),
             np.zeros(1, np.int64),
         )
+        self._solvable.clear()
         self._seen = set(self._digests(layer).tolist())
         told_apart, exact = False, not self._relevance.chance
         while len(layer):
@@ -118,8 +121,9 @@ class Guessing:
                 if (reached.won > self._level).any():
                     return Guess(Answer.KNOWS, len(self._seen), True)
                 hopeful = reached.won + reached.going @ self._weights > self._level
-                told_apart |= bool((hopeful & ~alike).any())
                 following.append(self._new(reached.part(np.flatnonzero(hopeful & alike))))
+                apart = reached.part(np.flatnonzero(hopeful & ~alike))
+                told_apart = told_apart or self._may_know(apart, states)
                 if len(self._seen) > states:
                     return Guess(Answer.UNDECIDED, len(self._seen), False)
             layer = _Together(
@@ -129,6 +133,28 @@ class Guessing:
                 )
             )
         return Guess(Answer.TELLS_APART if told_apart else Answer.GUESSES, len(self._seen), exact)
+
+    def _may_know(self, apart: _Together, states: int) -> bool:
+        """Whether more than a guess might get right can be solved, by who knows which room it is from here on."""
+        for k in range(len(apart)):
+            best = int(apart.won[k])
+            for room in np.flatnonzero(apart.going[k]).tolist():
+                best += int(self._weights[room]) * self._may_be_solved(
+                    apart.part(slice(k, k + 1)), room, states
+                )
+            if best > self._level:
+                return True
+        return False
+
+    def _may_be_solved(self, state: _Together, room: int, states: int) -> bool:
+        """Whether nothing is known to keep a room from being solved."""
+        registers = state.registers[0, room]
+        relevant = np.minimum(registers[self._relevance.registers], self._relevance.limits)
+        known = relevant.tobytes()
+        if known not in self._solvable:
+            found = self._alone.solve(registers, state.boards[0, room], state.keys[0, room], states)
+            self._solvable[known] = found.verdict is not Verdict.UNSOLVABLE
+        return self._solvable[known]
 
     def _step(self, layer: _Together) -> tuple[_Together, NDArray[np.bool_]]:
         """Do everything in these states; what follows, and whether the rooms that go on still look alike."""

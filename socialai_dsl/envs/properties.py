@@ -238,7 +238,7 @@ def _told(compared: Sequence[Compared], effort: Effort) -> Report:
 _KNOWN: Final = {
     Answer.GUESSES: "{} leave nothing but a guess",
     Answer.KNOWS: "in {} it can be known without",
-    Answer.TELLS_APART: "in {} something is told without, and what follows was not tried",
+    Answer.TELLS_APART: "in {} something else tells, and more may be made of it",
     Answer.UNDECIDED: "{} are undecided",
 }
 

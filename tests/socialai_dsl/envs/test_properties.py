@@ -147,6 +147,35 @@ def test_who_shows_it_without_knowing_is_no_help(tried: Trying) -> None:
     assert (report.verdict, report.held) == (Verdict.UNDECIDED, 0), "the rooms look different"
 
 
+BOXES = """
+scenario: boxes
+horizon: 30
+actions: [left, right, forward, toggle]
+grammar: {templates: [Say <noun>], nouns: [it]}
+room: {size: 5}
+objects:
+  boxes: {type: box, count: 2, color: red, at: [[0, 2], [4, 2]], exclusive: true}
+  apple: {type: apple, inside: target}
+let: {target: pick(boxes)}
+cast:
+  ada: {at: [2, 3], facing: up, color: red}
+  agent: {at: [2, 2], facing: left}
+outcome: [{success: apple.eaten}]
+check: [{needs: ada}]
+"""
+
+
+@pytest.mark.parametrize(("exclusive", "verdict"), [("false", Verdict.UNDECIDED), ("true", Verdict.HOLDS)])
+def test_knowing_too_late_is_no_better_than_a_guess(tmp_path: Path, exclusive: str, verdict: Verdict) -> None:
+    """An open box shows what is in it; where the other then stays shut, that helps nobody."""
+    file = tmp_path / "boxes.yaml"
+    file.write_text(BOXES.replace("exclusive: true", f"exclusive: {exclusive}"))
+    loaded = socialai_dsl.load(file)
+    assert isinstance(loaded, socialai_dsl.LoadedScenario)
+    report = check_property(loaded, loaded.checked.properties[0], Effort(2))
+    assert report.verdict is verdict
+
+
 def test_cues_of_those_who_may_tell_are_no_leaks(tried: Trying) -> None:
     report = tried("{only_through: {draw: exit, by: [ada]}}")
     assert report.verdict is Verdict.HOLDS
