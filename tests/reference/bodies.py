@@ -80,9 +80,17 @@ class Activity:
     verb: str
     goal: Any = None
     way: Any = None  # of a push
+    acting: bool = False  # this turn is that of the toggle or the push itself
 
     def primitive(self, world: World, me: Entity) -> str:
         """The body action it asks for now."""
+        asked = self.asked(world, me)
+        act = {"use": "toggle", "push": "forward"}.get(self.verb)
+        self.acting = act == asked and geometry.faces(world, me, self.goal)
+        return asked
+
+    def asked(self, world: World, me: Entity) -> str:
+        """The body action by itself."""
         if me.cell is None:
             return "none"
         if self.verb in ("left", "right", "forward", "toggle", "stop_pointing"):
@@ -128,10 +136,8 @@ class Activity:
 
     def finished(self, world: World, me: Entity) -> bool:
         """Whether it ended with the turn that was just taken; single actions take one turn."""
-        if self.verb == "push":
-            return me.bumped and me.facing == self.way and geometry.faces(world, me, self.goal)
-        if self.verb == "use":
-            return me.action == "toggle" and geometry.faces(world, me, self.goal)
+        if self.verb in ("use", "push"):
+            return self.acting and me.action == ("toggle" if self.verb == "use" else "forward")
         if self.verb in ("go_to", "enter", "go_next_to"):
             return self.fulfilled(world, me)
         if self.verb == "perform":

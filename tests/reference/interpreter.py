@@ -134,6 +134,7 @@ class Reference:
         # Step 1: the agent's body action. A scripted agent reads its `first` before.
         runner = FrameRunner(self.sources, world, world.agent)
         turn = runner.begin()
+        turn.activity.primitive(world, world.agent)  # what its frame asks for, whatever the agent does
         bodies.act(world, world.agent, self.primitive(action))
         # Links are direct consequences and part of an early picture; computed statuses are not.
         self.settling.links()
