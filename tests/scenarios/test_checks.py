@@ -39,7 +39,18 @@ def test_no_claiming_scenario_is_left_out() -> None:
     claiming = {
         file.stem for file in folder.rglob("*.yaml") if "\ncheck:" in file.read_text(encoding="utf-8")
     }
-    assert claiming == {name for name in CLAIMING if "+" not in name} | set(NOVEL)
+    assert claiming == {name for name in CLAIMING if "+" not in name} | set(NOVEL) | {
+        "information_seeking_base"
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cue", ["", "+pointing", "+color", "+feedback"])
+@pytest.mark.parametrize("problem", ["boxes", "switches", "generators", "marbles", "doors", "levers"])
+def test_nobody_solves_a_problem_of_the_school_without_the_caretaker(problem: str, cue: str) -> None:
+    found = verdicts(f"school/{problem}{cue}", 2)
+    assert list(found) == ["needs: caretaker"]
+    assert found["needs: caretaker"].startswith("holds")
 
 
 @pytest.mark.slow
