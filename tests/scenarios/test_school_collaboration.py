@@ -96,11 +96,11 @@ class TestAll:
         assert play_oracle(name, 200, 1, 1000).solved >= 198
 
     @pytest.mark.parametrize("name", ALL)
-    def test_done_ends_it_and_time_runs_out_after_eighty_steps(self, name: str) -> None:
-        step = Episode(name).act("done")
-        assert (step.ended, step.reward) == ("failure", 0)
+    def test_done_does_nothing_and_time_runs_out_after_eighty_steps(self, name: str) -> None:
         episode = Episode(name)
-        assert wait(episode, 79).ended is None
+        step = episode.act("done")
+        assert (step.ended, step.reward) == (None, 0)
+        assert wait(episode, 78).ended is None
         step = episode.act()
         assert (step.ended, step.reward) == ("timeout", 0)
 
