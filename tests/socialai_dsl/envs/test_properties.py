@@ -200,3 +200,15 @@ def test_turning_in_view_is_a_cue(tried: Trying) -> None:
     turning = ("waiting: {then", "waiting: {do: face(exit), then")
     assert tried("{only_through: {draw: exit, by: [ada]}}", turning).verdict is Verdict.HOLDS
     assert tried("{only_through: {draw: exit, by: [bob]}}", turning).verdict is Verdict.FAILS
+
+
+def test_the_picture_before_npcs_shows_the_turn_a_step_later(tried: Trying) -> None:
+    turning = ("waiting: {then", "waiting: {do: face(exit), then")
+    before = ("outcome:", "observe: {image: before_npcs}\noutcome:")
+    assert tried("{only_through: {draw: exit, by: [ada]}}", turning, before).verdict is Verdict.HOLDS
+    assert tried("{only_through: {draw: exit, by: [bob]}}", turning, before).verdict is Verdict.FAILS
+
+
+def test_where_names_are_hidden_every_line_may_be_a_cue(tried: Trying) -> None:
+    hidden = ("outcome:", "observe: {names: hidden}\noutcome:")
+    assert tried("{only_through: {draw: exit, by: [bob]}}", hidden).verdict is Verdict.HOLDS
