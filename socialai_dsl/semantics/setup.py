@@ -139,7 +139,8 @@ def _inside(resolver: Resolver, objects: Objects, group: ObjectGroup) -> Iterato
         spot = _spot(objects, i, path, len(objects.numbers))
         holder = contents.inside_of(resolver, objects, i, path, str(group.inside))
         span = resolver.findings.at(path)
-        yield Placing(spot.entity, spot.site, spot.number, span, inside=holder)
+        site = f"objects.{objects.called(i)}.inside"
+        yield Placing(spot.entity, spot.site, spot.number, span, inside=holder, where_site=site)
 
 
 def _spot(objects: Objects, index: int, path: DataPath, count: int) -> places.Spot:
