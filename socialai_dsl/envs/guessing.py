@@ -76,7 +76,7 @@ class Guessing:
         self._weights, self._level = weights, int(weights.max())
         self._relevance = Relevance.of(program)
         actions = useful_actions(program, self._relevance.whole_utterance)
-        chances = CHANCES if self._relevance.chance else 1
+        chances = CHANCES if self._relevance.drawn else 1  # which line is said may tell something, too
         self._actions = np.repeat(actions, chances, axis=0)
         self._marks = np.tile(marks(chances), len(actions))
         rooms = len(weights)
@@ -113,7 +113,7 @@ class Guessing:
         )
         self._solvable.clear()
         self._seen = set(self._digests(layer).tolist())
-        told_apart, exact = False, not self._relevance.chance
+        told_apart, exact = False, not self._relevance.drawn
         while len(layer):
             following = []
             for first in range(0, len(layer), self._at_once):

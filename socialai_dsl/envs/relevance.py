@@ -84,12 +84,14 @@ class Relevance:
         limits: for each of them the value from which on all values are alike.
         whole_utterance: whether utterances of one class may have different effects.
         chance: whether anything but what is said is drawn after the reset.
+        drawn: whether anything at all is drawn after the reset, if only which line is said.
     """
 
     registers: NDArray[np.intp]
     limits: NDArray[np.int16]
     whole_utterance: bool
     chance: bool
+    drawn: bool
 
     @classmethod
     def of(cls, program: Program) -> Relevance:
@@ -116,6 +118,7 @@ class Relevance:
             any(register in limits for register in _WHOLE_UTTERANCE)
             or any(op == Op.HEARD_NOUN for block in blocks for op, _ in block),
             any(_draws_matter(program, block) for block in blocks),
+            any(op in (*_DRAWS, *_CHANCY) for block in blocks for op, _ in block),
         )
 
 

@@ -212,3 +212,22 @@ def test_the_picture_before_npcs_shows_the_turn_a_step_later(tried: Trying) -> N
 def test_where_names_are_hidden_every_line_may_be_a_cue(tried: Trying) -> None:
     hidden = ("outcome:", "observe: {names: hidden}\noutcome:")
     assert tried("{only_through: {draw: exit, by: [bob]}}", hidden).verdict is Verdict.HOLDS
+
+
+def test_which_line_is_said_may_be_what_tells(tried: Trying) -> None:
+    """Bob, who says any number but that of the exit, in words that nobody waits for, tells it to who hears him."""
+    lines = (
+        "  ada: {name",
+        "  bob: {name: Bob, at: [3, 3], facing: up, color: red, frame: hint}\n  ada: {name",
+    )
+    alone = ("  bob: {name: Bob, at: [3, 3], facing: up, color: red}\n", "")
+    frame = (
+        "cast:\n",
+        "  hint: {states: {a: {then: [{chance: 0.3, say: Not <pick(d in doors where d != exit).index>}]}}}\ncast:\n",
+    )
+    report = tried("{needs: ada}", alone, lines, frame)
+    assert (report.verdict, report.held) == (Verdict.UNDECIDED, 0)
+    nonsense = (frame[0], frame[1].replace(" where d != exit", ""))
+    report = tried("{needs: ada}", alone, lines, nonsense)
+    assert report.verdict is Verdict.HOLDS
+    assert "chance during the episode was tried only in part" in report.said
