@@ -5,9 +5,10 @@ from __future__ import annotations
 from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.lines import Lines
+from socialai_dsl.compiler.mobility import numbers_of
 from socialai_dsl.compiler.registers import entity_register, label
 from socialai_dsl.program import Body, Field, Op
-from socialai_dsl.semantics.terms import Activity, Checked, Const, ObjectType, Term
+from socialai_dsl.semantics.terms import Activity, Checked, Const, Measure, ObjectType, Term
 
 _BODIES = {"left": Body.LEFT, "right": Body.RIGHT, "forward": Body.FORWARD, "toggle": Body.TOGGLE}
 GOING = ("go_to", "go_next_to", "enter")
@@ -34,6 +35,7 @@ class Activities:
 
     Attributes:
         clock: the register of its frame's clock.
+        absent: the entities that may not be in the room.
         aim: where it is noted what the activity of this turn is about (`has_aim`); None: nowhere.
     """
 
@@ -44,10 +46,11 @@ class Activities:
         lines: Lines,
         entity: int,
         clock: int,
+        absent: frozenset[int],
         aim: int | None = None,
     ) -> None:
         self.to, self.checked, self.lines, self.entity, self.clock = to, checked, lines, entity, clock
-        self.aim = aim
+        self.absent, self.aim = absent, aim
         self.turn = to.sites.row(f"cast.{label(checked.entities[entity])}.turn")
 
     def emit(self, activity: Activity) -> None:
@@ -75,7 +78,7 @@ class Activities:
             case "left" | "right" | "forward" | "toggle":
                 block.emit(Op.BODY, constant(_BODIES[activity.name]))
             case "face":
-                self._turn_towards(to.value(activity.args[0]))
+                self._turn_towards(self._present(activity.args[0]))
             case "turn_to":
                 block.emit(Op.TURN_TO, own, to.value(activity.args[0]), self.turn)
             case "turn":
@@ -92,16 +95,30 @@ class Activities:
             case "push":
                 self._push(activity)
             case "point":
-                block.emit(Op.POINT, own, to.value(activity.args[0]))
+                way = activity.args[0]
+                if isinstance(way, Measure):
+                    self._present(way.args[1])
+                block.emit(Op.POINT, own, to.value(way))
             case "stop_pointing":
                 block.emit(Op.BODY, constant(Body.STOP_POINTING))
             case "flee":
-                away = self._turned_round(to.into_temporary(Op.QUADRANT, own, to.value(activity.args[0])))
+                away = self._turned_round(
+                    to.into_temporary(Op.QUADRANT, own, self._present(activity.args[0]))
+                )
                 self._walk(away)
             case "perform":
                 self._perform(activity)
             case "choose":
                 self._choose(activity)
+
+    def _present(self, goal: Term) -> int:
+        """What the activity is about; if it is not in the room, there is nothing to be done."""
+        to = self.to
+        entity = to.value(goal)
+        if goal.type.kind == "entity" and self.absent.intersection(numbers_of(goal)):
+            assert to.failed is not None, "internal: an activity can always come to nothing"
+            to.block.test(Op.IF_EQ, to.into_temporary(Op.FIELD, entity, Field.GONE), constant(0), to.failed)
+        return entity
 
     def _aimed_at(self, activity: Activity) -> int:
         """What the activity is about, noted if its end asks for it."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 from socialai_dsl.compiler.activities import ACTING, ACTS, GOING, NOTHING, Activities, has_aim
 from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Sites, constant
@@ -15,6 +16,7 @@ from socialai_dsl.compiler.expressions import Expressions, chance_word
 from socialai_dsl.compiler.folding import FALSE, SEVERAL, Facts, fold
 from socialai_dsl.compiler.homes import Homes
 from socialai_dsl.compiler.lines import Lines
+from socialai_dsl.compiler.mobility import sometimes_absent
 from socialai_dsl.compiler.registers import Registers, state_names
 from socialai_dsl.program import Op
 from socialai_dsl.semantics import terms
@@ -54,6 +56,11 @@ class Behaviour:
     code: CodeTable
     rules: list[str]
     inbox_of: dict[str, int]
+
+    @cached_property
+    def absent(self) -> frozenset[int]:
+        """The entities that may not be in the room."""
+        return sometimes_absent(self.checked)
 
     def frame(self, number: int, frame: FramePlan) -> FrameCode:
         """The code of frame instance `number`."""
@@ -164,7 +171,7 @@ class _FrameCompiler:
 
     def _activities(self, to: Expressions, aim: int | None = None) -> Activities:
         shared = self.shared
-        return Activities(to, shared.checked, shared.lines, self.frame.entity, self.clock, aim)
+        return Activities(to, shared.checked, shared.lines, self.frame.entity, self.clock, shared.absent, aim)
 
     def _idle_row(self) -> list[int]:
         return [0] * (1 + 2 * (self.shared.classes.count + 1))
