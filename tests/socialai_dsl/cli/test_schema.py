@@ -30,3 +30,13 @@ def test_every_reference_leads_somewhere(capsys: pytest.CaptureFixture[str]) -> 
     references = {part.partition('"')[0] for part in text.split('"$ref": "')[1:]}
     assert references
     assert references == {f"#/$defs/{name}" for name in schema["$defs"]}
+
+
+def test_editors_know_what_the_models_never_see(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["schema"])
+    definitions = json.loads(capsys.readouterr().out)["$defs"]
+    member = definitions["CastMember"]["properties"]
+    assert member["count"]["maximum"] == 16
+    assert {"type": "array", "items": {}} in member["name"]["anyOf"]
+    assert {"type": "string"} in member["one_of"]["anyOf"]
+    assert {"type": "string"} in definitions["Scenario"]["properties"]["grammar"]["anyOf"]
