@@ -23,16 +23,27 @@ class Channels:
         """`image`: packed cells, (E, 49). `gestures`: the fifth and sixth channel, (E, 49), or (E, 0)."""
         self._parts = _parts(image, gestures)
         self.values = self._parts[0] if len(self._parts) == 1 else np.concatenate(self._parts, axis=-1)
+        # Two channels at a time, each a plain copy with a stride: several times as fast as joining cells of bytes.
+        self._pairs = [
+            (_in_pairs(self.values)[..., place], _in_pairs(part)[..., k])
+            for place, (part, k) in enumerate((p, k) for p in self._parts for k in range(p.shape[-1] // 2))
+        ]
 
     def refresh(self) -> None:
         """Take over what the engine has written."""
         if len(self._parts) > 1:
-            np.concatenate(self._parts, axis=-1, out=self.values)
+            for target, source in self._pairs:
+                target[...] = source
 
 
 def joined(image: NDArray[np.uint32], gestures: NDArray[np.uint16]) -> Image:
     """The pictures in one array; see Channels."""
     return Channels(image, gestures).values
+
+
+def _in_pairs(image: Image) -> NDArray[np.uint16]:
+    """The same memory, two channels in one number."""
+    return image.view(np.uint16)
 
 
 def _parts(image: NDArray[np.uint32], gestures: NDArray[np.uint16]) -> list[Image]:

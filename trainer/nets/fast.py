@@ -8,6 +8,9 @@ from torch import Tensor, nn
 from trainer.nets.base import ActorCritic, NetSpec
 from trainer.nets.dialogue import DialogueEncoder
 
+LARGEST_TABLE = 1 << 16
+"""Up to so many kinds of cells there can be, a table finds those that there are; beyond, sorting is faster."""
+
 
 class Cells:
     """Images as the kinds of their cells: there are far fewer kinds than cells.
@@ -22,6 +25,10 @@ class Cells:
         code = cells[..., 0].to(torch.int64)
         for channel, size in enumerate(sizes[1:], start=1):
             code = code * size + cells[..., channel]
+        if _product(sizes) > LARGEST_TABLE:
+            codes, self.kind_of = torch.unique(code, return_inverse=True)
+            self.kinds = _unravel(codes, sizes)
+            return
         present = torch.zeros(_product(sizes), dtype=torch.bool, device=images.device)
         present[code.flatten()] = True
         self.kinds = _unravel(present.nonzero().squeeze(1), sizes)

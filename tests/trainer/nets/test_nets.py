@@ -90,6 +90,15 @@ def test_kinds_of_cells_are_told_apart_by_every_channel() -> None:
     assert len(set(view.kind_of[:, 2 * 7 + 3].tolist())) == 5
 
 
+def test_kinds_are_the_same_whether_looked_up_or_sorted(monkeypatch: pytest.MonkeyPatch) -> None:
+    images, sizes = random_images(4), tuple(high + 1 for high in SPEC.image_high)
+    looked_up = Cells(images, sizes)
+    monkeypatch.setattr("trainer.nets.fast.LARGEST_TABLE", 0)
+    sorted_ = Cells(images, sizes)
+    assert torch.equal(looked_up.kinds, sorted_.kinds)
+    assert torch.equal(looked_up.kind_of, sorted_.kind_of)
+
+
 @pytest.mark.parametrize("name", ["fast", "paper"])
 def test_shared_frames_have_the_features_of_separate_ones(name: str) -> None:
     net = build_net(name, SPEC, 0).double()
