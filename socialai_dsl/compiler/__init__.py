@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
@@ -27,7 +26,7 @@ from socialai_dsl.compiler.world_rules import world_rules
 from socialai_dsl.program import Flag, Header, Program
 from socialai_dsl.semantics.terms import Checked
 
-__all__ = ["compile_loaded", "compile_scenario", "verify"]
+__all__ = ["compile_scenario", "verify"]
 
 
 def compile_scenario(checked: Checked) -> Program:
@@ -71,17 +70,3 @@ def compile_scenario(checked: Checked) -> Program:
     verify(program)
     assert program.words.dtype == np.int32, "internal: a program is a vector of int32"
     return program
-
-
-class Loaded(Protocol):
-    """What `load` returns, as far as the compiler reads it."""
-
-    @property
-    def checked(self) -> Checked:
-        """The resolved scenario."""
-        ...
-
-
-def compile_loaded(scenario: Loaded) -> Program:
-    """The program of a scenario that `load` returned."""
-    return compile_scenario(scenario.checked)

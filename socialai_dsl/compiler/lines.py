@@ -9,7 +9,7 @@ from itertools import product
 from math import prod
 
 from socialai_dsl.compiler.assembler import Label, constant
-from socialai_dsl.compiler.classes import OTHER, Classes, normal, parts, texts_of_pairs
+from socialai_dsl.compiler.classes import Classes, normal, parts, texts_of_pairs
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.registers import Registers, said_path
 from socialai_dsl.program import Op
@@ -227,13 +227,6 @@ class Lines:
         longest = sum(max(len(self.tokens[line]) for line in self.speakers[s]) for s in heard)
         bound = max(self.checked.horizon * longest, max((len(t) for t in self.tokens), default=1))
         return max(8, min(MAX_TOKENS, -(-bound // 8) * 8))
-
-    @property
-    def hearable_by_npcs(self) -> int:
-        """How many cast members other than the agent say something that a rule waits for."""
-        return sum(
-            any(self.classes[line] > OTHER for line in lines) for s, lines in self.speakers.items() if s != 0
-        )
 
 
 def note_what_is_said(checked: Checked, lines: Lines, registers: Registers) -> None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import product
 
 from socialai_dsl.program import CODES_OF_TYPES, pack_cell
-from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.terms import ObjectType, Region, RoomPlan, Term
+from socialai_dsl.semantics.geometry import interior_cells
+from socialai_dsl.semantics.terms import ObjectType, RoomPlan
 
 EMPTY = pack_cell(CODES_OF_TYPES["empty"])
 GREY = 5
@@ -37,7 +36,7 @@ def _template(room: RoomPlan, width: int, height: int) -> list[int]:
             solid[y] &= ~(1 << x)
             floor[y] |= 1 << x
     for kind, region, _span in room.build:
-        for x, y in _cells(region, width, height):
+        for x, y in interior_cells(region, (width, height)):
             _build(kind, x, y, cells, solid, floor)
     return [*(cell for row in cells for cell in row), WALL, *solid, *floor]
 
@@ -51,47 +50,3 @@ def _build(
     solid[y] &= ~(1 << x)
     if kind.initial not in kind.walkable:
         solid[y] |= 1 << x
-
-
-def _cells(region: Region, width: int, height: int) -> list[tuple[int, int]]:
-    """Interior cells of a region that reads nothing but width and height."""
-    args = [_number(arg, width, height) for arg in region.args]
-    inside: dict[str, Callable[[int, int], bool]] = {
-        "anywhere": lambda x, y: True,
-        "left_half": lambda x, y: x < width // 2,
-        "right_half": lambda x, y: x > width // 2,
-        "top_half": lambda x, y: y < height // 2,
-        "bottom_half": lambda x, y: y > height // 2,
-        "column": lambda x, y: x == args[0],
-        "row": lambda x, y: y == args[0],
-        "rect": lambda x, y: args[0] <= x <= args[2] and args[1] <= y <= args[3],
-    }
-    holds = inside[region.name]
-    return [(x, y) for y in range(1, height - 1) for x in range(1, width - 1) if holds(x, y)]
-
-
-def _number(term: Term, width: int, height: int) -> int:
-    match term:
-        case terms.Const():
-            return term.value
-        case terms.World(name="width"):
-            return width
-        case terms.World(name="height"):
-            return height
-        case terms.Operation():
-            args = [_number(arg, width, height) for arg in term.args]
-            return _OPERATIONS[term.op](*args)
-    raise AssertionError(f"internal: {term} decides what is built")
-
-
-_OPERATIONS: dict[str, Callable[..., int]] = {
-    "+": lambda a, b: a + b,
-    "-": lambda a, b: a - b,
-    "*": lambda a, b: a * b,
-    "//": lambda a, b: a // b if b else 0,
-    "%": lambda a, b: a % b if b else 0,
-    "min": min,
-    "max": max,
-    "abs": abs,
-    "neg": lambda a: -a,
-}

@@ -71,11 +71,12 @@ def one_of(term: Term, values: Sequence[Const]) -> Term:
 def arithmetic(op: Any, *args: Term) -> Term:
     """An operation on numbers with the range of its result; known values are computed."""
     if all(isinstance(arg, Const) for arg in args):
-        return number(_compute(op, *(arg.value for arg in args if isinstance(arg, Const))))
+        return number(compute(op, *(arg.value for arg in args if isinstance(arg, Const))))
     return Operation(_range(op, *(arg.type for arg in args)), op, args)
 
 
-def _compute(op: str, *values: int) -> int:
+def compute(op: str, *values: int) -> int:
+    """The result of an operation on numbers that are known."""
     a, b = values[0], values[-1]
     match op:
         case "+":
@@ -114,7 +115,7 @@ def _range(op: str, *types: Type) -> Type:
     elif op == "neg":
         results = [-a.low, -a.high]
     else:
-        results = [_compute(op, x, y) for x in (a.low, a.high) for y in (b.low, b.high)]
+        results = [compute(op, x, y) for x in (a.low, a.high) for y in (b.low, b.high)]
     return integer(min(results), max(results))
 
 

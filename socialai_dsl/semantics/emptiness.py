@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Final
@@ -10,18 +10,12 @@ from typing import Final
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.findings import Findings
+from socialai_dsl.semantics.geometry import Cell, Size, UnknownError, interior_cells, value
 from socialai_dsl.semantics.terms import Checked, Const, Placing, Region, Term
-
-Cell = tuple[int, int]
-Size = tuple[int, int]
 
 _AROUND: Final = ((0, -1), (0, 1), (-1, 0), (1, 0))
 _TAKES_AWAY: Final = {"at": 1, "in_front_of": 1, "next_to": 4}
 """How many cells at most `not here.TEST(x)` excludes for each x."""
-
-
-class _UnknownError(Exception):
-    """What decides this is only known in a drawn room."""
 
 
 def check_placements(checked: Checked, findings: Findings) -> None:
@@ -89,7 +83,7 @@ class _Room:
         try:
             cells, least = self._region_cells(placing)
             kept, excluded = self._conditions(placing.where, cells)
-        except _UnknownError:
+        except UnknownError:
             return 1, 1
         if cells is not None:
             least = len(kept)
@@ -122,9 +116,7 @@ class _Room:
 
     def _inside(self, region: Region) -> set[Cell]:
         """Cells inside the walls that a region covers which only the size decides."""
-        args = [self._number(arg) for arg in region.args]
-        cells = product(range(1, self.size[0] - 1), range(1, self.size[1] - 1))
-        return {cell for cell in cells if _lies_in(region.name, args, cell, self.size)}
+        return set(interior_cells(region, self.size))
 
     def _built(self) -> set[Cell]:
         return {cell for _, region, _ in self.checked.room.build for cell in self._inside(region)}
@@ -159,17 +151,17 @@ class _Room:
         floor = self.floor()
         target = region.args[0]
         if not isinstance(target, Const):
-            raise _UnknownError
+            raise UnknownError
         own = next((p for p in self.placings if p.entity == target.value), None)
         if own is None or own.nowhere or own.inside is not None:
-            raise _UnknownError
+            raise UnknownError
         homes = self._homes(own)
         return min((sum((x + dx, y + dy) in floor for dx, dy in _AROUND) for x, y in homes), default=0)
 
     def _homes(self, placing: Placing) -> set[Cell]:
         """Where something can be at all."""
         if placing.at is not None:
-            return {(self._number(placing.at[0]), self._number(placing.at[1]))}
+            return {(value(placing.at[0], self.size), value(placing.at[1], self.size))}
         if any(region.name in ("next_to", "in_front_of") for region in placing.regions):
             return self.floor()
         found: set[Cell] = set()
@@ -187,7 +179,7 @@ class _Room:
             if part is None:
                 continue
             if _of_the_cell(part):
-                kept = {cell for cell in kept if self._number(part, cell)}
+                kept = {cell for cell in kept if value(part, self.size, cell)}
             else:
                 excluded += _taken_away(part)
         return kept, excluded
@@ -198,52 +190,9 @@ class _Room:
             return False
         try:
             homes = self._homes(other)
-        except _UnknownError:
+        except UnknownError:
             return True
         return bool(homes & (self.floor() if cells is None else cells))
-
-    def _number(self, term: Term, here: Cell = (0, 0)) -> int:
-        """The value of a term that reads only the size of the room and the cell."""
-        match term:
-            case Const():
-                return term.value
-            case terms.World(name="width"):
-                return self.size[0]
-            case terms.World(name="height"):
-                return self.size[1]
-            case terms.Here(name=name):
-                return here[0 if name == "x" else 1]
-            case terms.Operation(op=op, args=args):
-                return _OPERATIONS[op](*(self._number(arg, here) for arg in args))
-            case terms.Compare(op=op, left=left, right=right):
-                return _COMPARISONS[op](self._number(left, here), self._number(right, here))
-            case terms.Logic(op="and", args=args):
-                return all(self._number(arg, here) for arg in args)
-            case terms.Logic(args=args):
-                return any(self._number(arg, here) for arg in args)
-            case terms.Not(arg=arg):
-                return not self._number(arg, here)
-        raise _UnknownError
-
-
-def _lies_in(name: str, args: Sequence[int], cell: Cell, size: Size) -> bool:
-    (x, y), (width, height) = cell, size
-    match name:
-        case "left_half":
-            return x < width // 2
-        case "right_half":
-            return x > width // 2
-        case "top_half":
-            return y < height // 2
-        case "bottom_half":
-            return y > height // 2
-        case "column":
-            return x == args[0]
-        case "row":
-            return y == args[0]
-        case "rect":
-            return args[0] <= x <= args[2] and args[1] <= y <= args[3]
-    return True
 
 
 def _of_the_cell(term: Term) -> bool:
@@ -265,24 +214,4 @@ def _taken_away(term: Term) -> int:
             arg=terms.Quantified(op="any", items=items, condition=terms.Test(subject=None, name=name))
         ) if name in _TAKES_AWAY:
             return _TAKES_AWAY[name] * len(items)
-    raise _UnknownError
-
-
-_OPERATIONS: Final[dict[str, Callable[..., int]]] = {
-    "+": lambda a, b: a + b,
-    "-": lambda a, b: a - b,
-    "*": lambda a, b: a * b,
-    "//": lambda a, b: a // b if b else 0,
-    "%": lambda a, b: a % b if b else 0,
-    "min": min,
-    "max": max,
-    "abs": abs,
-    "neg": lambda a: -a,
-}
-
-_COMPARISONS: Final[dict[str, Callable[[int, int], bool]]] = {
-    "==": lambda a, b: a == b,
-    "!=": lambda a, b: a != b,
-    "<": lambda a, b: a < b,
-    "<=": lambda a, b: a <= b,
-}
+    raise UnknownError
