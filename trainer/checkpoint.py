@@ -199,7 +199,7 @@ def restore_net(
         raise CheckpointError(
             f"checkpoint was made with the network {name}; name it (--net {name}) to load that code"
         )
-    model = build_net(name, spec, meta.config.seed)
+    model = build_net(name, spec, meta.config.seed, meta.config.precision)
     weights = checkpoint.part("net")
     if vocabulary != meta.vocabulary:
         _warn_of_words(meta.vocabulary, vocabulary)

@@ -69,6 +69,11 @@ class TrainConfig(BaseModel):
     net: str = Field(
         "fast", min_length=1, description="fast, paper, paper-reference, or my.module:MyNet of the user's"
     )
+    precision: Literal["float32", "bfloat16"] = Field(
+        "float32",
+        description="number type of the network's bulk of arithmetic; bfloat16 only for networks that can (paper). "
+        "What is stored stays float32",
+    )
     curriculum: str = Field(
         "none",
         min_length=1,

@@ -56,7 +56,7 @@ class Session:
         if envs.num_envs != config.num_envs:
             raise ValueError(f"envs: got {envs.num_envs} environments, expected num_envs = {config.num_envs}")
         spec = net_spec(envs)
-        net = build_net(config.net, spec, config.seed).to(config.device)
+        net = build_net(config.net, spec, config.seed, config.precision).to(config.device)
         tutor = None
         if config.curriculum != "none":
             tutor = Tutor(build_curriculum(config.curriculum, Leaves.of(envs)), envs)

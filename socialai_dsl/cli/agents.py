@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from socialai_dsl.program_suite import Playable
     from trainer.config import TrainConfig
     from trainer.evaluate import EvalResult
+    from trainer.nets import Precision
     from trainer.policies import Policy
 
 # Test episodes played together. It is fixed, because a sampling policy draws for all of them at once.
@@ -47,6 +48,24 @@ def resolve_device(device: str) -> str:
     if device == "cuda" and not available:
         raise UsageError("--device cuda: PyTorch finds no CUDA device on this machine")
     return "cuda" if device == "cuda" or (device == "auto" and available) else "cpu"
+
+
+def resolve_precision(choice: str, net: str, device: str) -> "Precision":
+    """`auto` is the type in which the device computes this network fastest.
+
+    Raises:
+        UsageError: there is no such network.
+    """
+    from trainer.nets import best_precision
+
+    if choice == "bfloat16":
+        return "bfloat16"
+    if choice == "float32":
+        return "float32"
+    try:
+        return best_precision(net, device)
+    except ValueError as error:
+        raise UsageError(str(error)) from None
 
 
 def resolve_exploration(kind: str, scenario: str) -> tuple[Literal["none", "lang", "cell"], float]:
@@ -86,6 +105,7 @@ def train_config(settings: "Settings") -> "TrainConfig":
             net=settings.net,
             explo=settings.explo,
             explo_c=settings.explo_c,
+            precision=settings.precision,
             curriculum=settings.curriculum,
             device=settings.device,
         )

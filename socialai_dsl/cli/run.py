@@ -65,6 +65,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="who chooses the members of a suite while training: expert, progress, reverse, a .yaml file of phases, or "
         "my.module:MyCurriculum (default: none)",
     )
+    parser.add_argument(
+        "--precision",
+        choices=("auto", "float32", "bfloat16"),
+        default="auto",
+        help="numbers the convolutions of `paper` compute with (default: auto, bfloat16 where the device has it)",
+    )
     parser.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help="default: auto")
     parser.add_argument(
         "--eval-episodes", type=_positive, default=500, metavar="N", help="of the test set (default: 500)"
@@ -157,7 +163,7 @@ def _training_figures(folder: Path) -> dict[str, Any]:
 
 def _started(arguments: argparse.Namespace) -> Settings:
     """The settings of a new run."""
-    from socialai_dsl.cli.agents import resolve_device, resolve_exploration
+    from socialai_dsl.cli.agents import resolve_device, resolve_exploration, resolve_precision
 
     if arguments.scenario is None:
         raise UsageError("expected a scenario (a path or a name), or --resume RUN_DIR")
@@ -171,6 +177,7 @@ def _started(arguments: argparse.Namespace) -> Settings:
         raise UsageError(f"--curriculum: the agent {arguments.agent!r} is not trained")
     if arguments.agent == "human" and arguments.json:
         raise UsageError("--json: the agent 'human' plays on standard output")
+    device = resolve_device(arguments.device)
     explo, explo_c = resolve_exploration(arguments.explo, arguments.scenario)
     return Settings(
         scenario=arguments.scenario,
@@ -181,8 +188,9 @@ def _started(arguments: argparse.Namespace) -> Settings:
         net=arguments.net,
         explo=explo,
         explo_c=explo_c,
-        device=resolve_device(arguments.device),
+        device=device,
         eval_episodes=arguments.eval_episodes,
+        precision=resolve_precision(arguments.precision, arguments.net, device),
         curriculum=arguments.curriculum,
     )
 

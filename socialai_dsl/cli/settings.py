@@ -18,6 +18,7 @@ class Settings:
         explo: exploration bonus, `none`, `lang` or `cell`, with `auto` resolved.
         explo_c: scale of the bonus.
         device: where the network runs.
+        precision: number type of the network's bulk of arithmetic, with `auto` resolved.
         curriculum: who chooses the members of a suite while training, as the trainer names it; `none`: chance.
         eval_episodes: how many episodes of the test set are played, from the first on.
     """
@@ -32,4 +33,5 @@ class Settings:
     explo_c: float
     device: str
     eval_episodes: int
+    precision: Literal["float32", "bfloat16"] = "float32"
     curriculum: str = "none"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import torch
@@ -13,6 +13,8 @@ from torch import Tensor, nn
 
 from trainer.nets.dialogue import DialogueEncoder
 from trainer.nets.memory import Memory
+
+Precision = Literal["float32", "bfloat16"]
 
 HEADS = ("primitive", "speak", "template", "noun")
 
@@ -101,9 +103,13 @@ class ActorCritic(nn.Module, ABC):
     Attributes:
         distinct: whether equal frames may share their features; False for networks whose features depend on the
             rest of the batch.
+        reducible: whether the network can do the bulk of its arithmetic in bfloat16.
+        precision: number type of that bulk; all that is stored, and everything else, is float32.
     """
 
     distinct = True
+    reducible = False
+    precision: Precision = "float32"
 
     def __init__(
         self, spec: NetSpec, features: int, dialogue: DialogueEncoder, memory_size: int = 128

@@ -12,8 +12,16 @@ from trainer.nets.dialogue import DialogueEncoder
 _VOCABULARY_CAPACITY = 100
 
 
-def _conv(inputs: int, outputs: int) -> nn.Conv2d:
-    return nn.Conv2d(inputs, outputs, kernel_size=3, padding=1)
+class _Conv(nn.Conv2d):
+    """A 3x3 convolution that computes in the number type of its input; the weights stay as they are kept."""
+
+    def __init__(self, inputs: int, outputs: int) -> None:
+        super().__init__(inputs, outputs, kernel_size=3, padding=1)
+
+    def forward(self, images: Tensor) -> Tensor:
+        assert self.bias is not None
+        weight, bias = self.weight.to(images.dtype), self.bias.to(images.dtype)
+        return functional.conv2d(images, weight, bias, padding=1)
 
 
 def _norm(width: int, batch_norm: bool) -> nn.Module:
@@ -25,16 +33,16 @@ class _FilmBlock(nn.Module):
 
     def __init__(self, width: int, text_size: int, batch_norm: bool) -> None:
         super().__init__()
-        self.conv1, self.norm1 = _conv(width, width), _norm(width, batch_norm)
-        self.conv2, self.norm2 = _conv(width, width), _norm(width, batch_norm)
+        self.conv1, self.norm1 = _Conv(width, width), _norm(width, batch_norm)
+        self.conv2, self.norm2 = _Conv(width, width), _norm(width, batch_norm)
         self.scale = nn.Linear(text_size, width)
         self.shift = nn.Linear(text_size, width)
 
     def forward(self, images: Tensor, text: Tensor, text_index: Tensor) -> Tensor:
         hidden = self.conv2(torch.relu(self.norm1(self.conv1(images))))
-        scale = self.scale(text).index_select(0, text_index)[:, :, None, None]
-        shift = self.shift(text).index_select(0, text_index)[:, :, None, None]
-        return torch.relu(self.norm2(hidden * scale + shift)) + images
+        scale = self.scale(text).to(images.dtype).index_select(0, text_index)[:, :, None, None]
+        shift = self.shift(text).to(images.dtype).index_select(0, text_index)[:, :, None, None]
+        return torch.relu(self.norm2(torch.addcmul(shift, hidden, scale))) + images
 
 
 class PaperNet(ActorCritic):
@@ -43,20 +51,24 @@ class PaperNet(ActorCritic):
     Source: SocialAI 1.0, appendix on the baselines, with details of the released code: raw integers as input,
     gamma without "1 +", normalisation after the modulation, heads and FiLM layers with rows of length 1.
 
+    With the precision `bfloat16` the images, from the first convolution to the pooling, are of that type: they are
+    99 % of the arithmetic. Weights, their gradients, dialogue, LSTM, heads and losses stay float32.
+
     Attributes:
         batch_norm: whether to normalise over the batch as the released code does.
     """
 
     batch_norm = False
+    reducible = True
 
     def __init__(self, spec: NetSpec, width: int = 128) -> None:
         vocabulary = max(spec.vocabulary_size, _VOCABULARY_CAPACITY)
         super().__init__(spec, width, DialogueEncoder(vocabulary))
         self.image_conv = nn.Sequential(
-            _conv(spec.image_shape[2], width),
+            _Conv(spec.image_shape[2], width),
             _norm(width, self.batch_norm),
             nn.ReLU(),
-            _conv(width, width),
+            _Conv(width, width),
             _norm(width, self.batch_norm),
             nn.ReLU(),
         )
@@ -72,11 +84,12 @@ class PaperNet(ActorCritic):
 
     def perceive(self, prepared: Tensor, text: Tensor, image_index: Tensor, text_index: Tensor) -> Tensor:
         """Features (P, width) of the pairs; see `ActorCritic.perceive`."""
-        hidden = self.image_conv(prepared.to(text.dtype)).index_select(0, image_index)
+        number = torch.bfloat16 if self.precision == "bfloat16" else text.dtype
+        hidden = self.image_conv(prepared.to(number)).index_select(0, image_index)
         for block in self.blocks:
             hidden = block(hidden, text, text_index)
         pooled = functional.max_pool2d(hidden, tuple(hidden.shape[2:]))
-        return torch.relu(pooled.flatten(1))
+        return torch.relu(pooled.flatten(1)).to(text.dtype)
 
 
 class PaperReferenceNet(PaperNet):
@@ -87,3 +100,4 @@ class PaperReferenceNet(PaperNet):
 
     batch_norm = True
     distinct = False
+    reducible = False

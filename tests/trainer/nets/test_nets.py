@@ -8,7 +8,7 @@ import pytest
 import torch
 from torch.nn import functional
 
-from trainer.nets import ActorCritic, NetSpec, build_net, net_class
+from trainer.nets import ActorCritic, NetSpec, best_precision, build_net, net_class
 from trainer.nets.fast import Cells, FastNet
 from trainer.nets.paper import PaperNet
 
@@ -115,6 +115,43 @@ def test_shared_frames_have_the_features_of_separate_ones(name: str) -> None:
     )
     assert together.shape == (6, net.features)
     assert torch.allclose(together, apart, rtol=0, atol=1e-10)
+
+
+def test_bfloat16_changes_how_paper_computes_and_not_what_it_is() -> None:
+    plain, reduced = (build_net("paper", SPEC, 0, precision) for precision in ("float32", "bfloat16"))
+    images, text = random_images(8), torch.randn(3, 128)
+    index = torch.arange(8)
+    results = []
+    for net in (plain, reduced):
+        features = net.perceive(net.prepare(images), text, index, index % 3)
+        features.square().sum().backward()
+        results.append((features.detach(), [parameter.grad for parameter in net.parameters()]))
+    (exact, exact_grads), (rounded, rounded_grads) = results
+    assert rounded.dtype == torch.float32
+    assert not torch.equal(exact, rounded)  # or it would not have been reduced
+    # bfloat16 keeps 8 bits, and five convolutions in a row add their errors.
+    assert (exact - rounded).norm() < 0.03 * exact.norm()
+    assert all(value.dtype == torch.float32 for value in reduced.state_dict().values())
+    for one, other in zip(exact_grads, rounded_grads, strict=True):
+        if one is not None:
+            assert other is not None
+            assert other.dtype == torch.float32
+            assert (one - other).norm() < 0.1 * one.norm()
+
+
+def test_bfloat16_is_for_networks_that_can() -> None:
+    assert best_precision("fast", "cpu") == "float32"
+    assert best_precision("paper-reference", "cpu") == "float32"
+    with pytest.raises(ValueError, match="fast, which computes in float32 only"):
+        build_net("fast", SPEC, 0, "bfloat16")
+
+
+@pytest.mark.parametrize(("native", "expected"), [(True, "bfloat16"), (False, "float32")])
+def test_bfloat16_is_chosen_where_the_cpu_has_it(
+    native: bool, expected: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: {"avx512_bf16": native})
+    assert best_precision("paper", "cpu") == expected
 
 
 def test_equal_seeds_build_equal_networks_and_leave_torch_s_generator_alone() -> None:
