@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, PercentFormatter
 from numpy.typing import NDArray
 
-_BLUE: Final = "#2f62b8"
-_RED: Final = "#c23b33"
+BLUE: Final = "#2f62b8"
+RED: Final = "#c23b33"
 _GREYS: Final = ("#8d939d", "#b3b7be", "#d3d6da", "#e6e7ea")
 _SUCCESSES: Final = ("#3a8f56", "#6bb583", "#a0d2b0")
 _FAILURES: Final = ("#c8543f", "#dd8a62", "#ebb48f", "#f4d3b8")
@@ -64,7 +64,9 @@ def draw_learning_curve(curve: Curve, title: str, path: Path) -> None:
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     figure.suptitle(title, fontsize=11, x=0.01, ha="left", weight="bold")
     _draw_success(above, curve)
-    _draw_outcomes(below, curve)
+    shares = {name: smooth(values, _window(curve)) for name, values in curve.outcomes.items()}
+    draw_outcomes(below, curve.frames, shares, curve.successes, _BESIDE)
+    below.set_ylabel("episodes ended by", fontsize=9)
     for axes in (above, below):
         axes.set_ylim(0, 1)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
@@ -93,11 +95,11 @@ def _window(curve: Curve) -> int:
 
 
 def _draw_success(axes: Axes, curve: Curve) -> None:
-    axes.plot(curve.frames, curve.success, color=_BLUE, alpha=0.25, linewidth=0.8)
+    axes.plot(curve.frames, curve.success, color=BLUE, alpha=0.25, linewidth=0.8)
     axes.plot(
         curve.frames,
         smooth(curve.success, _window(curve)),
-        color=_BLUE,
+        color=BLUE,
         linewidth=1.8,
         label="training episodes",
     )
@@ -108,7 +110,7 @@ def _draw_success(axes: Axes, curve: Curve) -> None:
             [rate],
             [2 * error],
             fmt="o",
-            color=_RED,
+            color=RED,
             markersize=6,
             capsize=4,
             clip_on=False,
@@ -121,24 +123,38 @@ def _draw_success(axes: Axes, curve: Curve) -> None:
     axes.legend(loc="upper left", fontsize=8, frameon=False)
 
 
-def _draw_outcomes(axes: Axes, curve: Curve) -> None:
-    """Stack the ways episodes ended, successes at the bottom, the rarest of the others together."""
-    shares = {name: smooth(values, _window(curve)) for name, values in curve.outcomes.items()}
+_BESIDE: Final = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "reverse": True}
+
+
+def draw_outcomes(
+    axes: Axes,
+    frames: Sequence[float] | NDArray[np.float64],
+    shares: Mapping[str, NDArray[np.float64]],
+    successes: frozenset[str],
+    legend: Mapping[str, Any],
+) -> None:
+    """Stack the ways episodes ended, successes at the bottom.
+
+    Args:
+        axes: where to draw.
+        frames: (B,), frames seen so far.
+        shares: outcome -> (B,), its share of the episodes.
+        successes: which outcomes are successes.
+        legend: where it stands, as options of matplotlib's.
+    """
     shares = {name: values for name, values in shares.items() if np.nanmax(values, initial=0.0) > 0}
     if not shares:
         return
-    ranks = {name: _rank(name, curve.successes) for name in shares}
+    ranks = {name: _rank(name, successes) for name in shares}
     names = sorted(shares, key=lambda name: (ranks[name], -float(np.nanmean(shares[name]))))
-    colours = _colours([ranks[name] for name in names])
     axes.stackplot(
-        curve.frames,
+        frames,
         [np.nan_to_num(shares[name]) for name in names],
-        colors=colours,
+        colors=_colours([ranks[name] for name in names]),
         labels=names,
         linewidth=0,
     )
-    axes.set_ylabel("episodes ended by", fontsize=9)
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, frameon=False, reverse=True)
+    axes.legend(fontsize=7, frameon=False, **legend)
 
 
 def _rank(name: str, successes: frozenset[str]) -> int:

@@ -10,6 +10,7 @@ from typing import Final
 from socialai_dsl.cli import (
     bench,
     check,
+    curves,
     evaluate,
     fidelity,
     new,
@@ -37,6 +38,7 @@ _COMMANDS: Final = {
     "fidelity": fidelity,
     "oracles": oracles,
     "check": check,
+    "curves": curves,
     "sheets": sheets,
 }
 

@@ -1,0 +1,97 @@
+"""This module is `socialai curves`: the learning curves of several runs in one picture and one table."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.run_folder import RESULT, SETTINGS, read_json, scenario_folder_name
+
+if TYPE_CHECKING:
+    from socialai_dsl.cli.seeds_figure import Condition
+
+SUMMARY: Final = "draw the learning curves of several runs, seeds of one condition together"
+
+_SHOWN: Final = ("net", "explo", "curriculum")
+"""Settings that a title names where they are not the default."""
+
+_ROWS: Final = 8
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this command."""
+    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN_DIR", help="folders of finished runs")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("curves.png"),
+        metavar="FILE",
+        help="picture to write (default: curves.png)",
+    )
+
+
+def execute(arguments: argparse.Namespace) -> Exit:
+    """Group the runs by everything but their seed, draw them, and print a table in Markdown."""
+    from socialai_dsl.cli.agents import require_trainer
+
+    require_trainer()
+    from socialai_dsl.cli.seeds_figure import draw_conditions
+
+    groups: dict[str, list[Path]] = {}
+    for run in arguments.runs:
+        groups.setdefault(_title(_read(run, SETTINGS)), []).append(run)
+    conditions = [_condition(title, runs) for title, runs in groups.items()]
+    draw_conditions(conditions, arguments.out)
+    for condition in conditions:
+        print(_table(condition))
+    print(f"written to {arguments.out}")
+    return Exit.GOOD
+
+
+def _read(run: Path, name: str) -> dict[str, Any]:
+    if not (run / name).is_file():
+        raise UsageError(f"{run}: expected the folder of a finished run, it has no {name}")
+    return read_json(run / name)
+
+
+def _title(settings: dict[str, Any]) -> str:
+    """What was run, without the seed."""
+    named = [f"{key} {settings[key]}" for key in _SHOWN if settings.get(key) not in (None, "none", "fast")]
+    return ", ".join([scenario_folder_name(str(settings["scenario"])), *named])
+
+
+def _condition(title: str, runs: list[Path]) -> "Condition":
+    import socialai_dsl
+    from socialai_dsl.cli.seeds import read_seeds
+    from socialai_dsl.cli.seeds_figure import Condition
+
+    scenario = str(_read(runs[0], SETTINGS)["scenario"])
+    program = socialai_dsl.compile(socialai_dsl.load(scenario))
+    results = [_read(run, RESULT) for run in runs]
+    try:
+        seeds = read_seeds([run / "metrics.jsonl" for run in runs])
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    successes = frozenset(outcome.name for outcome in program.outcome_table if outcome.success)
+    tests = [(float(result["frames"]), float(result["eval"]["success_rate"])) for result in results]
+    return Condition(title, seeds, successes, tests)
+
+
+def _table(condition: "Condition") -> str:
+    """Success of each seed, and the mean rates of outcomes and rules, at a few moments, as Markdown."""
+    import numpy as np
+
+    seeds = condition.seeds
+    step = max(1, len(seeds.frames) // _ROWS)
+    moments = range(step - 1, len(seeds.frames), step)
+    rates = {name: rate for name, rate in seeds.rates.items() if np.nanmax(rate, initial=0.0) >= 0.005}
+    head = ["frames", *(f"run {number + 1}" for number in range(len(seeds.success)))]
+    head += [name.partition("/")[2] for name in rates]
+    lines = [f"\n{condition.title}\n", f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    for moment in moments:
+        cells = [f"{seeds.frames[moment] / 1e6:.2f} M"]
+        cells += [f"{value:.2f}" for value in seeds.success[:, moment]]
+        cells += [f"{np.mean(rate[:, moment]):.2f}" for rate in rates.values()]
+        lines.append(f"| {' | '.join(cells)} |")
+    test = ", ".join(f"{rate:.3f}" for _, rate in condition.tests)
+    return "\n".join([*lines, "", f"test set: {test}"])

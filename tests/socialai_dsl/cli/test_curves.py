@@ -1,0 +1,89 @@
+"""The learning curves of several runs in one picture."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from socialai_dsl.cli.main import main
+from socialai_dsl.cli.seeds import read_seeds
+
+
+def row(update: int, episodes: int, success: float | None, asked: float | None = None) -> str:
+    rates = {"outcomes": {"success@9": success, "timeout": None if success is None else 1 - success}}
+    return json.dumps(
+        {
+            "update": update,
+            "frames": 100 * update,
+            "episodes": episodes,
+            "success": success,
+            **rates,
+            "rules": {"ask": asked},
+        }
+    )
+
+
+def write_metrics(path: Path, rows: list[str]) -> Path:
+    path.write_text("".join(line + "\n" for line in rows))
+    return path
+
+
+def test_a_bin_counts_episodes_and_does_not_average_rates(tmp_path: Path) -> None:
+    rows = [row(1, 10, 0.5, 2.0), row(2, 30, 0.1, 0.0), row(3, 0, None), row(4, 4, 1.0, 1.0)]
+    seeds = read_seeds([write_metrics(tmp_path / "m.jsonl", rows)], bins=2)
+    assert seeds.frames.tolist() == [200, 400]
+    assert seeds.success.tolist() == [[(5 + 3) / 40, 1.0]]
+    assert seeds.part("rules")["ask"].tolist() == [[20 / 40, 1.0]]
+    assert list(seeds.part("outcomes")) == ["success@9", "timeout"]
+
+
+def test_a_bin_without_episodes_is_unknown(tmp_path: Path) -> None:
+    seeds = read_seeds([write_metrics(tmp_path / "m.jsonl", [row(1, 0, None), row(2, 2, 0.5)])])
+    assert np.isnan(seeds.success[0, 0])
+    assert seeds.success[0, 1] == 0.5
+
+
+def test_the_shortest_run_says_how_far_all_are_shown(tmp_path: Path) -> None:
+    long = write_metrics(tmp_path / "long.jsonl", [row(n, 1, 1.0) for n in range(1, 9)])
+    short = write_metrics(tmp_path / "short.jsonl", [row(n, 1, 0.0) for n in range(1, 5)])
+    seeds = read_seeds([long, short])
+    assert seeds.frames[-1] == 400
+    assert seeds.success[:, -1].tolist() == [1.0, 0.0]
+
+
+def make_run(folder: Path, scenario: str, seed: int, rate: float, explo: str = "none") -> Path:
+    run = folder / f"{scenario}-{explo}-{seed}"
+    run.mkdir()
+    settings = {"scenario": scenario, "seed": seed, "net": "fast", "explo": explo, "curriculum": "none"}
+    (run / "config.json").write_text(json.dumps(settings))
+    (run / "result.json").write_text(json.dumps({"frames": 300, "eval": {"success_rate": rate}}))
+    write_metrics(run / "metrics.jsonl", [row(n, 10, rate, 1.0) for n in range(1, 4)])
+    return run
+
+
+def test_seeds_of_one_condition_share_a_column_and_a_table(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runs = [make_run(tmp_path, "talkitout", seed, 0.2 + seed / 10) for seed in (0, 1)]
+    runs.append(make_run(tmp_path, "talkitout", 0, 0.9, explo="lang"))
+    picture = tmp_path / "curves.png"
+    assert main(["curves", *map(str, runs), "--out", str(picture)]) == 0
+    printed = capsys.readouterr().out
+    assert "talkitout\n\n| frames | run 1 | run 2 | success@9 | timeout | ask |" in printed
+    assert "| 0.00 M | 0.20 | 0.30 | 0.25 | 0.75 | 1.00 |" in printed
+    assert "test set: 0.200, 0.300" in printed
+    assert "talkitout, explo lang\n" in printed
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_is_no_finished_run_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["curves", str(tmp_path)]) == 2
+    assert "expected the folder of a finished run, it has no config.json" in capsys.readouterr().err
+
+
+def test_an_empty_log_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = make_run(tmp_path, "talkitout", 0, 0.5)
+    (run / "metrics.jsonl").write_text("")
+    assert main(["curves", str(run), "--out", str(tmp_path / "c.png")]) == 2
+    assert "expected at least one update, got an empty file" in capsys.readouterr().err
