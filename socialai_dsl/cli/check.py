@@ -38,6 +38,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help=f"how many states of a room are searched before it is undecided (default: {_STATES})",
     )
+    parser.add_argument(
+        "--deep",
+        action="store_true",
+        help="try all there is: the properties, whether everything can happen, how long a success takes, whether the "
+        "script succeeds, and what an agent gets that neither sees nor hears the NPCs",
+    )
     parser.add_argument("--format", choices=("text", "json"), default="text", help="default: text")
     parser.add_argument(
         "--strict", action="store_true", help="what is undecided, and warnings, count as failures too"
@@ -57,7 +63,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     reports = []
     for name in arguments.scenarios:
         for scenario, called in _scenarios(name):
-            reports.append(check_scenario(scenario, called, effort))
+            reports.append(check_scenario(scenario, called, effort, arguments.deep))
             if arguments.format == "text":
                 print("\n".join(reports[-1].lines()), flush=True)
     if arguments.format == "json":
@@ -66,23 +72,27 @@ def execute(arguments: argparse.Namespace) -> Exit:
     return Exit.FINDINGS if failed else Exit.GOOD
 
 
-def check_scenario(loaded: "LoadedScenario", called: str, effort: "Effort") -> ScenarioReport:
+def check_scenario(
+    loaded: "LoadedScenario", called: str, effort: "Effort", deep: bool = False
+) -> ScenarioReport:
     """Try what a scenario claims; if it claims nothing, whether everything in it can happen.
 
     Args:
         loaded: the scenario.
         called: its name, to which `+oracle` can be added.
         effort: how much to try.
+        deep: try both, and what success takes.
     """
     from socialai_dsl.envs.coverage import coverage
+    from socialai_dsl.envs.depth import depth
     from socialai_dsl.envs.properties import check_property
 
     scripted = _scripted(loaded, called)
     plans = loaded.checked.properties
-    if not plans:
-        return ScenarioReport(called, effort.rooms, effort.seed, (), coverage(loaded, effort, scripted))
     tried = tuple((plan, check_property(loaded, plan, effort, scripted)) for plan in plans)
-    return ScenarioReport(called, effort.rooms, effort.seed, tried, None)
+    happening = coverage(loaded, effort, scripted) if deep or not plans else None
+    success = depth(loaded, effort, scripted) if deep else None
+    return ScenarioReport(called, effort.rooms, effort.seed, tried, happening, success)
 
 
 def _scenarios(name: str) -> "list[tuple[LoadedScenario, str]]":

@@ -1,11 +1,14 @@
 """This module puts what `socialai check` found into lines for people and objects for tools."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from statistics import median_high
+from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
+    from socialai_dsl.envs.alone import Alone
     from socialai_dsl.envs.coverage import Coverage
+    from socialai_dsl.envs.depth import Depth
     from socialai_dsl.envs.properties import Report
     from socialai_dsl.semantics.terms import PropertyPlan
     from socialai_dsl.source import Span
@@ -17,7 +20,8 @@ class ScenarioReport:
 
     Attributes:
         scenario: its name. rooms, seed: what was tried: rooms 0 to rooms - 1 of the seed.
-        tried: its properties with what was found. coverage: if it has none, what of it never happens.
+        tried: its properties with what was found. coverage: what of it never happens, if that was tried.
+        depth: what success takes, if that was tried.
     """
 
     scenario: str
@@ -25,12 +29,14 @@ class ScenarioReport:
     seed: int
     tried: "tuple[tuple[PropertyPlan, Report], ...]"
     coverage: "Coverage | None"
+    depth: "Depth | None" = None
 
     def fails(self, strict: bool) -> bool:
-        """Whether a property fails; with `strict` also whether something is undecided or never happens."""
+        """Whether a property fails or no room can be solved; with `strict` also what is undecided or never happens."""
         verdicts = {report.verdict.value for _, report in self.tried}
         missing = self.coverage is not None and bool(self.coverage.missing)
-        return "fails" in verdicts or (strict and ("undecided" in verdicts or missing))
+        hopeless = self.depth is not None and not (self.depth.steps or self.depth.undecided)
+        return "fails" in verdicts or hopeless or (strict and ("undecided" in verdicts or missing))
 
     def lines(self) -> Iterator[str]:
         """The report for people."""
@@ -42,6 +48,8 @@ class ScenarioReport:
                 yield f"    at {_place(plan.span)}" + (f"; rooms {numbers}" if numbers else "")
         if self.coverage is not None:
             yield from _coverage(self.coverage)
+        if self.depth is not None:
+            yield from _depth(self.depth, self.rooms)
 
     def as_object(self) -> dict[str, Any]:
         """The report for JSON."""
@@ -66,6 +74,7 @@ class ScenarioReport:
             "never_happens": [
                 {"kind": part.kind, "name": part.name, **_place_as_object(part.span)} for part in missing
             ],
+            "success": None if self.depth is None else asdict(self.depth),
         }
 
 
@@ -75,6 +84,44 @@ def _coverage(found: "Coverage") -> Iterator[str]:
     why = "in none of these rooms" if found.proven else "in no room, as far as they were searched"
     for part in found.missing:
         yield f"  {_place(part.span)}: warning: the {part.kind} `{part.name}` happens {why}"
+
+
+def _depth(found: "Depth", rooms: int) -> Iterator[str]:
+    solvable = len(found.steps)
+    line = f"  a success can be reached in {solvable} of {rooms} rooms"
+    if found.steps:
+        middle, longest = median_high(found.steps), found.steps[-1]
+        line += f", in {middle} steps in the median and {longest} at most"
+    yield line
+    for said, numbers in (("no way was found", found.unsolvable), ("undecided", found.undecided)):
+        if numbers:
+            yield f"    {said} in {_listed(numbers)}"
+    if found.unsolved is not None:
+        yield f"  the script solves {rooms - len(found.unsolved)} of {rooms} rooms"
+        if found.unsolved:
+            yield f"    not {_listed(found.unsolved)}"
+    if found.alone is not None:
+        yield from _alone(found.alone)
+
+
+def _alone(found: "Alone") -> Iterator[str]:
+    yield (
+        f"  without seeing or hearing an NPC an agent can get at least {found.success:.1%} "
+        f"± {2 * found.error:.1%} (two standard errors)"
+    )
+    if found.undecided:
+        yield f"    {found.undecided} of {found.rooms} rooms were not decided and count as never solved"
+
+
+_LISTED: Final = 8
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    """The first of a list of rooms."""
+    more = len(numbers) - _LISTED
+    shown = ", ".join(map(str, numbers[:_LISTED]))
+    word = "room" if len(numbers) == 1 else "rooms"
+    return f"{word} {shown}" + (f" and {more} more" if more > 0 else "")
 
 
 def _place(span: "Span") -> str:

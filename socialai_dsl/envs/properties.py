@@ -98,7 +98,7 @@ def _reaching(loaded: LoadedScenario, plan: PropertyPlan, effort: Effort) -> Rep
     program, goals = compile_loaded(loaded), plan.goals
     if plan.condition is not None:
         program, goals = _with_goal(loaded, plan), (_HOLDS,)
-    findings = list(_search(program, goals, effort))
+    findings = list(search_rooms_of(program, goals, effort))
     reached = [k for k, finding in enumerate(findings) if finding.verdict is Searched.SOLVABLE]
     undecided = sum(finding.verdict is Searched.UNDECIDED for finding in findings)
     exact = (
@@ -122,7 +122,7 @@ def _reaching(loaded: LoadedScenario, plan: PropertyPlan, effort: Effort) -> Rep
 
 
 def _within(loaded: LoadedScenario, plan: PropertyPlan, effort: Effort) -> Report:
-    findings = list(_search(compile_loaded(loaded), None, effort))
+    findings = list(search_rooms_of(compile_loaded(loaded), None, effort))
     lengths = [finding.steps for finding in findings]
     held = sum(length is not None and length <= plan.steps for length in lengths)
     undecided = sum(finding.verdict is Searched.UNDECIDED for finding in findings)
@@ -150,7 +150,8 @@ def _with_goal(loaded: LoadedScenario, plan: PropertyPlan) -> Program:
     return compile_loaded(replace(loaded, checked=copy))
 
 
-def _search(program: Program, goals: Sequence[str] | None, effort: Effort) -> Iterator[Finding]:
+def search_rooms_of(program: Program, goals: Sequence[str] | None, effort: Effort) -> Iterator[Finding]:
+    """Search each room of the effort for one of the goals, names of outcomes; None: for a success."""
     table = Table([program], effort.rooms, 1)
     table.reset(effort.seed, None)
     search, state = Search(program, goals), table.state
@@ -178,7 +179,15 @@ def _oracle(plan: PropertyPlan, effort: Effort, scripted: LoadedScenario | None)
     if scripted is None:
         said = "nobody plays: the agent has no frame, and there is no variant `oracle`"
         return Report(Verdict.FAILS, 0, 0, 0, (), said)
-    program = compile_loaded(scripted)
+    won = solved_by_script(compile_loaded(scripted), effort)
+    against = np.flatnonzero(~won).tolist()
+    said = f"its own script solves {won.sum()} of {effort.rooms} rooms"
+    verdict = Verdict.HOLDS if won.mean() >= plan.share - 1e-9 else Verdict.FAILS
+    return Report(verdict, effort.rooms, int(won.sum()), 0, tuple(against[:_SHOWN]), said)
+
+
+def solved_by_script(program: Program, effort: Effort) -> NDArray[np.bool_]:
+    """In which rooms of the effort the agent's own frame succeeds, (rooms,)."""
     table = Table([program], effort.rooms, 1)
     table.reset(effort.seed, None)
     registers = table.state.registers
@@ -186,11 +195,8 @@ def _oracle(plan: PropertyPlan, effort: Effort, scripted: LoadedScenario | None)
         table.batch.ports.actions[:] = table.scripted_actions()
         table.batch.step(Task.STEP_ONLY)
     wins = np.array([outcome.success for outcome in program.outcome_table])
-    won = wins[registers[:, Register.OUTCOME]]
-    against = np.flatnonzero(~won).tolist()
-    said = f"its own script solves {won.sum()} of {effort.rooms} rooms"
-    verdict = Verdict.HOLDS if won.mean() >= plan.share - 1e-9 else Verdict.FAILS
-    return Report(verdict, effort.rooms, int(won.sum()), 0, tuple(against[:_SHOWN]), said)
+    won: NDArray[np.bool_] = wins[registers[:, Register.OUTCOME]]
+    return won
 
 
 def _only_through(

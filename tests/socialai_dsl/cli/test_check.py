@@ -126,3 +126,30 @@ def test_the_example_of_the_page_holds(tmp_path: Path, capsys: Capture) -> None:
     file.write_text(head + example.replace("cast:\n", "cast:\n  agent: {}\n"))
     assert main(["check", str(file), "--rooms", "3", "--strict"]) == 0, capsys.readouterr().out
     assert capsys.readouterr().out.count("  holds: ") == 6
+
+
+def test_deep_tries_everything(gate: Path, capsys: Capture) -> None:
+    name = claiming(gate, "{reachable: out, share: 1}")
+    assert main(["check", name, "--rooms", "3", "--deep"]) == 0
+    assert capsys.readouterr().out.splitlines()[1:] == [
+        "  holds: `reachable: out`: it can come about in 3 of 3 rooms",
+        "  4 of 6 states, steps, rules and outcomes happen in some room",
+        f"  {name}:11:55: warning: the rule `guard.watch.awake.then[1]` happens in none of these rooms",
+        f"  {name}:12:7: warning: the state `guard.watch.asleep` happens in none of these rooms",
+        "  a success can be reached in 3 of 3 rooms, in 3 steps in the median and 3 at most",
+        "  without seeing or hearing an NPC an agent can get at least 100.0% ± 0.0% (two standard errors)",
+    ]
+
+
+def test_deep_as_json(gate: Path, capsys: Capture) -> None:
+    assert main(["check", str(gate), "--rooms", "3", "--deep", "--format", "json"]) == 0
+    (report,) = json.loads(capsys.readouterr().out)
+    assert report["success"]["steps"] == [3, 3, 3]
+    assert report["success"]["unsolved"] is None
+    assert report["success"]["alone"] == {"success": 1.0, "error": 0.0, "rooms": 3, "undecided": 0}
+
+
+def test_deep_fails_where_nothing_can_succeed(gate: Path, capsys: Capture) -> None:
+    gate.write_text(GATE.replace("success: agent.at(gate)", "success: agent.at(gate) and t > 10"))
+    assert main(["check", str(gate), "--rooms", "2", "--deep"]) == 1
+    assert "no way was found in rooms 0, 1" in capsys.readouterr().out

@@ -1,0 +1,221 @@
+"""What an agent can get without the others: a lower bound, by twins that look alike to whoever sees no NPC.
+
+A scenario that is meant to need social skill is solved only by luck where the NPCs are neither seen nor heard. How
+good that luck is can be bounded from below by a policy that is found by search:
+
+1. A room is drawn. Its *twins* are rooms that are drawn again in everything that its looks leave open: the agent sees
+   the same walls, objects and colours in all of them, and stands in the same place. What is visible is the whole room,
+   not only what is in view, so the policy knows no less than any explorer.
+2. For some of the twins a shortest success is searched, the way an agent would go that knew all about this twin. Each
+   is a sequence of actions; the one that solves most of these twins is the policy for all rooms that look like this.
+3. It is tried on other twins, which had no part in choosing it. So its success is an unbiased estimate of what this
+   policy gets, and what the best policy gets is not less.
+
+Which draws the looks leave open is found out by trying: each site of a draw (`draws.py`) is drawn again by itself. If
+that ever changes the state of the room and not its looks, the draw is hidden. If it always shows, it is a part of the
+looks and stays as it is. Draws during the episode are made anew in every twin, since nobody could know them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.draws import GOLDEN, mix
+from socialai_dsl.engine.kernel import Task
+from socialai_dsl.envs.relevance import Relevance
+from socialai_dsl.envs.search import Search, Verdict
+from socialai_dsl.envs.table import Table
+from socialai_dsl.program import FIRST_ENTITY, Field, Header, Program, Register
+
+LEARNT_FROM: Final = 32
+"""At most so many twins of a room choose its policy, and at most a quarter of them."""
+
+TRIED_ON: Final = 96
+"""At most so many further twins it is tried on."""
+
+_BLOCK: Final = 512
+_BLOCKS: Final = 16
+"""Twins are drawn in blocks, so many at most; those that look otherwise are left out."""
+
+_SEARCHES: Final = 8
+"""For at most so many twins of a room a success is searched."""
+
+_FEWEST: Final = 8
+"""With fewer twins nothing is known about a room, which then counts as never solved."""
+
+_ROOMS_PER_SITE: Final = 32
+_SITE_MASK: Final = (1 << 31) - 1
+
+
+@dataclass(frozen=True)
+class Alone:
+    """What a policy that neither sees nor hears an NPC gets.
+
+    Attributes:
+        success: mean over the rooms of the share of twins that the policy for their looks solves.
+        error: standard error of that mean.
+        rooms: how many rooms were tried.
+        undecided: how many of them count as never solved because too few twins were found, or a search gave up.
+    """
+
+    success: float
+    error: float
+    rooms: int
+    undecided: int
+
+
+def success_alone(hidden: Program, rooms: int, seed: int, states: int) -> Alone:
+    """Bound from below what is possible without the NPCs.
+
+    Args:
+        hidden: the program of the scenario with its NPCs neither seen nor heard.
+        rooms: how many are drawn: rooms 0, 1, ... of the seed.
+        seed: of the rooms.
+        states: how many states of each twin may be searched.
+    """
+    twins = _Twins(hidden, seed)
+    search, solved, undecided = Search(hidden), [], 0
+    for room in range(rooms):
+        count = twins.draw(room, LEARNT_FROM + TRIED_ON)
+        plans = _plans(twins, search, count // 4, states) if count >= _FEWEST else None
+        undecided += plans is None
+        solved.append(_share(plans or [], count // 4))
+    values = np.array(solved)
+    return Alone(float(values.mean()), float(values.std() / np.sqrt(rooms)), rooms, undecided)
+
+
+def _plans(twins: _Twins, search: Search, learnt: int, states: int) -> list[NDArray[np.bool_]] | None:
+    """Of plans that together solve the first twins, `learnt` of them, as far as they can be: whom each solves, (K,).
+
+    None if a search gave up and nothing was found.
+    """
+    found: list[NDArray[np.bool_]] = []
+    left, gave_up = list(range(learnt)), False
+    for _ in range(_SEARCHES):
+        if not left:
+            break
+        finding = search.solve(*twins.start_of(left[0]), states)
+        gave_up |= finding.verdict is Verdict.UNDECIDED
+        wins = np.zeros(len(twins), np.bool_) if finding.plan is None else twins.play(finding.plan)
+        if wins.any():
+            found.append(wins)
+        left = [k for k in left[1:] if not wins[k]]
+    return None if gave_up and not found else found
+
+
+def _share(found: Sequence[NDArray[np.bool_]], learnt: int) -> float:
+    """How many of the later twins that plan solves that solves most of the first ones, `learnt` of them."""
+    if not found:
+        return 0.0
+    return float(max(found, key=lambda wins: int(wins[:learnt].sum()))[learnt:].mean())
+
+
+@dataclass(frozen=True)
+class _Start:
+    """How a twin begins, and which row of which table plays it."""
+
+    table: int
+    row: int
+    registers: NDArray[np.int16]
+    board: NDArray[np.uint32]
+    key: NDArray[np.uint64]
+
+
+class _Twins:
+    """The twins of one room after the other. Each is played by a copy of the program with other draws."""
+
+    def __init__(self, program: Program, seed: int) -> None:
+        self._program, self._seed = program, seed
+        canvas = program.header(Header.CANVAS_WIDTH) * program.header(Header.CANVAS_HEIGHT)
+        self._cells = slice(0, canvas)
+        self._wins = np.array([outcome.success for outcome in program.outcome_table] + [False])
+        self._redrawn = ~self._showing()
+        self._tables: list[Table] = []
+        self._starts: list[_Start] = []
+
+    def __len__(self) -> int:
+        return len(self._starts)
+
+    def draw(self, room: int, wanted: int) -> int:
+        """Draw twins of a room until so many look like it, itself among them; how many were found."""
+        self._starts, looks = [], None
+        for number in range(_BLOCKS):
+            table = self._table(number)
+            table.reset(self._seed, {"index": np.full(table.rows, room)})
+            looks_here = self._looks(table)
+            looks = looks_here[0] if looks is None else looks
+            state = table.state
+            self._starts += [
+                _Start(number, k, state.registers[k].copy(), state.boards[k].copy(), state.keys[k].copy())
+                for k in np.flatnonzero((looks_here == looks).all(axis=1)).tolist()
+            ]
+            if len(self._starts) >= wanted:
+                break
+        del self._starts[wanted:]
+        return len(self._starts)
+
+    def start_of(self, twin: int) -> tuple[NDArray[np.int16], NDArray[np.uint32], NDArray[np.uint64]]:
+        """Registers, board and key of a twin at the start."""
+        start = self._starts[twin]
+        return start.registers, start.board, start.key
+
+    def play(self, plan: tuple[NDArray[np.int64], ...]) -> NDArray[np.bool_]:
+        """Do the same in all twins; which of them succeed, (K,)."""
+        for start in self._starts:
+            state = self._tables[start.table].state
+            state.registers[start.row], state.boards[start.row] = start.registers, start.board
+            state.keys[start.row] = start.key
+        for number in sorted({start.table for start in self._starts}):
+            batch = self._tables[number].batch
+            for action in plan:
+                batch.ports.actions[:] = action
+                batch.step(Task.STEP_ONLY)
+        ends = np.stack([self._tables[start.table].state.registers[start.row] for start in self._starts])
+        solved: NDArray[np.bool_] = self._wins[ends[:, Register.OUTCOME]] & (ends[:, Register.ENDED] != 0)
+        return solved
+
+    def _table(self, number: int) -> Table:
+        """The table of a block; the first row of the first block plays the program as it is."""
+        if number == len(self._tables):
+            first = number * _BLOCK
+            copies = [_salted(self._program, self._redrawn, first + k) for k in range(_BLOCK)]
+            self._tables.append(Table(copies, _BLOCK, 1))
+        return self._tables[number]
+
+    def _looks(self, table: Table) -> NDArray[np.int64]:
+        """What a room looks like to whoever sees no NPC, (rows, cells + 3): its cells, and where the agent stands."""
+        registers = table.state.registers
+        pose = registers[:, [FIRST_ENTITY + field for field in (Field.X, Field.Y, Field.DIR)]]
+        return np.concatenate([table.state.boards[:, self._cells].astype(np.int64), pose], axis=1)
+
+    def _showing(self) -> NDArray[np.bool_]:
+        """Which sites show whenever they change anything, (sites,)."""
+        sites = self._program.header(Header.SITES)
+        only = np.eye(sites, dtype=np.bool_)
+        copies = [self._program, *(_salted(self._program, one, 1) for one in only)]
+        table = Table(copies, len(copies), 1)
+        relevant = Relevance.of(self._program).registers
+        shows, hides = np.zeros(sites, np.bool_), np.zeros(sites, np.bool_)
+        for room in range(_ROOMS_PER_SITE):
+            table.reset(self._seed, {"index": np.full(len(copies), room)})
+            looks, registers = self._looks(table), table.state.registers[:, relevant]
+            seen = (looks[1:] != looks[0]).any(axis=1)
+            shows |= seen
+            hides |= (registers[1:] != registers[0]).any(axis=1) & ~seen
+        return shows & ~hides
+
+
+def _salted(program: Program, sites: NDArray[np.bool_], salt: int) -> Program:
+    """The program with other draws at some sites, (sites,); salt 0 changes nothing."""
+    if salt == 0:
+        return program
+    words = program.words.copy()
+    table = words[program.header(Header.SITE_AT) :][: 2 * len(sites)].reshape(-1, 2)
+    for row in np.flatnonzero(sites).tolist():
+        table[row, 0] = mix(int(table[row, 0]) + salt * GOLDEN) & _SITE_MASK
+    return replace(program, words=words)

@@ -1,0 +1,59 @@
+"""How hard a scenario is and what it takes: shortest successes, what its script solves, what is possible alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from socialai_dsl.checking import LoadedScenario
+from socialai_dsl.compilation import compile_loaded
+from socialai_dsl.envs.alone import Alone, success_alone
+from socialai_dsl.envs.properties import Effort, search_rooms_of, solved_by_script
+from socialai_dsl.envs.search import Finding, Verdict
+
+
+@dataclass(frozen=True)
+class Depth:
+    """What is known about success in the rooms that were tried.
+
+    Attributes:
+        steps: length of a shortest success in each room that can be solved, ascending.
+        unsolvable: rooms without any success. undecided: rooms whose search gave up.
+        unsolved: rooms that the script does not solve; None without a script.
+        alone: what is possible where no NPC is seen or heard; None if there is none.
+    """
+
+    steps: tuple[int, ...]
+    unsolvable: tuple[int, ...]
+    undecided: tuple[int, ...]
+    unsolved: tuple[int, ...] | None
+    alone: Alone | None
+
+
+def depth(loaded: LoadedScenario, effort: Effort, scripted: LoadedScenario | None) -> Depth:
+    """Search rooms, let the script play them, and try what a policy gets that knows of no NPC.
+
+    Args:
+        loaded: the scenario.
+        effort: how much to try.
+        scripted: the same scenario with a frame for the agent, if there is one.
+    """
+    findings = list(search_rooms_of(compile_loaded(loaded), None, effort))
+    unsolved = None
+    if scripted is not None:
+        unsolved = tuple((~solved_by_script(compile_loaded(scripted), effort)).nonzero()[0].tolist())
+    alone = None
+    if any(entity.role == "npc" for entity in loaded.checked.entities):
+        hidden = replace(loaded, checked=replace(loaded.checked, npcs_hidden=True))
+        alone = success_alone(compile_loaded(hidden), effort.rooms, effort.seed, effort.states)
+    return Depth(
+        tuple(sorted(finding.steps for finding in findings if finding.steps is not None)),
+        _rooms(findings, Verdict.UNSOLVABLE),
+        _rooms(findings, Verdict.UNDECIDED),
+        unsolved,
+        alone,
+    )
+
+
+def _rooms(findings: Sequence[Finding], verdict: Verdict) -> tuple[int, ...]:
+    return tuple(room for room, finding in enumerate(findings) if finding.verdict is verdict)
