@@ -20,14 +20,15 @@ class Actor:
 
     Attributes:
         images: distinct images, uint8 (I, H, W, C).
-        histories: distinct 0-padded histories, int16 (D, L); row 0 is an empty one, where encoding begins.
+        histories: distinct 0-padded histories as the network reads them, int16 (D, `reader.length(L)`); row 0 is an
+            empty one, where encoding begins.
         pairs: distinct (image row, history row), int64 (P, 2).
     """
 
     def __init__(self, net: ActorCritic, tokens_length: int) -> None:
         self.net = net
         self.device = next(net.parameters()).device
-        self._length = tokens_length
+        self._length = net.reader.length(tokens_length)
         self._image_high = np.array(net.spec.image_high)
         self._frames = 0
         self.begin()
@@ -70,7 +71,7 @@ class Actor:
             raise ObservationError(
                 f"image: a cell exceeds the bounds {tuple(self.net.spec.image_high)} of its channels"
             )
-        history_rows = self._hear(history_ids, tokens)
+        history_rows = self._hear(history_ids, self._read(tokens))
         pairs = np.stack((image_rows, history_rows), 1)
         rows, fresh = self.pairs.add(image_rows << 32 | history_rows, pairs)
         if len(fresh):
@@ -85,15 +86,20 @@ class Actor:
         self._features = _with_room(self._features, self.pairs.size)
         self._features[self.pairs.size - len(pairs) : self.pairs.size] = features
 
+    def _read(self, tokens: NDArray[np.int16]) -> NDArray[np.int16]:
+        """The engine's tokens, once checked, as the words the network knows."""
+        last = self.net.spec.vocabulary_size - 1
+        for got in (int(tokens.min()), int(tokens.max())):
+            if not 0 <= got <= last:
+                raise ObservationError(f"tokens: got {got}, expected ids from 0 to {last}")
+        return self.net.reader.read(tokens)
+
     def _hear(self, ids: Int64, tokens: NDArray[np.int16]) -> Int64:
         """Row of every history, int64 (E,); new ones are encoded, from where the same environment was if possible."""
         before = self.histories.size
         rows, fresh = self.histories.add(ids, tokens)
         if len(fresh):
             words = tokens[fresh]
-            if words.min() < 0 or words.max() >= self.net.spec.vocabulary_size:
-                got, last = int(words.max()), self.net.spec.vocabulary_size - 1
-                raise ObservationError(f"tokens: got {got}, expected ids from 0 to {last}")
             lengths = history_lengths(words)
             parents = (
                 np.zeros(len(fresh), np.int64) if self._last_history is None else self._last_history[fresh]

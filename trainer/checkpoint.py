@@ -203,7 +203,7 @@ def restore_net(
     weights = checkpoint.part("net")
     if vocabulary != meta.vocabulary:
         _warn_of_words(meta.vocabulary, vocabulary)
-        _move_words(weights, model, meta.vocabulary, vocabulary)
+        _move_words(weights, model, meta.vocabulary)
     _check_weights(weights, model.state_dict())
     model.load_state_dict(weights)
     return model
@@ -217,14 +217,18 @@ def _warn_of_words(old: list[str], new: list[str]) -> None:
     warnings.warn(f"the checkpoint's vocabulary differs ({detail})", stacklevel=4)
 
 
-def _move_words(weights: dict[str, Tensor], model: ActorCritic, old: list[str], new: list[str]) -> None:
-    """Rearrange the rows of the word embedding from the order of `old` to that of `new`."""
+def _move_words(weights: dict[str, Tensor], model: ActorCritic, vocabulary: list[str]) -> None:
+    """Rearrange the rows of the word embedding from the words of the checkpoint's vocabulary to those of the model."""
+    try:
+        old = model.reader_class(vocabulary).words
+    except ValueError as error:
+        raise CheckpointError(f"checkpoint's vocabulary does not fit its network: {error}") from error
     source = weights.get(_EMBEDDING)
     fresh = model.state_dict()[_EMBEDDING].clone()
     if source is None or source.ndim != 2 or len(source) < len(old) or source.shape[1:] != fresh.shape[1:]:
         raise CheckpointError(f"checkpoint's {_EMBEDDING} does not fit its vocabulary")
     position = {word: index for index, word in enumerate(old)}
-    for index, word in enumerate(new):
+    for index, word in enumerate(model.reader.words):
         if word in position:
             fresh[index] = source[position[word]]
     weights[_EMBEDDING] = fresh

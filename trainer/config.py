@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -30,9 +31,14 @@ class TrainConfig(BaseModel):
     bptt: int = Field(
         0, ge=0, description="steps back-propagation goes back through the memory; 0 = the whole rollout"
     )
+    update: Literal["environments", "chunks"] = Field(
+        "environments",
+        description="environments: minibatches of whole environments, each distinct frame computed once; chunks: of "
+        "stretches of `bptt` steps, one step of all of them at a time (paper)",
+    )
     epochs: int = Field(4, ge=1, description="passes over each rollout (paper)")
     minibatches: int = Field(
-        4, ge=1, description="parts of whole environments a rollout is cut into (measured)"
+        4, ge=1, description="parts a rollout is cut into, of whole environments or of chunks (measured)"
     )
     lr: float = Field(7e-4, gt=0, description="Adam's learning rate (measured; paper 1e-4)")
     adam_eps: float = Field(1e-5, gt=0, description="Adam's epsilon (paper)")
@@ -99,6 +105,11 @@ class TrainConfig(BaseModel):
             )
         if self.bptt and self.horizon % self.bptt:
             raise ValueError(f"bptt: got {self.bptt}, expected a divisor of horizon = {self.horizon}, or 0")
+        if self.update == "chunks" and not 0 < self.bptt < self.horizon:
+            raise ValueError(
+                f"bptt: got {self.bptt}, expected less than horizon = {self.horizon} and not 0, because the update "
+                "shifts chunks of so many steps"
+            )
         return self
 
     @property
@@ -117,7 +128,9 @@ RESUMABLE_FIELDS = frozenset({"frames", "device", "threads", "checkpoint_every",
 
 
 def paper_preset(**overrides: Any) -> TrainConfig:
-    """Return the hyper-parameters of the paper's table (16 environments, recurrence 10, batches of 1280 frames).
+    """Return what the paper's agents learn with (16 environments, recurrence 10, batches of 1280 frames).
+
+    Network, reading of the dialogue and update are those of the released code, the numbers those of the paper's table.
 
     One rollout of 640 frames is one minibatch, as it was with the released code, whose batch of 1280 exceeds the
     640 frames it collects.
@@ -133,6 +146,7 @@ def paper_preset(**overrides: Any) -> TrainConfig:
         "gae_lambda": 0.99,
         "clip_value": True,
         "normalize_advantages": False,
+        "update": "chunks",
         "loss": "per_head",
         "net": "paper-reference",
     }
@@ -142,3 +156,19 @@ def paper_preset(**overrides: Any) -> TrainConfig:
 def paper_tuned_preset(**overrides: Any) -> TrainConfig:
     """Return the released run scripts' tuned variant of `paper_preset`: recurrence 5, Adam epsilon 1e-8."""
     return paper_preset(**({"bptt": 5, "adam_eps": 1e-8} | overrides))
+
+
+PRESETS: Mapping[str, Callable[..., TrainConfig]] = {
+    "paper-reference": paper_preset,
+    "paper-reference-tuned": paper_tuned_preset,
+}
+"""Agents that are more than a network: named where a network can be, they bring all of their numbers with them."""
+
+
+def configure(net: str, **overrides: Any) -> TrainConfig:
+    """The configuration of a preset by its name, or that of a network with the default numbers.
+
+    Raises:
+        pydantic.ValidationError: see `TrainConfig`.
+    """
+    return PRESETS[net](**overrides) if net in PRESETS else TrainConfig(net=net, **overrides)

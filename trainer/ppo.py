@@ -72,6 +72,11 @@ class LossParts:
     approx_kl: Tensor
     clip_fraction: Tensor
 
+    def row(self) -> Tensor:
+        """The first six of `STATISTICS`, without gradients."""
+        parts = (self.total, self.policy, self.value, self.entropy, self.approx_kl, self.clip_fraction)
+        return torch.stack([part.detach() for part in parts])
+
 
 def ppo_loss(
     batch: Batch, logits: Tensor, values: Tensor, sizes: tuple[int, ...], config: TrainConfig
@@ -120,7 +125,7 @@ def ppo_loss(
         )
 
 
-_STATISTICS = ("loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "grad_norm")
+STATISTICS = ("loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "grad_norm")
 
 
 def update(
@@ -143,9 +148,9 @@ def update(
     Raises:
         TrainingStopped: a loss or a gradient is not finite; the weights are as the last good step left them.
     """
-    raw = _advantages(actor, rollout, config)
+    raw = estimate_advantages(actor, rollout, config)
     returns = raw + rollout.values
-    advantages = (raw - raw.mean()) / (raw.std(correction=0) + 1e-8) if config.normalize_advantages else raw
+    advantages = scale_advantages(raw, config)
     stretch = config.bptt or config.horizon
 
     def prepare(envs: Tensor) -> Minibatch:
@@ -159,12 +164,17 @@ def update(
         for _ in range(config.epochs)
         for index in torch.randperm(len(groups), generator=generator).tolist()
     ]
+    return summarize(steps, rollout.values, returns)
+
+
+def summarize(steps: list[Tensor], values: Tensor, returns: Tensor) -> dict[str, float]:
+    """Means of the gradient steps' `STATISTICS` by name, and the share of the value's variance that was explained."""
     means = torch.stack(steps).mean(0).tolist()
-    unexplained = (returns - rollout.values).var(correction=0) / (returns.var(correction=0) + 1e-8)
-    return dict(zip(_STATISTICS, means, strict=True)) | {"explained_variance": 1 - float(unexplained)}
+    unexplained = (returns - values).var(correction=0) / (returns.var(correction=0) + 1e-8)
+    return dict(zip(STATISTICS, means, strict=True)) | {"explained_variance": 1 - float(unexplained)}
 
 
-def _advantages(actor: Actor, rollout: Rollout, config: TrainConfig) -> Tensor:
+def estimate_advantages(actor: Actor, rollout: Rollout, config: TrainConfig) -> Tensor:
     """`compute_gae` of a rollout, on the network's device."""
 
     def move(array: NDArray[Any]) -> Tensor:
@@ -182,6 +192,11 @@ def _advantages(actor: Actor, rollout: Rollout, config: TrainConfig) -> Tensor:
     )
 
 
+def scale_advantages(raw: Tensor, config: TrainConfig) -> Tensor:
+    """Advantages as the loss takes them: scaled to mean 0 and deviation 1 if the configuration says so."""
+    return (raw - raw.mean()) / (raw.std(correction=0) + 1e-8) if config.normalize_advantages else raw
+
+
 def _step(
     net: ActorCritic,
     optimizer: torch.optim.Optimizer,
@@ -189,7 +204,7 @@ def _step(
     config: TrainConfig,
     crew: Crew,
 ) -> Tensor:
-    """One gradient step on a group of environments, given in shares; returns `_STATISTICS`."""
+    """One gradient step on a group of environments, given in shares; returns `STATISTICS`."""
     parameters = list(net.parameters())
     total = sum(len(share.batch.returns) for share in shares)
 
@@ -198,16 +213,29 @@ def _step(
         loss = ppo_loss(share.batch, logits, values, net.spec.action_sizes, config)
         weight = len(share.batch.returns) / total
         gradients = torch.autograd.grad(loss.total * weight, parameters, allow_unused=True)
-        parts = (loss.total, loss.policy, loss.value, loss.entropy, loss.approx_kl, loss.clip_fraction)
-        return torch.stack([part.detach() for part in parts]) * weight, gradients
+        return loss.row() * weight, gradients
 
     results = crew.map(differentiate, shares)
     statistics = torch.stack([share[0] for share in results]).sum(0)
-    if not bool(torch.isfinite(statistics[0])):
-        raise TrainingStopped("the loss is not a finite number")
     for parameter, *gradients in zip(parameters, *(share[1] for share in results), strict=True):
         _add_up(parameter, gradients)
-    norm = nn.utils.clip_grad_norm_(parameters, config.max_grad_norm)
+    return descend(net, optimizer, statistics, config)
+
+
+def descend(
+    net: ActorCritic, optimizer: torch.optim.Optimizer, statistics: Tensor, config: TrainConfig
+) -> Tensor:
+    """Clip the gradients that lie in the parameters and make the optimiser's step.
+
+    Returns:
+        `STATISTICS`: the given ones, those of the loss, and the gradient's norm before clipping.
+
+    Raises:
+        TrainingStopped: the loss or the gradient is not finite; the weights are as they were.
+    """
+    if not bool(torch.isfinite(statistics[0])):
+        raise TrainingStopped("the loss is not a finite number")
+    norm = nn.utils.clip_grad_norm_(net.parameters(), config.max_grad_norm)
     if not bool(torch.isfinite(norm)):
         raise TrainingStopped("a gradient is not a finite number")
     optimizer.step()

@@ -180,4 +180,4 @@ class Session:
 
 def net_spec(envs: Any) -> NetSpec:
     """Shapes a network for these environments must have."""
-    return NetSpec.of(envs.single_action_space, envs.single_observation_space, len(envs.program.vocabulary))
+    return NetSpec.of(envs.single_action_space, envs.single_observation_space, envs.program.vocabulary)

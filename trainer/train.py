@@ -15,6 +15,7 @@ from trainer.crew import Crew
 from trainer.errors import CheckpointError, ObservationError, TrainingStopped
 from trainer.metrics import MetricsLog, episode_metrics
 from trainer.ppo import update
+from trainer.ppo_chunks import update_chunks
 from trainer.rollout import collect
 from trainer.session import Session
 
@@ -93,6 +94,7 @@ def _loop(
     progress: Callable[[Progress], None] | None,
 ) -> None:
     config, envs, began, first = session.config, session.envs, time.perf_counter(), session.update
+    learn = update_chunks if config.update == "chunks" else update
     session.actor.net.train()
     counted, then = envs.counters(), began
     while session.update < config.updates:
@@ -106,7 +108,7 @@ def _loop(
                 session.bonus,
                 session.tutor,
             )
-            losses = update(session.actor, session.optimizer, rollout, config, session.generator, crew)
+            losses = learn(session.actor, session.optimizer, rollout, config, session.generator, crew)
             session.update += 1
             before, counted = counted, envs.counters()
             before_time, then = then, time.perf_counter()

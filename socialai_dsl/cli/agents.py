@@ -56,6 +56,7 @@ def resolve_precision(choice: str, net: str, device: str) -> "Precision":
     Raises:
         UsageError: there is no such network.
     """
+    from trainer.config import configure
     from trainer.nets import best_precision
 
     if choice == "bfloat16":
@@ -63,7 +64,7 @@ def resolve_precision(choice: str, net: str, device: str) -> "Precision":
     if choice == "float32":
         return "float32"
     try:
-        return best_precision(net, device)
+        return best_precision(configure(net).net, device)
     except ValueError as error:
         raise UsageError(str(error)) from None
 
@@ -86,6 +87,13 @@ def resolve_exploration(kind: str, scenario: str) -> tuple[Literal["none", "lang
     return ("cell" if kind == "cell" else "none"), float(scale)
 
 
+def default_envs(net: str) -> int:
+    """How many environments an agent trains on unless told otherwise."""
+    from trainer.config import configure
+
+    return configure(net).num_envs
+
+
 def train_config(settings: "Settings") -> "TrainConfig":
     """The trainer's configuration of a run.
 
@@ -94,15 +102,17 @@ def train_config(settings: "Settings") -> "TrainConfig":
     """
     from pydantic import ValidationError
 
-    from trainer.config import TrainConfig
+    from trainer.config import PRESETS, configure
 
+    # A small batch of environments cannot be cut into as many parts as the default has; a preset's number is its own.
+    parts = {} if settings.net in PRESETS else {"minibatches": min(4, settings.envs)}
     try:
-        return TrainConfig(
+        return configure(
+            settings.net,
             frames=settings.frames,
             seed=settings.seed,
             num_envs=settings.envs,
-            minibatches=min(4, settings.envs),
-            net=settings.net,
+            **parts,
             explo=settings.explo,
             explo_c=settings.explo_c,
             precision=settings.precision,

@@ -47,10 +47,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=_natural, default=0, metavar="N", help="default: 0")
     parser.add_argument(
-        "--envs", type=_positive, default=256, metavar="N", help="environments at once (default: 256)"
+        "--envs",
+        type=_positive,
+        metavar="N",
+        help="environments at once (default: 256, or the preset's number)",
     )
     parser.add_argument(
-        "--net", default="fast", help="fast (default), paper, paper-reference, or my.module:MyNet"
+        "--net",
+        default="fast",
+        help="fast (default), paper, or my.module:MyNet; paper-reference and paper-reference-tuned are presets: the "
+        "paper's network with its update and all of its numbers",
     )
     parser.add_argument(
         "--explo",
@@ -163,7 +169,12 @@ def _training_figures(folder: Path) -> dict[str, Any]:
 
 def _started(arguments: argparse.Namespace) -> Settings:
     """The settings of a new run."""
-    from socialai_dsl.cli.agents import resolve_device, resolve_exploration, resolve_precision
+    from socialai_dsl.cli.agents import (
+        default_envs,
+        resolve_device,
+        resolve_exploration,
+        resolve_precision,
+    )
 
     if arguments.scenario is None:
         raise UsageError("expected a scenario (a path or a name), or --resume RUN_DIR")
@@ -184,7 +195,7 @@ def _started(arguments: argparse.Namespace) -> Settings:
         agent=arguments.agent,
         seed=arguments.seed,
         frames=(arguments.frames or DEFAULT_FRAMES) if trains else 0,
-        envs=arguments.envs,
+        envs=arguments.envs or default_envs(arguments.net),
         net=arguments.net,
         explo=explo,
         explo_c=explo_c,

@@ -14,7 +14,7 @@ class Settings:
         seed: of training; the test set is always the same.
         frames: to train for, 0 for agents that are not trained here.
         envs: environments stepped together while training.
-        net: the network, as the trainer names it.
+        net: the network or preset, as the trainer names it.
         explo: exploration bonus, `none`, `lang` or `cell`, with `auto` resolved.
         explo_c: scale of the bonus.
         device: where the network runs.

@@ -31,7 +31,7 @@ def test_six_channels_can_be_learned_from(net: str, tmp_path: Path) -> None:
     other = sd.make_vec("talkitout", 4)
     spec_of_sizes = net_spec(other)
     actions = type(spec_of_sizes)(
-        spec.action_sizes, spec_of_sizes.image_shape, spec_of_sizes.image_high, spec.vocabulary_size
+        spec.action_sizes, spec_of_sizes.image_shape, spec_of_sizes.image_high, spec.vocabulary
     )
     with pytest.raises(CheckpointError, match=r"for images \(7, 7, 6\), but the scenario has \(7, 7, 4\)"):
         restore_net(checkpoint, actions, list(envs.program.vocabulary))

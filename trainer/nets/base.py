@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -13,6 +14,7 @@ from torch import Tensor, nn
 
 from trainer.nets.dialogue import DialogueEncoder
 from trainer.nets.memory import Memory
+from trainer.nets.reading import Reader
 
 Precision = Literal["float32", "bfloat16"]
 
@@ -27,16 +29,21 @@ class NetSpec:
         action_sizes: choices of the four heads: primitive (last = no movement), speak (0 = silent), template, noun.
         image_shape: cells along, cells ahead, channels.
         image_high: highest value of each channel.
-        vocabulary_size: words, the padding and the unknown word included.
+        vocabulary: word of each token id, the padding and the unknown word included.
     """
 
     action_sizes: tuple[int, int, int, int]
     image_shape: tuple[int, int, int]
     image_high: tuple[int, ...]
-    vocabulary_size: int
+    vocabulary: tuple[str, ...]
+
+    @property
+    def vocabulary_size(self) -> int:
+        """Number of token ids."""
+        return len(self.vocabulary)
 
     @classmethod
-    def of(cls, action_space: Any, observation_space: Any, vocabulary_size: int) -> NetSpec:
+    def of(cls, action_space: Any, observation_space: Any, vocabulary: Sequence[str]) -> NetSpec:
         """Read the spaces of one environment.
 
         Raises:
@@ -61,7 +68,7 @@ class NetSpec:
             (sizes[0], sizes[1], sizes[2], sizes[3]),
             (image.shape[0], image.shape[1], image.shape[2]),
             tuple(int(value) for value in high),
-            vocabulary_size,
+            tuple(vocabulary),
         )
 
 
@@ -105,17 +112,20 @@ class ActorCritic(nn.Module, ABC):
             rest of the batch.
         reducible: whether the network can do the bulk of its arithmetic in bfloat16.
         precision: number type of that bulk; all that is stored, and everything else, is float32.
+        reader_class: how histories are read before they are encoded. reader: such a reader of the scenario's words.
     """
 
     distinct = True
     reducible = False
     precision: Precision = "float32"
+    reader_class: type[Reader] = Reader
 
     def __init__(
         self, spec: NetSpec, features: int, dialogue: DialogueEncoder, memory_size: int = 128
     ) -> None:
         super().__init__()
         self.spec = spec
+        self.reader = self.reader_class(spec.vocabulary)
         self.features = features
         self.dialogue = dialogue
         self.memory = Memory(features, memory_size)

@@ -8,8 +8,7 @@ from torch.nn import functional
 
 from trainer.nets.base import ActorCritic, NetSpec, unit_row_linear
 from trainer.nets.dialogue import DialogueEncoder
-
-_VOCABULARY_CAPACITY = 100
+from trainer.nets.reading import LetterReader
 
 
 class _Conv(nn.Conv2d):
@@ -62,8 +61,8 @@ class PaperNet(ActorCritic):
     reducible = True
 
     def __init__(self, spec: NetSpec, width: int = 128) -> None:
-        vocabulary = max(spec.vocabulary_size, _VOCABULARY_CAPACITY)
-        super().__init__(spec, width, DialogueEncoder(vocabulary))
+        words = max(len(self.reader_class(spec.vocabulary).words), LetterReader.CAPACITY)
+        super().__init__(spec, width, DialogueEncoder(words))
         self.image_conv = nn.Sequential(
             _Conv(spec.image_shape[2], width),
             _norm(width, self.batch_norm),
@@ -95,9 +94,11 @@ class PaperNet(ActorCritic):
 class PaperReferenceNet(PaperNet):
     """The paper's network with BatchNorm, whose statistics are those of the batch while acting and while learning.
 
-    Frames are never shared, because each one's features depend on the others in its batch.
+    Frames are never shared, because each one's features depend on the others in its batch. Histories are read as
+    letters only, and in evaluation (`eval()`) the running statistics are used.
     """
 
     batch_norm = True
     distinct = False
     reducible = False
+    reader_class = LetterReader

@@ -12,7 +12,8 @@ from trainer.nets import ActorCritic, NetSpec, best_precision, build_net, net_cl
 from trainer.nets.fast import Cells, FastNet
 from trainer.nets.paper import PaperNet
 
-SPEC = NetSpec((8, 2, 4, 16), (7, 7, 4), (12, 5, 3, 3), 40)
+WORDS = ("<pad>", "<unk>", *(a + b for a in "abcdef" for b in "ghijkl"), "it's", "3")
+SPEC = NetSpec((8, 2, 4, 16), (7, 7, 4), (12, 5, 3, 3), WORDS)
 
 
 def random_images(count: int) -> torch.Tensor:
@@ -32,7 +33,7 @@ def random_images(count: int) -> torch.Tensor:
 def test_the_reference_network_has_the_published_number_of_parameters(
     action_sizes: tuple[int, int, int, int], parameters: int
 ) -> None:
-    net = build_net("paper-reference", NetSpec(action_sizes, (7, 7, 4), (12, 5, 3, 3), 40), 0)
+    net = build_net("paper-reference", NetSpec(action_sizes, (7, 7, 4), (12, 5, 3, 3), WORDS), 0)
     assert sum(p.numel() for p in net.parameters()) == parameters
 
 
