@@ -10,14 +10,25 @@ from numpy.typing import NDArray
 from trainer.config import TrainConfig
 from trainer.distinct import Int64
 
+_CODED_FRAMES = 40
+_SILENCE = 0  # what the environments' `utterance_ids` say when nothing was heard
+
 
 class Bonus:
-    """`T * tanh(sum over keys k of (C / 40) / (N_k + 1) ** M)`, N_k = earlier visits of k in this episode.
+    """A bonus for keys k that were visited N_k times before in the running episode.
 
-    `lang`: the one key of a step is the utterance heard, silence included. `cell`: the keys are the distinct kinds
-    of cells in the image. The observation a step returns counts, the first one after a reset does not; a step that
-    ends the episode pays nothing and clears the counts.
-    Source: SocialAI 1.0, exploration bonus (text and released code agree).
+    `lang`: the one key of a step is all that was heard in it; several lines together are a key of their own.
+    `cell`: the keys are the distinct kinds of cells in the image. The observation a step returns counts, the first one
+    after a reset does not; a step that ends the episode pays nothing and clears the counts.
+
+    Text and released code of the paper agree on that, and differ in two things:
+
+    * `as_coded`: `T * tanh(sum over k of (C / 40) / (N_k + 1) ** M)`, 40 being the frames of one environment in a
+      rollout; silence is a key like any other, so each episode's first silent step pays as well.
+    * `as_printed`: `tanh(sum over k of C / ((N_k + 1) ** M * T))`; silence pays nothing, because the text speaks of
+      making the others respond.
+
+    Source: SocialAI 1.0, appendix on the exploration bonus, and its released code.
 
     Attributes:
         counts: int32 (E, K), visits in the running episodes, by environment and key.
@@ -28,7 +39,12 @@ class Bonus:
         if config.explo == "none":
             raise ValueError("explo: got 'none', expected 'lang' or 'cell'")
         self._kind = config.explo
-        self._unit, self._power, self._scale = config.explo_c / 40, config.explo_m, config.explo_t
+        self._power = config.explo_m
+        self._as_coded = config.explo_formula == "as_coded"
+        if self._as_coded:
+            self._unit, self._scale = config.explo_c / _CODED_FRAMES, config.explo_t
+        else:
+            self._unit, self._scale = config.explo_c / config.explo_t, 1.0
         self.counts = np.zeros((num_envs, 0), np.int32)
         self.keys: dict[int, int] = {}
 
@@ -42,7 +58,7 @@ class Bonus:
         """
         if self._kind == "lang":
             keys = np.asarray(envs.utterance_ids())[:, None]
-            new = np.ones(keys.shape, np.bool_)
+            new = np.full(keys.shape, True) if self._as_coded else keys != _SILENCE
         else:
             keys = np.sort(cell_codes(image), axis=1)
             new = np.ones(keys.shape, np.bool_)

@@ -71,7 +71,10 @@ class TrainConfig(BaseModel):
     )
     explo_c: float = Field(7.0, ge=0, description="C of the bonus; the paper sets it per scenario")
     explo_m: float = Field(50.0, ge=0, description="M of the bonus: 50 pays first visits only (paper)")
-    explo_t: float = Field(0.6, ge=0, description="T of the bonus, its upper bound per step (paper)")
+    explo_t: float = Field(0.6, gt=0, description="T of the bonus, as coded its upper bound per step (paper)")
+    explo_formula: Literal["as_coded", "as_printed"] = Field(
+        "as_coded", description="the bonus of the code the paper's figures come from, or that of its text"
+    )
     net: str = Field(
         "fast", min_length=1, description="fast, paper, paper-reference, or my.module:MyNet of the user's"
     )

@@ -1,11 +1,13 @@
 """The exploration bonus pays what the published formula says."""
 
+from collections import Counter
 from math import tanh
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import socialai_dsl as sd
 from trainer.bonus import Bonus, cell_codes
 from trainer.config import TrainConfig
 
@@ -27,6 +29,59 @@ def test_first_silence_and_first_utterances_pay_and_repetitions_do_not() -> None
     assert bonus.step(hears(0, 0), IMAGE, ended(0, 0)) == pytest.approx([first, first])
     assert bonus.step(hears(0, 99), IMAGE, ended(0, 0)) == pytest.approx([0, first], abs=1e-12)
     assert bonus.step(hears(-3, 99), IMAGE, ended(0, 0)) == pytest.approx([first, 0], abs=1e-12)
+
+
+def test_a_second_visit_pays_next_to_nothing() -> None:
+    """tanh(x) is x for small x: 0.6 * 0.175 / 2 ** 50."""
+    bonus = Bonus(TrainConfig(explo="lang", explo_c=7.0), 1)
+    got = [bonus.step(hears(0), IMAGE[:1], ended(0))[0] for _ in range(2)]
+    assert got[0] == pytest.approx(0.10394, abs=1e-5)
+    assert got[1] == pytest.approx(9.3e-17, rel=1e-2, abs=0)
+
+
+@pytest.mark.parametrize(("c", "paid"), [(7.0, 0.10394), (20.0, 0.27727)])
+def test_the_published_scales_of_the_language_bonus(c: float, paid: float) -> None:
+    bonus = Bonus(TrainConfig(explo="lang", explo_c=c), 1)
+    assert bonus.step(hears(3), IMAGE[:1], ended(0))[0] == pytest.approx(paid, abs=1e-5)
+
+
+def test_the_bonus_as_printed() -> None:
+    """tanh(C / ((N + 1) ** M * T)): C = .3, T = .6, M = 1 give .5, then .25; silence is nobody's response."""
+    config = TrainConfig(explo="lang", explo_c=0.3, explo_m=1.0, explo_t=0.6, explo_formula="as_printed")
+    bonus = Bonus(config, 1)
+    got = [bonus.step(hears(id_), IMAGE[:1], ended(0))[0] for id_ in (0, 5, 0, 5, 6)]
+    assert got == pytest.approx([0, tanh(0.5), 0, tanh(0.25), tanh(0.5)])
+    bonus = Bonus(config.model_copy(update={"explo": "cell"}), 1)
+    image = IMAGE[:1].copy()
+    image[0, 0, 0] = (4, 1, 0, 0)
+    assert bonus.step(hears(0), image, ended(0))[0] == pytest.approx(tanh(1.0)), "two kinds of cells, .5 each"
+
+
+def test_ids_pay_what_counting_the_strings_would() -> None:
+    """The code counts what it heard as text; a real scenario, played at random, several lines at once included."""
+    envs = sd.make_vec("talkitout+as_coded", 32, autoreset_mode="SameStep")
+    rng = np.random.default_rng(0)
+    bonus = Bonus(TrainConfig(explo="lang", explo_c=7.0, explo_m=2.0), 32)
+    counts: list[Counter[str]] = [Counter() for _ in range(32)]
+    heard: set[str] = set()
+    observation, _ = envs.reset(seed=0)
+    greet, ask = (3, 3), (0, 1)  # "How are you", "Where is the exit"
+    for step in range(300):
+        actions = np.ones((32, 4), np.int64)
+        actions[:, 0] = rng.choice([0, 1, 2, 7], 32)
+        actions[:, 2:] = ask if step % 2 else greet
+        observation, _, terminated, truncated, _ = envs.step(actions)
+        done = terminated | truncated
+        got = bonus.step(envs, observation["image"], done)
+        for e, text in enumerate(envs.utterances()):
+            paid = 0 if done[e] else 0.6 * tanh(7 / 40 / (counts[e][text] + 1) ** 2)
+            assert got[e] == pytest.approx(paid, abs=1e-12), f"step {step}, environment {e}"
+            counts[e] = Counter() if done[e] else counts[e] + Counter([text])
+            heard.add(text)
+    envs.close()
+    assert "NA" in heard
+    assert len(heard) > 20, "there must be enough to tell apart"
+    assert any("\n" in text for text in heard), "several spoke at once"
 
 
 def test_an_episode_s_end_pays_nothing_and_forgets() -> None:

@@ -6,7 +6,13 @@ import pytest
 import yaml
 
 import trainer
-from trainer.config import RESUMABLE_FIELDS, TrainConfig, paper_preset, paper_tuned_preset
+from trainer.config import (
+    PRESETS,
+    RESUMABLE_FIELDS,
+    TrainConfig,
+    configure,
+    paper_preset,
+)
 
 
 def test_the_defaults_are_the_settings_that_worked() -> None:
@@ -17,14 +23,57 @@ def test_the_defaults_are_the_settings_that_worked() -> None:
     assert not config.bootstrap_timeouts
 
 
+# The paper's table of hyper-parameters, with what its released run scripts add.
+PUBLISHED = {
+    "net": "paper-reference",
+    "update": "chunks",
+    "loss": "per_head",
+    "frames": 30_000_000,
+    "num_envs": 16,
+    "horizon": 40,
+    "bptt": 10,
+    "epochs": 4,
+    "minibatches": 1,  # a batch of 1280 holds all 640 frames
+    "lr": 1e-4,
+    "adam_eps": 1e-5,
+    "gamma": 0.99,
+    "gae_lambda": 0.99,
+    "clip": 0.2,
+    "clip_value": True,
+    "value_coef": 0.5,
+    "entropy_coef": 0.01,
+    "max_grad_norm": 0.5,
+    "normalize_advantages": False,
+    "bootstrap_timeouts": False,
+    "explo": "none",
+    "explo_m": 50.0,
+    "explo_t": 0.6,
+    "explo_formula": "as_coded",
+}
+
+
 def test_the_paper_s_preset() -> None:
-    config = paper_preset(seed=3)
-    assert (config.lr, config.adam_eps, config.gae_lambda, config.bptt) == (1e-4, 1e-5, 0.99, 10)
+    config = configure("paper-reference")
+    assert {name: getattr(config, name) for name in PUBLISHED} == PUBLISHED
     assert config.frames_per_update == 640
     assert config.updates == 46_875
-    assert (config.loss, config.clip_value, config.seed) == ("per_head", True, 3)
-    tuned = paper_tuned_preset()
-    assert (tuned.bptt, tuned.adam_eps) == (5, 1e-8)
+
+
+def test_the_tuned_preset_differs_in_recurrence_and_epsilon_only() -> None:
+    tuned, paper = configure("paper-reference-tuned").model_dump(), configure("paper-reference").model_dump()
+    changed = {name: value for name, value in tuned.items() if value != paper[name]}
+    assert changed == {"bptt": 5, "adam_eps": 1e-8}
+
+
+def test_what_is_said_overrides_a_preset() -> None:
+    config = configure("paper-reference", num_envs=4, frames=100, seed=3, lr=1e-3)
+    assert config == paper_preset(num_envs=4, frames=100, seed=3, lr=1e-3)
+    assert (config.num_envs, config.frames, config.seed, config.lr, config.horizon) == (4, 100, 3, 1e-3, 40)
+
+
+def test_other_names_are_networks_with_the_default_numbers() -> None:
+    assert configure("paper", seed=1) == TrainConfig(net="paper", seed=1)
+    assert set(PRESETS) == {"paper-reference", "paper-reference-tuned"}
 
 
 def test_updates_are_rounded_up() -> None:
@@ -37,6 +86,9 @@ def test_updates_are_rounded_up() -> None:
     [
         ({"num_envs": 2}, "minibatches: got 4, expected at most num_envs = 2"),
         ({"bptt": 5}, "bptt: got 5, expected a divisor of horizon = 32"),
+        ({"update": "chunks"}, "bptt: got 0, expected less than horizon = 32 and not 0"),
+        ({"update": "chunks", "bptt": 32}, "bptt: got 32, expected less than horizon = 32"),
+        ({"explo_t": 0.0}, "explo_t"),
         ({"lr": float("nan")}, "lr"),
         ({"lr": 0}, "lr"),
         ({"seed": -1}, "seed"),
@@ -60,9 +112,18 @@ def test_every_field_says_what_it_is() -> None:
     assert set(TrainConfig.model_fields) >= RESUMABLE_FIELDS
 
 
-def test_the_exploration_table_is_well_formed() -> None:
+def test_the_exploration_table_is_the_published_one() -> None:
     table = yaml.safe_load(Path(trainer.__file__).with_name("exploration.yaml").read_text())
-    assert len(table) == 11
-    for settings in table.values():
-        assert set(settings) == {"kind", "c"}
-        assert TrainConfig(explo=settings["kind"], explo_c=float(settings["c"])).explo_t == 0.6
+    assert {name: (settings["kind"], settings["c"]) for name, settings in table.items()} == {
+        "talkitout": ("lang", 7),
+        "talkitout_no_liar": ("lang", 7),
+        "diverse_exit": ("lang", 20),
+        "dance": ("cell", 3),
+        "showme": ("cell", 3),
+        "showme_no_social": ("cell", 3),
+        "help": ("cell", 3),
+        "help_as_helper": ("cell", 3),
+        "cointhief": ("cell", 2),
+        "cointhief_tags": ("cell", 2),
+        "social_env": ("cell", 2),
+    }

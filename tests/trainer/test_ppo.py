@@ -144,6 +144,41 @@ def test_clipped_value_loss_takes_the_worse_of_the_two() -> None:
     )
 
 
+def test_per_head_value_loss_weighs_frames_by_the_heads_that_took_part() -> None:
+    """A spoken and a silent frame: four and two heads of eight carry their clipped value errors."""
+    spoken, logits = one_frame(True, advantage=0.0, acting=0.5, now=0.5)
+    silent, _ = one_frame(False, advantage=0.0, acting=0.5, now=0.5)
+    batch = Batch(
+        torch.cat((spoken.actions, silent.actions)),
+        torch.cat((spoken.log_probs, silent.log_probs)),
+        values=torch.tensor([1.0, 1.0]),
+        advantages=torch.tensor([0.0, 0.0]),
+        returns=torch.tensor([3.0, 1.5]),
+    )
+    settings = config(loss="per_head", clip_value=True)
+    parts = ppo_loss(batch, logits.expand(2, -1), torch.tensor([2.5, 0.5]), SIZES, settings)
+    clipped = (1.2 - 3) ** 2  # worse than (2.5 - 3) ** 2
+    plain = (0.5 - 1.5) ** 2  # worse than (0.8 - 1.5) ** 2
+    assert parts.value.item() == pytest.approx((4 * clipped + 2 * plain) / 8)
+    entropies = 6 * log(2) / 8
+    assert parts.total.item() == pytest.approx(0.5 * parts.value.item() - 0.01 * entropies)
+
+
+@pytest.mark.parametrize(
+    ("advantage", "now", "expected"),
+    [
+        (2.0, 0.7, -2 * 1.2),  # ratio 1.4 of a good action: clipped
+        (2.0, 0.3, -2 * 0.6),  # ratio 0.6 of a good action: not clipped
+        (-2.0, 0.7, 2 * 1.4),  # ratio 1.4 of a bad action: not clipped
+        (-2.0, 0.3, 2 * 0.8),  # ratio 0.6 of a bad action: clipped
+    ],
+)
+def test_each_head_clips_its_own_ratio(advantage: float, now: float, expected: float) -> None:
+    batch, logits = one_frame(True, advantage, acting=0.5, now=now)
+    parts = ppo_loss(batch, logits, torch.tensor([3.0]), SIZES, config(loss="per_head"))
+    assert parts.policy.item() == pytest.approx(expected, rel=1e-5), "the mean of four equal heads"
+
+
 def played(config: TrainConfig) -> tuple[Session, Any]:
     envs = EchoEnvs(config.num_envs, length=8, chatter=0.4)
     session = Session.start(config, envs)

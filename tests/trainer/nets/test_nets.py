@@ -8,9 +8,12 @@ import pytest
 import torch
 from torch.nn import functional
 
+import socialai_dsl as sd
 from trainer.nets import ActorCritic, NetSpec, best_precision, build_net, net_class
+from trainer.nets.base import unit_row_linear
 from trainer.nets.fast import Cells, FastNet
 from trainer.nets.paper import PaperNet
+from trainer.session import net_spec
 
 WORDS = ("<pad>", "<unk>", *(a + b for a in "abcdef" for b in "ghijkl"), "it's", "3")
 SPEC = NetSpec((8, 2, 4, 16), (7, 7, 4), (12, 5, 3, 3), WORDS)
@@ -51,6 +54,55 @@ def test_the_reference_network_s_parts_have_the_published_sizes() -> None:
     assert size(net.memory) == 132_096
     critic = net.heads.hidden.weight[:64].numel() + 64 + size(net.heads.out[4])
     assert critic == 8_321
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("talkitout", 1_097_503),
+        ("diverse_exit", 1_097_503),
+        ("showme", 1_096_463),
+        ("help", 1_096_463),
+        ("dance", 1_096_203),
+        ("cointhief", 1_096_463),
+        ("social_env", 1_100_103),
+    ],
+)
+def test_the_reference_network_of_each_scenario_has_the_published_size(name: str, parameters: int) -> None:
+    envs = sd.make_vec(f"{name}+as_coded", 1)
+    net = build_net("paper-reference", net_spec(envs), 0)
+    envs.close()
+    assert sum(p.numel() for p in net.parameters()) == parameters
+
+
+def test_a_linear_layer_is_drawn_row_by_row_on_the_unit_sphere() -> None:
+    layer = torch.nn.Linear(2, 3)
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(5)
+        drawn = torch.empty(3, 2).normal_()
+        torch.manual_seed(5)
+        unit_row_linear(layer)
+    lengths = [(a * a + b * b) ** 0.5 for a, b in drawn.tolist()]
+    expected = [[a / n, b / n] for (a, b), n in zip(drawn.tolist(), lengths, strict=True)]
+    assert np.allclose(layer.weight.detach().numpy(), expected, atol=1e-6)
+    assert layer.bias.tolist() == [0, 0, 0]
+
+
+def test_only_linear_layers_of_the_reference_network_are_drawn_so() -> None:
+    net = build_net("paper-reference", SPEC, 0)
+    linear = [module for module in net.modules() if isinstance(module, torch.nn.Linear)]
+    assert len(linear) == 4 + 6, (
+        "scale and shift of two blocks, the heads' first layers as one, five last ones"
+    )
+    for layer in linear:
+        assert torch.allclose(layer.weight.norm(dim=1), torch.ones(len(layer.weight)))
+        assert (layer.bias == 0).all()
+    bound = 128**-0.5  # PyTorch's default: uniform up to 1 / sqrt(size of the state)
+    for module in (net.dialogue.gru, net.memory.cell):
+        for weight in module.parameters():
+            assert 0.9 * bound < weight.abs().max() <= bound
+    assert 0.95 < net.dialogue.embedding.weight.std() < 1.05, "normal, the padding's row too"
+    assert net.dialogue.embedding.weight[0].abs().max() > 0
 
 
 def test_linear_layers_of_the_paper_network_start_with_unit_rows() -> None:
