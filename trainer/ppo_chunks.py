@@ -90,11 +90,12 @@ def update_chunks(
     advantages = scale_advantages(raw, config)
     frames = _Frames.of(actor, rollout, advantages, returns)
     memories = acting_memories(rollout, config.bptt)
+    horizon, envs = rollout.values.shape
     steps = []
     for epoch in range(config.epochs):
-        starts = chunk_starts(config.num_envs, config.horizon, config.bptt, shifted=epoch % 2 == 1)
+        starts = chunk_starts(envs, horizon, config.bptt, shifted=epoch % 2 == 1)
         order = torch.randperm(len(starts), generator=generator)
-        size = config.num_envs * config.horizon // config.bptt // config.minibatches
+        size = envs * horizon // config.bptt // config.minibatches
         for chunks in torch.split(starts[order], size):
             steps.append(_step(actor.net, optimizer, frames, memories, chunks.to(actor.device), config))
     return summarize(steps, rollout.values, returns)

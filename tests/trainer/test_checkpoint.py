@@ -244,6 +244,42 @@ def test_words_are_moved_by_spelling(session: Session, tmp_path: Path) -> None:
     assert torch.equal(new[5], old[4])
 
 
+def test_words_of_letters_are_moved_by_their_own_spelling(small_config: Any, tmp_path: Path) -> None:
+    """The embedding of the paper's network has a row for each run of letters, not for each word of the scenario."""
+    envs = EchoEnvs(8)
+    envs.program.vocabulary = ["<pad>", "<unk>", "voice", "say", "it's", "2", "two2", "you", "la", "di"]
+    session = Session.start(small_config(net="paper-reference"), envs)
+    path = write(tmp_path, session.checkpoint())
+    other = EchoEnvs(2)
+    other.program.vocabulary = ["<pad>", "<unk>", "two", "5", "la", "it", "novel", "voice", "s"]
+    with pytest.warns(UserWarning, match="vocabulary differs"):
+        net = restored(path, other)
+    old, new = rows_by_word(session.actor.net), rows_by_word(net)
+    shared = {"", "this", "is", "what", "you", "hear", "two", "la", "it", "voice", "s"}
+    assert set(new) == shared | {"novel"}
+    for word in shared:
+        assert torch.equal(new[word], old[word]), word
+    assert net.reader.words.index("two") != session.actor.net.reader.words.index("two")
+
+
+def rows_by_word(net: Any) -> dict[str, torch.Tensor]:
+    return dict(zip(net.reader.words, net.dialogue.embedding.weight.detach(), strict=False))
+
+
+def test_a_vocabulary_that_the_network_has_no_room_for_is_refused(small_config: Any) -> None:
+    session = Session.start(small_config(net="paper-reference"), EchoEnvs(8))
+    good = session.checkpoint()
+    many = ["<pad>", "<unk>", *(a + b for a in "bcdfgjklmn" for b in "opqrstuvwx")]
+    meta = good.meta.model_copy(update={"vocabulary": many})
+    with (
+        pytest.warns(UserWarning, match="vocabulary differs"),
+        pytest.raises(CheckpointError, match="vocabulary does not fit its network"),
+    ):
+        restore_net(
+            Checkpoint(meta, good.tensors), net_spec(session.envs), list(session.envs.program.vocabulary)
+        )
+
+
 def test_another_order_of_the_same_words_changes_nothing_but_the_rows(
     session: Session, tmp_path: Path
 ) -> None:

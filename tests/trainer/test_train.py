@@ -58,13 +58,26 @@ def test_it_learns_to_repeat_a_word_it_heard(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("net", "explo", "threads"), [("fast", "lang", 1), ("fast", "cell", 2), ("paper-reference", "none", 1)]
+    ("net", "explo", "threads", "update"),
+    [
+        ("fast", "lang", 1, "environments"),
+        ("fast", "cell", 2, "environments"),
+        ("paper-reference", "none", 1, "chunks"),
+    ],
 )
 def test_a_run_stopped_three_times_ends_with_the_same_bits(
-    net: str, explo: str, threads: int, tmp_path: Path, small_config: Any
+    net: str, explo: str, threads: int, update: str, tmp_path: Path, small_config: Any
 ) -> None:
     updates = 9 if net == "fast" else 4
-    config = small_config(net=net, explo=explo, threads=threads, frames=64 * updates, bootstrap_timeouts=True)
+    config = small_config(
+        net=net,
+        explo=explo,
+        threads=threads,
+        update=update,
+        bptt=4,
+        frames=64 * updates,
+        bootstrap_timeouts=True,
+    )
     whole = read(train(config, EchoEnvs(8, chatter=0.3), tmp_path / "whole"))
     stops = np.sort(np.random.default_rng(0).choice(np.arange(1, updates), 3, replace=False)).tolist()
     for index, stop in enumerate(stops):

@@ -7,7 +7,11 @@ from typing import Any
 import pytest
 from PIL import Image
 
+from socialai_dsl.cli.agents import train_config
+from socialai_dsl.cli.errors import UsageError
 from socialai_dsl.cli.main import main, run_main
+from socialai_dsl.cli.settings import Settings
+from trainer.config import configure, paper_preset
 
 Capture = pytest.CaptureFixture[str]
 
@@ -82,6 +86,50 @@ def test_a_resumed_run_equals_one_that_never_stopped() -> None:
     assert run_main(["--resume", "stopped", "--frames", "4000"]) == 0
     assert run_main(["corridor.yaml", *QUICK, "--frames", "4000", "--out", "straight"]) == 0
     assert result_of("stopped")["eval"] == result_of("straight")["eval"]
+
+
+def test_a_preset_brings_its_numbers_and_options_override_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        "trainer.crew.available_cores", lambda: 1
+    )  # threads of torch would wait for busy cores
+    few = [
+        "--net",
+        "paper-reference",
+        "--frames",
+        "80",
+        "--envs",
+        "2",
+        "--eval-episodes",
+        "4",
+        "--device",
+        "cpu",
+    ]
+    assert run_main(["corridor.yaml", *few, "--seed", "5", "--out", "here"]) == 0
+    written = json.loads(Path("here", "config.json").read_text())
+    assert written["trainer"] == paper_preset(frames=80, num_envs=2, seed=5, explo_c=0.0).model_dump()
+    assert run_main(["--resume", "here", "--frames", "160"]) == 0
+    assert result_of("here")["frames"] == 160
+    assert main(["evaluate", "here", "--on", "corridor.yaml", "--episodes", "4", "--device", "cpu"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("net", "envs"), [("paper-reference-tuned", 16), ("paper-reference", 16), ("fast", 256)]
+)
+def test_the_number_of_environments_is_the_preset_s_unless_given(
+    net: str, envs: int, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trained: list[Settings] = []
+
+    def train_agent(settings: Settings, *_: object) -> None:
+        trained.append(settings)
+        raise UsageError("far enough")
+
+    monkeypatch.setattr("socialai_dsl.cli.agents.train_agent", train_agent)
+    assert run_main(["corridor.yaml", "--net", net, "--explo", "cell"]) == 2
+    (settings,) = trained
+    assert settings.envs == envs
+    config = train_config(settings)
+    assert config == configure(net, frames=settings.frames, num_envs=envs, explo="cell", explo_c=3.0)
 
 
 def test_random_play_is_the_same_every_time() -> None:
