@@ -37,6 +37,7 @@ class CheckpointMeta(BaseModel):
         action_sizes, image_shape: what the weights were made for.
         vocabulary: words by token id.
         program_sha256: digest of the compiled scenario.
+        scenario: its name. actions, templates, nouns: what the choices of the agent's action mean in it.
         frames, update: how far the run had come.
         torch_version: version that wrote it.
     """
@@ -49,6 +50,10 @@ class CheckpointMeta(BaseModel):
     image_shape: tuple[int, int, int]
     vocabulary: list[str] = Field(max_length=100_000)
     program_sha256: str = Field(max_length=64)
+    scenario: str = Field("", max_length=10_000)
+    actions: list[str] = Field(default_factory=list, max_length=1_000)
+    templates: list[str] = Field(default_factory=list, max_length=10_000)
+    nouns: list[str] = Field(default_factory=list, max_length=10_000)
     frames: int = Field(ge=0)
     update: int = Field(ge=0)
     torch_version: str = Field(max_length=100)

@@ -101,6 +101,10 @@ class Session:
             image_shape=spec.image_shape,
             vocabulary=list(program.vocabulary),
             program_sha256=program.sha256,
+            scenario=program.name,
+            actions=list(program.actions),
+            templates=list(program.templates),
+            nouns=list(program.nouns),
             frames=self.frames,
             update=self.update,
             torch_version=str(torch.__version__),
@@ -179,5 +183,8 @@ class Session:
 
 
 def net_spec(envs: Any) -> NetSpec:
-    """Shapes a network for these environments must have."""
-    return NetSpec.of(envs.single_action_space, envs.single_observation_space, envs.program.vocabulary)
+    """Shapes a network must have for this environment, single or vector."""
+    many = hasattr(envs, "single_action_space")
+    actions = envs.single_action_space if many else envs.action_space
+    observations = envs.single_observation_space if many else envs.observation_space
+    return NetSpec.of(actions, observations, envs.program.vocabulary)

@@ -9,6 +9,7 @@ from gymnasium import spaces
 
 from trainer.distinct import content_ids
 
+_SAME, _DISABLED = gym.vector.AutoresetMode.SAME_STEP, gym.vector.AutoresetMode.DISABLED
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 
 
@@ -29,12 +30,24 @@ class EchoEnvs(gym.vector.VectorEnv):
 
     Speaking right ends the episode with success; at any other time speaking does nothing. Episodes last at most
     `limit` steps (a time-out), and primitive 0 at the very first step ends them at once (outcome "left").
-    `chatter` is the probability of an extra line of four words in a step.
+    `chatter` is the probability of an extra line of four words in a step. With `mode` Disabled nothing happens in an
+    environment whose episode is over until it is reset.
     """
 
-    metadata = {"autoreset_mode": gym.vector.AutoresetMode.SAME_STEP}  # noqa: RUF012 - Gymnasium's own form
-
-    def __init__(self, num_envs, nouns=4, delay=2, limit=6, length=16, chatter=0.0, pictures=40, lethal=True):
+    def __init__(
+        self,
+        num_envs,
+        nouns=4,
+        delay=2,
+        limit=6,
+        length=16,
+        chatter=0.0,
+        pictures=40,
+        lethal=True,
+        mode=_SAME,
+    ):
+        self.metadata = {"autoreset_mode": mode}
+        self._over = np.zeros(num_envs, np.bool_)
         self.num_envs, self.nouns, self.delay, self.limit = num_envs, nouns, delay, limit
         self.length, self.chatter, self.pictures, self.lethal = length, chatter, pictures, lethal
         high = np.broadcast_to(np.array([12, 5, 3, 3], np.uint8), (7, 7, 4))
@@ -47,7 +60,13 @@ class EchoEnvs(gym.vector.VectorEnv):
         self.observation_space = gym.vector.utils.batch_space(self.single_observation_space, num_envs)
         self.action_space = gym.vector.utils.batch_space(self.single_action_space, num_envs)
         self.program = SimpleNamespace(
-            outcomes=["right", "left", "time_out"], vocabulary=self.vocabulary, sha256="0" * 64
+            name="echo",
+            outcomes=["right", "left", "time_out"],
+            vocabulary=self.vocabulary,
+            sha256="0" * 64,
+            actions=("stop", "wait", "look"),
+            templates=("ask <noun>", "say <noun>"),
+            nouns=tuple(f"word{i}" for i in range(nouns)),
         )
         kinds = np.stack([np.arange(48) % 13, np.arange(48) % 6, np.arange(48) % 3, np.arange(48) % 4], 1)
         drawn = np.random.default_rng(1).integers(0, 48, (pictures, 7, 7))
@@ -70,10 +89,11 @@ class EchoEnvs(gym.vector.VectorEnv):
 
     def reset(self, *, seed=None, options=None):
         s = self._s
-        s["t"][:], s["heard"][:] = 0, 0
-        self._tokens[:] = 0
+        chosen = np.asarray((options or {}).get("reset_mask", np.ones(self.num_envs, np.bool_)))
+        s["t"][chosen], s["heard"][chosen], self._over[chosen] = 0, 0, False
+        self._tokens[chosen] = 0
         if options and "test_episode" in options:
-            s["seed"][:], s["episode"][:] = 2**40, np.asarray(options["test_episode"])
+            s["seed"][chosen], s["episode"][chosen] = 2**40, np.asarray(options["test_episode"])[chosen]
         elif seed is not None:
             s["seed"][:], s["episode"][:] = np.arange(self.num_envs) + 1000 * np.asarray(seed), 0
         else:
@@ -84,20 +104,21 @@ class EchoEnvs(gym.vector.VectorEnv):
         s, word = self._s, self._word()
         actions = np.asarray(actions)
         assert actions.shape == (self.num_envs, 4)
-        s["t"] += 1
+        alive = ~self._over
+        s["t"] += alive
         t = s["t"]
-        speaks = actions[:, 1] == 1
+        speaks = (actions[:, 1] == 1) & alive
         right = speaks & (actions[:, 2] == 1) & (actions[:, 3] == word) & (t == self.delay + 1)
-        left = (t == 1) & (actions[:, 0] == 0) & self.lethal
+        left = (t == 1) & (actions[:, 0] == 0) & self.lethal & alive
         terminated = right | left
-        truncated = ~terminated & (t >= self.limit)
+        truncated = ~terminated & (t >= self.limit) & alive
         reward = right * (1 - 0.9 * t / self.limit)
         self._stats["rules"]["speaks"] += int(speaks.sum())
         s["heard"][:] = 0
-        self._say(np.flatnonzero(t == 1), [2, 3], 4 + word, 1)
+        self._say(np.flatnonzero((t == 1) & alive), [2, 3], 4 + word, 1)
         if self.chatter:
             noisy = _mix(s["seed"], s["episode"], t, 9) % np.uint64(1000) < np.uint64(1000 * self.chatter)
-            self._say(np.flatnonzero(noisy), [2, 4 + self.nouns, 5 + self.nouns], 4 + word, 2)
+            self._say(np.flatnonzero(noisy & alive), [2, 4 + self.nouns, 5 + self.nouns], 4 + word, 2)
         done = terminated | truncated
         infos = {}
         if done.any():
@@ -113,8 +134,11 @@ class EchoEnvs(gym.vector.VectorEnv):
                 "_outcome": done,
                 "final_obs": final,
             }
-            s["episode"][done] += 1
-            s["t"][done], s["heard"][done], self._tokens[done] = 0, 0, 0
+            if self.metadata["autoreset_mode"] is _DISABLED:
+                self._over |= done
+            else:
+                s["episode"][done] += 1
+                s["t"][done], s["heard"][done], self._tokens[done] = 0, 0, 0
         observation = self._observe()
         if self.poison == "reward":
             reward = reward * np.nan
