@@ -106,7 +106,7 @@ class CheckpointPolicy:
             greedy: take the most probable action instead of sampling.
             seed: of the sampling.
             device: where the network runs.
-            net: name of the network, needed if it is not a shipped one, because a file must not choose what is imported.
+            net: name of the network, needed if it is not a shipped one: no file chooses what is imported.
 
         Raises:
             CheckpointError: see `checkpoint.read` and `checkpoint.restore_net`.

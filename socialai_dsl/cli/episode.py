@@ -1,6 +1,6 @@
 """This module records one episode for people: a film with its dialogue, and a transcript."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from socialai_dsl.cli.endings import Ending
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.envs.panel import DialogueLine, Face, compose_frame
 from socialai_dsl.program_suite import Playable
@@ -16,6 +17,7 @@ from socialai_dsl.program_suite import Playable
 _STEP_MILLISECONDS: Final = 450
 _END_MILLISECONDS: Final = 2500
 _PALETTE_COLOURS: Final = 160
+_ENDING_WIDTH: Final = 52
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,8 @@ class Episode:
         title: what was recorded.
         steps: in order.
         frames: a picture after the reset and one after each step, uint8 (H, W, 3).
-        outcome: how it ended, in the scenario's words.
+        outcome: how it ended, by name.
+        ending: the same as the scenario's file says it, and where; None if that is not known.
         success: whether that counts as success.
         reward: sum of the rewards.
     """
@@ -58,18 +61,21 @@ class Episode:
     steps: list[Step] = field(default_factory=list)
     frames: list[NDArray[np.uint8]] = field(default_factory=list)
     outcome: str = ""
+    ending: Ending | None = None
     success: bool = False
     reward: float = 0.0
 
     def transcript(self) -> str:
-        """The episode as text: one line for each step, what was heard under it."""
-        lines = [self.title, ""]
+        """The episode as text: one line for each step, what was heard under it, and how it ended."""
+        lines = [self.title, "", "step  did       said and heard"]
         for step in self.steps:
             said = f'   You: "{step.said}"' if step.said is not None else ""
             lines.append(f"{step.t:>4}  {step.action:<8}{said}".rstrip())
             lines += [f"{'':17}{printable(line)}" for line in step.heard]
         verdict = "success" if self.success else "no success"
         lines += ["", f"{verdict} ({self.outcome}) after {len(self.steps)} steps, reward {self.reward:.3f}"]
+        if self.ending is not None:
+            lines.append(f"{printable(self.ending.text)}   {self.ending.place}".rstrip())
         return "\n".join(lines) + "\n"
 
     def save_film(self, path: Path) -> None:
@@ -93,6 +99,7 @@ def record(
     title: str,
     reset: dict[str, Any],
     meet: Callable[[], Sequence[Face]] = tuple,
+    endings: Mapping[str, Ending] | None = None,
 ) -> Episode:
     """Play one episode with given actions and record it.
 
@@ -103,6 +110,7 @@ def record(
         title: first line of the transcript; of a suite the member that is played is added.
         reset: arguments of `env.reset`.
         meet: says who is in the room; asked after the reset.
+        endings: what the scenario's file says of each outcome, by name.
     """
     _, info = env.reset(**reset)
     cast = meet()
@@ -119,6 +127,7 @@ def record(
         dialogue += step.dialogue
         if ended:
             episode.outcome, episode.success = str(info["outcome"]), bool(info["success"])
+            episode.ending = (endings or {}).get(episode.outcome)
         episode.frames.append(
             compose_frame(env.render(), dialogue, _caption(episode, step, ended), now=step.t, cast=cast)
         )
@@ -145,7 +154,8 @@ def _caption(episode: Episode, step: Step, ended: bool) -> list[str]:
     lines = [f"step {step.t}   {step.action}"]
     if ended:
         verdict = "success" if episode.success else "no success"
-        lines.append(f"{verdict} ({episode.outcome}), reward {episode.reward:.3f}")
+        how = episode.outcome if episode.ending is None else episode.ending.short(_ENDING_WIDTH)
+        lines.append(f"{verdict} ({how}), reward {episode.reward:.3f}")
     else:
         lines.append("")
     return lines

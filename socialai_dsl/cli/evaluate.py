@@ -2,13 +2,20 @@
 
 import argparse
 import json
+import sys
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Any, Final
 
+from socialai_dsl.cli.arguments import natural, positive
 from socialai_dsl.cli.errors import Exit, UsageError
-from socialai_dsl.cli.run_folder import SETTINGS, read_json
+from socialai_dsl.cli.run_folder import SETTINGS, read_json, versions, write_text
+
+if TYPE_CHECKING:
+    from socialai_dsl.cli.evaluation import Evaluation
 
 SUMMARY: Final = "evaluate a trained agent on its own or another scenario's test set"
+FIGURES: Final = "evaluation.json"
+_RECORDED: Final = 3
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,9 +27,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--on", action="append", metavar="SCENARIO", help="what to play (default: the run's own); repeatable"
     )
     parser.add_argument(
-        "--episodes", type=int, default=500, metavar="N", help="of the test set (default: 500)"
+        "--episodes", type=positive, default=500, metavar="N", help="of the test set (default: 500)"
+    )
+    parser.add_argument(
+        "--greedy",
+        action="store_true",
+        help="take the most probable action (default: sample, as the paper does)",
+    )
+    parser.add_argument(
+        "--seed",
+        type=natural,
+        default=0,
+        metavar="N",
+        help="of the sampling (default: 0); rooms never change",
     )
     parser.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help="default: auto")
+    parser.add_argument(
+        "--net", metavar="my.module:MyNet", help="import this code, for an agent with a network of your own"
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help=f"write {FIGURES}, and for each scenario a folder with films, transcripts and a list of all episodes",
+    )
+    parser.add_argument(
+        "--record",
+        type=natural,
+        metavar="N",
+        help=f"with --out: how many failures and how many successes are recorded (default: {_RECORDED})",
+    )
     parser.add_argument(
         "--json", action="store_true", help="print an array with one object for each scenario"
     )
@@ -30,32 +64,69 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Evaluate on each scenario."""
-    import socialai_dsl
-    from socialai_dsl.cli.agents import evaluate_agent, require_trainer, resolve_device
+    from socialai_dsl.cli.agents import require_trainer, resolve_device
+    from socialai_dsl.cli.evaluation import Player, evaluate_agent
+    from socialai_dsl.cli.evaluation_report import write_episodes
 
-    if arguments.episodes < 1:
-        raise UsageError(f"--episodes: got {arguments.episodes}, expected at least 1")
+    if arguments.record is not None and arguments.out is None:
+        raise UsageError("--record: expected --out DIR as well, where the recordings go")
+    if arguments.run == "human" and arguments.json:
+        raise UsageError("--json: the agent 'human' plays on standard output")
     require_trainer()
-    device = resolve_device(arguments.device)
+    player = Player(
+        arguments.run, resolve_device(arguments.device), arguments.greedy, arguments.seed, arguments.net
+    )
     results = []
-    for scenario in arguments.on or [_own_scenario(Path(arguments.run))]:
-        program = socialai_dsl.compile(socialai_dsl.load(scenario))
-        figures, _ = evaluate_agent(
-            arguments.run, scenario, program, arguments.episodes, device, arguments.run
-        )
-        results.append({"scenario": scenario, "agent": arguments.run, "eval": figures})
+    for scenario in arguments.on or [_own_scenario(arguments.run)]:
+        evaluation = evaluate_agent(player, scenario, arguments.episodes)
+        for warning in evaluation.warnings:
+            print(f"warning: {warning}", file=sys.stderr)
+        results.append(_result(evaluation))
         if not arguments.json:
-            print(
-                f"{scenario}: success {figures['success_rate']:.1%} ± {figures['success_rate_se']:.1%}, "
-                f"mean length {figures['mean_length']:.1f}, mean return {figures['mean_return']:.3f}",
-                flush=True,
-            )
+            print(_table(evaluation, results[-1]["eval"]), flush=True)
+        if arguments.out is not None:
+            count = _RECORDED if arguments.record is None else arguments.record
+            place = write_episodes(evaluation, arguments.out, count, f"agent {arguments.run}")
+            if not arguments.json:
+                print(f"\nepisodes written to {place}\n", flush=True)
+            # After each scenario, so that nothing is lost should the agent not fit the next one.
+            write_text(arguments.out / FIGURES, _text(results) + "\n")
     if arguments.json:
-        print(json.dumps(results, indent=2, ensure_ascii=False))
+        print(_text(results))
     return Exit.GOOD
 
 
-def _own_scenario(run: Path) -> str:
+def _text(results: list[dict[str, Any]]) -> str:
+    return json.dumps(results, indent=2, ensure_ascii=False)
+
+
+def _result(evaluation: "Evaluation") -> dict[str, Any]:
+    return {
+        "scenario": evaluation.scenario,
+        "agent": evaluation.player.agent,
+        "greedy": evaluation.player.greedy,
+        "seed": evaluation.player.seed,
+        "warnings": list(evaluation.warnings),
+        "eval": evaluation.figures(),
+        "program_sha256": evaluation.program.sha256,
+        "versions": versions(),
+    }
+
+
+def _table(evaluation: "Evaluation", figures: dict[str, Any]) -> str:
+    from socialai_dsl.cli.evaluation_report import aligned, ending_lines, rule_lines, summary_rows
+
+    parts = [
+        [f"{evaluation.scenario}, agent {evaluation.player.agent}"],
+        aligned(summary_rows(figures)),
+        ending_lines(figures),
+        rule_lines(figures),
+    ]
+    return "\n\n".join("\n".join(lines) for lines in parts if lines)
+
+
+def _own_scenario(agent: str) -> str:
+    run = Path(agent)
     if not (run / SETTINGS).is_file():
         raise UsageError(f"--on: {run} does not say which scenario it was trained on; name one")
     scenario = read_json(run / SETTINGS).get("scenario")

@@ -8,6 +8,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from socialai_dsl.cli.arguments import natural, positive
 from socialai_dsl.cli.errors import Exit, UsageError
 from socialai_dsl.cli.run_folder import (
     RESULT,
@@ -22,13 +23,13 @@ from socialai_dsl.cli.run_folder import (
 from socialai_dsl.cli.settings import Settings
 
 if TYPE_CHECKING:
+    from socialai_dsl.cli.evaluation import Evaluation
     from socialai_dsl.program_suite import Playable
 
 SUMMARY: Final = "train an agent on a scenario, evaluate it and write pictures and figures"
 
 # About two minutes of training with the fast network on two cores of a server.
 DEFAULT_FRAMES: Final = 600_000
-_NUMBERS_SHOWN: Final = 8
 BUILT_IN_AGENTS: Final = ("ppo", "random", "oracle", "human")
 
 
@@ -43,12 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="ppo (default), random, oracle, human, or a checkpoint or run folder; all but ppo skip training",
     )
     parser.add_argument(
-        "--frames", type=_positive, metavar="N", help=f"frames to train for (default: {DEFAULT_FRAMES:,})"
+        "--frames", type=positive, metavar="N", help=f"frames to train for (default: {DEFAULT_FRAMES:,})"
     )
-    parser.add_argument("--seed", type=_natural, default=0, metavar="N", help="default: 0")
+    parser.add_argument("--seed", type=natural, default=0, metavar="N", help="default: 0")
     parser.add_argument(
         "--envs",
-        type=_positive,
+        type=positive,
         metavar="N",
         help="environments at once (default: 256, or the preset's number)",
     )
@@ -79,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help="default: auto")
     parser.add_argument(
-        "--eval-episodes", type=_positive, default=500, metavar="N", help="of the test set (default: 500)"
+        "--eval-episodes", type=positive, default=500, metavar="N", help="of the test set (default: 500)"
     )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder of this run (default: runs/<scenario>/<time>-s<seed>)"
@@ -91,7 +92,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(arguments: argparse.Namespace) -> Exit:
     """Do the whole run."""
     import socialai_dsl
-    from socialai_dsl.cli.agents import evaluate_agent, require_trainer, train_agent
+    from socialai_dsl.cli.agents import require_trainer, train_agent
+    from socialai_dsl.cli.evaluation import Player, evaluate_agent
 
     require_trainer()
     settings = _resumed(arguments) if arguments.resume else _started(arguments)
@@ -111,19 +113,20 @@ def execute(arguments: argparse.Namespace) -> Exit:
             _discard_unstarted(folder)
             raise
         training = _training_figures(folder)
-    label = f"agent {settings.agent}, seed {settings.seed}"
-    evaluation, episode = evaluate_agent(
-        agent, settings.scenario, program, settings.eval_episodes, settings.device, label
-    )
+    player = Player(agent, settings.device, net=settings.net)
+    evaluation = evaluate_agent(player, settings.scenario, settings.eval_episodes)
+    for warning in evaluation.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
     result = {
         "scenario": settings.scenario,
         "agent": settings.agent,
         "seed": settings.seed,
         **training,
-        "eval": evaluation,
+        "eval": evaluation.figures(),
         "program_sha256": program.sha256,
         "versions": versions(),
     }
+    episode = evaluation.record(_shown(evaluation), f"agent {settings.agent}, seed {settings.seed}")
     write_text(folder / "transcript.txt", episode.transcript())
     episode.save_film(folder / "episode.gif")
     if settings.agent == "ppo":
@@ -247,57 +250,17 @@ def _size(program: "Playable") -> str:
     return f"{len(program.actions)} actions, {said} utterances, {len(program.vocabulary)} words"
 
 
+def _shown(evaluation: "Evaluation") -> int:
+    """The episode whose film is made: the first success, or the first of all if there is none."""
+    return int(evaluation.result.success.argmax())
+
+
 def _table(result: dict[str, Any], folder: Path) -> str:
-    evaluation = result["eval"]
-    rate, error = evaluation["success_rate"], evaluation["success_rate_se"]
-    rows = [
-        ("success", f"{rate:.1%} ± {error:.1%} (standard error) of {evaluation['episodes']} test episodes")
-    ]
-    rows += [
-        (f"  {member}", f"{played['success_rate']:.1%} of the {played['share']:.1%} that played it")
-        for member, played in evaluation.get("members", {}).items()
-        if played["share"] > 0
-    ]
-    rows += [(f"  {name}", f"{share:.1%}") for name, share in evaluation["outcomes"].items() if share > 0]
-    rows += [
-        ("mean length", f"{evaluation['mean_length']:.1f} steps"),
-        ("mean return", f"{evaluation['mean_return']:.3f}"),
-    ]
-    if evaluation.get("unsolved"):
-        rows.append(("unsolved", _numbers(evaluation["unsolved"])))
+    from socialai_dsl.cli.evaluation_report import aligned, ending_lines, summary_rows
+
+    rows = summary_rows(result["eval"])
     if result["frames"]:
-        speed = result["frames_per_second"]
-        rows.append(
-            (
-                "training",
-                f"{result['frames']:,} frames in {result['train_seconds']:.0f} s, {speed:,.0f} frames/s",
-            )
-        )
+        seconds, speed = result["train_seconds"], result["frames_per_second"]
+        rows.append(("training", f"{result['frames']:,} frames in {seconds:.0f} s, {speed:,.0f} frames/s"))
     rows.append(("written to", str(folder)))
-    width = max(len(name) for name, _ in rows)
-    return "\n" + "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
-
-
-def _numbers(episodes: list[int]) -> str:
-    """The first of a list of test episodes; `result.json` has them all."""
-    shown = ", ".join(map(str, episodes[:_NUMBERS_SHOWN]))
-    more = len(episodes) - _NUMBERS_SHOWN
-    return f"test episodes {shown}" + (f" and {more} more (all in {RESULT})" if more > 0 else "")
-
-
-def _positive(text: str) -> int:
-    return _number(text, 1)
-
-
-def _natural(text: str) -> int:
-    return _number(text, 0)
-
-
-def _number(text: str, least: int) -> int:
-    try:
-        number = int(text.replace("_", "").replace(",", ""))
-    except ValueError:
-        number = least - 1
-    if number < least:
-        raise argparse.ArgumentTypeError(f"expected a whole number of at least {least}, got {text!r}")
-    return number
+    return "\n".join(["", *aligned(rows), "", *ending_lines(result["eval"])])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from socialai_dsl.cli.endings import Ending
 from socialai_dsl.cli.episode import Episode, Step, describe_step, record
 from socialai_dsl.envs.panel import DialogueLine
 from socialai_dsl.program import Program
@@ -81,6 +82,7 @@ def test_transcript() -> None:
     assert recorded().transcript().splitlines() == [
         "an episode",
         "",
+        "step  did       said and heard",
         '   1  left       You: "Where is the exit"',
         "                 Ann: I am fine.",
         r"                 Bob: Me \x1b[31mtoo",
@@ -89,6 +91,15 @@ def test_transcript() -> None:
         "                 nobody",
         "",
         "success (success@7) after 3 steps, reward 0.750",
+    ]
+
+
+def test_a_transcript_ends_with_the_line_that_decided() -> None:
+    ending = Ending("success@7", True, "success: agent.at(door)", "my.yaml", 7)
+    episode = record(Stand(HEARD), PROGRAM, ACTIONS, "an episode", {}, endings={"success@7": ending})
+    assert episode.transcript().splitlines()[-2:] == [
+        "success (success@7) after 3 steps, reward 0.750",
+        "success: agent.at(door)   my.yaml:7",
     ]
 
 

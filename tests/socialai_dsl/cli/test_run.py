@@ -64,7 +64,11 @@ def test_a_run_leaves_everything_it_promises(capsys: Capture) -> None:
     with Image.open(run / "episode.gif") as film:
         steps = int(Path(run, "transcript.txt").read_text().split(" after ")[1].split(" steps")[0])
         assert film.n_frames <= steps + 1  # type: ignore[attr-defined]
-    assert "of 30 test episodes" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    low, high = result["eval"]["success_interval"]
+    assert f"95% interval {low:.1%} to {high:.1%} (Wilson)" in printed
+    assert "30 of the test set, sampled actions, seed 0" in printed
+    assert len(printed.splitlines()) < 20, "the table stays short"
 
 
 def test_json_prints_the_result_and_nothing_else(capsys: Capture) -> None:

@@ -1,0 +1,276 @@
+"""This module plays the test set with an agent and keeps what is needed to count, describe and record its episodes."""
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from socialai_dsl.cli.endings import Ending, endings_of
+from socialai_dsl.cli.errors import UsageError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from socialai_dsl.cli.episode import Episode
+    from socialai_dsl.program_suite import Playable
+    from trainer.evaluate import EvalResult
+    from trainer.policies import Policy
+
+# Test episodes played together: enough to be fast, and no result depends on it.
+_TOGETHER: Final = 125
+
+
+@dataclass(frozen=True)
+class Player:
+    """Who plays, and how.
+
+    Attributes:
+        agent: `random`, `oracle`, `human`, or the path of a run, of a folder of checkpoints or of one of them.
+        device: where a network runs.
+        greedy: whether a network takes its most probable action instead of sampling.
+        seed: of what a network or `random` draws; rooms do not depend on it.
+        net: name of a network that does not ship, whose code is imported if a checkpoint asks for it.
+    """
+
+    agent: str
+    device: str = "cpu"
+    greedy: bool = False
+    seed: int = 0
+    net: str | None = None
+
+    @property
+    def manner(self) -> str:
+        """How actions come about, in a phrase; empty where there is nothing to say."""
+        if self.agent in ("oracle", "human"):
+            return ""
+        return "most probable actions" if self.greedy else f"sampled actions, seed {self.seed}"
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """Test episodes as an agent played them.
+
+    Attributes:
+        scenario: as it was asked for. program: the scenario's.
+        player: who played.
+        result: what came of it.
+        endings: in the order of the program's outcomes.
+        actions: of each episode, int64 (4,) each.
+        warnings: what the agent's checkpoint does not know of this scenario, and the like.
+    """
+
+    scenario: str
+    program: "Playable"
+    player: Player
+    result: "EvalResult"
+    endings: Sequence[Ending]
+    actions: "Mapping[int, list[NDArray[np.int64]]]"
+    warnings: Sequence[str] = field(default_factory=tuple)
+
+    def figures(self) -> dict[str, Any]:
+        """The figures as a JSON-able object."""
+        result = self.result
+        shares = result.outcomes
+        figures: dict[str, Any] = {
+            "episodes": result.episodes,
+            "success_rate": result.success_rate,
+            "success_rate_se": result.success_rate_se,
+            "success_interval": list(result.success_interval),
+            "mean_length": result.mean_length,
+            "mean_return": result.mean_return,
+            "actions": self.player.manner,
+            "outcomes": shares,
+            "endings": [ending.figures(shares[ending.name], result.episodes) for ending in self.endings],
+            "rules": dict(result.rules),
+        }
+        figures |= _by_member(self.program, shares)
+        if self.player.agent == "oracle":
+            # A room that the script does not solve is worth looking at: it can be played again by its number.
+            figures["unsolved"] = (~result.success).nonzero()[0].tolist()
+        return figures
+
+    def pick(self, success: bool, count: int) -> list[int]:
+        """Numbers of up to `count` episodes that succeeded, or failed: each way of ending has its turn."""
+        queues = [
+            ((self.result.outcome == i) & (self.result.success == success)).nonzero()[0].tolist()
+            for i in range(len(self.result.names))
+        ]
+        queues.sort(key=len, reverse=True)
+        rounds = [queue[turn] for turn in range(count) for queue in queues if turn < len(queue)]
+        return sorted(rounds[:count])
+
+    def record(self, number: int, label: str) -> "Episode":
+        """Play one of the episodes once more, for people to look at.
+
+        Args:
+            number: of the test episode.
+            label: how the recording calls the agent.
+        """
+        import socialai_dsl
+        from socialai_dsl.cli.episode import record
+
+        env = socialai_dsl.make(self.scenario, render_mode="rgb_array")
+        title = f"{self.scenario}, test episode {number}, {label}"
+        endings = {ending.name: ending for ending in self.endings}
+        try:
+            return record(
+                env,
+                self.program,
+                self.actions[number],
+                title,
+                {"options": {"test_episode": number}},
+                env.cast,
+                endings,
+            )
+        finally:
+            env.close()
+
+
+def evaluate_agent(player: Player, scenario: str, episodes: int) -> Evaluation:
+    """Play test episodes 0 to `episodes - 1` of a scenario.
+
+    Raises:
+        ScenarioError: the scenario has mistakes.
+        UsageError: the checkpoint or the script does not fit it.
+    """
+    import socialai_dsl
+
+    loaded = socialai_dsl.load(scenario)
+    program = socialai_dsl.compile(loaded)
+    endings = endings_of(loaded, program)
+    if player.agent == "human":
+        result, played = _let_a_person_play(scenario, program, episodes)
+        return Evaluation(scenario, program, player, result, endings, played)
+
+    from trainer.evaluate import evaluate
+
+    envs = socialai_dsl.make_vec(
+        _with_script(scenario, program) if player.agent == "oracle" else scenario,
+        num_envs=min(_TOGETHER, episodes),
+        copy=False,
+        autoreset_mode="Disabled",
+    )
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            policy = _Remembering(_make_policy(player, envs))
+        told = [str(warning.message) for warning in caught]
+        result = evaluate(policy, envs, episodes)
+    except ValueError as error:
+        raise UsageError(f"{scenario}: {error}") from error
+    finally:
+        envs.close()
+    actions = {number: policy.played[number][:length] for number, length in enumerate(result.lengths)}
+    return Evaluation(scenario, program, player, result, endings, actions, told)
+
+
+def _with_script(scenario: str, program: "Playable") -> str:
+    """The scenario itself if it scripts the agent, else its variant `oracle`, in which everything else is the same.
+
+    Raises:
+        UsageError: there is no script.
+    """
+    import socialai_dsl
+    from socialai_dsl.program_suite import is_scripted
+
+    if is_scripted(program):
+        return scenario
+    name, mark, parameters = scenario.partition("?")
+    scripted = f"{name}+oracle{mark}{parameters}"
+    try:
+        socialai_dsl.load(scripted)
+    except socialai_dsl.ScenarioError as error:
+        if all(diagnostic.code == "S503" for diagnostic in error.diagnostics):
+            raise UsageError(
+                f"{scenario}: the agent has no frame, and there is no variant `oracle`"
+            ) from None
+        raise
+    return scripted
+
+
+def _make_policy(player: Player, envs: Any) -> "Policy":
+    from trainer.policies import CheckpointPolicy, RandomPolicy, ScriptedPolicy
+
+    if player.agent == "random":
+        return RandomPolicy(tuple(int(n) for n in envs.single_action_space.nvec), player.seed)
+    if player.agent == "oracle":
+        return ScriptedPolicy(envs)
+    return CheckpointPolicy.load(
+        Path(player.agent), envs, player.greedy, player.seed, player.device, player.net
+    )
+
+
+class _Remembering:
+    """A policy that keeps its actions, so that an episode can be played again for the recording.
+
+    Attributes:
+        played: number of an episode -> its actions, and perhaps more from after its end.
+    """
+
+    def __init__(self, policy: "Policy") -> None:
+        self._policy = policy
+        self._numbers: list[int] = []
+        self.played: dict[int, list[NDArray[np.int64]]] = {}
+
+    def reset(self, mask: "NDArray[np.bool_]", episodes: "NDArray[np.int64] | None" = None) -> None:
+        """See `Policy.reset`."""
+        assert episodes is not None, "internal: test episodes have numbers"
+        self._numbers = episodes.tolist()
+        self._policy.reset(mask, episodes)
+
+    def act(self, observation: Any) -> "NDArray[np.int64]":
+        """See `Policy.act`."""
+        actions = self._policy.act(observation)
+        for number, action in zip(self._numbers, actions.copy(), strict=True):
+            self.played.setdefault(number, []).append(action)
+        return actions
+
+
+def _let_a_person_play(
+    scenario: str, program: "Playable", episodes: int
+) -> "tuple[EvalResult, dict[int, list[NDArray[np.int64]]]]":
+    """Let a person play test episodes until they quit."""
+    import numpy as np
+
+    import socialai_dsl
+    from socialai_dsl.cli.play import HELP, Played, Quit, play_episode
+    from trainer.evaluate import EvalResult
+
+    env = socialai_dsl.make(scenario, render_mode="ansi")
+    played: list[Played] = []
+    print(HELP)
+    try:
+        for number in range(episodes):
+            played.append(play_episode(env, program, {"options": {"test_episode": number}}))
+    except Quit:
+        if not played:
+            raise UsageError("no episode was played to its end") from None
+    finally:
+        env.close()
+    names = tuple(program.outcomes)
+    result = EvalResult(
+        np.array([p.success for p in played]),
+        np.array([names.index(p.outcome) for p in played]),
+        np.array([len(p.actions) for p in played]),
+        np.array([p.reward for p in played]),
+        names,
+    )
+    return result, {number: p.actions for number, p in enumerate(played)}
+
+
+def _by_member(program: "Playable", shares: Mapping[str, float]) -> dict[str, Any]:
+    """Of a suite: how often each member was played, and how often with success; nothing for a scenario."""
+    from socialai_dsl.program_suite import ProgramSuite, prefixed
+
+    if not isinstance(program, ProgramSuite):
+        return {}
+    successes = {outcome.name for outcome in program.outcome_table if outcome.success}
+    members = {}
+    for member, own in zip(program.members, program.programs, strict=True):
+        names = {prefixed(member, name) for name in own.outcomes}
+        share = sum(shares[name] for name in names)
+        won = sum(shares[name] for name in names & successes)
+        members[member] = {"share": share, "success_rate": won / share if share else None}
+    return {"members": members}

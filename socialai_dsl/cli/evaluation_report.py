@@ -1,0 +1,132 @@
+"""This module shows what an evaluation found: the table on the terminal, and the folder with its episodes."""
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from socialai_dsl.cli.run_folder import RESULT, scenario_folder_name, write_text
+
+if TYPE_CHECKING:
+    from socialai_dsl.cli.evaluation import Evaluation
+
+_NUMBERS_SHOWN: Final = 8
+_RULES_SHOWN: Final = 12
+_TEXT_WIDTH: Final = 64
+
+Row = tuple[str, str]
+
+
+def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
+    """Success with its interval, of each member of a suite as well, then mean length and return."""
+    low, high = figures["success_interval"]
+    rows = [
+        ("success", f"{figures['success_rate']:.1%}, 95% interval {low:.1%} to {high:.1%} (Wilson)"),
+        ("episodes", f"{figures['episodes']} of the test set" + _comma(figures["actions"])),
+        ("mean length", f"{figures['mean_length']:.1f} steps"),
+        ("mean return", f"{figures['mean_return']:.3f}"),
+    ]
+    rows[1:1] = [
+        (f"  {member}", f"{played['success_rate']:.1%} of the {played['share']:.1%} that played it")
+        for member, played in figures.get("members", {}).items()
+        if played["share"] > 0
+    ]
+    if figures.get("unsolved"):
+        rows.append(("unsolved", _numbers(figures["unsolved"])))
+    return rows
+
+
+def ending_lines(figures: Mapping[str, Any]) -> list[str]:
+    """How the episodes ended: share, what the file says and where; what never happened is left out."""
+    endings = sorted(
+        (ending for ending in figures["endings"] if ending["episodes"]),
+        key=lambda ending: (not ending["success"], -ending["share"]),
+    )
+    texts = [_shortened(ending["text"]) for ending in endings]
+    width = max(map(len, texts), default=0)
+    lines = [
+        f"  {ending['share']:>6.1%}  {text:<{width}}  {_place(ending)}".rstrip()
+        for ending, text in zip(endings, texts, strict=True)
+    ]
+    return ["how the episodes ended", *lines]
+
+
+def rule_lines(figures: Mapping[str, Any]) -> list[str]:
+    """The rules that fired most often; nothing if none did."""
+    fired = sorted(
+        ((rate, name) for name, rate in figures["rules"].items() if rate > 0), key=lambda rule: -rule[0]
+    )
+    if not fired:
+        return []
+    lines = [f"  {rate:>6.2f}  {name}" for rate, name in fired[:_RULES_SHOWN]]
+    more = len(fired) - _RULES_SHOWN
+    lines += [f"          and {more} more"] if more > 0 else []
+    return ["rules of the others that fired, per episode", *lines]
+
+
+def aligned(rows: Sequence[Row]) -> list[str]:
+    """Two columns."""
+    width = max(len(name) for name, _ in rows)
+    return [f"{name:<{width}}  {value}" for name, value in rows]
+
+
+def write_episodes(evaluation: "Evaluation", folder: Path, count: int, label: str) -> Path:
+    """Record up to `count` failures and as many successes, and list all episodes.
+
+    Args:
+        evaluation: what was played.
+        folder: gets a folder named after the scenario, which is returned.
+        count: films and transcripts of either kind.
+        label: how the recordings call the agent.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    place = folder / scenario_folder_name(evaluation.scenario)
+    place.mkdir(parents=True, exist_ok=True)
+    for success in (False, True):
+        for number in evaluation.pick(success, count):
+            episode = evaluation.record(number, label)
+            name = f"{'success' if success else 'failure'}-{number:03d}"
+            write_text(place / f"{name}.txt", episode.transcript())
+            episode.save_film(place / f"{name}.gif")
+    write_text(place / "episodes.csv", _episodes(evaluation))
+    return place
+
+
+def _episodes(evaluation: "Evaluation") -> str:
+    """One line for each test episode."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("episode", "success", "outcome", "length", "return"))
+    result = evaluation.result
+    columns = zip(
+        result.success.tolist(),
+        result.outcome.tolist(),
+        result.lengths.tolist(),
+        result.returns.tolist(),
+        strict=True,
+    )
+    for number, (success, outcome, length, total) in enumerate(columns):
+        writer.writerow((number, int(success), result.names[outcome], length, f"{total:.6g}"))
+    return text.getvalue()
+
+
+def _comma(text: str) -> str:
+    return f", {text}" if text else ""
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= _TEXT_WIDTH else text[: _TEXT_WIDTH - 1] + "…"
+
+
+def _place(ending: Mapping[str, Any]) -> str:
+    return f"{ending['file']}:{ending['line']}" if ending["file"] else ""
+
+
+def _numbers(episodes: list[int]) -> str:
+    """The first of a list of test episodes; `result.json` has them all."""
+    shown = ", ".join(map(str, episodes[:_NUMBERS_SHOWN]))
+    more = len(episodes) - _NUMBERS_SHOWN
+    return f"test episodes {shown}" + (f" and {more} more (all in {RESULT})" if more > 0 else "")
