@@ -13,7 +13,7 @@ from trainer import checkpoint as checkpoints
 from trainer.config import TrainConfig
 from trainer.crew import Crew
 from trainer.errors import CheckpointError, ObservationError, TrainingStopped
-from trainer.metrics import MetricsLog, episode_metrics
+from trainer.metrics import MetricsLog, Tracker, episode_metrics
 from trainer.ppo import update
 from trainer.ppo_chunks import update_chunks
 from trainer.rollout import collect
@@ -48,6 +48,7 @@ def train(
     run_dir: Path,
     progress: Callable[[Progress], None] | None = None,
     resume: bool = False,
+    tracker: Tracker | None = None,
 ) -> Path:
     """Train a network and return the path of its final checkpoint.
 
@@ -61,9 +62,10 @@ def train(
         run_dir: directory of the run, made if missing.
         progress: called after every update.
         resume: continue the run in `run_dir`.
+        tracker: takes the figures elsewhere as well.
 
     Raises:
-        ValueError: configuration and environments do not fit.
+        ValueError: configuration and environments do not fit, or the tracker cannot begin.
         CheckpointError: there is nothing to resume, or it is damaged or of another run.
         TrainingStopped: something is not finite or out of bounds, or the disk is full; the last good checkpoint
             is intact.
@@ -76,7 +78,7 @@ def train(
         session.load(checkpoints.read(folder))
     with _explained(session, folder):
         run_dir.mkdir(parents=True, exist_ok=True)
-        log = MetricsLog(run_dir, session.update, config.tensorboard)
+        log = MetricsLog(run_dir, session.update, config.tensorboard, session.frames, tracker)
         if not resume:
             checkpoints.write(folder, session.checkpoint())
     divisible = session.actor.net.distinct and session.actor.device.type == "cpu"

@@ -1,5 +1,6 @@
 """This module trains agents for the commands, by way of the trainer."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Final, Literal
 
@@ -8,6 +9,7 @@ from socialai_dsl.cli.errors import RunFailed, UsageError
 if TYPE_CHECKING:
     from socialai_dsl.cli.settings import Settings
     from trainer.config import TrainConfig
+    from trainer.metrics import Tracker
     from trainer.nets import Precision
 
 _DEFAULT_EXPLO_C: Final = {"lang": 7.0, "cell": 3.0}
@@ -138,7 +140,8 @@ def train_agent(settings: "Settings", folder: Path, resume: bool, stream: IO[str
             def report(progress: Progress) -> None:
                 shown.update(progress.frames, progress.success_rate, progress.frames_per_second)
 
-            return train(config, envs, folder, progress=report, resume=resume)
+            tracker = _tracker(settings, config, folder)
+            return train(config, envs, folder, progress=report, resume=resume, tracker=tracker)
     except TrainingStopped as error:
         if isinstance(error.__cause__, OSError):
             raise UsageError(str(error)) from error
@@ -151,3 +154,15 @@ def train_agent(settings: "Settings", folder: Path, resume: bool, stream: IO[str
         raise KeyboardInterrupt(f"interrupted; go on with: socialai-run --resume {folder}") from None
     finally:
         envs.close()
+
+
+def _tracker(settings: "Settings", config: "TrainConfig", folder: Path) -> "Tracker | None":
+    """Where the figures go besides the folder, if anywhere."""
+    if settings.wandb is None:
+        return None
+    from socialai_dsl.cli.run_folder import scenario_folder_name
+    from trainer.tracking import WandbTracker
+
+    asked = asdict(settings) | {"trainer": config.model_dump()}
+    name = f"{scenario_folder_name(settings.scenario)} {folder.name}"
+    return WandbTracker(settings.wandb, folder, asked, name)

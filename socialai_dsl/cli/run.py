@@ -85,6 +85,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder of this run (default: runs/<scenario>/<time>-s<seed>)"
     )
+    parser.add_argument(
+        "--wandb",
+        metavar="PROJECT",
+        help="also send the figures to this project of Weights & Biases (needs the extra `wandb`)",
+    )
     parser.add_argument("--resume", type=Path, metavar="RUN_DIR", help="go on with a run that was stopped")
     parser.add_argument("--json", action="store_true", help="print only the result, as one JSON object")
 
@@ -187,6 +192,8 @@ def _started(arguments: argparse.Namespace) -> Settings:
         raise UsageError(f"--agent: expected {known} or the path of a checkpoint, got {arguments.agent!r}")
     if not trains and arguments.frames is not None:
         raise UsageError(f"--frames: the agent {arguments.agent!r} is not trained")
+    if not trains and arguments.wandb is not None:
+        raise UsageError(f"--wandb: the agent {arguments.agent!r} is not trained")
     if not trains and arguments.curriculum != "none":
         raise UsageError(f"--curriculum: the agent {arguments.agent!r} is not trained")
     if arguments.agent == "human" and arguments.json:
@@ -206,11 +213,12 @@ def _started(arguments: argparse.Namespace) -> Settings:
         eval_episodes=arguments.eval_episodes,
         precision=resolve_precision(arguments.precision, arguments.net, device),
         curriculum=arguments.curriculum,
+        wandb=arguments.wandb,
     )
 
 
 def _resumed(arguments: argparse.Namespace) -> Settings:
-    """The settings of a run that was stopped; `--frames` may be raised."""
+    """The settings of a run that was stopped; `--frames` may be raised, and W&B be told from now on."""
     from pydantic import TypeAdapter, ValidationError
 
     folder: Path = arguments.resume
@@ -231,7 +239,9 @@ def _resumed(arguments: argparse.Namespace) -> Settings:
         raise UsageError(f"{folder / SETTINGS}: {place}: {first['msg']}") from None
     if settings.agent != "ppo":
         raise UsageError(f"--resume: the agent {settings.agent!r} of {folder} is not trained")
-    return replace(settings, frames=arguments.frames or settings.frames)
+    return replace(
+        settings, frames=arguments.frames or settings.frames, wandb=arguments.wandb or settings.wandb
+    )
 
 
 def _draw_curve(settings: Settings, program: "Playable", folder: Path, result: dict[str, Any]) -> None:

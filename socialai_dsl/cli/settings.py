@@ -20,6 +20,7 @@ class Settings:
         device: where the network runs.
         precision: number type of the network's bulk of arithmetic, with `auto` resolved.
         curriculum: who chooses the members of a suite while training, as the trainer names it; `none`: chance.
+        wandb: project of Weights & Biases that is sent the figures; None: they stay here.
         eval_episodes: how many episodes of the test set are played, from the first on.
     """
 
@@ -35,3 +36,4 @@ class Settings:
     eval_episodes: int
     precision: Literal["float32", "bfloat16"] = "float32"
     curriculum: str = "none"
+    wandb: str | None = None

@@ -58,3 +58,36 @@ def test_numbers_json_does_not_know_are_not_written(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="not JSON compliant"):
         log.write(1, {"loss": float("nan")})
     log.close()
+
+
+def points(run_dir: Path, tag: str) -> list[tuple[int, float]]:
+    """What TensorBoard shows of a run: step and value."""
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    shown = EventAccumulator(str(run_dir))
+    shown.Reload()
+    return [(event.step, event.value) for event in shown.Scalars(tag)]
+
+
+def test_tensorboard_counts_frames_and_forgets_what_is_made_again(tmp_path: Path) -> None:
+    log = MetricsLog(tmp_path, 0, tensorboard=True)
+    for update in range(1, 6):
+        log.write(update, {"frames": 64 * update, "loss": 0.5, "outcomes": {"won": 0.25, "lost": None}})
+    log.close()
+    assert points(tmp_path, "loss") == [(64 * update, 0.5) for update in range(1, 6)]
+    log = MetricsLog(tmp_path, 2, tensorboard=True, frames=128)
+    for update in range(3, 7):
+        log.write(update, {"frames": 64 * update, "loss": 0.25, "outcomes": {"won": 0.25}})
+    log.close()
+    expected = [(64, 0.5), (128, 0.5), (192, 0.25), (256, 0.25), (320, 0.25), (384, 0.25)]
+    assert points(tmp_path, "loss") == expected
+    assert [step for step, _ in points(tmp_path, "outcomes/won")] == [step for step, _ in expected]
+
+
+def test_what_was_synced_is_in_tensorboard_though_nothing_was_closed(tmp_path: Path) -> None:
+    """As after a kill right behind a checkpoint."""
+    log = MetricsLog(tmp_path, 0, tensorboard=True)
+    log.write(1, {"frames": 64, "loss": 0.5})
+    log.sync()
+    assert points(tmp_path, "loss") == [(64, 0.5)]
+    log.close()
