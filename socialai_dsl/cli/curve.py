@@ -30,17 +30,19 @@ class Curve:
         success: share of the training episodes that ended in this update and succeeded; nan where none ended.
         outcomes: outcome -> its share of those episodes.
         successes: which outcomes are successes.
-        test: frames, success rate and standard error of the evaluation, None if there was none.
+        test: frames, success rate and both ends of its 95 % interval; None if it was not evaluated.
     """
 
     frames: Sequence[float]
     success: Sequence[float]
     outcomes: Mapping[str, Sequence[float]]
     successes: frozenset[str]
-    test: tuple[float, float, float] | None = None
+    test: tuple[float, float, float, float] | None = None
 
 
-def read_curve(metrics: Path, successes: frozenset[str], test: tuple[float, float, float] | None) -> Curve:
+def read_curve(
+    metrics: Path, successes: frozenset[str], test: tuple[float, float, float, float] | None
+) -> Curve:
     """The curve that a run's `metrics.jsonl` describes."""
     rows = [json.loads(line) for line in metrics.read_text(encoding="utf-8").splitlines()]
     names = list(dict.fromkeys(name for row in rows for name in row["outcomes"]))
@@ -104,17 +106,17 @@ def _draw_success(axes: Axes, curve: Curve) -> None:
         label="training episodes",
     )
     if curve.test is not None:
-        frames, rate, error = curve.test
+        frames, rate, low, high = curve.test
         axes.errorbar(
             [frames],
             [rate],
-            [2 * error],
+            [[rate - low], [high - rate]],
             fmt="o",
             color=RED,
             markersize=6,
             capsize=4,
             clip_on=False,
-            label=f"test set: {rate:.1%} ± {2 * error:.1%}",
+            label=f"test set: {rate:.1%} ({low:.1%} to {high:.1%})",
             zorder=3,
         )
     axes.set_ylabel("success", fontsize=9)

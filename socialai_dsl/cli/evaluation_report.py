@@ -37,18 +37,22 @@ def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
     return rows
 
 
-def ending_lines(figures: Mapping[str, Any]) -> list[str]:
-    """How the episodes ended: share, what the file says and where; what never happened is left out."""
+def ending_rows(figures: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Share, text and place of the ways in which episodes ended, successes first; what never happened is left out."""
     endings = sorted(
         (ending for ending in figures["endings"] if ending["episodes"]),
         key=lambda ending: (not ending["success"], -ending["share"]),
     )
-    texts = [_shortened(ending["text"]) for ending in endings]
-    width = max(map(len, texts), default=0)
-    lines = [
-        f"  {ending['share']:>6.1%}  {text:<{width}}  {_place(ending)}".rstrip()
-        for ending, text in zip(endings, texts, strict=True)
+    return [
+        (f"{e['share']:.1%}", e["text"], f"{e['file']}:{e['line']}" if e["file"] else "") for e in endings
     ]
+
+
+def ending_lines(figures: Mapping[str, Any]) -> list[str]:
+    """`ending_rows` as a table for the terminal."""
+    rows = [(share, _shortened(text), place) for share, text, place in ending_rows(figures)]
+    width = max((len(text) for _, text, _ in rows), default=0)
+    lines = [f"  {share:>6}  {text:<{width}}  {place}".rstrip() for share, text, place in rows]
     return ["how the episodes ended", *lines]
 
 
@@ -119,10 +123,6 @@ def _comma(text: str) -> str:
 
 def _shortened(text: str) -> str:
     return text if len(text) <= _TEXT_WIDTH else text[: _TEXT_WIDTH - 1] + "…"
-
-
-def _place(ending: Mapping[str, Any]) -> str:
-    return f"{ending['file']}:{ending['line']}" if ending["file"] else ""
 
 
 def _numbers(episodes: list[int]) -> str:

@@ -23,6 +23,7 @@ from socialai_dsl.cli.run_folder import (
 from socialai_dsl.cli.settings import Settings
 
 if TYPE_CHECKING:
+    from socialai_dsl.checking import Loaded
     from socialai_dsl.cli.evaluation import Evaluation
     from socialai_dsl.program_suite import Playable
 
@@ -102,7 +103,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
     require_trainer()
     settings = _resumed(arguments) if arguments.resume else _started(arguments)
-    program = socialai_dsl.compile(socialai_dsl.load(settings.scenario))
+    loaded = socialai_dsl.load(settings.scenario)
+    program = socialai_dsl.compile(loaded)
     written = _written(settings)
     folder = arguments.resume or create_run_folder(arguments.out, settings.scenario, settings.seed)
     write_json(folder / SETTINGS, written)
@@ -136,6 +138,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     episode.save_film(folder / "episode.gif")
     if settings.agent == "ppo":
         _draw_curve(settings, program, folder, result)
+        _write_card(settings, loaded, folder, Path(agent), result)
     write_json(folder / RESULT, result)  # last, so that its presence means a complete run
     print(json.dumps(result, indent=2, ensure_ascii=False) if arguments.json else _table(result, folder))
     return Exit.GOOD
@@ -247,11 +250,23 @@ def _resumed(arguments: argparse.Namespace) -> Settings:
 def _draw_curve(settings: Settings, program: "Playable", folder: Path, result: dict[str, Any]) -> None:
     from socialai_dsl.cli.curve import draw_learning_curve, read_curve
 
-    test = (result["frames"], result["eval"]["success_rate"], result["eval"]["success_rate_se"])
+    test = (result["frames"], result["eval"]["success_rate"], *result["eval"]["success_interval"])
     successes = frozenset(outcome.name for outcome in program.outcome_table if outcome.success)
     curve = read_curve(folder / "metrics.jsonl", successes, test)
     title = f"{scenario_folder_name(settings.scenario)}, {settings.agent}, seed {settings.seed}"
     draw_learning_curve(curve, title, folder / "learning_curve.png")
+
+
+def _write_card(
+    settings: Settings, loaded: "Loaded", folder: Path, weights: Path, result: dict[str, Any]
+) -> None:
+    from socialai_dsl.cli.agents import train_config
+    from socialai_dsl.cli.model_card import FILE, model_card
+
+    data = loaded.resolved.data
+    about = str(data.get("about", "")) if isinstance(data, dict) else ""
+    hyper = train_config(settings).model_dump()
+    write_text(folder / FILE, model_card(settings, hyper, result, about, folder, weights))
 
 
 def _size(program: "Playable") -> str:

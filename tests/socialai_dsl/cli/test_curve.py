@@ -26,7 +26,7 @@ def test_smoothing_knows_nothing_before_the_first_value() -> None:
         Curve(
             [100, 200, 300], [NAN, 0.2, 0.4], {"success@3": [NAN, 0.2, 0.4], "timeout": [NAN, 0.8, 0.6]}, WINS
         ),
-        Curve([100], [0.5], {}, WINS, test=(100, 0.5, 0.02)),
+        Curve([100], [0.5], {}, WINS, test=(100, 0.5, 0.46, 0.54)),
         Curve([], [], {}, WINS),
         Curve([100, 200], [NAN, NAN], {"success@3": [NAN, NAN]}, WINS),
     ],

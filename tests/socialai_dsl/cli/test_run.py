@@ -1,6 +1,7 @@
 """`socialai-run` and `socialai evaluate` from end to end, on a scenario that trains in seconds."""
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,7 @@ def test_a_run_leaves_everything_it_promises(capsys: Capture) -> None:
         "checkpoints",
         "events",
         "learning_curve.png",
+        "model_card.md",
         "episode.gif",
         "transcript.txt",
         "result.json",
@@ -167,6 +169,10 @@ def test_a_trained_agent_is_evaluated_elsewhere(capsys: Capture) -> None:
         (["corridor.yaml", "--agent", "nobody"], "--agent: expected ppo, random, oracle, human or"),
         (["corridor.yaml", "--agent", "random", "--frames", "10"], "is not trained"),
         (["corridor.yaml", "--net", "huge"], "net: got 'huge'"),
+        (
+            ["corridor.yaml", "--agent", "random", "--wandb", "p"],
+            "--wandb: the agent 'random' is not trained",
+        ),
         (["--resume", "nowhere"], "is not a run's folder"),
         (["nowhere.yaml"], "there is no such file"),
         (["corridor.yaml", "--agent", "corridor.yaml"], "corridor.yaml"),
@@ -182,6 +188,28 @@ def test_a_scenario_with_mistakes_is_not_run(capsys: Capture) -> None:
     assert run_main(["broken.yaml"]) == 1
     assert "broken.yaml:3:1: S101" in capsys.readouterr().err
     assert not Path("runs").exists()
+
+
+def test_wandb_that_is_not_installed(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "wandb", None)
+    assert run_main(["corridor.yaml", *QUICK, "--wandb", "project", "--out", "here"]) == 2
+    assert "pip install 'socialai-dsl[wandb]'" in capsys.readouterr().err
+    assert not Path("here").exists(), "the same command can be given again"
+
+
+def test_a_network_of_ones_own_is_evaluated(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    Path("my_nets.py").write_text(
+        "from trainer.nets.fast import FastNet\nclass MyNet(FastNet):\n    kind_size = 4\n"
+    )
+    monkeypatch.syspath_prepend(str(Path.cwd()))
+    assert run_main(["corridor.yaml", *QUICK, "--net", "my_nets:MyNet", "--out", "here"]) == 0
+    own = result_of("here")["eval"]
+    capsys.readouterr()
+    command = ["evaluate", "here", "--episodes", "30", "--device", "cpu", "--json"]
+    assert main([*command, "--net", "my_nets:MyNet"]) == 0
+    assert json.loads(capsys.readouterr().out)[0]["eval"] == own
+    assert main(command) == 2
+    assert "name it (--net my_nets:MyNet)" in capsys.readouterr().err
 
 
 def test_unwritable_output(capsys: Capture) -> None:

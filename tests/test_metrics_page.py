@@ -1,0 +1,45 @@
+"""docs/metrics.md names every field that a run writes, and no other."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+import socialai_dsl
+from socialai_dsl.cli.evaluation import Player, evaluate_agent
+from trainer.config import TrainConfig
+from trainer.train import train
+
+PAGE = Path(__file__).parents[1] / "docs" / "metrics.md"
+
+
+def tables() -> list[list[str]]:
+    """The first column of each table of fields, in order."""
+    found: list[list[str]] = []
+    for line in PAGE.read_text(encoding="utf-8").splitlines():
+        if line.startswith("| field "):
+            found.append([])
+        elif match := re.match(r"\| `(\w+)` \|", line):
+            found[-1].append(match[1])
+    return found
+
+
+def test_every_field_of_a_row_is_named_in_its_order(tmp_path: Path) -> None:
+    envs = socialai_dsl.make_vec("help", num_envs=16, copy=False, autoreset_mode="SameStep")
+    train(TrainConfig(frames=512, num_envs=16, tensorboard=False, threads=1), envs, tmp_path)
+    row = json.loads((tmp_path / "metrics.jsonl").read_text(encoding="utf-8").splitlines()[-1])
+    assert list(row) == tables()[0]
+
+
+def test_every_figure_of_an_evaluation_is_named_in_its_order() -> None:
+    figures = evaluate_agent(Player("oracle"), "social_env", 20).figures()
+    assert list(figures) == tables()[1]
+
+
+@pytest.mark.parametrize("table", range(2))
+def test_every_field_has_a_meaning(table: int) -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    for field in tables()[table]:
+        (line,) = [line for line in text.splitlines() if line.startswith(f"| `{field}` |")][-1:]
+        assert len(line.split("|")[3].split()) >= 2, field
