@@ -66,7 +66,7 @@ def rule_lines(figures: Mapping[str, Any]) -> list[str]:
     lines = [f"  {rate:>6.2f}  {name}" for rate, name in fired[:_RULES_SHOWN]]
     more = len(fired) - _RULES_SHOWN
     lines += [f"          and {more} more"] if more > 0 else []
-    return ["rules of the others that fired, per episode", *lines]
+    return ["rules that fired, per episode", *lines]
 
 
 def aligned(rows: Sequence[Row]) -> list[str]:
