@@ -198,18 +198,18 @@ def test_wandb_that_is_not_installed(capsys: Capture, monkeypatch: pytest.Monkey
 
 
 def test_a_network_of_ones_own_is_evaluated(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
-    Path("my_nets.py").write_text(
-        "from trainer.nets.fast import FastNet\nclass MyNet(FastNet):\n    kind_size = 4\n"
+    Path("narrow_nets.py").write_text(
+        "from trainer.nets.fast import FastNet\nclass NarrowNet(FastNet):\n    kind_size = 4\n"
     )
     monkeypatch.syspath_prepend(str(Path.cwd()))
-    assert run_main(["corridor.yaml", *QUICK, "--net", "my_nets:MyNet", "--out", "here"]) == 0
+    assert run_main(["corridor.yaml", *QUICK, "--net", "narrow_nets:NarrowNet", "--out", "here"]) == 0
     own = result_of("here")["eval"]
     capsys.readouterr()
     command = ["evaluate", "here", "--episodes", "30", "--device", "cpu", "--json"]
-    assert main([*command, "--net", "my_nets:MyNet"]) == 0
+    assert main([*command, "--net", "narrow_nets:NarrowNet"]) == 0
     assert json.loads(capsys.readouterr().out)[0]["eval"] == own
     assert main(command) == 2
-    assert "name it (--net my_nets:MyNet)" in capsys.readouterr().err
+    assert "name it (--net narrow_nets:NarrowNet)" in capsys.readouterr().err
 
 
 def test_unwritable_output(capsys: Capture) -> None:
