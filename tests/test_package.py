@@ -59,4 +59,4 @@ def test_a_wheel_carries_the_scenarios_and_the_data_files(tmp_path: Path) -> Non
         for path in (ROOT / package).rglob("*"):
             if path.is_file() and path.suffix != ".pyc":
                 assert str(path.relative_to(ROOT)) in names
-    assert not [name for name in names if name.startswith(("tests/", "runs/"))]
+    assert not [name for name in names if name.startswith(("tests/", "runs/", "benchmarks/"))]

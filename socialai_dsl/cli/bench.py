@@ -1,16 +1,17 @@
-"""This module is `socialai bench`: how fast the environments, and if asked the trainer, are on this machine."""
+"""This module is `socialai bench`: how fast the environments are on this machine, or the trainer beside its peers."""
 
 import argparse
 import json
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.errors import Exit, UsageError
 
 if TYPE_CHECKING:
     from socialai_dsl.cli.measure import Report
 
-SUMMARY: Final = "measure the speed of the environments on one core of this machine"
+SUMMARY: Final = "measure the speed of the environments, or of training, on this machine"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,10 +29,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--batch", type=_batches, default="1,16,256,4096", metavar="N,N", help="default: 1,16,256,4096"
     )
     parser.add_argument("--mix", choices=("walk", "random", "both"), default="both", help="default: both")
-    parser.add_argument("--repeat", type=int, default=5, metavar="N", help="repetitions; the median counts")
-    parser.add_argument("--seconds", type=float, default=0.3, metavar="S", help="length of one repetition")
     parser.add_argument(
-        "--train", type=int, nargs="?", const=200_000, metavar="FRAMES", help="time training too"
+        "--repeat", type=int, metavar="N", help="repetitions; the median counts (default: 5; with --train 3)"
+    )
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        metavar="S",
+        help="length of one repetition (default: 0.3), or with --train of all of them (default: 10)",
+    )
+    training = parser.add_argument_group("training")
+    training.add_argument(
+        "--train",
+        action="store_true",
+        help="measure training instead: rollout and update of one SCENARIO, ours beside other trainers",
+    )
+    training.add_argument("--threads", type=int, metavar="N", help="cores to use (default: 1)")
+    training.add_argument(
+        "--only", action="append", metavar="NAME", help="measure only this trainer; may be given again"
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object instead of a table")
     parser.add_argument("--out", type=Path, metavar="FILE", help="also write the JSON object to a file")
@@ -39,10 +54,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Measure, then print."""
-    if arguments.repeat < 1 or arguments.seconds <= 0:
+    if (arguments.repeat is not None and arguments.repeat < 1) or (arguments.seconds or 1) <= 0:
         raise UsageError("--repeat and --seconds: expected positive numbers")
     if arguments.all and arguments.scenarios:
         raise UsageError("--all: expected no SCENARIO beside it")
+    if not arguments.train and (arguments.threads is not None or arguments.only):
+        raise UsageError("--threads and --only: expected --train beside them")
+    content, table = (_training if arguments.train else _environments)(arguments)
+    text = json.dumps(content, indent=2)
+    if arguments.out:
+        arguments.out.write_text(text + "\n", encoding="utf-8")
+    print(text if arguments.json else table)
+    return Exit.GOOD
+
+
+def _environments(arguments: argparse.Namespace) -> tuple[dict[str, Any], str]:
+    """Report on the environments, as an object and as a table."""
     from socialai_dsl.cli.measure import measure_all
     from socialai_dsl.cli.shipped import shipped_scenarios
 
@@ -50,15 +77,44 @@ def execute(arguments: argparse.Namespace) -> Exit:
         shipped_scenarios() if arguments.all else arguments.scenarios or ["talkitout"],
         arguments.batch,
         ("walk", "random") if arguments.mix == "both" else (arguments.mix,),
-        arguments.repeat,
-        arguments.seconds,
-        arguments.train,
+        arguments.repeat or 5,
+        arguments.seconds or 0.3,
     )
-    text = json.dumps(report.as_json(), indent=2)
-    if arguments.out:
-        arguments.out.write_text(text + "\n", encoding="utf-8")
-    print(text if arguments.json else _table(report))
-    return Exit.GOOD
+    return report.as_json(), _table(report)
+
+
+def _training(arguments: argparse.Namespace) -> tuple[dict[str, Any], str]:
+    """Report on training, as an object and as a table."""
+    if arguments.all or len(arguments.scenarios) > 1:
+        raise UsageError("--train: expected one SCENARIO")
+    try:
+        from socialai_dsl.cli.training_entries import entries
+        from socialai_dsl.cli.training_report import training_table
+        from socialai_dsl.cli.training_speed import measure_training
+        from trainer.crew import available_cores
+    except ImportError as error:
+        raise UsageError(f"--train: {error}; install the extra [train]") from error
+
+    threads, cores = 1 if arguments.threads is None else arguments.threads, available_cores()
+    if not 1 <= threads <= cores:
+        raise UsageError(f"--threads: got {threads}, expected 1 to {cores}, the cores of this machine")
+    known = entries()
+    names = [entry.name for entry in known]
+    for name in arguments.only or ():
+        if name not in names:
+            raise UsageError(f"--only: got {name!r}, expected one of {', '.join(names)}")
+    chosen = [entry for entry in known if not arguments.only or entry.name in arguments.only]
+    scenario = arguments.scenarios[0] if arguments.scenarios else "talkitout"
+    report = measure_training(
+        scenario, chosen, threads, arguments.seconds or 10.0, arguments.repeat or 3, _note
+    )
+    return report.as_json(), training_table(report)
+
+
+def _note(name: str) -> None:
+    """Tell what is measured now, where a person is looking on."""
+    if sys.stderr.isatty():
+        print(f"measuring {name} ...", file=sys.stderr)
 
 
 def _batches(text: str) -> list[int]:
@@ -86,6 +142,4 @@ def _table(report: "Report") -> str:
             f"{row.resets:>10,.0f} {1000 * row.cpu / report.reference:>8.2f}"
         )
     lines += ["", "ratio: steps for every 1,000 iterations of the reference loop; compare machines by it"]
-    if report.training is not None:
-        lines.append(f"training: {report.training:,.0f} frames/s wall, all cores")
     return "\n".join(lines)

@@ -1,17 +1,14 @@
 """This module takes the measurements of `socialai bench`."""
 
-import os
-import platform
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import socialai_dsl
+from socialai_dsl.cli.machine import machine, on_cores
 from socialai_dsl.cli.mixes import BATCHES, Actions, Allowed, random_actions, walk_actions
 from socialai_dsl.cli.reference_loop import reference_speed
 
@@ -45,7 +42,6 @@ class Report:
     repetitions: int
     reference: float
     rows: list[Row] = field(default_factory=list)
-    training: float | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The report as a JSON-able object; `ratio` compares machines."""
@@ -55,7 +51,6 @@ class Report:
             "repetitions": self.repetitions,
             "reference_iterations_per_second": self.reference,
             "rows": rows,
-            "training_frames_per_second": self.training,
         }
 
 
@@ -65,19 +60,16 @@ def measure_all(
     mixes: Sequence[str],
     repetitions: int,
     seconds: float,
-    train_frames: int | None,
 ) -> Report:
-    """Measure every scenario with every mix and batch size, the peer, and training if asked."""
-    with _one_core():
-        report = Report(_machine(), repetitions, reference_speed(repetitions))
+    """Measure every scenario with every mix and batch size, and the peer."""
+    with on_cores(1):
+        report = Report(machine(), repetitions, reference_speed(repetitions))
         for mix in mixes:
             for name in scenarios:
                 report.rows += _measure_scenario(name, mix, batches, repetitions, seconds)
             if len(scenarios) > 1:
                 report.rows.append(_measure_mixture(scenarios, mix, max(batches), repetitions, seconds))
         report.rows += _measure_peer(repetitions, seconds)
-    if train_frames is not None:
-        report.training = _measure_training(scenarios[0], train_frames)
     return report
 
 
@@ -170,27 +162,6 @@ def _measure_peer(repetitions: int, seconds: float) -> Iterator[Row]:
     yield _measure_env(what, "random", env, actions, repetitions, seconds)
 
 
-def _measure_training(scenario: str, frames: int) -> float:
-    """Frames per second of training with the trainer's defaults, the first tenth left out."""
-    from tempfile import TemporaryDirectory
-
-    from trainer.config import TrainConfig
-    from trainer.train import Progress, train
-
-    config = TrainConfig(frames=frames, tensorboard=False)
-    envs = socialai_dsl.make_vec(scenario, num_envs=config.num_envs, copy=False, autoreset_mode="SameStep")
-    speeds: list[float] = []
-
-    def note(progress: Progress) -> None:
-        speeds.append(progress.frames_per_second)
-
-    with TemporaryDirectory() as folder:
-        train(config, envs, Path(folder), progress=note)
-    envs.close()
-    kept = speeds[len(speeds) // 10 :]
-    return len(kept) / sum(1 / speed for speed in kept)
-
-
 def _time(run: Callable[[int], None], per_step: int, repetitions: int, seconds: float) -> tuple[float, float]:
     """Median steps per CPU second and per second on the clock; each repetition takes about `seconds`."""
     steps, wall = 8, 0.0
@@ -210,27 +181,3 @@ def _time(run: Callable[[int], None], per_step: int, repetitions: int, seconds: 
         cpu_speeds.append(steps * per_step / max(cpu, 1e-9))
         wall_speeds.append(steps * per_step / wall)
     return float(np.median(cpu_speeds)), float(np.median(wall_speeds))
-
-
-def _machine() -> str:
-    """The processor's name, as far as the system tells."""
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as file:
-            names = [line.split(":", 1)[1].strip() for line in file if line.startswith("model name")]
-    except OSError:
-        names = []
-    return f"{names[0] if names else platform.processor() or platform.machine()}, Python {platform.python_version()}"
-
-
-@contextmanager
-def _one_core() -> Iterator[None]:
-    """Keep this process on one core meanwhile, where the system can."""
-    if not hasattr(os, "sched_setaffinity"):
-        yield
-        return
-    before = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {max(before)})
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, before)

@@ -1,0 +1,1 @@
+"""This package holds what `socialai bench` compares with; it stays in the repository, no wheel carries it."""

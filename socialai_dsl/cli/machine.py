@@ -1,0 +1,30 @@
+"""This module says what machine a measurement was taken on, and keeps one on as many cores as it is about."""
+
+import os
+import platform
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+def machine() -> str:
+    """The processor's name, as far as the system tells, and Python's version."""
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            names = [line.split(":", 1)[1].strip() for line in file if line.startswith("model name")]
+    except OSError:
+        names = []
+    return f"{names[0] if names else platform.processor() or platform.machine()}, Python {platform.python_version()}"
+
+
+@contextmanager
+def on_cores(count: int) -> Iterator[None]:
+    """Keep this thread, and those it starts, on `count` cores meanwhile, where the system can."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, set(sorted(before)[-count:]))
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)

@@ -1,0 +1,202 @@
+"""This module takes the measurements of `socialai bench --train`: frames per second of ours and of the peers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any, Final
+
+import numpy as np
+import torch
+
+from socialai_dsl.cli.machine import machine, on_cores
+from socialai_dsl.cli.reference_loop import reference_speed
+from socialai_dsl.cli.roofline import Work, convolution_limit
+from socialai_dsl.cli.training_entries import Entry, Update
+
+_PATIENCE: Final = 2.5
+_PACKAGES: Final = ("torch", "numpy", "gymnasium", "stable-baselines3", "sb3-contrib")
+# Who is compared with whom: the same network on both sides, or one as large.
+_PAIRS: Final = (
+    ("paper-every-frame", "plain-loop"),
+    ("paper", "plain-loop"),
+    ("paper-reference", "plain-loop"),
+    ("paper", "clean-paper"),
+    ("paper", "sb3-paper"),
+    ("fast", "clean-fast"),
+    ("fast", "sb3-fast"),
+    ("fast-long", "clean-fast"),
+    ("fast-long", "sb3-fast"),
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One trainer's speed, in frames trained per second: rollout and all epochs.
+
+    Attributes:
+        name, what, num_envs, horizon, minibatches, epochs, words: see `Entry`.
+        updates: updates measured.
+        wall, wall_low, wall_high: median, slowest and fastest update on the clock.
+        cpu: median per second of CPU time of the process.
+        distinct: share of the frames that were computed in the update; None for peers, who compute all.
+        rollout_share: share of the time that went into the rollout; None for peers.
+        gflops: the paper network's arithmetic done per second on the clock, in 10**9; None for other networks and
+            for peers.
+        gflops_cpu: the same per second of CPU time.
+    """
+
+    name: str
+    what: str
+    num_envs: int
+    horizon: int
+    minibatches: int
+    epochs: int
+    words: str
+    updates: int
+    wall: float
+    wall_low: float
+    wall_high: float
+    cpu: float
+    distinct: float | None
+    rollout_share: float | None
+    gflops: float | None
+    gflops_cpu: float | None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How many times faster one of ours is than a peer.
+
+    Attributes:
+        ours, peer: names.
+        wall, cpu: ratio of the medians.
+        floor: frames/s the peer is expected to reach at least on the CPU it was set for; None if there is no such.
+        scaled: `wall`, but with the floor in the place of a peer that is slower.
+    """
+
+    ours: str
+    peer: str
+    wall: float
+    cpu: float
+    floor: float | None
+    scaled: float
+
+
+@dataclass(frozen=True)
+class TrainingReport:
+    """Everything measured in one run.
+
+    Attributes:
+        reference: iterations per second of the reference loop on one core.
+        limits: convolutions' operations per second by type, forward and backward, in 10**9.
+    """
+
+    machine: str
+    versions: dict[str, str]
+    scenario: str
+    threads: int
+    reference: float
+    limits: dict[str, float]
+    rows: list[Row]
+    comparisons: list[Comparison]
+
+    def as_json(self) -> dict[str, Any]:
+        """The report as a JSON-able object."""
+        return asdict(self)
+
+
+def measure_training(
+    scenario: str,
+    chosen: Sequence[Entry],
+    threads: int,
+    seconds: float,
+    repetitions: int,
+    note: Callable[[str], None],
+) -> TrainingReport:
+    """Measure the entries one after the other on `threads` cores.
+
+    Args:
+        scenario: name or path.
+        chosen: what to measure.
+        threads: cores, and threads of each trainer.
+        seconds: how long each entry is measured, at least.
+        repetitions: updates measured at least, unless they take 2.5 times as long.
+        note: told the name of what is measured next.
+    """
+    before = torch.get_num_threads()
+    with on_cores(threads):
+        reference = reference_speed(3)
+        limits = {
+            "float32": convolution_limit(torch.float32, threads) / 1e9,
+            "bfloat16": convolution_limit(torch.bfloat16, threads) / 1e9,
+        }
+        rows = []
+        for entry in chosen:
+            note(entry.name)
+            rows.append(_measure(entry, scenario, threads, seconds, repetitions))
+    torch.set_num_threads(before)
+    floors = {entry.name: entry.floor.get(threads) for entry in chosen}
+    return TrainingReport(
+        machine(), _versions(), scenario, threads, reference, limits, rows, list(_compare(rows, floors))
+    )
+
+
+def _measure(entry: Entry, scenario: str, threads: int, seconds: float, repetitions: int) -> Row:
+    training = entry.start(scenario, threads)
+    next(training)  # compiles, allocates, and warms up
+    walls: list[float] = []
+    cpus: list[float] = []
+    updates: list[Update] = []
+    while sum(walls) < seconds or (len(walls) < repetitions and sum(walls) < _PATIENCE * seconds):
+        wall, cpu = time.perf_counter(), time.process_time()
+        update = next(training)
+        walls.append(time.perf_counter() - wall)
+        cpus.append(time.process_time() - cpu)
+        if update is not None:
+            updates.append(update)
+    speeds = entry.frames / np.array(walls)
+    work = (
+        Work(*np.sum([list(asdict(update.work).values()) for update in updates], axis=0)) if updates else None
+    )
+    frames = len(walls) * entry.frames
+    flops = work.flops(frames, entry.epochs) / 1e9 if work and entry.paper else None
+    return Row(
+        entry.name,
+        entry.what,
+        entry.num_envs,
+        entry.horizon,
+        entry.minibatches,
+        entry.epochs,
+        entry.words,
+        len(walls),
+        float(np.median(speeds)),
+        float(speeds.min()),
+        float(speeds.max()),
+        float(np.median(entry.frames / np.maximum(cpus, 1e-9))),
+        float(work.learnt_pairs / (frames * entry.epochs)) if work else None,
+        sum(update.rollout_seconds for update in updates) / sum(walls) if updates else None,
+        flops and flops / sum(walls),
+        flops and flops / sum(cpus),
+    )
+
+
+def _compare(rows: Sequence[Row], floors: dict[str, float | None]) -> Iterator[Comparison]:
+    by_name = {row.name: row for row in rows}
+    for ours, peer in _PAIRS:
+        if ours in by_name and peer in by_name:
+            mine, other, floor = by_name[ours], by_name[peer], floors[peer]
+            scaled = mine.wall / max(other.wall, floor or 0.0)
+            yield Comparison(ours, peer, mine.wall / other.wall, mine.cpu / other.cpu, floor, scaled)
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for name in _PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found

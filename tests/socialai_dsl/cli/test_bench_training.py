@@ -1,0 +1,128 @@
+"""`socialai bench --train`: what it measures, how it compares, and what it refuses."""
+
+import json
+import sys
+import time
+from collections.abc import Iterator
+
+import pytest
+import torch
+from torch.utils.flop_counter import FlopCounterMode
+
+import socialai_dsl
+from socialai_dsl.cli import training_speed
+from socialai_dsl.cli.main import main
+from socialai_dsl.cli.roofline import Work, convolution_limit, every_frame
+from socialai_dsl.cli.training_entries import Entry, entries, own_updates
+from socialai_dsl.cli.training_report import training_table
+from trainer.config import paper_preset
+from trainer.nets import NetSpec, build_net
+
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """What takes seconds and is not asked about."""
+    monkeypatch.setattr(training_speed, "reference_speed", lambda _: 1e8)
+    monkeypatch.setattr(training_speed, "convolution_limit", lambda dtype, _: 1e11 * torch.finfo(dtype).bits)
+    before = torch.get_num_threads()
+    yield
+    torch.set_num_threads(before)
+
+
+def entry(name: str, seconds: float, floor: float | None = None) -> Entry:
+    def start(scenario: str, threads: int) -> Iterator[None]:
+        assert (scenario, threads) == ("talkitout", 1)
+        while True:
+            time.sleep(seconds)
+            yield
+
+    return Entry(name, name, 4, 5, 1, 4, "", start, floor={1: floor} if floor else {})
+
+
+def test_a_slow_peer_is_replaced_by_its_floor() -> None:
+    chosen = [entry("fast", 0.002), entry("clean-fast", 0.02, floor=2000.0), entry("sb3-fast", 0.02)]
+    report = training_speed.measure_training("talkitout", chosen, 1, 0.1, 3, lambda _: None)
+    assert [row.updates >= 3 for row in report.rows] == [True] * 3
+    assert all(row.wall_low <= row.wall <= row.wall_high for row in report.rows)
+    clean, other = report.comparisons
+    assert (clean.ours, clean.peer, other.peer) == ("fast", "clean-fast", "sb3-fast")
+    fast, slow, _ = (row.wall for row in report.rows)
+    assert clean.wall == pytest.approx(fast / slow)
+    assert clean.scaled == pytest.approx(fast / 2000)
+    assert other.scaled == other.wall
+    table = training_table(report)
+    assert all(name in table for name in ("fast", "clean-fast", "2,000", "4 x 5"))
+
+
+def test_updates_are_repeated_but_not_without_end() -> None:
+    report = training_speed.measure_training("talkitout", [entry("fast", 0.03)], 1, 0.02, 50, lambda _: None)
+    assert 1 <= report.rows[0].updates <= 3
+
+
+def test_the_report_is_json(capsys: Capture) -> None:
+    command = ["bench", "--train", "--only", "fast", "--seconds", "0.01", "--repeat", "1", "--json"]
+    assert main(command) == 0
+    report = json.loads(capsys.readouterr().out)
+    (row,) = report["rows"]
+    assert (row["name"], row["num_envs"], row["horizon"], row["epochs"]) == ("fast", 256, 32, 4)
+    assert row["wall"] > 0 < row["cpu"]
+    assert 0 < row["distinct"] < 1
+    assert 0 < row["rollout_share"] < 1
+    assert row["gflops"] is None
+    assert report["threads"] == 1
+    assert "torch" in report["versions"]
+
+
+def test_duplicates_are_counted_and_kept_if_asked() -> None:
+    config = paper_preset(net="paper", num_envs=4, horizon=10, threads=1)
+    frames = config.frames_per_update * config.epochs
+    for every_frame, low, high in ((False, 0.1, 0.95), (True, 1.0, 1.0)):
+        envs = socialai_dsl.make_vec("talkitout", num_envs=4, copy=False, autoreset_mode="SameStep")
+        update = next(own_updates(config, envs, every_frame))
+        assert low <= update.work.learnt_pairs / frames <= high
+        assert low <= update.work.learnt_images / frames <= high
+        assert update.rollout_seconds > 0
+
+
+def test_peers_are_left_out_where_they_are_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert {"plain-loop", "clean-paper", "clean-fast", "fast-long"} < {entry.name for entry in entries()}
+    monkeypatch.setitem(sys.modules, "benchmarks.training", None)
+    assert [entry.name for entry in entries()] == ["fast", "paper", "paper-every-frame", "paper-reference"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--threads", "1"], "expected --train"),
+        (["--only", "fast"], "expected --train"),
+        (["--train", "--only", "slow"], "expected one of fast, "),
+        (["--train", "--threads", "0"], "--threads: got 0"),
+        (["--train", "--threads", "100000"], "--threads: got 100000"),
+        (["--train", "--all"], "expected one SCENARIO"),
+        (["--train", "dance", "help"], "expected one SCENARIO"),
+    ],
+)
+def test_wrong_usage(options: list[str], message: str, capsys: Capture) -> None:
+    assert main(["bench", *options]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_operations_are_those_of_the_network() -> None:
+    spec = NetSpec((8, 2, 4, 16), (7, 7, 4), (12, 5, 3, 3), 40)
+    net = build_net("paper", spec, 0)
+    images = torch.zeros(3, 7, 7, 4, dtype=torch.uint8)
+    with FlopCounterMode(display=False) as counter:
+        text = torch.zeros(1, 128)
+        features = net.perceive(net.prepare(images), text, torch.arange(3), torch.zeros(3, dtype=torch.int64))
+        net.heads(net.memory.step(features, net.memory.initial(3))[0])
+    counted = counter.get_total_flops() / 3
+    assert Work(1, 1, 0, 0).flops(1, 0) == pytest.approx(counted, rel=0.003)
+    assert every_frame(1, 4).flops(1, 4) == pytest.approx(951e6, rel=0.002)
+    assert Work(2, 4, 0, 0).flops(0, 4) < 4 * Work(1, 1, 0, 0).flops(0, 4)
+
+
+def test_the_limit_is_a_speed_of_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("socialai_dsl.cli.roofline._SECONDS", 0.02)
+    assert 1e8 < convolution_limit(torch.float32, 1) < 1e14
