@@ -78,9 +78,9 @@ def test_the_report_is_json(capsys: Capture) -> None:
 def test_duplicates_are_counted_and_kept_if_asked() -> None:
     config = paper_preset(net="paper", num_envs=4, horizon=10, threads=1)
     frames = config.frames_per_update * config.epochs
-    for every_frame, low, high in ((False, 0.1, 0.95), (True, 1.0, 1.0)):
+    for alone, low, high in ((False, 0.1, 0.95), (True, 1.0, 1.0)):
         envs = socialai_dsl.make_vec("talkitout", num_envs=4, copy=False, autoreset_mode="SameStep")
-        update = next(own_updates(config, envs, every_frame))
+        update = next(own_updates(config, envs, alone))
         assert low <= update.work.learnt_pairs / frames <= high
         assert low <= update.work.learnt_images / frames <= high
         assert update.rollout_seconds > 0
