@@ -13,6 +13,7 @@ import socialai_dsl
 from socialai_dsl.cli.roofline import Work
 from trainer.config import TrainConfig, paper_preset
 from trainer.crew import Crew
+from trainer.nets import best_precision
 from trainer.ppo import update
 from trainer.rollout import collect
 from trainer.session import Session
@@ -41,6 +42,7 @@ class Entry:
         num_envs, horizon, minibatches, epochs: sizes of its rollouts and updates.
         words: how it encodes histories.
         start: called with a scenario and a number of threads; each `next` is one rollout with its update.
+        precision: number type of the bulk of its arithmetic.
         paper: whether its network is the paper's.
         floor: frames/s by number of cores below which ratios to it are scaled.
     """
@@ -53,6 +55,7 @@ class Entry:
     epochs: int
     words: str
     start: Callable[[str, int], Iterator[Update | None]]
+    precision: str = "float32"
     paper: bool = False
     floor: dict[int, float] = field(default_factory=dict)
 
@@ -87,16 +90,18 @@ def _own(
     wrap: Callable[[Any], Any] | None = None,
     every_frame: bool = False,
 ) -> Entry:
+    precision = best_precision(config.net, "cpu")
+
     def start(scenario: str, threads: int) -> Iterator[Update]:
         envs = socialai_dsl.make_vec(
             scenario, num_envs=config.num_envs, copy=False, autoreset_mode="SameStep"
         )
-        settings = config.model_copy(update={"threads": threads})
+        settings = config.model_copy(update={"threads": threads, "precision": precision})
         return own_updates(settings, wrap(envs) if wrap else envs, every_frame)
 
     words = "streamed" if wrap is None else "streamed, to 64"
     sizes = config.num_envs, config.horizon, config.minibatches, config.epochs
-    return Entry(name, what, *sizes, words, start, paper=config.net.startswith("paper"))
+    return Entry(name, what, *sizes, words, start, precision, paper=config.net.startswith("paper"))
 
 
 def own_updates(config: TrainConfig, envs: Any, every_frame: bool) -> Iterator[Update]:

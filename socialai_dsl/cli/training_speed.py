@@ -37,7 +37,7 @@ class Row:
     """One trainer's speed, in frames trained per second: rollout and all epochs.
 
     Attributes:
-        name, what, num_envs, horizon, minibatches, epochs, words: see `Entry`.
+        name, what, num_envs, horizon, minibatches, epochs, words, precision: see `Entry`.
         updates: updates measured.
         wall, wall_low, wall_high: median, slowest and fastest update on the clock.
         cpu: median per second of CPU time of the process.
@@ -46,6 +46,7 @@ class Row:
         gflops: the paper network's arithmetic done per second on the clock, in 10**9; None for other networks and
             for peers.
         gflops_cpu: the same per second of CPU time.
+        limit_share: `gflops` in parts of what the convolutions alone could do with these numbers.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Row:
     minibatches: int
     epochs: int
     words: str
+    precision: str
     updates: int
     wall: float
     wall_low: float
@@ -64,6 +66,7 @@ class Row:
     rollout_share: float | None
     gflops: float | None
     gflops_cpu: float | None
+    limit_share: float | None
 
 
 @dataclass(frozen=True)
@@ -136,7 +139,7 @@ def measure_training(
         rows = []
         for entry in chosen:
             note(entry.name)
-            rows.append(_measure(entry, scenario, threads, seconds, repetitions))
+            rows.append(_measure(entry, scenario, threads, seconds, repetitions, limits))
     torch.set_num_threads(before)
     floors = {entry.name: entry.floor.get(threads) for entry in chosen}
     return TrainingReport(
@@ -144,7 +147,9 @@ def measure_training(
     )
 
 
-def _measure(entry: Entry, scenario: str, threads: int, seconds: float, repetitions: int) -> Row:
+def _measure(
+    entry: Entry, scenario: str, threads: int, seconds: float, repetitions: int, limits: dict[str, float]
+) -> Row:
     training = entry.start(scenario, threads)
     next(training)  # compiles, allocates, and warms up
     walls: list[float] = []
@@ -171,6 +176,7 @@ def _measure(entry: Entry, scenario: str, threads: int, seconds: float, repetiti
         entry.minibatches,
         entry.epochs,
         entry.words,
+        entry.precision,
         len(walls),
         float(np.median(speeds)),
         float(speeds.min()),
@@ -180,6 +186,7 @@ def _measure(entry: Entry, scenario: str, threads: int, seconds: float, repetiti
         sum(update.rollout_seconds for update in updates) / sum(walls) if updates else None,
         flops and flops / sum(walls),
         flops and flops / sum(cpus),
+        flops and flops / sum(walls) / limits[entry.precision],
     )
 
 
