@@ -12,21 +12,27 @@ def training_table(report: TrainingReport) -> str:
     """The report as text."""
     cores = "one core" if report.threads == 1 else f"{report.threads} cores"
     limits = ", ".join(f"{value:,.0f} in {name}" for name, value in report.limits.items())
+    own = [row for row in report.rows if row.distinct is not None]
     lines = [
         f"{report.machine}; {cores}; {report.scenario}",
         ", ".join(f"{name} {version}" for name, version in report.versions.items()),
         f"reference loop: {report.reference / 1e6:.0f} M iterations per CPU second",
         f"convolutions of the paper's network, forward and backward, GFLOP/s: {limits}",
         "",
-        f"{'name':<18} {'envs x steps':>12} {'parts':>5} {'epochs':>6} {'histories':<19} {'frames/s':>9} "
-        f"{'slowest':>8} {'fastest':>8} {'per cpu s':>9} {'n':>3} {'distinct':>8} {'rollout':>7} {'numbers':<8} {'GFLOP/s':>7} {'of limit':>8}",
-        *(_row(row) for row in report.rows),
-        "",
-        "frames/s: rollout and all epochs, on the clock, median of n updates; distinct: share of the frames "
-        "computed",
-        "in the update; rollout: its share of the time; GFLOP/s: the paper network's arithmetic that was done,",
-        "of limit: in parts of its convolutions' speed with the same numbers",
+        f"{'name':<18} {'envs x steps':>12} {'parts':>5} {'epochs':>6} {'histories':<19} {'numbers':<8} "
+        f"{'frames/s':>9} {'slowest':>8} {'fastest':>8} {'per cpu s':>9} {'n':>3}",
+        *(_speed(row) for row in report.rows),
+        "frames/s: rollout and all epochs, on the clock, median of n updates",
     ]
+    if own:
+        lines += ["", f"{'name':<18} {'distinct':>8} {'rollout':>7} {'GFLOP/s':>8} {'of limit':>8}"]
+        lines += [_work(row) for row in own]
+        lines.append(
+            "distinct: share of the frames computed in the update; rollout: its share of the time; of limit:"
+        )
+        lines.append(
+            "the paper network's arithmetic in parts of its convolutions' speed with the same numbers"
+        )
     if report.comparisons:
         lines += ["", f"{'ours':<18} {'peer':<12} {'clock':>7} {'cpu':>7} {'floor':>6} {'scaled':>7}"]
         lines += [_comparison(comparison) for comparison in report.comparisons]
@@ -41,16 +47,18 @@ def training_table(report: TrainingReport) -> str:
     return "\n".join(lines)
 
 
-def _row(row: Row) -> str:
-    distinct = "" if row.distinct is None else f"{row.distinct:.2f}"
-    rollout = "" if row.rollout_share is None else f"{100 * row.rollout_share:.0f} %"
-    share = "" if row.limit_share is None else f"{100 * row.limit_share:.0f} %"
-    gflops = "" if row.gflops is None else f"{row.gflops:,.0f}"
+def _speed(row: Row) -> str:
     return (
         f"{row.name:<18} {f'{row.num_envs} x {row.horizon}':>12} {row.minibatches:>5} {row.epochs:>6} {row.words:<19} "
-        f"{row.wall:>9,.0f} {row.wall_low:>8,.0f} {row.wall_high:>8,.0f} {row.cpu:>9,.0f} {row.updates:>3} "
-        f"{distinct:>8} {rollout:>7} {row.precision:<8} {gflops:>7} {share:>8}"
+        f"{row.precision:<8} {row.wall:>9,.0f} {row.wall_low:>8,.0f} {row.wall_high:>8,.0f} {row.cpu:>9,.0f} "
+        f"{row.updates:>3}"
     )
+
+
+def _work(row: Row) -> str:
+    gflops = "" if row.gflops is None else f"{row.gflops:,.0f}"
+    share = "" if row.limit_share is None else f"{100 * row.limit_share:.0f} %"
+    return f"{row.name:<18} {row.distinct:>8.2f} {f'{100 * (row.rollout_share or 0):.0f} %':>7} {gflops:>8} {share:>8}"
 
 
 def _comparison(comparison: Comparison) -> str:

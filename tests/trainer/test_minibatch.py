@@ -1,0 +1,124 @@
+"""A minibatch computes what plain re-encoding of every frame computes, in values and gradients, shared or not."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from tests.trainer.fake_envs import EchoEnvs
+from trainer.actor import Actor
+from trainer.config import TrainConfig
+from trainer.minibatch import make_minibatch
+from trainer.nets import ActorCritic, build_net
+from trainer.rollout import Rollout, RolloutState, collect
+from trainer.session import net_spec
+
+STEPS, ENVS, STRETCH = 12, 6, 4
+
+
+@pytest.fixture(autouse=True)
+def double() -> Iterator[None]:
+    torch.set_default_dtype(torch.float64)
+    yield
+    torch.set_default_dtype(torch.float32)
+
+
+def play(net_name: str, distinct: bool) -> tuple[Actor, Rollout, list[dict[str, np.ndarray]]]:
+    """A rollout with a network of doubles, and what was observed (T items)."""
+    envs = EchoEnvs(ENVS, length=12, chatter=0.7, pictures=3, lethal=False, limit=9)
+    config = TrainConfig(num_envs=ENVS, horizon=STEPS, bptt=STRETCH, minibatches=1, net=net_name, threads=1)
+    net = build_net(net_name, net_spec(envs), 0)
+    net.distinct = distinct
+    observation, _ = envs.reset(seed=3)
+    state = RolloutState.initial(observation, net.memory.initial(ENVS))
+    actor, generator = Actor(net, 12), torch.Generator().manual_seed(0)
+    collect(
+        actor, envs, state, config, generator, None
+    )  # so that the next one begins in the middle of episodes
+    seen = [{"image": state.image.copy(), "tokens": state.tokens.copy()}]
+    step = envs.step
+
+    def note(actions: np.ndarray) -> object:
+        result = step(actions)
+        seen.append({key: value.copy() for key, value in result[0].items()})
+        return result
+
+    envs.step = note  # type: ignore[method-assign]
+    rollout = collect(actor, envs, state, config, generator, None)
+    return actor, rollout, seen[:-1]
+
+
+def encode(net: ActorCritic, tokens: np.ndarray) -> Tensor:
+    """One history, from its first word, by PyTorch's own GRU."""
+    words = torch.from_numpy(tokens[tokens > 0].astype(np.int64))
+    if not len(words):
+        return torch.zeros(net.dialogue.size)
+    return net.dialogue.gru(net.dialogue.embedding(words))[1][0]
+
+
+def reference(net: ActorCritic, rollout: Rollout, seen: list[dict[str, np.ndarray]]) -> tuple[Tensor, Tensor]:
+    """Logits (T, E, ...) and values (T, E), one frame after the other."""
+    only = torch.tensor([0])
+    logits, values = [], []
+    for t, observation in enumerate(seen):
+        if t % STRETCH == 0:
+            memory = rollout.memories[t // STRETCH]
+        memory = memory * torch.from_numpy(~rollout.starts[t])[:, None]
+        features = [
+            net.perceive(net.prepare(torch.from_numpy(image[None])), encode(net, tokens)[None], only, only)
+            for image, tokens in zip(observation["image"], observation["tokens"], strict=True)
+        ]
+        memory = net.memory.step(torch.cat(features), memory)
+        for results, result in zip((logits, values), net.heads(memory[0]), strict=True):
+            results.append(result)
+    return torch.stack(logits), torch.stack(values)
+
+
+def by_stretch(array: Tensor) -> Tensor:
+    """(T, E, ...) in the order of a minibatch's frames."""
+    return array.view(-1, STRETCH, *array.shape[1:]).transpose(0, 1).flatten(0, 2)
+
+
+def furthest(one: Tensor, other: Tensor) -> float:
+    """Largest difference in parts of the largest value."""
+    return float((one - other).detach().abs().max() / other.detach().abs().max())
+
+
+@pytest.mark.parametrize("distinct", [True, False], ids=["duplicates removed", "duplicates kept"])
+@pytest.mark.parametrize("net_name", ["fast", "paper"])
+def test_agrees_with_reencoding_every_frame(net_name: str, distinct: bool) -> None:
+    actor, rollout, seen = play(net_name, distinct)
+    net = actor.net
+    assert rollout.starts.any(), "episodes must begin within the rollout"
+    assert max(np.count_nonzero(o["tokens"], axis=1).max() for o in seen) > 8, "histories must be long"
+    zeros = torch.zeros(STEPS, ENVS)
+    minibatch = make_minibatch(actor, rollout, zeros, zeros, torch.arange(ENVS), STRETCH)
+    shared = len(minibatch.image_index) < STEPS * ENVS
+    assert shared == distinct, "duplicates must be removed exactly where that was asked for"
+
+    expected = [by_stretch(array) for array in reference(net, rollout, seen)]
+    got = minibatch.evaluate(net)
+    for one, other in zip(got, expected, strict=True):
+        assert one.dtype == torch.float64
+        assert furthest(one, other) < 1e-12
+    assert furthest(by_stretch(rollout.values), expected[1]) < 1e-12, "acting streams the same values"
+
+    weights = [torch.randn_like(array) for array in expected]
+    parameters = dict(net.named_parameters())
+    gradients = [
+        torch.autograd.grad(
+            sum(
+                ((array * weight).sum() for array, weight in zip(outputs, weights, strict=True)), zeros.sum()
+            ),
+            list(parameters.values()),
+            allow_unused=True,
+        )
+        for outputs in (got, expected)
+    ]
+    largest = max(float(gradient.abs().max()) for gradient in gradients[1] if gradient is not None)
+    for name, one, other in zip(parameters, *gradients, strict=True):
+        assert (one is None) == (other is None), name
+        if one is not None:
+            assert float((one - other).abs().max()) < 1e-12 * largest, name
