@@ -16,6 +16,11 @@ def machine() -> str:
     return f"{names[0] if names else platform.processor() or platform.machine()}, Python {platform.python_version()}"
 
 
+def load() -> float | None:
+    """How many threads of the whole machine wanted a core in the last minute, where the system tells."""
+    return os.getloadavg()[0] if hasattr(os, "getloadavg") else None
+
+
 @contextmanager
 def on_cores(count: int) -> Iterator[None]:
     """Keep this thread, and those it starts, on `count` cores meanwhile, where the system can."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
     from socialai_dsl.cli.training_speed import Comparison, Row, TrainingReport
+
+_IDLE: Final = 0.5
 
 
 def training_table(report: TrainingReport) -> str:
@@ -18,6 +20,7 @@ def training_table(report: TrainingReport) -> str:
         ", ".join(f"{name} {version}" for name, version in report.versions.items()),
         f"reference loop: {report.reference / 1e6:.0f} M iterations per CPU second",
         f"convolutions of the paper's network, forward and backward, GFLOP/s: {limits}",
+        *_busy(report.load),
         "",
         f"{'name':<18} {'envs x steps':>12} {'parts':>5} {'epochs':>6} {'histories':<19} {'numbers':<8} "
         f"{'frames/s':>9} {'slowest':>8} {'fastest':>8} {'per cpu s':>9} {'n':>3}",
@@ -45,6 +48,13 @@ def training_table(report: TrainingReport) -> str:
             "no peer was measured; they are in the repository's benchmarks/, not in an installed package",
         ]
     return "\n".join(lines)
+
+
+def _busy(load: float | None) -> list[str]:
+    """A warning if the machine was not ours."""
+    if load is None or load < _IDLE:
+        return []
+    return [f"other work was running (load {load:.1f} before): trust the times per CPU second"]
 
 
 def _speed(row: Row) -> str:

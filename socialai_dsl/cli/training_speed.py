@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 import torch
 
-from socialai_dsl.cli.machine import machine, on_cores
+from socialai_dsl.cli.machine import load, machine, on_cores
 from socialai_dsl.cli.reference_loop import reference_speed
 from socialai_dsl.cli.roofline import Work, convolution_limit
 from socialai_dsl.cli.training_entries import Entry, Update
@@ -93,6 +93,7 @@ class TrainingReport:
     """Everything measured in one run.
 
     Attributes:
+        load: threads that wanted a core in the minute before; None where the system does not tell.
         reference: iterations per second of the reference loop on one core.
         limits: convolutions' operations per second by type, forward and backward, in 10**9.
     """
@@ -101,6 +102,7 @@ class TrainingReport:
     versions: dict[str, str]
     scenario: str
     threads: int
+    load: float | None
     reference: float
     limits: dict[str, float]
     rows: list[Row]
@@ -129,7 +131,7 @@ def measure_training(
         repetitions: updates measured at least, unless they take 2.5 times as long.
         note: told the name of what is measured next.
     """
-    before = torch.get_num_threads()
+    before, busy = torch.get_num_threads(), load()
     with on_cores(threads):
         reference = reference_speed(3)
         limits = {
@@ -143,7 +145,15 @@ def measure_training(
     torch.set_num_threads(before)
     floors = {entry.name: entry.floor.get(threads) for entry in chosen}
     return TrainingReport(
-        machine(), _versions(), scenario, threads, reference, limits, rows, list(_compare(rows, floors))
+        machine(),
+        _versions(),
+        scenario,
+        threads,
+        busy,
+        reference,
+        limits,
+        rows,
+        list(_compare(rows, floors)),
     )
 
 

@@ -4,6 +4,7 @@ import json
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 import torch
@@ -52,7 +53,9 @@ def test_a_slow_peer_is_replaced_by_its_floor() -> None:
     assert clean.wall == pytest.approx(fast / slow)
     assert clean.scaled == pytest.approx(fast / 2000)
     assert other.scaled == other.wall
-    table = training_table(report)
+    table = training_table(replace(report, load=3.0))
+    assert "load 3.0" in table
+    assert "other work" not in training_table(replace(report, load=None))
     assert all(name in table for name in ("fast", "clean-fast", "2,000", "4 x 5"))
 
 
