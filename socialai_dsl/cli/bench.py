@@ -111,10 +111,9 @@ def _training(arguments: argparse.Namespace) -> tuple[dict[str, Any], str]:
     return report.as_json(), training_table(report)
 
 
-def _note(name: str) -> None:
-    """Tell what is measured now, where a person is looking on."""
-    if sys.stderr.isatty():
-        print(f"measuring {name} ...", file=sys.stderr)
+def _note(line: str) -> None:
+    """Show that it goes on; the report itself comes at the end."""
+    print(line, file=sys.stderr, flush=True)
 
 
 def _batches(text: str) -> list[int]:

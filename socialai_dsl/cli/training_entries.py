@@ -15,6 +15,7 @@ from trainer.config import TrainConfig, paper_preset
 from trainer.crew import Crew
 from trainer.nets import best_precision
 from trainer.ppo import update
+from trainer.ppo_chunks import update_chunks
 from trainer.rollout import collect
 from trainer.session import Session
 
@@ -67,12 +68,11 @@ class Entry:
 
 def entries() -> list[Entry]:
     """Our trainers, then the peers; only the repository has those, no wheel does."""
+    paper = paper_preset(net="paper", update="environments")
     own = [
         _own("fast", "ours, fast", TrainConfig()),
-        _own("paper", "ours, paper", paper_preset(net="paper")),
-        _own(
-            "paper-every-frame", "ours, paper, duplicates kept", paper_preset(net="paper"), every_frame=True
-        ),
+        _own("paper", "ours, paper", paper),
+        _own("paper-every-frame", "ours, paper, duplicates kept", paper, every_frame=True),
         _own("paper-reference", "ours, paper-reference", paper_preset()),
     ]
     try:
@@ -119,6 +119,7 @@ def own_updates(config: TrainConfig, envs: Any, every_frame: bool) -> Iterator[U
     net.train()
     count = _Count(net.perceive)
     net.perceive = count  # type: ignore[method-assign]
+    learn = update_chunks if config.update == "chunks" else update
     with Crew(config.threads, divisible) as crew:
         while True:
             began = time.perf_counter()
@@ -126,7 +127,7 @@ def own_updates(config: TrainConfig, envs: Any, every_frame: bool) -> Iterator[U
                 session.actor, envs, session.state, config, session.generator, session.bonus, session.tutor
             )
             seconds = time.perf_counter() - began
-            update(session.actor, session.optimizer, rollout, config, session.generator, crew)
+            learn(session.actor, session.optimizer, rollout, config, session.generator, crew)
             session.update += 1
             yield Update(seconds, count.take())
 

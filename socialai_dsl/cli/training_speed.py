@@ -129,7 +129,7 @@ def measure_training(
         threads: cores, and threads of each trainer.
         seconds: how long each entry is measured, at least.
         repetitions: updates measured at least, unless they take 2.5 times as long.
-        note: told the name of what is measured next.
+        note: told each entry's speed as soon as it is known.
     """
     before, busy = torch.get_num_threads(), load()
     with on_cores(threads):
@@ -140,8 +140,8 @@ def measure_training(
         }
         rows = []
         for entry in chosen:
-            note(entry.name)
             rows.append(_measure(entry, scenario, threads, seconds, repetitions, limits))
+            note(f"{entry.name}: {rows[-1].wall:,.0f} frames/s, {rows[-1].cpu:,.0f} per CPU second")
     torch.set_num_threads(before)
     floors = {entry.name: entry.floor.get(threads) for entry in chosen}
     return TrainingReport(

@@ -19,7 +19,7 @@ from trainer.distinct import prefix_tree
 from trainer.nets import ActorCritic, NetSpec, build_net
 from trainer.ppo import compute_gae
 
-SPEC = NetSpec((8, 2, 4, 16), (7, 7, 4), (12, 5, 3, 3), 40)
+SPEC = NetSpec((8, 2, 4, 16), (7, 7, 4), (12, 5, 3, 3), tuple(map(str, range(40))))
 NEEDS_SB3 = pytest.mark.skipif(find_spec("sb3_contrib") is None, reason="sb3-contrib is not installed")
 
 

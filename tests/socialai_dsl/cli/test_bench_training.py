@@ -79,7 +79,7 @@ def test_the_report_is_json(capsys: Capture) -> None:
 
 
 def test_duplicates_are_counted_and_kept_if_asked() -> None:
-    config = paper_preset(net="paper", num_envs=4, horizon=10, threads=1)
+    config = paper_preset(net="paper", update="environments", num_envs=4, horizon=20, threads=1)
     frames = config.frames_per_update * config.epochs
     for alone, low, high in ((False, 0.1, 0.95), (True, 1.0, 1.0)):
         envs = socialai_dsl.make_vec("talkitout", num_envs=4, copy=False, autoreset_mode="SameStep")
@@ -113,7 +113,7 @@ def test_wrong_usage(options: list[str], message: str, capsys: Capture) -> None:
 
 
 def test_operations_are_those_of_the_network() -> None:
-    spec = NetSpec((8, 2, 4, 16), (7, 7, 4), (12, 5, 3, 3), 40)
+    spec = NetSpec((8, 2, 4, 16), (7, 7, 4), (12, 5, 3, 3), tuple(map(str, range(40))))
     net = build_net("paper", spec, 0)
     images = torch.zeros(3, 7, 7, 4, dtype=torch.uint8)
     with FlopCounterMode(display=False) as counter:
