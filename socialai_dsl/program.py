@@ -449,6 +449,7 @@ class Program:
         outcomes: by index; the last two are `deadly` and `timeout`. rules: name of each counted rule.
         vocabulary: token id -> word; 0 pads, 1 is unknown.
         source_map: one span (or None) for each instruction. labels: pc -> what starts there.
+        origin: what the compiler made it from, for tools that explain it; None if it made it from nothing.
     """
 
     words: npt.NDArray[np.int32]
@@ -464,6 +465,7 @@ class Program:
     vocabulary: tuple[str, ...]
     source_map: Sequence[Span | None] = field(repr=False)
     labels: Mapping[int, str] = field(repr=False)
+    origin: object = field(default=None, repr=False)
 
     def header(self, word: Header) -> int:
         """One word of the header."""

@@ -17,6 +17,7 @@ from socialai_dsl.compiler.folding import FALSE, SEVERAL, Facts, fold
 from socialai_dsl.compiler.homes import Homes
 from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.mobility import sometimes_absent
+from socialai_dsl.compiler.probes import NO_PROBES, Asked, Probes
 from socialai_dsl.compiler.registers import Registers, state_names
 from socialai_dsl.program import Op
 from socialai_dsl.semantics import terms
@@ -56,6 +57,7 @@ class Behaviour:
     code: CodeTable
     rules: list[str]
     inbox_of: dict[str, int]
+    probes: Probes = NO_PROBES
 
     @cached_property
     def absent(self) -> frozenset[int]:
@@ -148,6 +150,10 @@ class _FrameCompiler:
         ]
 
     def _by_class(self, emit: Callable[[Expressions], None], label: str) -> list[int]:
+        if self.shared.probes.recording:
+            to = self._expressions(Facts(heard=SEVERAL))
+            emit(to)
+            return [self.shared.code.add(to.block, label)] * (self.shared.classes.count + 1)
         addresses = []
         for heard in (*range(self.shared.classes.count), SEVERAL):
             to = self._expressions(Facts(heard=heard))
@@ -195,33 +201,50 @@ class _FrameCompiler:
     ) -> None:
         """Rules top to bottom; the first that holds fires. `clock` is known right after a goto_now."""
         for rule in rules:
-            if clock is not None and rule.after > clock:
-                continue
             heard = fold(terms.Heard(rule.hears), to.facts, self.shared.classes) if rule.hears else None
             when = fold(rule.when.term, to.facts, self.shared.classes) if rule.when else None
-            if FALSE in (heard, when):
-                continue
-            self._rule(to, rule, follow)
+            if FALSE not in (heard, when) and (clock is None or rule.after <= clock):
+                self._rule(to, rule, follow)
+            elif self.shared.probes.recording:
+                self._ask_in_vain(to, rule)
         to.block.halt()
+
+    def _ask_in_vain(self, to: Expressions, rule: RulePlan) -> None:
+        """Only note what keeps a rule from firing here."""
+        following = Label()
+        asked = self._asked(to, rule)
+        self._conditions(to, rule, asked, following)
+        asked.report(to, following)
+        to.block.bind(following)
+
+    def _asked(self, to: Expressions, what: RulePlan | StepPlan) -> Asked:
+        return self.shared.probes.rule(to, self.counters[what.name], what, self.frame.entity)
+
+    def _conditions(self, to: Expressions, rule: RulePlan, asked: Asked, following: Label) -> None:
+        """Fall through if all conditions of a rule hold, else skip to `following`."""
+        block = to.block
+        block.span = rule.span
+        if rule.hears:
+            heard = fold(terms.Heard(rule.hears), to.facts, self.shared.classes)
+            to.condition(heard, asked.unless("hears", following))
+        if rule.once:
+            block.test(Op.IF_EQ, self.once[rule.name], constant(0), asked.unless("once", following))
+        if rule.after:
+            block.test(Op.IF_LE, constant(rule.after), self.clock, asked.unless("after", following))
+        if rule.when is not None:
+            asked.condition(to, "when", rule.when, following)
+        block.span = rule.span
+        if rule.chance is not None:
+            site = self.shared.sites.row(f"{rule.site}.chance")
+            block.test(Op.IF_CHANCE, chance_word(rule.chance), site, asked.unless("chance", following))
 
     def _rule(self, to: Expressions, rule: RulePlan, follow: bool) -> None:
         block = to.block
         following = Label()
         mark = block.taken
-        block.span = rule.span
-        if rule.hears:
-            to.condition(fold(terms.Heard(rule.hears), to.facts, self.shared.classes), following)
-        if rule.once:
-            block.test(Op.IF_EQ, self.once[rule.name], constant(0), following)
-        if rule.after:
-            block.test(Op.IF_LE, constant(rule.after), self.clock, following)
-        if rule.when is not None:
-            to.sited_condition(rule.when, following)
-        block.span = rule.span
-        if rule.chance is not None:
-            site = self.shared.sites.row(f"{rule.site}.chance")
-            block.test(Op.IF_CHANCE, chance_word(rule.chance), site, following)
-        operands = self._effects(to).compute(rule, following, self.speaker)
+        asked = self._asked(to, rule)
+        self._conditions(to, rule, asked, following)
+        operands = self._effects(to).compute(rule, asked.nothing("values", following), self.speaker)
         block.emit(Op.COUNT, self.counters[rule.name])
         if rule.do is None:
             self._effects(to).carry_out(rule, operands, self.speaker)
@@ -235,6 +258,7 @@ class _FrameCompiler:
         else:
             self._activities(to).emit(rule.do)
             block.halt()
+        asked.report(to, following)
         block.bind(following)
         block.release(mark)
 
@@ -298,19 +322,24 @@ class _FrameCompiler:
         block = to.block
         running, ended = Label(), Label()
         block.span = step.span
+        asked = self._asked(to, step)
         if step.duration is not None and step.duration > 0:
-            self._after(step.duration, to, ended, running if step.until is None else None)
+            unless = asked.unless("for", running) if step.until is None else None
+            self._after(step.duration, to, ended, unless)
         if step.until is not None:
-            to.sited_condition(step.until, running)
+            asked.condition(to, "until", step.until, running)
         elif step.duration == FOR_EVER:
             block.halt()
             return
         elif step.duration is None:
-            self._activities(to, self.aims.get(k)).unless_finished(step.activity, running, ended)
+            unfinished = asked.unless("do", running)
+            self._activities(to, self.aims.get(k)).unless_finished(step.activity, unfinished, ended)
         block.bind(ended)
-        self._effects(to).emit(step, self.counters[step.name], running, self.speaker)
+        failed = asked.nothing("values", running)
+        self._effects(to).emit(step, self.counters[step.name], failed, self.speaker)
         block.emit(Op.GOTO, self.number, self._next(k))
         block.halt()
+        asked.report(to, running)
         block.bind(running)
         block.halt()
 

@@ -90,6 +90,12 @@ class Lines:
     def _noun_of_pair(self, k: int) -> int:
         return k % len(self.checked.nouns)
 
+    def adopt(self, other: Lines) -> None:
+        """Number all lines as `other` does, which was made for the same scenario."""
+        self.texts, self.classes, self.nouns = [*other.texts], [*other.classes], [*other.nouns]
+        self.tokens, self._known = [*other.tokens], dict(other._known)
+        self.speakers = {speaker: set(lines) for speaker, lines in other.speakers.items()}
+
     def said_by(self, speaker: int, pattern: Pattern | None) -> frozenset[int]:
         """The lines of an NPC that fit a pattern (None: all of them), once it is known what everybody says."""
         wanted = None if pattern is None else self.classes_of.matching(pattern)

@@ -6,6 +6,7 @@ from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Sites
 from socialai_dsl.compiler.classes import Classes
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import FALSE, Facts, fold
+from socialai_dsl.compiler.probes import NO_PROBES, Probes
 from socialai_dsl.compiler.registers import Registers
 from socialai_dsl.program import Body, Op
 from socialai_dsl.semantics.terms import Checked
@@ -15,27 +16,37 @@ _BODIES = range(Body.NONE + 1)
 
 
 def outcome_table(
-    checked: Checked, registers: Registers, classes: Classes, sites: Sites, code: CodeTable
+    checked: Checked,
+    registers: Registers,
+    classes: Classes,
+    sites: Sites,
+    code: CodeTable,
+    probes: Probes = NO_PROBES,
 ) -> list[int]:
     """Addresses by (class, action), row by row."""
+    if probes.recording:
+        to = Expressions(Block(), checked, registers, classes, sites)
+        _first_that_holds(to, checked, probes)
+        return [code.add(to.block, "outcome")] * (classes.count * 8)
     table = []
     for said in range(classes.count):
         for action in map(Body, _BODIES):
             facts = Facts(said=said, action=action)
             to = Expressions(Block(), checked, registers, classes, sites)
             to.facts = facts
-            _first_that_holds(to, checked)
+            _first_that_holds(to, checked, probes)
             table.append(code.add(to.block, f"outcome after class {said}, {action.name.lower()}"))
     return table
 
 
-def _first_that_holds(to: Expressions, checked: Checked) -> None:
+def _first_that_holds(to: Expressions, checked: Checked, probes: Probes) -> None:
     block = to.block
     for number, outcome in enumerate(checked.outcomes):
-        if fold(outcome.condition.term, to.facts, to.classes) == FALSE:
+        if fold(outcome.condition.term, to.facts, to.classes) == FALSE and not probes.recording:
             continue
         following = Label()
-        to.sited_condition(outcome.condition, following)
+        asked = probes.outcome(to, number, outcome)
+        asked.condition(to, "outcome", outcome.condition, following)
         if outcome.graded is not None and outcome.success:
             mark = block.taken
             block.emit(Op.END_GRADED, number, to.sited_value(outcome.graded))
@@ -43,5 +54,6 @@ def _first_that_holds(to: Expressions, checked: Checked) -> None:
         else:
             block.emit(Op.END, number, outcome.percent if outcome.success else 0)
         block.halt()
+        asked.report(to, following)
         block.bind(following)
     block.halt()

@@ -16,12 +16,17 @@ def entity_register(entity: int, which: Field) -> int:
 
 @dataclass
 class Registers:
-    """Allocates registers in order of need and remembers their names and ranges."""
+    """Allocates registers in order of need and remembers their names and ranges.
+
+    Attributes:
+        end: registers up to this number belong to the program, even if none of the others reaches so far.
+    """
 
     next_free: int
     canvas: tuple[int, int]
     by_path: dict[str, int] = field(default_factory=dict)
     names: list[RegisterName] = field(default_factory=list)
+    end: int = 0
 
     @classmethod
     def of(cls, checked: Checked) -> Registers:

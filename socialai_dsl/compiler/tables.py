@@ -99,7 +99,7 @@ class Tables:
 
         header |= entries | {
             Header.SIZE: Header.END + len(body),
-            Header.REGISTERS: self.registers.next_free,
+            Header.REGISTERS: max(self.registers.next_free, self.registers.end),
             Header.CANVAS_WIDTH: checked.room.canvas[0],
             Header.CANVAS_HEIGHT: checked.room.canvas[1],
             Header.ENTITIES: len(checked.entities),
@@ -156,6 +156,7 @@ class Tables:
             vocabulary=lines.vocabulary,
             source_map=tuple(self.code.spans),
             labels=dict(self.code.labels),
+            origin=checked,
         )
 
     def _flags(self) -> int:

@@ -13,7 +13,7 @@ from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.activities import activity, effect
 from socialai_dsl.semantics.build import all_of, any_of
 from socialai_dsl.semantics.findings import FailedError, dotted, surviving
-from socialai_dsl.semantics.hearing import bound
+from socialai_dsl.semantics.hearing import binding, bound
 from socialai_dsl.semantics.scope import Draws, PlayedFrame, Scope
 from socialai_dsl.semantics.terms import (
     BOOL,
@@ -161,6 +161,9 @@ class _Planner:
             goto=self._target(rule.goto, (*path, "goto")),
             goto_now=self._target(rule.goto_now, (*path, "goto_now")),
         )
+        if patterns:
+            self.resolver.readings.change(f"{plan.site}.when", binding(patterns))
+        self.resolver.readings.entries[plan.site] = rule
         return bound(plan, patterns)
 
     def _hears(self, rule: Rule, path: DataPath, address: str) -> tuple[tuple[Pattern, ...], Term | None]:
@@ -277,6 +280,8 @@ class _Planner:
         path = (*self.played.path, "steps", index)
         address = self.addresses[path]
         doing = self._activity((*path, "do"), step.do, address)
+        name = f"{self.played.member}.{self.played.name}.steps[{index}]"
+        self.resolver.readings.entries[name] = step
         duration = self._duration((*path, "for"), step.for_)
         head = (step.do or "").partition("(")[0].strip()
         endless = doing is not None and (doing.name in _ENDLESS or head in _ENDLESS)
@@ -285,7 +290,7 @@ class _Planner:
             message = f"`{step.do}` never ends by itself: add `until:` or `for:`"
             findings.error("S304", message, findings.at((*path, "do"), 0, len(step.do)))
         return StepPlan(
-            name=f"{self.played.member}.{self.played.name}.steps[{index}]",
+            name=name,
             state=step.state,
             activity=doing or self._staying(path),
             span=self.resolver.findings.places.value_span(path),

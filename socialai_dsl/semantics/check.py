@@ -185,6 +185,7 @@ class _Run:
             channels=self._channels(),
             each_step=round(scenario.reward.each_step * 1_000_000),
             properties=claimed,
+            readings=resolver.readings,
         )
         check_placements(made, findings)
         return made
@@ -261,6 +262,7 @@ class _Run:
                 term = self.resolver.written((*path, kind), raw, BOOL, at_every_step(scope))
                 line = findings.places.key_span((*path, kind)).line
                 condition = Sited(term, scope.draws.site, span)
+                self.resolver.readings.entries[condition.site] = outcome
                 percent, graded = self._reward(outcome.reward, (*path, "reward"))
                 if kind == "failure" and "reward" in outcome.model_fields_set:
                     place = findings.places.key_span((*path, "reward"))

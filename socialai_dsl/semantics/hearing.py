@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
@@ -144,7 +144,12 @@ def speakers(
 
 
 def bound(plan: RulePlan, patterns: Sequence[Pattern]) -> RulePlan:
-    """A rule whose `speaker` and `noun` know what it hears; what only the agent says needs no search."""
+    """A rule whose `speaker` and `noun` know what it hears."""
+    return changed(plan, binding(patterns))  # type: ignore[no-any-return]
+
+
+def binding(patterns: Sequence[Pattern]) -> Callable[[Term], Term | None]:
+    """What `speaker` and `noun` are where these are heard; what only the agent says needs no search."""
     only_agent = not any(pattern.said_by_npcs for pattern in patterns)
 
     def change(term: Term) -> Term | None:
@@ -154,4 +159,4 @@ def bound(plan: RulePlan, patterns: Sequence[Pattern]) -> RulePlan:
             return World(term.type, "noun") if only_agent else HeardNoun(term.type, tuple(patterns))
         return None
 
-    return changed(plan, change)  # type: ignore[no-any-return]
+    return change

@@ -11,6 +11,7 @@ from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import links, resolve_calls, resolve_groups, resolve_names, sequences, tables
 from socialai_dsl.semantics.build import all_of, any_of, arithmetic, between, number, one_of
 from socialai_dsl.semantics.findings import FailedError, Findings, Scalar, surviving
+from socialai_dsl.semantics.readings import Readings
 from socialai_dsl.semantics.registers import Registers
 from socialai_dsl.semantics.scope import PlayedFrame, Scope, Symbols
 from socialai_dsl.semantics.terms import (
@@ -46,6 +47,7 @@ class Resolver:
         utterances: what the agent can say.
         frames: member -> the frame it plays.
         npc_texts: every text that an NPC can say, for what others may hear. said_by: member -> those it can say.
+        readings: how everything was written that has been given a meaning.
     """
 
     def __init__(
@@ -63,6 +65,7 @@ class Resolver:
         self.utterances = Utterances(self, symbols.scenario.grammar)
         self.npc_texts: dict[str, None] = {}
         self.said_by: dict[str, dict[str, None]] = {}
+        self.readings = Readings()
         self._tables: dict[str, tuple[tuple[str, ...], tuple[Term, ...]] | None] = {}
 
     def table(self, name: str) -> tuple[tuple[str, ...], tuple[Term, ...]]:
@@ -106,6 +109,15 @@ class Resolver:
 
     def value(self, node: ast.Expr, expected: Type | None, scope: Scope) -> Term:
         """The term for a tree, of the expected type if one is given."""
+        reading = self.readings.begin(node)
+        term: Term | None = None
+        try:
+            term = self._value(node, expected, scope)
+        finally:
+            self.readings.end(reading, term, scope.draws.site)
+        return term
+
+    def _value(self, node: ast.Expr, expected: Type | None, scope: Scope) -> Term:
         match node:
             case ast.Number(value=value):
                 return self.fit(number(value), expected, node, scope)

@@ -20,9 +20,12 @@ cell       CELL + 32 * y + x (program.py); where an entity is asked for its plac
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from socialai_dsl.source import Span
+
+if TYPE_CHECKING:
+    from socialai_dsl.semantics.readings import Readings
 
 Kind = Literal[
     "bool", "int", "direction", "color", "action", "entity", "text", "noun", "status", "utterance", "cell"
@@ -747,6 +750,7 @@ class Checked:
         beliefs: what members take for true. slope: thousandths of the success reward that are lost by the horizon.
         each_step: millionths added to the reward of every step. channels: of the picture, 4 or 6.
         properties: what the scenario claims about itself; no program contains it.
+        readings: how conditions were written; None if it was not made from a file.
     """
 
     name: str
@@ -775,6 +779,7 @@ class Checked:
     each_step: int = 0
     channels: int = 4
     properties: tuple[PropertyPlan, ...] = ()
+    readings: Readings | None = field(default=None, compare=False, repr=False)
 
 
 TURN = Type("int", -1, 1, ("left", "none", "right"))

@@ -44,6 +44,7 @@ def _rule(resolver: Resolver, rule: WorldRule, path: DataPath) -> RulePlan:
             scope = _scope((*path, "when"), f"{name}.when")
             term = resolver.written((*path, "when"), rule.when, BOOL, scope)
             when = Sited(term, scope.draws.site, resolver.findings.at((*path, "when")))
+    resolver.readings.entries[name] = rule
     return RulePlan(
         name=rule.id or name,
         site=name,
