@@ -170,7 +170,7 @@ class Recorder(Probes):
                 *(_Shown("", _INT, _known(register)) for register in heard),
                 _Shown("", _INT, lambda to: to.into_temporary(Op.DISTANCE, constant(0), constant(entity))),
             ],
-            **dict.fromkeys(("after", "for"), [_Shown("", _INT, _known(clock))]),
+            **{key: [_Shown("", _INT, _known(clock))] for key in ("after", "for")},
         }
 
 

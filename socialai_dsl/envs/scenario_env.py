@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.engine.kernel import BAD_ACTION, Task
+from socialai_dsl.engine.state import Key
 from socialai_dsl.engine.step import TRUNCATED
 from socialai_dsl.envs.actions import encode_action
 from socialai_dsl.envs.panel import Face
 from socialai_dsl.envs.picture import cast_of, frame
+from socialai_dsl.envs.recording import Recording
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Register
 from socialai_dsl.program_suite import Playable, ProgramSuite
@@ -60,6 +62,9 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._ended = True
         self._playing = self._table.program(0)
         self._always: dict[str, Any] = {}
+        self._recording = Recording.of(self._table, 0)
+        self._last_act: Recording | None = None
+        self._explainers: dict[str, Any] = {}
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -76,6 +81,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         if self.render_mode == "human":
             self.render()
         self._look_up()
+        self._record()
         return self._observation(), {"utterance": SILENCE, "history": self._history, **self._always}
 
     def step(
@@ -91,7 +97,9 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         ended = self._table.play(Task.STEP_ONLY)
         if ended == BAD_ACTION:
             raise self._refusal(action)
+        self._recording.actions.append(self._action.tobytes())
         if self._acts:  # another one may have begun
+            self._turn_over()
             self._look_up()
             self._history = "\n".join(self._table.history(0))
         info: dict[str, Any] = {"utterance": SILENCE, "history": self._history, **self._always}
@@ -111,6 +119,17 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         if self.render_mode == "human":
             self.render()
         return self._observation(), self._reward.item(), terminated, truncated, info
+
+    def _record(self) -> None:
+        """Remember from here on what is done."""
+        self._recording, self._last_act = Recording.of(self._table, 0), None
+
+    def _turn_over(self) -> None:
+        """Begin anew where another act has begun."""
+        if self._table.state.keys[0, Key.ACT] == self._recording.start.key[Key.ACT]:
+            self._last_act = None
+        else:
+            self._last_act, self._recording = self._recording, Recording.of(self._table, 0)
 
     def _look_up(self) -> None:
         """Look up which program this episode plays."""
@@ -137,6 +156,34 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         """The state in the scenario's own names; can be put back as a layout."""
         return self._table.describe(0)
 
+    def explain(self) -> dict[str, Any]:
+        """Which rules fired in the last step, and for the others that could have, why they did not.
+
+        Keys: `t`, `fired` and `others`, two lists in the order in which rules were asked. An entry has `who` (a member
+        of the cast, `world` or `outcome`), `kind` (rule, step, world rule or outcome), of a rule in a frame `state` and
+        `list` (first or then), `name`, `at` (file:line), `words` (how it is written), and of the others `why`; where a
+        part of its condition was false, also that `part` as it is written and `values`, what it was about. Rules of
+        states that a frame was not in are left out. Nothing changes; the step is played again from the start of the
+        episode, so this is for looking, not for every step of training.
+
+        Raises:
+            ValueError: no step has been taken since `reset` or `restore`.
+        """
+        recording = self._last_act or self._recording
+        if not recording.actions:
+            raise ValueError("explain: got a call before the first step; expected step() first")
+        number = self._table.number_at(int(recording.start.key[Key.PROGRAM]))
+        program = self._table.programs[number]
+        from socialai_dsl.envs.explain import Explainer  # the compiler is needed for this alone
+
+        if program.sha256 not in self._explainers:
+            suite = self.program if isinstance(self.program, ProgramSuite) else None
+            self._explainers[program.sha256] = Explainer(program, suite, number)
+        # Where another act has begun, the registers are that one's.
+        reached = self._registers if self._last_act is None else None
+        explained: dict[str, Any] = self._explainers[program.sha256].explain(recording, reached)
+        return explained
+
     def snapshot(self) -> bytes:
         """The exact state, randomness included."""
         return self._table.snapshot()
@@ -145,6 +192,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         """Put back a snapshot of this scenario. Raises ValueError for any other."""
         self._table.restore(data)
         self._look_up()
+        self._record()
         self._ended = bool(self._registers[Register.ENDED])
         self._history = "\n".join(self._table.history(0))
 

@@ -230,7 +230,11 @@ class Table:
 
     def number(self, row: int) -> int:
         """Which program a row plays in this episode."""
-        return self._number_at[self.state.keys.item(row, _PROGRAM)]
+        return self.number_at(self.state.keys.item(row, _PROGRAM))
+
+    def number_at(self, offset: int) -> int:
+        """Which program begins at this word of the batch."""
+        return self._number_at[offset]
 
     def program(self, row: int) -> Program:
         """The program that a row plays in this episode."""

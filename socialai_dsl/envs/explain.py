@@ -1,0 +1,333 @@
+"""This module says which rules fired in the last step, and why the others did not.
+
+The episode is played again by a program that notes what was asked and what was false (`compiler.probes`), on the same
+engine, from the same moment, with the same actions. That it ends in the same state is checked each time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.compiler import compile_probed
+from socialai_dsl.compiler.probes import Part, Probe, Value
+from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.state import Key
+from socialai_dsl.envs.recording import Recording
+from socialai_dsl.envs.table import Table
+from socialai_dsl.envs.values import shown, utterance_text
+from socialai_dsl.program import EntityColumn, Header, LineColumn, Program, Register
+from socialai_dsl.program_suite import ProgramSuite
+from socialai_dsl.schema.base import Model
+from socialai_dsl.semantics.readings import Readings
+from socialai_dsl.semantics.terms import Checked, FramePlan, OutcomePlan, RulePlan, StepPlan
+from socialai_dsl.source import Span
+
+_ORDER: Final = ("hears", "until", "for", "when", "after", "chance", "once", "success", "failure", "do", "set",
+                 "reward", "cause", "say", "goto", "goto_now")  # fmt: skip
+"""In which order the keys of a rule are shown."""
+
+
+class Explainer:
+    """Plays the last step of an environment again and reads what was noted.
+
+    Args:
+        program: what the environment plays.
+        suite: the suite it is a member of, None if it plays alone.
+        number: which member it is.
+    """
+
+    def __init__(self, program: Program, suite: ProgramSuite | None, number: int) -> None:
+        if not isinstance(program.origin, Checked):
+            raise ValueError("explain: got a program that was not compiled from a scenario")
+        self._checked = program.origin
+        self._program = program
+        self._probed = compile_probed(self._checked)
+        self._table = Table([_alone(self._probed.program, suite, number)], 1, 1)
+        self._table.reset(0, None)
+
+    def explain(self, recording: Recording, reached: NDArray[np.int16] | None) -> dict[str, Any]:
+        """What happened in the last step of a recording, which led to these registers, int16 (R,), if they are known.
+
+        See `ScenarioEnv.explain`.
+        """
+        fired = self._play(recording)
+        registers = self._table.state.registers[0]
+        known = self._probed.first
+        same = reached is None or np.array_equal(registers[:known], reached[:known])
+        assert same, "internal: the step that was explained went another way"
+        notes = _Notes(self._probed.program, self._program, registers)
+        story = _Story(self._checked, self._probed.rules, self._probed.outcomes, notes, fired)
+        entries = list(story.entries())
+        return {
+            "t": int(registers[Register.T]),
+            "fired": [entry for entry in entries if entry["fired"]],
+            "others": [entry for entry in entries if not entry["fired"]],
+        }
+
+    def _play(self, recording: Recording) -> NDArray[np.int64]:
+        """Play the recording; which counters the last step has raised."""
+        state, ports = self._table.state, self._table.batch.ports
+        own = [Key.PROGRAM, Key.POOL]
+        start, key = recording.start, recording.start.key.copy()
+        key[own] = state.keys[0, own]
+        state.keys[0] = key
+        state.registers[:] = 0
+        state.registers[0, : self._probed.first] = start.registers[: self._probed.first]
+        state.boards[0] = start.board[: state.boards.shape[1]]
+        state.tokens[:] = 0
+        before = ports.counters[0].copy()
+        for action in recording.actions:
+            state.registers[0, self._probed.first :] = 0
+            before = ports.counters[0].copy()
+            ports.actions[0] = np.frombuffer(action, np.int64)
+            self._table.batch.step(Task.STEP_ONLY)
+        return np.asarray(ports.counters[0] - before)
+
+
+def _alone(program: Program, suite: ProgramSuite | None, number: int) -> Program | ProgramSuite:
+    """The program with the action space of the suite that it is a member of."""
+    if suite is None:
+        return program
+    return ProgramSuite(
+        suite.name,
+        (program,),
+        (suite.members[number],),
+        suite.actions,
+        suite.templates,
+        suite.nouns,
+        (suite.template_maps[number],),
+        (suite.noun_maps[number],),
+    )
+
+
+@dataclass(frozen=True)
+class _Notes:
+    """What a probed program has noted, in words."""
+
+    probed: Program
+    program: Program
+    registers: NDArray[np.int16]
+
+    def number(self, probe: Probe) -> int:
+        """What `Probe.register` says."""
+        return int(self.registers[probe.register])
+
+    def values(self, part: Part) -> dict[str, Any]:
+        """What a part was about, by how it is written."""
+        return {value.words: self._value(value) for value in part.values if value.words}
+
+    def why(self, probe: Probe, words: str) -> str:
+        """Why a rule did not fire: its first part that was false."""
+        number = self.number(probe)
+        part = probe.parts[abs(number) - 1]
+        written = part.words or words
+        if number < 0:
+            return f"{written} finds nothing" if written else "something that it needs is not there"
+        match part.key:
+            case "hears":
+                return f"{words}: {self._heard(part)}"
+            case "once":
+                return "it fires once, and has fired before"
+            case "after" | "for":
+                return f"{words}: turn {self._plain(part)[0]} of this state"
+            case "chance":
+                return f"{words}: not drawn"
+            case "do":
+                return f"{words} is not finished"
+        values = ", ".join(f"{name} is {_spoken(value)}" for name, value in self.values(part).items())
+        return f"{written} is false" + (f": {values}" if values else "")
+
+    def _plain(self, part: Part) -> list[int]:
+        return [int(self.registers[value.name.register]) for value in part.values]
+
+    def _value(self, value: Value) -> Any:
+        number, name = int(self.registers[value.name.register]), value.name
+        known = not name.values or name.low <= number <= name.high
+        if name.kind == "entity" and not 0 <= number < len(self.program.entities):
+            known = False
+        return shown(self.program, name, number) if known else None
+
+    def _heard(self, part: Part) -> str:
+        """What was heard instead, or why nothing was."""
+        count, *classes, distance = self._plain(part)
+        said = int(self.registers[Register.UTTERANCE])
+        own = str(utterance_text(self.program, said)) if said else ""
+        if count == 0:
+            if not said:
+                return "nothing was heard"
+            near, far = self._voice()
+            if near <= distance <= far:
+                return f'nothing was heard, though the agent said "{own}"'
+            return f'nothing was heard: the agent said "{own}" at distance {distance}, its voice carries {far}'
+        texts = [own if number == int(self.registers[Register.CLASS]) and said else self._text(number)
+                 for number in classes[:count]]  # fmt: skip
+        return "heard " + " and ".join(dict.fromkeys(texts and [f'"{text}"' for text in texts]))
+
+    def _voice(self) -> tuple[int, int]:
+        at = self.program.header(Header.ENTITY_AT)
+        near, far = (int(self.program.words[at + column]) for column in (EntityColumn.NEAR, EntityColumn.FAR))
+        return near, far
+
+    def _text(self, number: int) -> str:
+        """A line of this class: one that was said in this step, if it can be told."""
+        program = self.program
+        at, count = program.header(Header.LINE_AT), program.header(Header.LINES)
+        table = program.words[at : at + LineColumn.COLUMNS * count].reshape(count, LineColumn.COLUMNS)
+        first, heard = program.header(Header.HEARD), int(self.registers[Register.HEARD])
+        lines = [int(line) for line in self.registers[first : first + heard]]
+        fitting = np.flatnonzero(table[:, LineColumn.CLASS] == number).tolist()
+        told = [line for line in lines if line in fitting] or fitting
+        return program.lines[told[0]] if len(told) == 1 else "something else"
+
+
+@dataclass(frozen=True)
+class _Story:
+    """The rules of a step in the order in which they were asked."""
+
+    checked: Checked
+    rules: dict[int, Probe]
+    outcomes: dict[int, Probe]
+    notes: _Notes
+    raised: NDArray[np.int64]
+
+    def entries(self) -> Iterator[dict[str, Any]]:
+        """One for each rule that was asked, and for those that would have come after one that fired."""
+        counter = 0
+        for frame in self.checked.frames:
+            size = len(frame.steps) + sum(len(state.first) + len(state.then) for state in frame.states)
+            yield from self._frame(frame, range(counter, counter + size))
+            counter += size
+        for number in range(counter, counter + len(self.checked.rules)):
+            yield from self._asked(number, self.rules.get(number), "world", {}, "world rule")
+        ended = self.raised[counter + len(self.checked.rules) :]
+        listed = [
+            (probe.plan, probe, bool(ended[number])) for number, probe in sorted(self.outcomes.items())
+        ]
+        yield from self._list(listed, "outcome", {}, "outcome")
+
+    def _frame(self, frame: FramePlan, counters: range) -> Iterator[dict[str, Any]]:
+        if frame.steps:
+            for number, step in zip(counters, frame.steps, strict=True):
+                state = {"state": step.state} if step.state else {}
+                yield from self._asked(number, self.rules.get(number), frame.member, state, "step")
+            return
+        numbers = iter(counters)
+        lists: list[tuple[str, str, list[tuple[Any, Probe | None, bool]]]] = []
+        for state in frame.states:
+            for part, rules in (("first", state.first), ("then", state.then)):
+                found = [(rule, self.rules.get(n), bool(self.raised[n])) for rule, n in zip(rules, numbers, strict=False)]  # fmt: skip  # noqa: E501
+                lists.append((state.name, part, found))
+        for name, part, found in _in_turn([one for one in lists if self._is_asked(one[2])]):
+            yield from self._list(found, frame.member, {"state": name, "list": part}, "rule")
+
+    def _is_asked(self, found: Iterable[tuple[Any, Probe | None, bool]]) -> bool:
+        return any(fired or (probe is not None and self.notes.number(probe)) for _, probe, fired in found)
+
+    def _list(
+        self, found: Sequence[tuple[Any, Probe | None, bool]], who: str, more: dict[str, Any], kind: str
+    ) -> Iterator[dict[str, Any]]:
+        """A list of which the first that holds fires; nothing if it was not read."""
+        if not self._is_asked(found):
+            return
+        before: Span | None = None
+        for plan, probe, fired in found:
+            entry = self._entry(plan, who, more, kind, fired)
+            if not fired and before is not None:
+                entry["why"] = f"not asked: line {before.line} came first"
+            elif not fired and probe is not None:
+                entry |= self._reason(probe)
+            yield entry
+            if fired:
+                before = _span(plan)
+
+    def _asked(
+        self, number: int, probe: Probe | None, who: str, more: dict[str, Any], kind: str
+    ) -> Iterator[dict[str, Any]]:
+        """One that is asked for itself; nothing if it was not."""
+        fired = bool(self.raised[number])
+        if probe is None or not (fired or self.notes.number(probe)):
+            return
+        entry = self._entry(probe.plan, who, more, kind, fired)
+        yield entry if fired else entry | self._reason(probe)
+
+    def _reason(self, probe: Probe) -> dict[str, Any]:
+        number = self.notes.number(probe)
+        part = probe.parts[abs(number) - 1]
+        words = part.words or self._words_of(probe.plan, part.key)
+        values = self.notes.values(part) if number > 0 else {}
+        return {"why": self.notes.why(probe, words), "part": words, "values": values}
+
+    def _entry(
+        self, plan: RulePlan | StepPlan | OutcomePlan, who: str, more: dict[str, Any], kind: str, fired: bool
+    ) -> dict[str, Any]:
+        span = _span(plan)
+        return {
+            "who": who,
+            "kind": kind,
+            **more,
+            "name": plan.name,
+            "at": f"{span.file}:{span.line}",
+            "words": self._words_of(plan),
+            "fired": fired,
+        }
+
+    def _words_of(self, plan: RulePlan | StepPlan | OutcomePlan, key: str = "") -> str:
+        """How a rule is written, in one line, or one of its keys."""
+        readings = self.checked.readings or Readings()
+        model = readings.entries.get(_site(plan))
+        if model is None:
+            return ""
+        written = _written(model)
+        if key:
+            return f"{key}: {_flow(written[key])}" if key in written else ""
+        keys = [word for word in _ORDER if word in written]
+        return ", ".join(f"{word}: {_flow(written[word])}" for word in keys)
+
+
+def _in_turn(lists: list[tuple[str, str, list[tuple[Any, Probe | None, bool]]]]) -> Iterator[Any]:
+    """Lists of a frame that were read in a step: `first`, then the lists of `then` as `goto_now` leads through them."""
+    left = [one for one in lists if one[1] == "then"]
+    yield from (one for one in lists if one[1] == "first")
+    while left:
+        aims = {plan.goto_now for _, _, found in left for plan, _, fired in found if fired and plan.goto_now}
+        following = next((one for one in left if one[0] not in aims), left[0])
+        left.remove(following)
+        yield following
+
+
+def _span(plan: RulePlan | StepPlan | OutcomePlan) -> Span:
+    return plan.condition.span if isinstance(plan, OutcomePlan) else plan.span
+
+
+def _site(plan: RulePlan | StepPlan | OutcomePlan) -> str:
+    """What a rule is called among the readings."""
+    if isinstance(plan, OutcomePlan):
+        return plan.condition.site
+    return plan.site if isinstance(plan, RulePlan) else plan.name
+
+
+def _written(model: Model) -> dict[str, Any]:
+    """The keys that an author wrote, with their values."""
+    given = model.model_dump(by_alias=True, exclude_unset=True)
+    return {key: value for key, value in given.items() if value not in (None, (), {})}
+
+
+def _flow(value: Any) -> str:
+    """A value as it could be written in one line of YAML."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_flow(part)}" for key, part in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return _flow(value[0]) if len(value) == 1 else "[" + ", ".join(map(_flow, value)) + "]"
+    return _spoken(value) if isinstance(value, bool) else " ".join(str(value).split())
+
+
+def _spoken(value: Any) -> str:
+    """A value as the scenario would say it."""
+    if value is None:
+        return "nothing"
+    return str(value).lower() if isinstance(value, bool) else str(value)
