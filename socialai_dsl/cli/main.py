@@ -10,6 +10,7 @@ from typing import Final
 from socialai_dsl.cli import (
     bench,
     check,
+    coverage,
     curves,
     evaluate,
     fidelity,
@@ -20,6 +21,7 @@ from socialai_dsl.cli import (
     schema,
     sheets,
     show,
+    trace,
     validate,
 )
 from socialai_dsl.cli.errors import Exit, RunFailed, UsageError, is_usage
@@ -34,6 +36,8 @@ _COMMANDS: Final = {
     "show": show,
     "evaluate": evaluate,
     "play": play,
+    "trace": trace,
+    "coverage": coverage,
     "bench": bench,
     "fidelity": fidelity,
     "oracles": oracles,

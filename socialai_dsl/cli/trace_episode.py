@@ -1,0 +1,247 @@
+"""This module plays one episode and asks after each step why things went as they did."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from socialai_dsl.cli.errors import UsageError
+from socialai_dsl.cli.play import outcome_name, split_line
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+_NOT_STATE: Final = ("t", "heard", "pending", "last")
+"""What `describe` says beside what the room is like."""
+
+
+@dataclass
+class TraceStep:
+    """One step.
+
+    Attributes:
+        t: counted from 1. action: the agent's body action. said: its utterance, None if it was silent. heard: lines.
+        picture: the room after the step. state: `describe()` after it. changed: key -> values before and after.
+        fired, others: as `explain()` gives them. reward: of this step.
+    """
+
+    t: int
+    action: str
+    said: str | None
+    heard: tuple[str, ...]
+    picture: str
+    state: dict[str, Any]
+    changed: dict[str, tuple[Any, Any]]
+    fired: list[dict[str, Any]]
+    others: list[dict[str, Any]]
+    reward: float
+
+    def as_object(self, names: Sequence[str]) -> dict[str, Any]:
+        """The step for JSON, with the rules of these members only, if any are named."""
+        chosen = [
+            [rule for rule in rules if not names or is_among(rule["who"], names)]
+            for rules in (self.fired, self.others)
+        ]
+        return {
+            "t": self.t,
+            "action": self.action,
+            "said": self.said,
+            "heard": list(self.heard),
+            "picture": self.picture.split("\n"),
+            "changed": {key: list(values) for key, values in self.changed.items()},
+            "fired": chosen[0],
+            "others": chosen[1],
+            "reward": self.reward,
+        }
+
+
+@dataclass
+class Trace:
+    """An episode.
+
+    Attributes:
+        scenario, agent: who plays what. origin: which episode it is. member: of a suite, which one is played.
+        cast: the agent and the NPCs. picture, state: before the first step.
+        length, reward: so far. outcome: how it ended, None while it has not. success: whether that is one.
+    """
+
+    scenario: str
+    agent: str
+    origin: str
+    member: str | None
+    cast: tuple[str, ...]
+    picture: str
+    state: dict[str, Any]
+    length: int = 0
+    reward: float = 0.0
+    outcome: str | None = None
+    success: bool = False
+
+    def as_object(self, steps: list[dict[str, Any]]) -> dict[str, Any]:
+        """The trace for JSON, with these steps."""
+        return {
+            "scenario": self.scenario,
+            "agent": self.agent,
+            "episode": self.origin,
+            "member": self.member,
+            "start": self.state,
+            "picture": self.picture.split("\n"),
+            "steps": steps,
+            "length": self.length,
+            "reward": self.reward,
+            "outcome": self.outcome,
+            "success": self.success,
+        }
+
+
+class Traced:
+    """Plays an episode of a scenario.
+
+    Args:
+        scenario: a path or a name.
+        agent: oracle, random, or a checkpoint; None: oracle where there is one, else random.
+        lines: what the agent does, step by step, as typed in `socialai play`; then there is no other agent.
+        seed: of an agent that chooses by chance.
+
+    Raises:
+        UsageError: the agent cannot play this.
+    """
+
+    def __init__(self, scenario: str, agent: str | None, lines: list[str] | None, seed: int) -> None:
+        import socialai_dsl
+        from socialai_dsl.cli.agents import with_script
+
+        self.agent = agent or "typed"
+        self._lines, self._seed = lines, seed
+        if lines is None and agent in (None, "oracle"):
+            try:
+                scenario = with_script(scenario, socialai_dsl.compile(socialai_dsl.load(scenario)))
+                self.agent = "oracle"
+            except UsageError:
+                if agent is not None:
+                    raise
+                self.agent = "random"
+        self.scenario = scenario
+        self._env: Any = socialai_dsl.make(scenario, render_mode="ansi")
+        self._act = self._actor()
+
+    def begin(self, reset: dict[str, Any]) -> Trace:
+        """Start the episode.
+
+        Raises:
+            UsageError: there is no such episode, or the layout does not fit.
+        """
+        env = self._env.unwrapped
+        try:
+            self._observation, info = env.reset(**reset)
+        except ValueError as error:
+            raise UsageError(str(error)) from None
+        options = reset["options"] or {}
+        origin = f"test episode {options['test_episode']}" if "test_episode" in options else f"seed {reset['seed']}"
+        member = info.get("member")
+        return Trace(
+            self.scenario, self.agent, origin, member, self._cast(member), env.render(), env.describe()
+        )
+
+    def steps(self, trace: Trace) -> Iterator[TraceStep]:
+        """Play on to the end, or as far as there is something typed."""
+        env, before = self._env.unwrapped, trace.state
+        while trace.outcome is None:
+            action = self._act(self._observation)
+            if action is None:
+                return
+            self._observation, reward, terminated, truncated, info = env.step(action)
+            after, explained = env.describe(), env.explain()
+            trace.length += 1
+            trace.reward += float(reward)
+            if terminated or truncated:
+                trace.outcome, trace.success = outcome_name(info), bool(info["success"])
+            done = after.get("last", {"action": "none", "said": None})
+            yield TraceStep(
+                trace.length,
+                done["action"],
+                None if done["said"] is None else str(done["said"]),
+                () if info["utterance"] == "NA" else tuple(info["utterance"].splitlines()),
+                env.render(),
+                after,
+                changes(before, after),
+                explained["fired"],
+                explained["others"],
+                float(reward),
+            )
+            before = after
+
+    def close(self) -> None:
+        """Let the environment go."""
+        self._env.close()
+
+    def _cast(self, member: str | None) -> tuple[str, ...]:
+        """The agent and the NPCs of what is played."""
+        program = self._env.unwrapped.program
+        if member is not None:
+            program = program.programs[program.members.index(member)]
+        return tuple(str(entity) for entity in program.entities if entity.role != "object")
+
+    def _actor(self) -> "Callable[[Any], NDArray[np.int64] | None]":
+        """What chooses an action for an observation; None at the end of what was typed."""
+        import numpy as np
+
+        env = self._env.unwrapped
+        if self._lines is not None:
+            typed = iter([self._typed(line) for line in self._lines])
+            return lambda observation: next(typed, None)
+        if self.agent == "oracle":
+            return lambda observation: env.scripted_action()
+        if self.agent == "random":
+            generator, sizes = np.random.default_rng(self._seed), env.action_space.nvec
+            return lambda observation: generator.integers(0, sizes, dtype=np.int64)
+        policy = self._policy()
+        policy.reset(np.ones(1, np.bool_))
+        return lambda observation: policy.act({key: value[None] for key, value in observation.items()})[0]
+
+    def _typed(self, line: str) -> "NDArray[np.int64]":
+        env = self._env.unwrapped
+        try:
+            action: NDArray[np.int64] = env.encode_action(split_line(line.strip(), env.program.actions))
+        except ValueError as error:
+            raise UsageError(f"--do: {error}") from None
+        return action
+
+    def _policy(self) -> Any:
+        import socialai_dsl
+        from socialai_dsl.cli.agents import make_policy, require_trainer
+
+        require_trainer()
+        envs = socialai_dsl.make_vec(self.scenario, num_envs=1)
+        try:
+            return make_policy(self.agent, envs, "cpu")
+        except ValueError as error:
+            raise UsageError(str(error)) from error
+        finally:
+            envs.close()
+
+
+def is_among(who: str, names: Sequence[str]) -> bool:
+    """Whether somebody is named, or is a member of a group that is."""
+    return who in names or who.partition("[")[0] in names
+
+
+def changes(before: dict[str, Any], after: dict[str, Any]) -> dict[str, tuple[Any, Any]]:
+    """What differs between two states, by address: `honest.state`, `doors[1].state`, `let.exit`."""
+    old, new = dict(_leaves(before, "")), dict(_leaves(after, ""))
+    return {
+        key: (old.get(key), new.get(key)) for key in {**old, **new} if old.get(key) != new.get(key)
+    }
+
+
+def _leaves(value: Any, address: str) -> Iterator[tuple[str, Any]]:
+    """Values by address; a place counts as one, and so does all of a memory."""
+    if isinstance(value, dict):
+        for key, part in value.items():
+            if address or key not in _NOT_STATE:
+                yield from _leaves(part, f"{address}.{key}" if address else key)
+    elif isinstance(value, list) and value and isinstance(value[0], dict):
+        for index, part in enumerate(value):
+            yield from _leaves(part, f"{address}[{index}]")
+    else:
+        yield address, value
