@@ -88,7 +88,7 @@ class Text:
                 yield self._paint(f"not    {self._place(rule)}  as before", _DIM)
                 continue
             yield from self._rule("not    ", rule, "")
-            yield from _folded(rule["why"], " " * 9)
+            yield from _folded(f"-> {rule['why']}", " " * 9)
 
     def _is_asked_for(self, rule: dict[str, Any]) -> bool:
         """Without names: what those in the room did not do, as far as it was asked."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import fold, mentions
-from socialai_dsl.compiler.registers import Registers, state_names
+from socialai_dsl.compiler.registers import Registers, label, state_names
 from socialai_dsl.grammar import unparse
 from socialai_dsl.program import Op, Program, RegisterName
 from socialai_dsl.semantics import terms
@@ -294,9 +294,9 @@ def _asked_about(term: Term, reading: Reading | None, checked: Checked) -> Itera
         if value not in found and value in written and not _is_free(value):
             found[value] = None
             yield _Shown(written[value], value.type, _computed(value))
-        elif isinstance(value, terms.InState) and value not in found:
+        elif value not in found and (shown := _unwritten(value, checked)) is not None:
             found[value] = None
-            yield _state_of(value, checked)
+            yield shown
 
 
 def _values(term: Term, outermost: bool) -> Iterator[Term]:
@@ -319,11 +319,20 @@ def _values(term: Term, outermost: bool) -> Iterator[Term]:
             yield term
 
 
+def _unwritten(term: Term, checked: Checked) -> _Shown | None:
+    """What `x.is(state)` asks about, of an object or a member of the cast."""
+    if isinstance(term, terms.InState):
+        return _state_of(term, checked)
+    if isinstance(term, terms.FieldOf) and term.name == "status" and isinstance(term.entity, Const):
+        return _Shown(label(checked.entities[term.entity.value]), term.type, _computed(term))
+    return None
+
+
 def _state_of(term: terms.InState, checked: Checked) -> _Shown:
     frame = next(f for f in checked.frames if f.member == term.member and f.frame == term.frame)
     names = state_names(frame)
     return _Shown(
-        f"the state of {term.member}",
+        term.member,
         Type("status", 0, len(names) - 1, names),
         lambda to: to.registers.by_path[f"{term.member}.frame"],
     )

@@ -164,9 +164,9 @@ class _Notes:
             if near <= distance <= far:
                 return f'nothing was heard, though the agent said "{own}"'
             return f'nothing was heard: the agent said "{own}" at distance {distance}, its voice carries {far}'
-        texts = [own if number == int(self.registers[Register.CLASS]) and said else self._text(number)
-                 for number in classes[:count]]  # fmt: skip
-        return "heard " + " and ".join(dict.fromkeys(texts and [f'"{text}"' for text in texts]))
+        spoken = int(self.registers[Register.CLASS])
+        texts = [own if said and number == spoken else self._text(number) for number in classes[:count]]
+        return "heard " + " and ".join(dict.fromkeys(f'"{text}"' for text in texts))
 
     def _voice(self) -> tuple[int, int]:
         at = self.program.header(Header.ENTITY_AT)
@@ -220,7 +220,11 @@ class _Story:
         lists: list[tuple[str, str, list[tuple[Any, Probe | None, bool]]]] = []
         for state in frame.states:
             for part, rules in (("first", state.first), ("then", state.then)):
-                found = [(rule, self.rules.get(n), bool(self.raised[n])) for rule, n in zip(rules, numbers, strict=False)]  # fmt: skip  # noqa: E501
+                own = [next(numbers) for _ in rules]
+                found = [
+                    (rule, self.rules.get(number), bool(self.raised[number]))
+                    for rule, number in zip(rules, own, strict=True)
+                ]
                 lists.append((state.name, part, found))
         for name, part, found in _in_turn([one for one in lists if self._is_asked(one[2])]):
             yield from self._list(found, frame.member, {"state": name, "list": part}, "rule")
@@ -323,6 +327,8 @@ def _flow(value: Any) -> str:
         return "{" + ", ".join(f"{key}: {_flow(part)}" for key, part in value.items()) + "}"
     if isinstance(value, list | tuple):
         return _flow(value[0]) if len(value) == 1 else "[" + ", ".join(map(_flow, value)) + "]"
+    if isinstance(value, float):
+        return f"{value:g}"
     return _spoken(value) if isinstance(value, bool) else " ".join(str(value).split())
 
 

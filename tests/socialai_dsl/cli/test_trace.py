@@ -1,0 +1,128 @@
+"""`socialai trace`: an episode step by step, for people and as JSON."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from socialai_dsl.cli.main import main
+from tests.tiny import Folder
+
+Capture = pytest.CaptureFixture[str]
+
+SHY = """
+frames:
+  shy:
+    states:
+      on: {then: [{hears: Say hello, when: distance(agent) <= 2, say: Hello.}]}
+cast:
+  guide: {at: [5, 1], facing: left, frame: shy}
+  peers: {count: 2, place: row(4), frame: shy}
+  agent: {at: [1, 1], facing: right}
+outcome: [{success: agent.said("Say bye")}]
+"""
+
+
+@pytest.fixture
+def shy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    Folder(tmp_path).write("shy", SHY)
+    monkeypatch.chdir(tmp_path)
+    return "shy.yaml"
+
+
+def test_why_does_my_guide_not_answer(shy: str, capsys: Capture) -> None:
+    assert main(["trace", shy, "--why", "guide", "--do", "Say hello", "--do", "forward", "--do", "f Say hello"]) == 0
+    printed = capsys.readouterr().out
+    assert "distance(agent) <= 2 is false: distance(agent) is 4" in printed
+    assert "heard   Guide: Hello." in printed
+    assert "fired  guide in on  shy.yaml:6" in printed
+    assert "peers" not in printed.split("-- step 1")[1].split("\n\n", 2)[2].split("-- step 2")[0]
+    assert printed.rstrip().endswith("not ended after 3 steps, reward 0.000")
+
+
+def test_it_fits_a_terminal_and_has_no_colour_elsewhere(capsys: Capture) -> None:
+    assert main(["trace", "talkitout", "--seed", "3", "--agent", "oracle"]) == 0
+    printed = capsys.readouterr().out
+    assert max(map(len, printed.splitlines())) <= 100
+    assert "\x1b" not in printed
+    assert "changed wizard.state: stranger -> acquainted" in printed
+    assert 'agent   none, says "Open sesame"' in printed
+    assert "talkitout.yaml:30  as before" in printed
+    assert printed.splitlines()[-1].startswith("success (success@54) after 16 steps, reward 0.")
+
+
+def test_json_is_one_object(shy: str, capsys: Capture) -> None:
+    assert main(["trace", shy, "--json", "--do", "Say hello", "--do", "Say bye"]) == 0
+    trace = json.loads(capsys.readouterr().out)
+    assert (trace["scenario"], trace["agent"], trace["outcome"], trace["success"]) == (
+        shy,
+        "typed",
+        "success@12",
+        True,
+    )
+    first, second = trace["steps"]
+    assert (first["t"], first["said"], first["heard"], first["fired"]) == (1, "Say hello", [], [])
+    assert first["others"][0]["values"] == {"distance(agent)": 4}
+    assert [entry["who"] for entry in second["fired"]] == ["outcome"]
+    assert trace["start"]["agent"]["at"] == [1, 1]
+
+
+def test_a_group_is_named_as_a_whole(shy: str, capsys: Capture) -> None:
+    assert main(["trace", shy, "--json", "--why", "peers[1]", "--do", "Say hello"]) == 0
+    (step,) = json.loads(capsys.readouterr().out)["steps"]
+    assert [entry["who"] for entry in step["others"]] == ["peers[1]"]
+
+
+def test_a_window_of_the_episode(capsys: Capture) -> None:
+    command = ["trace", "dance", "--agent", "random", "--seed", "1", "--json", "--from", "3", "--steps", "2"]
+    assert main(command) == 0
+    trace = json.loads(capsys.readouterr().out)
+    assert [step["t"] for step in trace["steps"]] == [3, 4]
+    assert trace["outcome"] is None
+
+
+def test_a_layout_and_a_test_episode(shy: str, capsys: Capture) -> None:
+    Path("room.json").write_text('{"guide": {"at": [3, 1]}}', encoding="utf-8")
+    assert main(["trace", shy, "--layout", "room.json", "--do", "Say hello"]) == 0
+    assert "heard   Guide: Hello." in capsys.readouterr().out
+    assert main(["trace", shy, "--test-episode", "4", "--do", "none"]) == 0
+    assert "test episode 4" in capsys.readouterr().out
+
+
+def test_a_suite_says_what_it_plays(capsys: Capture) -> None:
+    assert main(["trace", "social_env", "--json", "--steps", "1", "--agent", "random"]) == 0
+    trace = json.loads(capsys.readouterr().out)
+    assert trace["member"]
+    assert len(trace["steps"]) == 1
+
+
+def test_without_a_script_chance_plays(shy: str, capsys: Capture) -> None:
+    assert main(["trace", shy, "--json", "--steps", "2"]) == 0
+    assert json.loads(capsys.readouterr().out)["agent"] == "random"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--why", "guid"], "did you mean 'guide'?"),
+        (["--why", "nobody"], "expected one of agent, guide, peers[0], peers[1], world, outcome"),
+        (["--do", "Sing a song"], "--do: "),
+        (["--steps", "0"], "--steps: got 0, expected at least 1"),
+        (["--from", "-1"], "--from: got -1, expected at least 1"),
+        (["--seed", "-1"], "--seed: got -1, expected at least 0"),
+        (["--test-episode", "-1"], "test_episode"),
+        (["--layout", "nowhere.json"], "No such file or directory: nowhere.json"),
+        (["--layout", "shy.yaml"], "is no JSON"),
+        (["--layout", "wrong.json"], "guide.at"),
+        (["--agent", "oracle"], "the agent has no frame"),
+    ],
+)
+def test_wrong_usage_is_said_in_one_line(shy: str, options: list[str], said: str, capsys: Capture) -> None:
+    Path("wrong.json").write_text('{"guide": {"at": [0, 99]}}', encoding="utf-8")
+    assert main(["trace", shy, *options]) == 2
+    captured = capsys.readouterr()
+    assert said in captured.err
+    assert captured.out == ""
+    assert "Traceback" not in captured.err

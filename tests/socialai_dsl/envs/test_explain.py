@@ -1,0 +1,269 @@
+"""`explain()`: which rule fired in the last step, and the first part that was false of the others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import socialai_dsl as sd
+from socialai_dsl.envs import ScenarioEnv
+from tests.tiny import Folder, Play
+
+GUIDE = """
+frames:
+  help:
+    define: {near: distance(agent) <= 2}
+    let: {asked: 0}
+    start: waiting
+    states:
+      waiting:
+        then:
+          - {hears: Say hello, when: near and eye_contact(agent), say: Hello., goto: talking}
+          - {hears: Say bye, after: 3, say: Bye.}
+          - {when: agent.x + 2 * asked == 40 or asked >= 2, set: {asked: 0}}
+          - {id: count, hears: any, once: true, set: {asked: asked + 1}}
+      talking:
+        do: face(agent)
+        then: [{when: not near and not eye_contact(agent), goto: waiting}]
+cast:
+  guide: {at: [5, 1], facing: left, frame: help}
+  agent: {at: [1, 1], facing: right}
+"""
+
+
+def explained(play: Play) -> dict[str, Any]:
+    env: Any = play.env.unwrapped
+    found: dict[str, Any] = env.explain()
+    return found
+
+
+def reason(play: Play, line: str) -> dict[str, Any]:
+    """The entry of the rule whose words contain `line`."""
+    (entry,) = [entry for entry in explained(play)["others"] if line in entry["words"]]
+    return entry
+
+
+@pytest.fixture
+def tiny(tmp_path: Path) -> Folder:
+    return Folder(tmp_path)
+
+
+def test_the_first_false_part_with_its_values(tiny: Folder) -> None:
+    play = tiny(GUIDE).step(None, "Say hello")
+    entry = reason(play, "say: Hello.")
+    assert entry["part"] == "distance(agent) <= 2"
+    assert entry["values"] == {"distance(agent)": 4}
+    assert entry["why"] == "distance(agent) <= 2 is false: distance(agent) is 4"
+    assert (entry["who"], entry["state"], entry["list"]) == ("guide", "waiting", "then")
+    assert entry["at"].endswith("tiny.yaml:11")
+    assert entry["words"] == "hears: Say hello, when: near and eye_contact(agent), say: Hello., goto: talking"
+
+
+def test_parts_before_it_held(tiny: Folder) -> None:
+    """From two cells away the distance is right; the guide looks away from the agent."""
+    play = tiny(GUIDE, {"guide": {"at": [3, 1], "facing": "up"}}).step(None, "Say hello")
+    assert reason(play, "say: Hello.")["why"] == "eye_contact(agent) is false"
+
+
+def test_what_fired_and_what_was_not_asked_after_it(tiny: Folder) -> None:
+    play = tiny(GUIDE, {"guide": {"at": [3, 1]}}).step(None, "Say hello")
+    (fired,) = explained(play)["fired"]
+    assert fired["name"] == "guide.help.waiting.then[0]"
+    assert reason(play, "say: Bye.")["why"] == "not asked: line 11 came first"
+    assert play.status("guide") == "talking"
+
+
+def test_values_of_alternatives_and_of_what_is_negated(tiny: Folder) -> None:
+    play = tiny(GUIDE).step()
+    assert reason(play, "asked >= 2")["values"] == {"agent.x + 2 * asked": 1, "asked": 0}
+    play = tiny(GUIDE, {"guide": {"at": [3, 1], "state": "talking"}}).step()
+    assert reason(play, "goto: waiting")["why"] == "not near is false: distance(agent) is 2"
+
+
+def test_heard_after_and_once(tiny: Folder) -> None:
+    play = tiny(GUIDE).step()
+    assert reason(play, "say: Bye.")["why"] == "hears: Say bye: nothing was heard"
+    play.step(None, "Say bye")
+    assert reason(play, "say: Bye.")["why"] == "after: 3: turn 2 of this state"
+    assert reason(play, "Say hello")["why"] == 'hears: Say hello: heard "Say bye"'
+    assert [entry["name"] for entry in explained(play)["fired"]] == ["count"]
+    play.step(None, "Say hello")
+    assert reason(play, "once: true")["why"] == "it fires once, and has fired before"
+
+
+def test_a_voice_that_does_not_carry(tiny: Folder) -> None:
+    play = tiny("earshot: 3\n" + GUIDE).step(None, "Say hello")
+    why = reason(play, "say: Hello.")["why"]
+    assert why.endswith('nothing was heard: the agent said "Say hello" at distance 4, its voice carries 3')
+
+
+def test_what_another_member_said(tiny: Folder) -> None:
+    play = tiny(
+        """
+        frames:
+          talk: {states: {on: {then: [{when: t == 1, say: Ready when you are.}]}}}
+          wait:
+            states:
+              on:
+                then:
+                  - {hears: "Ready, steady, go.", say: Go.}
+                  - {hears: Ready when you are., when: t > 5, say: No.}
+          shout: {states: {on: {then: [{when: t > 9, say: "Ready, steady, go."}]}}}
+        cast:
+          one: {at: [3, 3], frame: talk}
+          two: {at: [4, 4], frame: wait}
+          three: {at: [5, 5], frame: shout}
+          agent: {at: [1, 1]}
+        """
+    ).step()
+    assert "Ready when you are." in reason(play, "steady, go., say: Go.")["why"]
+    assert reason(play, "say: No.")["why"] == "t > 5 is false: t is 1"
+
+
+def test_steps_name_what_they_wait_for(tiny: Folder) -> None:
+    play = tiny(
+        """
+        objects: {door: {type: door, place: wall(top), state: closed}}
+        frames:
+          walk:
+            steps:
+              - {do: stay, for: 2}
+              - {do: stay, until: door.open, say: Open.}
+              - {do: go_to(agent)}
+        cast:
+          walker: {at: [5, 5], facing: up, frame: walk}
+          agent: {at: [1, 1]}
+        """
+    ).step()
+    assert reason(play, "for: 2")["why"] == "for: 2: turn 1 of this state"
+    play.step()
+    assert [entry["kind"] for entry in explained(play)["fired"]] == ["step"]
+    play.step()
+    assert reason(play, "say: Open.")["why"] == "door.open is false: door is closed"
+
+
+def test_chance_and_choices_that_find_nothing(tiny: Folder) -> None:
+    play = tiny(
+        """
+        objects: {boxes: {type: box, count: 2, place: row(3)}}
+        frames:
+          try:
+            states:
+              on:
+                then:
+                  - {chance: 0, say: Never.}
+                  - {when: first(b in boxes where b.opened).x == 2, say: Found.}
+                  - {say: "The <first(b in boxes where b.opened).color> one."}
+        cast:
+          guide: {at: [5, 5], frame: try}
+          agent: {at: [1, 1]}
+        """
+    ).step()
+    assert reason(play, "Never.")["why"] == "chance: 0: not drawn"
+    assert reason(play, "Found.")["why"].endswith("finds nothing")
+    assert reason(play, "one.")["why"] == "something that it needs is not there"
+
+
+def test_rules_of_the_world_and_outcomes(tiny: Folder) -> None:
+    play = tiny(
+        """
+        state: {rounds: 0}
+        rules:
+          - {when: t % 2 == 0, set: {rounds: "min(rounds + 1, 9)"}}
+          - {id: slow, when: rounds > 3, reward: 1}
+        outcome:
+          - success: rounds == 2 and agent.did(left)
+          - failure: agent.did(done)
+        cast: {agent: {at: [1, 1]}}
+        """
+    ).step()
+    assert reason(play, "t % 2")["why"] == "t % 2 == 0 is false: t % 2 is 1"
+    assert reason(play, "success")["values"] == {"rounds": 0}
+    play.step("done")
+    names = [(entry["who"], entry["name"]) for entry in explained(play)["fired"]]
+    assert names[0] == ("world", "rules[0]")
+    assert names[1][0] == "outcome"
+    assert names[1][1].startswith("failure@")
+    assert reason(play, "reward")["name"] == "slow"
+
+
+def test_goto_now_is_told_in_the_order_it_is_gone(tiny: Folder) -> None:
+    play = tiny(
+        """
+        frames:
+          hop:
+            start: c
+            states:
+              a: {then: [{when: t > 5, say: Late.}]}
+              b: {then: [{goto_now: a}]}
+              c: {then: [{goto_now: b}]}
+        cast: {guide: {at: [5, 5], frame: hop}, agent: {at: [1, 1]}}
+        """
+    ).step()
+    assert [entry["state"] for entry in explained(play)["fired"]] == ["c", "b"]
+    assert reason(play, "Late.")["state"] == "a"
+
+
+def test_it_changes_nothing_and_needs_a_step(tiny: Folder) -> None:
+    play = tiny(GUIDE)
+    env: Any = play.env.unwrapped
+    with pytest.raises(ValueError, match="before the first step"):
+        env.explain()
+    play.step(None, "Say hello")
+    before, counted = env.snapshot(), env.counters()
+    first = env.explain()
+    assert env.explain() == first
+    assert (env.snapshot(), env.counters()) == (before, counted)
+    env.restore(before)
+    with pytest.raises(ValueError, match="before the first step"):
+        env.explain()
+    play.step(None, "Say hello")
+    assert explained(play)["t"] == 2
+
+
+def test_after_restore_it_goes_on_from_there(tiny: Folder) -> None:
+    """The same step gives the same explanation, whether the episode is played through or put back in its middle."""
+    whole = tiny(GUIDE).step(None, "Say bye")
+    middle = whole.env.unwrapped.snapshot()  # type: ignore[attr-defined]
+    whole.step("forward", "Say bye")
+    expected = explained(whole)
+    whole.env.unwrapped.restore(middle)  # type: ignore[attr-defined]
+    whole.step("forward", "Say bye")
+    assert explained(whole) == expected
+
+
+def test_members_of_suites_and_acts(tiny: Folder) -> None:
+    """The action space of a suite is its own; an act that has just ended is explained, not the one that began."""
+    for name, noun in (("one", "hello"), ("two", "bye")):
+        tiny.write(
+            name,
+            f"""
+            grammar: {{templates: [Say <noun>], nouns: [{noun}]}}
+            frames: {{f: {{states: {{on: {{then: [{{hears: Say {noun}, say: Yes.}}]}}}}}}}}
+            cast: {{guide: {{at: [5, 5], frame: f}}, agent: {{at: [1, 1]}}}}
+            outcome: [{{success: agent.said("Say {noun}")}}]
+            """,
+        )
+    acts = tiny.save("acts", "suite: acts\ndraw: in_sequence\nmembers: [one.yaml, two.yaml]\nactions: union\n")
+    env: Any = sd.make(str(acts)).unwrapped
+    env.reset(seed=0)
+    for noun in ("hello", "bye"):
+        env.step(env.encode_action((None, f"Say {noun}")))
+        fired = env.explain()["fired"]
+        assert [entry["who"] for entry in fired] == ["guide", "outcome"]
+        assert noun in fired[0]["words"]
+
+
+def test_a_program_from_nowhere_cannot_be_explained(tiny: Folder) -> None:
+    from dataclasses import replace
+
+    program = sd.compile(sd.load(str(tiny.write("tiny", GUIDE))))
+    assert isinstance(program, sd.Program)
+    env = ScenarioEnv(replace(program, origin=None))
+    env.reset(seed=0)
+    env.step(np.array([0, 0, 0, 0]))
+    with pytest.raises(ValueError, match="not compiled from a scenario"):
+        env.explain()
