@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from socialai_dsl.cli.errors import Exit
 
 if TYPE_CHECKING:
-    from socialai_dsl.frontend import Loaded
+    from socialai_dsl.loader import Resolved
 
 SUMMARY: Final = "print a scenario after extends and variants, or the program it compiles to"
 
@@ -16,7 +16,9 @@ SUMMARY: Final = "print a scenario after extends and variants, or the program it
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
     parser.add_argument(
-        "scenario", metavar="SCENARIO", help="a path or a name, with +variants and ?parameters"
+        "scenario",
+        metavar="SCENARIO",
+        help="a path or a name, with +variants and ?parameters; any other file of the language but for --program",
     )
     choice = parser.add_mutually_exclusive_group()
     choice.add_argument("--program", action="store_true", help="print the compiled program's listing instead")
@@ -25,26 +27,44 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Print the resolved scenario as YAML, its listing, or its values with their origins."""
-    import socialai_dsl
-
-    scenario = socialai_dsl.load(arguments.scenario)
     if arguments.program:
-        print(socialai_dsl.compile(scenario).listing())
-    elif arguments.origin:
-        for line in _origins(scenario):
+        import socialai_dsl
+
+        print(socialai_dsl.compile(socialai_dsl.load(arguments.scenario)).listing())
+        return Exit.GOOD
+    resolved = _resolved(arguments.scenario)
+    if arguments.origin:
+        for line in _origins(resolved):
             print(line)
     else:
         import yaml
 
-        print(yaml.safe_dump(scenario.resolved.data, sort_keys=False, allow_unicode=True, width=100), end="")
+        print(yaml.safe_dump(resolved.data, sort_keys=False, allow_unicode=True, width=100), end="")
     return Exit.GOOD
 
 
-def _origins(scenario: "Loaded") -> Iterator[str]:
-    """One line for each value that is no container: its place, its path, itself."""
-    for path, value in _leaves(scenario.resolved.data, ()):
+def _resolved(name: str) -> "Resolved":
+    """What is written in a file, or under a name, of any kind.
+
+    Raises:
+        ScenarioError: it has mistakes.
+    """
+    from socialai_dsl.diagnostics import ScenarioError
+    from socialai_dsl.frontend import check
+
+    result = check(name)
+    if result.has_errors:
+        raise ScenarioError(result.diagnostics, result.sources)
+    assert result.resolved is not None, "internal: nothing was read, and nothing is wrong"
+    return result.resolved
+
+
+def _origins(resolved: "Resolved") -> Iterator[str]:
+    """One line for each value that is no container: its place, its path, itself; also in files that are drawn from."""
+    whole = resolved.with_drawn_files() if resolved.kind == "scenario" else resolved
+    for path, value in _leaves(whole.data, ()):
         written = json.dumps(value, ensure_ascii=False)
-        yield f"{scenario.resolved.origin(path)}: {_dotted(path)} = {written}"
+        yield f"{whole.origin(path)}: {_dotted(path)} = {written}"
 
 
 def _leaves(value: Any, path: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], Any]]:

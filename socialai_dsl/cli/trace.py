@@ -25,7 +25,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--test-episode", type=int, metavar="N", help="episode N of the fixed test set instead of a seed"
     )
     parser.add_argument(
-        "--layout", type=Path, metavar="FILE", help="start from a known room: a JSON file, see docs/layouts.md"
+        "--layout",
+        type=Path,
+        metavar="FILE",
+        help="start from a known room: a JSON file, see docs/layouts.md",
     )
     played = parser.add_mutually_exclusive_group()
     played.add_argument(

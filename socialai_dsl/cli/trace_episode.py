@@ -137,7 +137,11 @@ class Traced:
         except ValueError as error:
             raise UsageError(str(error)) from None
         options = reset["options"] or {}
-        origin = f"test episode {options['test_episode']}" if "test_episode" in options else f"seed {reset['seed']}"
+        origin = (
+            f"test episode {options['test_episode']}"
+            if "test_episode" in options
+            else f"seed {reset['seed']}"
+        )
         member = info.get("member")
         return Trace(
             self.scenario, self.agent, origin, member, self._cast(member), env.render(), env.describe()
@@ -229,9 +233,7 @@ def is_among(who: str, names: Sequence[str]) -> bool:
 def changes(before: dict[str, Any], after: dict[str, Any]) -> dict[str, tuple[Any, Any]]:
     """What differs between two states, by address: `honest.state`, `doors[1].state`, `let.exit`."""
     old, new = dict(_leaves(before, "")), dict(_leaves(after, ""))
-    return {
-        key: (old.get(key), new.get(key)) for key in {**old, **new} if old.get(key) != new.get(key)
-    }
+    return {key: (old.get(key), new.get(key)) for key in {**old, **new} if old.get(key) != new.get(key)}
 
 
 def _leaves(value: Any, address: str) -> Iterator[tuple[str, Any]]:

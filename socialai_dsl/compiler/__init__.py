@@ -89,7 +89,9 @@ def _compiled(checked: Checked, probes: Probes, numbered: Lines | None) -> tuple
         Header.BEFORE_PC: entry("before", remember),
         Header.LINKS_PC: entry("links", links),
         Header.SETTLE_PC: entry("settle", computed.settle),
-        Header.RULES_PC: entry("rules", push_acts, lambda to: world_rules(to, lines, homes, behaviour.rules, probes)),
+        Header.RULES_PC: entry(
+            "rules", push_acts, lambda to: world_rules(to, lines, homes, behaviour.rules, probes)
+        ),
         Header.TICK_PC: entry("tick", tick),
     }
     outcomes = outcome_table(checked, registers, classes, sites, code, probes)

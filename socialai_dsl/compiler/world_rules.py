@@ -36,9 +36,7 @@ def _ask_in_vain(to: Expressions, rule: RulePlan, counter: int, probes: Probes) 
     to.block.bind(following)
 
 
-def _rule(
-    to: Expressions, lines: Lines, homes: Homes, rule: RulePlan, counter: int, probes: Probes
-) -> None:
+def _rule(to: Expressions, lines: Lines, homes: Homes, rule: RulePlan, counter: int, probes: Probes) -> None:
     assert not rule.hears, "internal: the world has no ears"
     assert rule.say is None, "internal: the world has no voice"
     assert rule.do is None, "internal: the world has no body"

@@ -163,7 +163,9 @@ class _Notes:
             near, far = self._voice()
             if near <= distance <= far:
                 return f'nothing was heard, though the agent said "{own}"'
-            return f'nothing was heard: the agent said "{own}" at distance {distance}, its voice carries {far}'
+            return (
+                f'nothing was heard: the agent said "{own}" at distance {distance}, its voice carries {far}'
+            )
         spoken = int(self.registers[Register.CLASS])
         texts = [own if said and number == spoken else self._text(number) for number in classes[:count]]
         return "heard " + " and ".join(dict.fromkeys(f'"{text}"' for text in texts))
@@ -205,9 +207,7 @@ class _Story:
         for number in range(counter, counter + len(self.checked.rules)):
             yield from self._asked(number, self.rules.get(number), "world", {}, "world rule")
         ended = self.raised[counter + len(self.checked.rules) :]
-        listed = [
-            (probe.plan, probe, bool(ended[number])) for number, probe in sorted(self.outcomes.items())
-        ]
+        listed = [(probe.plan, probe, bool(ended[number])) for number, probe in sorted(self.outcomes.items())]
         yield from self._list(listed, "outcome", {}, "outcome")
 
     def _frame(self, frame: FramePlan, counters: range) -> Iterator[dict[str, Any]]:

@@ -85,9 +85,15 @@ def addresses(loaded: LoadedScenario) -> dict[tuple[str, str, str], str]:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_what_fired_is_what_fired_in_the_reference(name: str) -> None:
-    loaded = load(str(ROOT / "scenarios" / f"{name.partition('+')[0]}.yaml") + "".join(name.partition("+")[1:]))
+    loaded = load(
+        str(ROOT / "scenarios" / f"{name.partition('+')[0]}.yaml") + "".join(name.partition("+")[1:])
+    )
     assert isinstance(loaded, LoadedScenario)
-    env, reference, known = ScenarioEnv(compile_scenario(loaded.checked)), Reference(loaded.resolved), addresses(loaded)
+    env, reference, known = (
+        ScenarioEnv(compile_scenario(loaded.checked)),
+        Reference(loaded.resolved),
+        addresses(loaded),
+    )
     scripted = any(frame.entity == 0 for frame in loaded.checked.frames)
     rng = np.random.default_rng(4)
     seen = 0

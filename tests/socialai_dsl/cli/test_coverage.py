@@ -18,9 +18,9 @@ frames:
     states:
       on:
         then:
-          - {when: t == 1, say: Hm., goto: off}
+          - {when: t == 1, say: Hm., goto: silent}
           - {id: never_hears, hears: Say hello, when: t < 0, say: Hello.}
-      off: {}
+      silent: {}
 cast: {guide: {at: [5, 1], frame: deaf}, agent: {at: [1, 1]}}
 """
 
@@ -52,7 +52,9 @@ def test_json_counts_for_each_agent(capsys: Capture) -> None:
     assert report["scenarios"] == ["diverse_exit", "help"]
     assert report["episodes"] == {"random": 48, "oracle": 48}
     files = {Path(part["file"]).name for part in report["parts"]}
-    assert files == {"diverse_exit.yaml", "teacher.yaml", "help.yaml"}, "the script's own rules are not the scenario's"
+    assert files == {"diverse_exit.yaml", "teacher.yaml", "help.yaml"}, (
+        "the script's own rules are not the scenario's"
+    )
     start = next(part for part in report["parts"] if part["name"] == "introduction.stranger")
     assert start["times"] == {"random": 24, "oracle": 24}
     assert sum(report["endings"].values()) == 96

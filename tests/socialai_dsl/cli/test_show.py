@@ -49,3 +49,40 @@ def test_the_program_is_listed(scenario: str, capsys: Capture) -> None:
     listing = capsys.readouterr().out
     assert "horizon 34" in listing
     assert "Ada: After you." in listing
+
+
+def test_origins_lead_into_files_that_are_drawn_from(capsys: Capture) -> None:
+    assert main(["show", "--origin", "diverse_exit"]) == 0
+    files = {line.partition(".yaml:")[0].rpartition("/")[2] for line in capsys.readouterr().out.splitlines()}
+    assert files >= {"diverse_exit", "teacher", "npc_00", "npc_11"}
+
+
+def test_origins_of_variants_and_suites(capsys: Capture) -> None:
+    assert main(["show", "--origin", "talkitout+unsocial"]) == 0
+    assert 'unsocial.yaml:3:21: observe.npcs = "hidden"' in capsys.readouterr().out
+    assert main(["show", "--origin", "social_env"]) == 0
+    assert "social_env.yaml:" in capsys.readouterr().out
+    assert main(["show", "--program", "social_env?split=test"]) == 0
+    assert "=== help_as_helper ===" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["diverse_exit/npc_03.yaml", "unsocial.yaml", "school/base.yaml"])
+def test_other_kinds_of_files_are_shown_but_have_no_program(name: str, capsys: Capture) -> None:
+    path = str(Path(__file__).parents[3] / "scenarios" / name)
+    assert main(["show", path]) == 0
+    assert yaml.safe_load(capsys.readouterr().out)
+    assert main(["show", "--origin", path]) == 0
+    assert Path(name).name + ":1:" in capsys.readouterr().out
+    assert main(["show", "--program", path]) == 1
+    assert "S108" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "said"), [("nowhere", "S504 there is no scenario `nowhere`"), ("talkitout+nope", "S503")]
+)
+@pytest.mark.parametrize("option", [[], ["--origin"], ["--program"]])
+def test_names_that_do_not_exist(name: str, said: str, option: list[str], capsys: Capture) -> None:
+    assert main(["show", *option, name]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert said in captured.err

@@ -33,7 +33,10 @@ def shy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 def test_why_does_my_guide_not_answer(shy: str, capsys: Capture) -> None:
-    assert main(["trace", shy, "--why", "guide", "--do", "Say hello", "--do", "forward", "--do", "f Say hello"]) == 0
+    assert (
+        main(["trace", shy, "--why", "guide", "--do", "Say hello", "--do", "forward", "--do", "f Say hello"])
+        == 0
+    )
     printed = capsys.readouterr().out
     assert "distance(agent) <= 2 is false: distance(agent) is 4" in printed
     assert "heard   Guide: Hello." in printed
@@ -59,7 +62,7 @@ def test_json_is_one_object(shy: str, capsys: Capture) -> None:
     assert (trace["scenario"], trace["agent"], trace["outcome"], trace["success"]) == (
         shy,
         "typed",
-        "success@12",
+        "success@11",
         True,
     )
     first, second = trace["steps"]
@@ -87,7 +90,7 @@ def test_a_layout_and_a_test_episode(shy: str, capsys: Capture) -> None:
     Path("room.json").write_text('{"guide": {"at": [3, 1]}}', encoding="utf-8")
     assert main(["trace", shy, "--layout", "room.json", "--do", "Say hello"]) == 0
     assert "heard   Guide: Hello." in capsys.readouterr().out
-    assert main(["trace", shy, "--test-episode", "4", "--do", "none"]) == 0
+    assert main(["trace", shy, "--test-episode", "4", "--do", ""]) == 0
     assert "test episode 4" in capsys.readouterr().out
 
 

@@ -247,7 +247,9 @@ def test_members_of_suites_and_acts(tiny: Folder) -> None:
             outcome: [{{success: agent.said("Say {noun}")}}]
             """,
         )
-    acts = tiny.save("acts", "suite: acts\ndraw: in_sequence\nmembers: [one.yaml, two.yaml]\nactions: union\n")
+    acts = tiny.save(
+        "acts", "suite: acts\ndraw: in_sequence\nmembers: [one.yaml, two.yaml]\nactions: union\n"
+    )
     env: Any = sd.make(str(acts)).unwrapped
     env.reset(seed=0)
     for noun in ("hello", "bye"):
