@@ -185,6 +185,22 @@ def test_commands_in_the_documents_are_understood(
     capsys.readouterr()
 
 
+def test_what_the_page_about_reasons_shows_is_printed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every command there that is followed by its output prints just that."""
+    page = ROOT / "docs" / "explain.md"
+    monkeypatch.chdir(tmp_path)
+    for text in blocks(page, "yaml"):
+        Path(text.split(maxsplit=2)[1] + ".yaml").write_text(text, encoding="utf-8")
+    shown = [text.partition("\n") for text in blocks(page, "console")]
+    with_output = [(command, output) for command, _, output in shown if output and not output.startswith("$")]
+    assert len(with_output) == 2
+    for command, output in with_output:
+        assert main.main(shlex.split(command)[2:]) == 0
+        assert capsys.readouterr().out.rstrip() == output.rstrip(), command
+
+
 # -- the reference is complete ------------------------------------------------------------------------------------
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.cli.errors import Exit, UsageError
-from socialai_dsl.cli.trace_episode import Trace, TraceStep, Traced
+from socialai_dsl.cli.trace_episode import Trace, Traced, TraceStep
 from socialai_dsl.cli.trace_text import Text
 from socialai_dsl.diagnostics import did_you_mean
 

@@ -49,7 +49,7 @@ class Text:
         facts += ["", *self._present(step.state)]
         title = f"-- step {step.t} "
         lines = [self._paint(title + "-" * (_WIDTH - len(title)), _BOLD), *_beside(step.picture, facts), ""]
-        return [*lines, *self._fired(step), *self._others(step), ""]
+        return [*lines, *self._fired(step), *self._others(step), *self._idle(step), ""]
 
     def end(self, trace: Trace) -> list[str]:
         """How it ended, or that it has not."""
@@ -89,6 +89,14 @@ class Text:
                 continue
             yield from self._rule("not    ", rule, "")
             yield from _folded(f"-> {rule['why']}", " " * 9)
+
+    def _idle(self, step: TraceStep) -> Iterator[str]:
+        """Whoever was named and had no rule to be asked, as in a state without rules."""
+        for name in self._names:
+            if not any(is_among(rule["who"], [name]) for rule in (*step.fired, *step.others)):
+                found = _found(step.state, name) or {}
+                state = f" in {found['state']}" if "state" in found else ""
+                yield printable(f"none   {name}{state}: no rule was asked")
 
     def _is_asked_for(self, rule: dict[str, Any]) -> bool:
         """Without names: what those in the room did not do, as far as it was asked."""

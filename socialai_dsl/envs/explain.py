@@ -213,8 +213,8 @@ class _Story:
     def _frame(self, frame: FramePlan, counters: range) -> Iterator[dict[str, Any]]:
         if frame.steps:
             for number, step in zip(counters, frame.steps, strict=True):
-                state = {"state": step.state} if step.state else {}
-                yield from self._asked(number, self.rules.get(number), frame.member, state, "step")
+                named = {"state": step.state} if step.state else {}
+                yield from self._asked(number, self.rules.get(number), frame.member, named, "step")
             return
         numbers = iter(counters)
         lists: list[tuple[str, str, list[tuple[Any, Probe | None, bool]]]] = []
