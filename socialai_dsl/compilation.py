@@ -5,9 +5,13 @@ from __future__ import annotations
 from typing import overload
 
 from socialai_dsl.checking import Loaded, LoadedScenario, LoadedSuite
-from socialai_dsl.compiler import compile_scenario
+from socialai_dsl.compiler import compile_probed, compile_scenario
+from socialai_dsl.compiler.probes import Part, Probe, Probed, Value
 from socialai_dsl.program import Program
 from socialai_dsl.program_suite import ProgramSuite
+from socialai_dsl.semantics.terms import Checked
+
+__all__ = ["Part", "Probe", "Probed", "Value", "compile_loaded", "scenario_of", "with_probes"]
 
 
 @overload
@@ -37,3 +41,23 @@ def compile_loaded(loaded: Loaded) -> Program | ProgramSuite:
         tuple(None if start is None else start.layout for start in loaded.starts),
         loaded.in_sequence,
     )
+
+
+def scenario_of(program: Program) -> Checked:
+    """The scenario that a program was compiled from.
+
+    Raises:
+        ValueError: it was made in another way.
+    """
+    if not isinstance(program.origin, Checked):
+        raise ValueError(f"{program.name}: got a program that was not compiled from a scenario")
+    return program.origin
+
+
+def with_probes(program: Program) -> Probed:
+    """A program that does the same, and notes why rules do not fire.
+
+    Raises:
+        ValueError: it was not compiled from a scenario.
+    """
+    return compile_probed(scenario_of(program))

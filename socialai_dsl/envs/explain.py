@@ -13,8 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.compiler import compile_probed
-from socialai_dsl.compiler.probes import Part, Probe, Value
+from socialai_dsl.compilation import Part, Probe, Value, scenario_of, with_probes
 from socialai_dsl.engine.kernel import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.recording import Recording
@@ -42,11 +41,9 @@ class Explainer:
     """
 
     def __init__(self, program: Program, suite: ProgramSuite | None, number: int) -> None:
-        if not isinstance(program.origin, Checked):
-            raise ValueError("explain: got a program that was not compiled from a scenario")
-        self._checked = program.origin
+        self._checked = scenario_of(program)
         self._program = program
-        self._probed = compile_probed(self._checked)
+        self._probed = with_probes(program)
         self._table = Table([_alone(self._probed.program, suite, number)], 1, 1)
         self._table.reset(0, None)
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.compilation import scenario_of
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.vector_env import Observation, ScenarioVectorEnv
 from socialai_dsl.program import FrameColumn, Header, Program
@@ -61,6 +62,9 @@ def tally(
         begin: is told in which environments an episode begins, bool (E,), before `choose` is asked.
         episodes: how many; they are numbers 0, 1, ... of the seed (`index`).
         seed: of the environments.
+
+    Raises:
+        ValueError: a program was not compiled from a scenario.
     """
     watch = _Watch(envs)
     for first in range(0, episodes, envs.num_envs):
@@ -151,8 +155,7 @@ class _Frames:
     """The frames of one program: which states they are in, and how often each was entered."""
 
     def __init__(self, program: Program) -> None:
-        assert isinstance(program.origin, Checked), "internal: a program without a scenario is played"
-        self.program, self.checked = program, program.origin
+        self.program, self.checked = program, scenario_of(program)
         start, rows = program.header(Header.FRAME_AT), program.header(Header.FRAMES)
         table = program.words[start : start + rows * FrameColumn.COLUMNS].reshape(rows, FrameColumn.COLUMNS)
         self._states = table[:, FrameColumn.STATE]
