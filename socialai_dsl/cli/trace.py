@@ -99,9 +99,10 @@ def _layout(path: Path) -> Any:
 
 
 def _check_names(names: list[str], trace: Trace) -> None:
-    known = [*trace.cast, "world", "outcome"]
+    known = [*trace.names, "world", "outcome"]
+    groups = {name.partition("[")[0] for name in trace.names}
     for name in names:
-        if name not in known:
+        if name not in known and name not in groups:
             near = did_you_mean(name, known)
             hint = f"; did you mean {near!r}?" if near else f"; expected one of {', '.join(known)}"
             raise UsageError(f"--why: got {name!r}{hint}")

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from socialai_dsl.program import Program
+
 _NOT_STATE: Final = ("t", "heard", "pending", "last")
 """What `describe` says beside what the room is like."""
 
@@ -21,7 +23,8 @@ class TraceStep:
 
     Attributes:
         t: counted from 1. action: the agent's body action. said: its utterance, None if it was silent. heard: lines.
-        picture: the room after the step. state: `describe()` after it. changed: key -> values before and after.
+        picture: the room after the step. state: `describe()` after it; where an act has ended, of the next one.
+        cast: who is in it. changed: key -> values before and after.
         fired, others: as `explain()` gives them. reward: of this step.
     """
 
@@ -31,6 +34,7 @@ class TraceStep:
     heard: tuple[str, ...]
     picture: str
     state: dict[str, Any]
+    cast: tuple[str, ...]
     changed: dict[str, tuple[Any, Any]]
     fired: list[dict[str, Any]]
     others: list[dict[str, Any]]
@@ -61,7 +65,8 @@ class Trace:
 
     Attributes:
         scenario, agent: who plays what. origin: which episode it is. member: of a suite, which one is played.
-        cast: the agent and the NPCs. picture, state: before the first step.
+        cast: the agent and the NPCs. names: of the cast of everything that may be played.
+        picture, state: before the first step.
         length, reward: so far. outcome: how it ended, None while it has not. success: whether that is one.
     """
 
@@ -70,6 +75,7 @@ class Trace:
     origin: str
     member: str | None
     cast: tuple[str, ...]
+    names: tuple[str, ...]
     picture: str
     state: dict[str, Any]
     length: int = 0
@@ -142,9 +148,11 @@ class Traced:
             if "test_episode" in options
             else f"seed {reset['seed']}"
         )
-        member = info.get("member")
+        member, cast = info.get("member"), self._cast(info)
         return Trace(
-            self.scenario, self.agent, origin, member, self._cast(member), env.render(), env.describe()
+            *(self.scenario, self.agent, origin, member, cast, self._names()),
+            picture=env.render(),
+            state=env.describe(),
         )
 
     def steps(self, trace: Trace) -> Iterator[TraceStep]:
@@ -168,6 +176,7 @@ class Traced:
                 () if info["utterance"] == "NA" else tuple(info["utterance"].splitlines()),
                 env.render(),
                 after,
+                self._cast(info),
                 changes(before, after),
                 explained["fired"],
                 explained["others"],
@@ -179,12 +188,18 @@ class Traced:
         """Let the environment go."""
         self._env.close()
 
-    def _cast(self, member: str | None) -> tuple[str, ...]:
+    def _cast(self, info: dict[str, Any]) -> tuple[str, ...]:
         """The agent and the NPCs of what is played."""
         program = self._env.unwrapped.program
-        if member is not None:
-            program = program.programs[program.members.index(member)]
-        return tuple(str(entity) for entity in program.entities if entity.role != "object")
+        if "member" in info:
+            program = program.programs[program.members.index(info["member"])]
+        return cast_of(program)
+
+    def _names(self) -> tuple[str, ...]:
+        """The same of everything that may be played."""
+        program = self._env.unwrapped.program
+        programs = getattr(program, "programs", (program,))
+        return tuple(dict.fromkeys(name for one in programs for name in cast_of(one)))
 
     def _actor(self) -> "Callable[[Any], NDArray[np.int64] | None]":
         """What chooses an action for an observation; None at the end of what was typed."""
@@ -223,6 +238,11 @@ class Traced:
             raise UsageError(str(error)) from error
         finally:
             envs.close()
+
+
+def cast_of(program: "Program") -> tuple[str, ...]:
+    """The agent and the NPCs, by name."""
+    return tuple(str(entity) for entity in program.entities if entity.role != "object")
 
 
 def is_among(who: str, names: Sequence[str]) -> bool:

@@ -37,6 +37,7 @@ class Text:
 
     def step(self, step: TraceStep) -> list[str]:
         """One step."""
+        self._cast = step.cast
         said = f', says "{step.said}"' if step.said is not None else ""
         facts = [f"agent   {step.action}{said}", *(f"heard   {line}" for line in step.heard)]
         facts += [

@@ -78,6 +78,22 @@ def test_a_group_is_named_as_a_whole(shy: str, capsys: Capture) -> None:
     assert [entry["who"] for entry in step["others"]] == ["peers[1]"]
 
 
+def test_a_whole_group_and_who_has_no_rules(shy: str, capsys: Capture) -> None:
+    assert main(["trace", shy, "--why", "peers", "--why", "agent", "--do", "Say hello"]) == 0
+    printed = capsys.readouterr().out
+    assert "peers[0] in on" in printed
+    assert "peers[1] in on" in printed
+    assert "guide in" not in printed
+    assert "none   agent: no rule was asked" in printed
+
+
+def test_acts_have_casts_of_their_own(capsys: Capture) -> None:
+    """A member of a later act can be asked about from the start."""
+    suite = str(Path(__file__).parents[3] / "scenarios" / "school" / "collaboration_in_turn.yaml")
+    assert main(["trace", suite, "--steps", "2", "--why", "partner", "--agent", "random"]) == 0
+    assert "-- step 2" in capsys.readouterr().out
+
+
 def test_a_window_of_the_episode(capsys: Capture) -> None:
     command = ["trace", "dance", "--agent", "random", "--seed", "1", "--json", "--from", "3", "--steps", "2"]
     assert main(command) == 0
@@ -129,3 +145,28 @@ def test_wrong_usage_is_said_in_one_line(shy: str, options: list[str], said: str
     assert said in captured.err
     assert captured.out == ""
     assert "Traceback" not in captured.err
+
+
+def test_a_trained_agent_can_be_watched(shy: str, capsys: Capture) -> None:
+    quick = [
+        "--frames",
+        "1500",
+        "--envs",
+        "32",
+        "--eval-episodes",
+        "5",
+        "--device",
+        "cpu",
+        "--out",
+        "trained",
+    ]
+    assert main(["run", shy, *quick]) == 0
+    capsys.readouterr()
+    assert main(["trace", shy, "--agent", "trained", "--steps", "3", "--json"]) == 0
+    trace = json.loads(capsys.readouterr().out)
+    assert trace["agent"] == "trained"
+    assert len(trace["steps"]) == 3 or trace["outcome"]
+    assert main(["coverage", shy, "--agent", "trained", "--episodes", "5", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["episodes"] == {"trained": 5}
+    assert main(["trace", "dance", "--agent", str(Path("trained").resolve())]) == 2
+    assert "checkpoint is for" in capsys.readouterr().err
