@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import sys
 from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -10,6 +11,9 @@ from socialai_dsl.cli.errors import Exit, UsageError
 from socialai_dsl.diagnostics import printable
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from socialai_dsl.checking import Loaded
     from socialai_dsl.envs.tally import Part, Tally
 
@@ -82,7 +86,7 @@ def _scripted(name: str, loaded: "Loaded", required: bool) -> str | None:
     Raises:
         UsageError: there is none, and it is required.
     """
-    from socialai_dsl.cli.agents import with_script
+    from socialai_dsl.cli.evaluation import with_script
     from socialai_dsl.compilation import compile_loaded
 
     try:
@@ -97,7 +101,8 @@ def _played(scenario: str, agent: str, episodes: int, seed: int) -> "Tally":
     import numpy as np
 
     import socialai_dsl
-    from socialai_dsl.cli.agents import make_policy, require_trainer
+    from socialai_dsl.cli.agents import require_trainer
+    from socialai_dsl.cli.evaluation import Player, make_policy
     from socialai_dsl.envs.tally import tally
 
     envs: Any = socialai_dsl.make_vec(
@@ -105,20 +110,26 @@ def _played(scenario: str, agent: str, episodes: int, seed: int) -> "Tally":
     )
     try:
         if agent == "oracle":
-            return tally(envs, lambda seen: envs.scripted_actions(), lambda rows: None, episodes, seed)
+            return tally(envs, lambda seen: envs.scripted_actions(), _nothing_to_forget, episodes, seed)
         if agent == "random":
             generator, sizes = np.random.default_rng(seed), envs.single_action_space.nvec
             shape = (envs.num_envs, len(sizes))
             return tally(
-                envs, lambda seen: generator.integers(0, sizes, shape), lambda rows: None, episodes, seed
+                envs, lambda seen: generator.integers(0, sizes, shape), _nothing_to_forget, episodes, seed
             )
         require_trainer()
-        policy = make_policy(agent, envs, "cpu")
+        policy, told = make_policy(Player(agent, seed=seed), envs)
+        for warning in told:
+            print(f"socialai: {printable(warning)}", file=sys.stderr)
         return tally(envs, policy.act, policy.reset, episodes, seed)
     except ValueError as error:
         raise UsageError(str(error)) from error
     finally:
         envs.close()
+
+
+def _nothing_to_forget(rows: "NDArray[np.bool_]", episodes: "NDArray[np.int64]") -> None:
+    """An agent without a memory."""
 
 
 @dataclass

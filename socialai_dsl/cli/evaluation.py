@@ -147,16 +147,14 @@ def evaluate_agent(player: Player, scenario: str, episodes: int) -> Evaluation:
     from trainer.evaluate import evaluate
 
     envs = socialai_dsl.make_vec(
-        _with_script(scenario, program) if player.agent == "oracle" else scenario,
+        with_script(scenario, program) if player.agent == "oracle" else scenario,
         num_envs=min(_TOGETHER, episodes),
         copy=False,
         autoreset_mode="Disabled",
     )
     try:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            policy = _Remembering(_make_policy(player, envs))
-        told = [str(warning.message) for warning in caught]
+        loaded_policy, told = make_policy(player, envs)
+        policy = _Remembering(loaded_policy)
         result = evaluate(policy, envs, episodes)
     except ValueError as error:
         raise UsageError(f"{scenario}: {error}") from error
@@ -166,7 +164,7 @@ def evaluate_agent(player: Player, scenario: str, episodes: int) -> Evaluation:
     return Evaluation(scenario, program, player, result, endings, actions, told)
 
 
-def _with_script(scenario: str, program: "Playable") -> str:
+def with_script(scenario: str, program: "Playable") -> str:
     """The scenario itself if it scripts the agent, else its variant `oracle`, in which everything else is the same.
 
     Raises:
@@ -190,16 +188,24 @@ def _with_script(scenario: str, program: "Playable") -> str:
     return scripted
 
 
-def _make_policy(player: Player, envs: Any) -> "Policy":
+def make_policy(player: Player, envs: Any) -> "tuple[Policy, list[str]]":
+    """What plays, and what is to be known about it, such as that it was trained on something else.
+
+    Raises:
+        ValueError: the checkpoint does not fit the environments.
+    """
     from trainer.policies import CheckpointPolicy, RandomPolicy, ScriptedPolicy
 
     if player.agent == "random":
-        return RandomPolicy(tuple(int(n) for n in envs.single_action_space.nvec), player.seed)
+        return RandomPolicy(tuple(int(n) for n in envs.single_action_space.nvec), player.seed), []
     if player.agent == "oracle":
-        return ScriptedPolicy(envs)
-    return CheckpointPolicy.load(
-        Path(player.agent), envs, player.greedy, player.seed, player.device, player.net
-    )
+        return ScriptedPolicy(envs), []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        policy = CheckpointPolicy.load(
+            Path(player.agent), envs, player.greedy, player.seed, player.device, player.net
+        )
+    return policy, [str(warning.message) for warning in caught]
 
 
 class _Remembering:

@@ -1,11 +1,13 @@
 """This module plays one episode and asks after each step why things went as they did."""
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.errors import UsageError
 from socialai_dsl.cli.play import outcome_name, split_line
+from socialai_dsl.diagnostics import printable
 
 if TYPE_CHECKING:
     import numpy as np
@@ -115,7 +117,7 @@ class Traced:
 
     def __init__(self, scenario: str, agent: str | None, lines: list[str] | None, seed: int) -> None:
         import socialai_dsl
-        from socialai_dsl.cli.agents import with_script
+        from socialai_dsl.cli.evaluation import with_script
 
         self.agent = agent or "typed"
         self._lines, self._seed = lines, seed
@@ -216,7 +218,7 @@ class Traced:
             return lambda observation: generator.integers(0, sizes, dtype=np.int64)
         policy = self._policy()
         policy.reset(np.ones(1, np.bool_))
-        return lambda observation: policy.act({key: value[None] for key, value in observation.items()})[0]
+        return lambda observation: policy.act(observation)
 
     def _typed(self, line: str) -> "NDArray[np.int64]":
         env = self._env.unwrapped
@@ -227,17 +229,17 @@ class Traced:
         return action
 
     def _policy(self) -> Any:
-        import socialai_dsl
-        from socialai_dsl.cli.agents import make_policy, require_trainer
+        from socialai_dsl.cli.agents import require_trainer
+        from socialai_dsl.cli.evaluation import Player, make_policy
 
         require_trainer()
-        envs = socialai_dsl.make_vec(self.scenario, num_envs=1)
         try:
-            return make_policy(self.agent, envs, "cpu")
+            policy, told = make_policy(Player(self.agent, seed=self._seed), self._env)
         except ValueError as error:
-            raise UsageError(str(error)) from error
-        finally:
-            envs.close()
+            raise UsageError(f"{self.scenario}: {error}") from error
+        for warning in told:
+            print(f"socialai: {printable(warning)}", file=sys.stderr)
+        return policy
 
 
 def cast_of(program: "Program") -> tuple[str, ...]:

@@ -50,7 +50,7 @@ class Tally:
 def tally(
     envs: ScenarioVectorEnv,
     choose: Callable[[Observation], NDArray[np.int64]],
-    begin: Callable[[NDArray[np.bool_]], None],
+    begin: Callable[[NDArray[np.bool_], NDArray[np.int64]], None],
     episodes: int,
     seed: int,
 ) -> Tally:
@@ -59,7 +59,8 @@ def tally(
     Args:
         envs: environments that do not reset themselves (autoreset_mode "Disabled"), which nobody has played yet.
         choose: actions, int64 (E, 4), for an observation.
-        begin: is told in which environments an episode begins, bool (E,), before `choose` is asked.
+        begin: is told in which environments an episode begins, bool (E,), and their numbers, int64 (E,), before
+            `choose` is asked.
         episodes: how many; they are numbers 0, 1, ... of the seed (`index`).
         seed: of the environments.
 
@@ -69,9 +70,10 @@ def tally(
     watch = _Watch(envs)
     for first in range(0, episodes, envs.num_envs):
         playing = np.arange(envs.num_envs) < episodes - first
-        options = {"index": np.arange(first, first + envs.num_envs), "reset_mask": playing}
+        numbers = np.arange(first, first + envs.num_envs)
+        options = {"index": numbers, "reset_mask": playing}
         observation, _ = envs.reset(seed=seed, options=options)
-        begin(playing)
+        begin(playing, numbers)
         watch.began(playing)
         while playing.any():
             watch.before()

@@ -29,7 +29,7 @@ def played(name: str, together: int, scripted: bool) -> Tally:
     assert isinstance(envs, ScenarioVectorEnv)
     sizes, step, first = envs.single_action_space.nvec, [0], [-together]
 
-    def begin(rows: Any) -> None:
+    def begin(rows: Any, numbers: Any) -> None:
         step[0], first[0] = 0, first[0] + together
 
     def act(observation: Any) -> Any:
@@ -112,7 +112,7 @@ def test_states_and_steps_are_counted_when_they_are_entered(tmp_path: Path) -> N
     envs = sd.make_vec(str(path), num_envs=2, autoreset_mode="Disabled")
     assert isinstance(envs, ScenarioVectorEnv)
     still = np.tile([envs.single_action_space.nvec[0] - 1, 0, 0, 0], (2, 1))
-    counted = tally(envs, lambda seen: still, lambda rows: None, episodes=4, seed=0)
+    counted = tally(envs, lambda seen: still, lambda rows, numbers: None, episodes=4, seed=0)
     times = {part.name: number for part, number in counted.times.items()}
     # Two members in four episodes: at the start, and back from c twice.
     assert (times["hop.a"], times["hop.b"], times["hop.c"], times["hop.d"]) == (24, 16, 16, 0)
