@@ -19,6 +19,7 @@ CODES: Final[dict[str, str]] = {
     "S005": "anchors, aliases, merge keys, tags and directives are not part of the language",
     "S006": "encoding or control character",
     "S007": "a file that cannot be read",
+    "W008": "a comment that ignores nothing",
     # S1xx: the shape of the document
     "S101": "unknown key",
     "S102": "a comma inside { } ends the value",

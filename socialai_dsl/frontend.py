@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from socialai_dsl.checking import (
@@ -15,12 +15,14 @@ from socialai_dsl.checking import (
     check_scenario,
     check_suite,
     naming_the_patch,
+    sift,
 )
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity
 from socialai_dsl.loader import Resolved, resolve
+from socialai_dsl.loader.files import display_name
 from socialai_dsl.schema import Scenario
 from socialai_dsl.semantics.terms import Checked
-from socialai_dsl.source import Source
+from socialai_dsl.source import Source, Span
 
 __all__ = ["CheckResult", "Loaded", "LoadedScenario", "LoadedSuite", "check", "check_files", "load"]
 
@@ -38,6 +40,7 @@ class CheckResult:
         diagnostics: sorted by place. sources: name -> source of every file read.
         resolved: the data with its positions; None if the files could not be read.
         suite: the suite with its members, if it is one and nothing is wrong with it.
+        used: the places of the codes in comments that silenced a warning.
     """
 
     name: str
@@ -47,6 +50,7 @@ class CheckResult:
     sources: dict[str, Source]
     resolved: Resolved | None
     suite: LoadedSuite | None = None
+    used: frozenset[Span] = frozenset()
 
     @property
     def has_errors(self) -> bool:
@@ -79,20 +83,37 @@ def load(name: str | Path) -> Loaded:
     )  # fmt: skip
 
 
-def check(name: str | Path) -> CheckResult:
-    """Check a scenario or suite; findings are returned, never raised."""
+def check(name: str | Path, texts: Mapping[Path, Source] | None = None) -> CheckResult:
+    """Check a scenario or suite; findings are returned, never raised.
+
+    Args:
+        name: a path or the name of a shipped scenario, with variants and parameters.
+        texts: resolved path -> text, for files that are not on the disk as they are meant: those of an editor.
+    """
     name = str(name)
     try:
-        resolved = resolve(name)
+        resolved = resolve(name, texts=texts)
     except ScenarioError as error:
         return CheckResult(name, None, None, tuple(DiagnosticBag(error.diagnostics)), error.sources, None)
     bag = DiagnosticBag()
     if resolved.kind == "suite":
         suite = check_suite(resolved, bag)
-        return CheckResult(name, None, None, tuple(bag), dict(resolved.files), resolved, suite)
+        return _sifted(CheckResult(name, None, None, tuple(bag), dict(resolved.files), resolved, suite))
     checked, scenario = _checked(resolved, bag)
-    found = DiagnosticBag(naming_the_patch(d, resolved) for d in bag)
-    return CheckResult(name, checked, scenario, tuple(found), dict(resolved.files), resolved)
+    found = tuple(DiagnosticBag(naming_the_patch(d, resolved) for d in bag))
+    return _sifted(CheckResult(name, checked, scenario, found, dict(resolved.files), resolved))
+
+
+def _sifted(result: CheckResult) -> CheckResult:
+    """Without the warnings that comments ignore; a file whose warnings are all known is to have no idle ones."""
+    assert result.resolved is not None, "internal: what was checked has been read"
+    meant = result.checked is not None or result.suite is not None
+    judged = display_name(result.resolved.path) if meant and not result.has_errors else None
+    sifted = sift(result.diagnostics, result.sources, judged)
+    suite = result.suite
+    if suite is not None and sifted.used:
+        suite = replace(suite, warnings=sifted.kept)
+    return replace(result, diagnostics=sifted.kept, used=sifted.used, suite=suite)
 
 
 def check_files(paths: Iterable[str | Path]) -> Iterator[CheckResult]:

@@ -21,35 +21,33 @@ Channels = Annotated[tuple[int, int], BeforeValidator(lambda v: tuple(v) if isin
 
 
 class ObjectTypeModel(Model):
-    """An object type as it is written in a library.
+    """An object type as it is written in a library."""
 
-    Attributes:
-        code: its number in the type channel of the view.
-        states: its statuses; the first is the initial one unless `initial` says otherwise.
-        walkable, transparent: statuses in which it can be entered, seen through.
-        toggled: status -> the status that a toggle makes of it.
-        deadly: entering it ends the episode.
-        active: statuses in which it works on what it is linked to (`unlocks`, `opens`).
-        pushed: status -> the status that a push makes of it.
-        rolls: statuses in which it moves by itself, until something is in its way.
-        expired: active status -> the status it has when its timer has run out.
-        shown: status -> what the status and orientation channels show.
-        color: where a scenario gives none; default random.
-    """
-
-    code: int = Field(ge=0, le=255)
-    states: Statuses = Field(min_length=1)
-    initial: Word | None = None
-    walkable: Statuses = ()
-    transparent: Statuses = ()
-    toggled: dict[Word, Word] = Field(default_factory=dict)
-    deadly: bool = False
-    active: Statuses = ()
-    pushed: dict[Word, Word] = Field(default_factory=dict)
-    rolls: Statuses = ()
-    expired: dict[Word, Word] = Field(default_factory=dict)
-    shown: dict[Word, Channels] = Field(default_factory=dict)
-    color: Word = "random"
+    code: int = Field(ge=0, le=255, description="its number in the type channel of the view")
+    states: Statuses = Field(
+        min_length=1, description="its statuses; the first is the initial one by default"
+    )
+    initial: Word | None = Field(None, description="the initial status")
+    walkable: Statuses = Field((), description="statuses in which it can be entered")
+    transparent: Statuses = Field((), description="statuses in which it can be seen through")
+    toggled: dict[Word, Word] = Field(
+        default_factory=dict, description="status: the status that a toggle makes of it"
+    )
+    deadly: bool = Field(False, description="entering it ends the episode")
+    active: Statuses = Field((), description="statuses in which it works on what it `unlocks` or `opens`")
+    pushed: dict[Word, Word] = Field(
+        default_factory=dict, description="status: the status that a push makes of it"
+    )
+    rolls: Statuses = Field(
+        (), description="statuses in which it moves by itself until something is in its way"
+    )
+    expired: dict[Word, Word] = Field(
+        default_factory=dict, description="active status: the status when its timer has run out"
+    )
+    shown: dict[Word, Channels] = Field(
+        default_factory=dict, description="status: what the status and orientation channels show"
+    )
+    color: Word = Field("random", description="where a scenario gives none")
 
     def compiled(self, name: str) -> ObjectType:
         """The type with statuses as numbers."""
@@ -75,15 +73,15 @@ class ObjectTypeModel(Model):
 class ObjectLibrary(Model):
     """A file of object types."""
 
-    library: Literal["objects"]
-    types: dict[Word, ObjectTypeModel]
+    library: Literal["objects"] = Field(description="what this file is a library of")
+    types: dict[Word, ObjectTypeModel] = Field(description="name: object type")
 
 
 class GrammarLibrary(Model):
     """A file of utterance grammars."""
 
-    library: Literal["grammars"]
-    grammars: dict[Word, UtteranceGrammar]
+    library: Literal["grammars"] = Field(description="what this file is a library of")
+    grammars: dict[Word, UtteranceGrammar] = Field(description="name: what an agent can say")
 
 
 @cache

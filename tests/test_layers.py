@@ -40,6 +40,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "parameters": (TEXT_SIDE - {"frontend", "checking", "library"}, set()),
     "checking": (TEXT_SIDE - {"frontend"}, set()),
     "frontend": (TEXT_SIDE, set()),
+    "authoring": (TEXT_SIDE, {"pydantic", "yaml", "pygls", "lsprotocol"}),
     "program": ({"source", "listing"}, {"numpy"}),
     "program_suite": ({"program"}, set()),
     "listing": ({"source", "program"}, {"numpy"}),

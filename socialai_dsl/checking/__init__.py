@@ -1,5 +1,6 @@
 """Resolved files to what they mean, or to what is wrong with them: one module for each kind of file."""
 
+from socialai_dsl.checking.ignored import sift
 from socialai_dsl.checking.libraries import check_library, check_npc
 from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite, Start
 from socialai_dsl.checking.scenarios import check_scenario, naming_the_patch
@@ -15,4 +16,5 @@ __all__ = [
     "check_scenario",
     "check_suite",
     "naming_the_patch",
+    "sift",
 ]

@@ -9,6 +9,7 @@ from typing import Any, Final
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.schema import CastMember
 from socialai_dsl.schema.positions import DataPath, Positions
+from socialai_dsl.schema.shape import PARAMETER
 from socialai_dsl.source import Span
 
 MOST: Final = 16
@@ -93,6 +94,8 @@ def _count(name: str, count: object, places: Positions, bag: DiagnosticBag) -> i
     """How many a group has; None if that is not known."""
     if isinstance(count, int) and not isinstance(count, bool) and 1 <= count <= MOST:
         return count
+    if isinstance(count, str) and PARAMETER.fullmatch(count):
+        return None  # there is no such parameter, which has been said
     message = f"`count` is a number of members from 1 to {MOST}"
     bag.error("S106", message, places.value_span(("cast", name, "count")))
     return None

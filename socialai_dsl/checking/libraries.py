@@ -20,9 +20,9 @@ def check_library(resolved: Resolved, bag: DiagnosticBag) -> None:
     assert isinstance(resolved.data, dict), "internal: a file is a mapping"
     kind = resolved.data["library"]
     if kind == "objects":
-        model_of(ObjectLibrary, resolved.data, resolved, bag)
+        model_of(ObjectLibrary, resolved.data, resolved, bag, parameters=False)
     elif kind == "grammars":
-        model_of(GrammarLibrary, resolved.data, resolved, bag)
+        model_of(GrammarLibrary, resolved.data, resolved, bag, parameters=False)
     else:
         message = f"there is no library of `{kind}`"
         bag.error("S103", message, resolved.value_span(("library",)), hint="one of objects, grammars")

@@ -49,7 +49,7 @@ def _right_shape(resolved: Resolved, own: DiagnosticBag) -> Suite | None:
     """The suite's models; None if the members cannot be looked at."""
     if not _has_parameters(resolved, own):
         return None
-    shaped = model_of(Suite, resolved.data, resolved, own)
+    shaped = model_of(Suite, resolved.data, resolved, own, parameters=False)
     _check_parameters(resolved, own)
     if shaped.model is None or own.has_errors:
         return None

@@ -5,46 +5,32 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Final
 
-from socialai_dsl.cli import (
-    bench,
-    check,
-    coverage,
-    curves,
-    evaluate,
-    fidelity,
-    new,
-    oracles,
-    play,
-    run,
-    schema,
-    sheets,
-    show,
-    trace,
-    validate,
-)
 from socialai_dsl.cli.errors import Exit, RunFailed, UsageError, is_usage
+from socialai_dsl.cli.terminal import shows_color
 from socialai_dsl.diagnostics import ScenarioError, render_text
 from socialai_dsl.engine.errors import RoomError
 
-_COMMANDS: Final = {
-    "run": run,
-    "new": new,
-    "validate": validate,
-    "schema": schema,
-    "show": show,
-    "evaluate": evaluate,
-    "play": play,
-    "trace": trace,
-    "coverage": coverage,
-    "bench": bench,
-    "fidelity": fidelity,
-    "oracles": oracles,
-    "check": check,
-    "curves": curves,
-    "sheets": sheets,
-}
+_COMMANDS: Final = (
+    "run",
+    "new",
+    "validate",
+    "schema",
+    "show",
+    "evaluate",
+    "play",
+    "trace",
+    "coverage",
+    "bench",
+    "fidelity",
+    "oracles",
+    "check",
+    "curves",
+    "sheets",
+)
+"""Each is a module beside this one."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -54,7 +40,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--version", action=_Version)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for name, module in _COMMANDS.items():
+    words = sys.argv[1:] if argv is None else argv
+    # The others are needed for their summaries alone, and loading them would double the time to start.
+    named = words[:1] if words and words[0] in _COMMANDS else _COMMANDS
+    for name in named:
+        module = import_module(f"socialai_dsl.cli.{name}")
         summary = module.SUMMARY
         command = commands.add_parser(name, help=summary, description=summary[0].upper() + summary[1:] + ".")
         module.add_arguments(command)
@@ -65,6 +55,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def run_main(argv: Sequence[str] | None = None) -> int:
     """Run `socialai-run ...`, the same as `socialai run ...`, and return its exit code."""
+    from socialai_dsl.cli import run
+
     parser = argparse.ArgumentParser(prog="socialai-run", description=run.SUMMARY.capitalize() + ".")
     parser.add_argument("--version", action=_Version)
     run.add_arguments(parser)
@@ -102,7 +94,7 @@ def _guarded(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> int
 
 def _explain(program: str, error: Exception) -> Exit:
     if isinstance(error, ScenarioError):
-        print(render_text(error.diagnostics, error.sources, color=sys.stderr.isatty()), file=sys.stderr)
+        print(render_text(error.diagnostics, error.sources, color=shows_color(sys.stderr)), file=sys.stderr)
         return Exit.USAGE if is_usage(error.diagnostics) else Exit.FINDINGS
     if isinstance(error, UsageError | RunFailed | RoomError):
         print(f"{program}: {error}", file=sys.stderr)

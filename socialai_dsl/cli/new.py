@@ -1,4 +1,4 @@
-"""This module is `socialai new`: it writes a commented scenario to start from."""
+"""This module is `socialai new`: it writes a commented scenario to start from, with a script that solves it."""
 
 import argparse
 import re
@@ -7,30 +7,82 @@ from typing import Final
 
 from socialai_dsl.cli.errors import Exit, UsageError
 
-SUMMARY: Final = "write a commented scenario file to start from"
+SUMMARY: Final = "write a commented scenario to start from, with a script that solves it"
 
-_TEMPLATE: Final = Path(__file__).with_name("starting_scenario.yaml")
+TEMPLATES: Final = {
+    "ask-a-guide": "ask an NPC which of four doors is the right one (the default)",
+    "imitate": "watch what a peer does, then do the same",
+    "hidden-information": "only the caretaker knows which box, and points at it",
+    "role-swap": "two who need each other; the agent can have either part",
+    "empty": "a room, a door and an agent",
+}
+"""Name -> one line; the files are in the folder `templates`."""
+
+_FOLDER: Final = Path(__file__).with_name("templates")
 _WORD: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}")
+_STANDING_NAME: Final = "my_scenario"
+_SCHEMA: Final = "socialai.schema.json"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
-    parser.add_argument("name", metavar="NAME", help="the scenario's name; NAME.yaml is written here")
+    parser.add_argument(
+        "name",
+        metavar="NAME",
+        nargs="?",
+        help="the scenario's name; NAME.yaml and its variants are written here",
+    )
+    parser.add_argument(
+        "--template",
+        choices=TEMPLATES,
+        default="ask-a-guide",
+        help="what to start from (default: ask-a-guide)",
+    )
+    parser.add_argument("--list", action="store_true", help="list the templates")
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
-    """Write the file; one that exists stays as it is."""
+    """Write the files, and the schema for editors beside them; nothing is written if one of them exists."""
+    if arguments.list:
+        width = max(map(len, TEMPLATES))
+        print("\n".join(f"{name:{width}}  {about}" for name, about in TEMPLATES.items()))
+        return Exit.GOOD
+    if arguments.name is None:
+        raise UsageError("expected a NAME, or --list")
     name = arguments.name.removesuffix(".yaml")
     if not _WORD.fullmatch(name):
         raise UsageError(
             f"NAME: expected letters, digits and underscores (at most 40), got {arguments.name!r}"
         )
-    path = Path(f"{name}.yaml")
-    text = _TEMPLATE.read_text(encoding="utf-8").replace("my_scenario", name, 1)
-    try:
+    files = template_files(arguments.template, name)
+    for path in files:
+        if path.exists() or path.is_symlink():
+            raise UsageError(f"{path} exists already")
+    for path, text in files.items():
         with open(path, "x", encoding="utf-8") as file:
             file.write(text)
-    except FileExistsError:
-        raise UsageError(f"{path} exists already") from None
-    print(f"wrote {path}; check it with: socialai validate {path}")
+    _write_schema(Path(_SCHEMA))
+    print(f"wrote {', '.join(map(str, files))}; check with: socialai validate {name}.yaml")
     return Exit.GOOD
+
+
+def template_files(template: str, name: str) -> dict[Path, str]:
+    """Path -> text, for the files of a template under the name of a scenario; the scenario itself first."""
+    modeline = f"# yaml-language-server: $schema={_SCHEMA}\n"
+    sources = [path for path in _FOLDER.glob(f"{template}*.yaml") if path.stem.partition("_")[0] == template]
+    return {
+        Path(name + path.stem.removeprefix(template) + ".yaml"): modeline
+        + path.read_text(encoding="utf-8").replace(_STANDING_NAME, name)
+        for path in sorted(sources, key=lambda path: len(path.stem))
+    }
+
+
+def _write_schema(path: Path) -> None:
+    """Put the schema where the files say it is; one that is there stays."""
+    from socialai_dsl.authoring.language_schema import shipped_schema
+
+    try:
+        with open(path, "x", encoding="utf-8") as file:
+            file.write(shipped_schema())
+    except FileExistsError:
+        pass

@@ -2,11 +2,11 @@
 
 import json
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 from xml.etree import ElementTree
 
-from socialai_dsl.diagnostics import CODES, Diagnostic, Severity, render_text, to_json
+from socialai_dsl.diagnostics import CODES, Diagnostic, Severity, printable, render_text, to_json
 from socialai_dsl.source import Source
 
 
@@ -18,21 +18,37 @@ class Checked:
         name: as given on the command line.
         diagnostics: sorted by place.
         sources: name -> source of the files they point into.
+        left_out: how many errors more there are than are to be reported.
     """
 
     name: str
     diagnostics: tuple[Diagnostic, ...]
     sources: dict[str, Source]
+    left_out: int = 0
 
     @property
     def errors(self) -> int:
         """Number of errors."""
-        return sum(d.severity is Severity.ERROR for d in self.diagnostics)
+        return sum(d.severity is Severity.ERROR for d in self.diagnostics) + self.left_out
 
     @property
     def warnings(self) -> int:
         """Number of warnings."""
-        return len(self.diagnostics) - self.errors
+        return sum(d.severity is Severity.WARNING for d in self.diagnostics)
+
+
+def limited(checked: Sequence[Checked], most: int) -> list[Checked]:
+    """What was checked with only the first `most` errors; one in a file that several inputs share counts once."""
+    errors = [d for d in _all(checked) if d.severity is Severity.ERROR]
+    hidden = set(errors[most:])
+    return [
+        replace(
+            c,
+            diagnostics=tuple(d for d in c.diagnostics if d not in hidden),
+            left_out=sum(d in hidden for d in c.diagnostics),
+        )
+        for c in checked
+    ]
 
 
 def report_text(checked: Sequence[Checked], color: bool) -> str:
@@ -40,7 +56,9 @@ def report_text(checked: Sequence[Checked], color: bool) -> str:
     diagnostics = _all(checked)
     sources = {name: source for c in checked for name, source in c.sources.items()}
     errors = sum(d.severity is Severity.ERROR for d in diagnostics)
-    counts = [_count(errors, "error"), _count(len(diagnostics) - errors, "warning")]
+    hidden = any(c.left_out for c in checked)
+    counts = [_count(errors, "error") + (" shown, more left out" if hidden else "")]
+    counts.append(_count(len(diagnostics) - errors, "warning"))
     summary = f"{_count(len(checked), 'file')} checked: {', '.join(counts)}"
     return "\n".join([render_text([d], sources, color) for d in diagnostics] + [summary])
 
@@ -57,14 +75,14 @@ def report_github(checked: Sequence[Checked], color: bool) -> str:
     lines = []
     for d in _all(checked):
         place = {
-            "file": d.span.file,
+            "file": printable(d.span.file),
             "line": d.span.line,
             "col": d.span.column,
             "endColumn": d.span.column + d.span.width,
             "title": d.code,
         }
         properties = ",".join(f"{key}={_escape(str(value), ':,')}" for key, value in place.items())
-        message = d.text if d.hint is None else f"{d.text}\n{d.hint}"
+        message = d.text if d.hint is None else f"{d.text}\n{printable(d.hint)}"
         lines.append(f"::{d.severity.value} {properties}::{_escape(message)}")
     return "\n".join(lines)
 
@@ -98,7 +116,9 @@ def report_junit(checked: Sequence[Checked], color: bool) -> str:
         "testsuite", name="socialai validate", tests=str(len(checked)), failures=str(failed)
     )
     for c in checked:
-        case = ElementTree.SubElement(suite, "testcase", classname="socialai.validate", name=c.name)
+        case = ElementTree.SubElement(
+            suite, "testcase", classname="socialai.validate", name=printable(c.name)
+        )
         if c.errors:
             failure = ElementTree.SubElement(case, "failure", message=_count(c.errors, "error"))
             failure.text = render_text(c.diagnostics, c.sources)
@@ -140,7 +160,9 @@ def _sarif_result(diagnostic: Diagnostic) -> dict[str, Any]:
         "ruleId": diagnostic.code,
         "level": diagnostic.severity.value,
         "message": {
-            "text": diagnostic.text if diagnostic.hint is None else f"{diagnostic.text}\n{diagnostic.hint}"
+            "text": diagnostic.text
+            if diagnostic.hint is None
+            else f"{diagnostic.text}\n{printable(diagnostic.hint)}"
         },
         "locations": [location],
     }

@@ -2,20 +2,21 @@
 
 import argparse
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.cli.errors import Exit, UsageError, is_usage
-from socialai_dsl.cli.reporters import REPORTERS, Checked
+from socialai_dsl.cli.files import STDIN, standard_input, yaml_files
+from socialai_dsl.cli.reporters import REPORTERS, Checked, limited
+from socialai_dsl.cli.terminal import shows_color
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError
 
 if TYPE_CHECKING:
     from socialai_dsl.frontend import CheckResult
 
 SUMMARY: Final = "check scenario files and folders of them"
-
-_SUFFIXES: Final = frozenset({".yaml", ".yml"})
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "paths",
         nargs="+",
         metavar="PATH",
-        help="a file, a folder, or a scenario's name such as dance+unsocial",
+        help="a file, a folder, a scenario's name such as dance+unsocial, or - for standard input",
     )
     parser.add_argument(
         "--format",
@@ -33,12 +34,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="how to print the findings (default: text); json prints an array",
     )
     parser.add_argument("--strict", action="store_true", help="warnings count as failures too")
+    parser.add_argument(
+        "--max-errors", type=int, metavar="N", help="report at most N errors; the exit code stays the same"
+    )
+    parser.add_argument(
+        "--stdin-filename",
+        default="stdin.yaml",
+        metavar="PATH",
+        help="what the file read from standard input is called, and where the files it names are looked for",
+    )
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Check everything that was named, then print one report."""
-    checked = [_check(name) for name in _expand(arguments.paths)]
-    report = REPORTERS[arguments.format](checked, sys.stdout.isatty())
+    if arguments.max_errors is not None and arguments.max_errors < 1:
+        raise UsageError(f"--max-errors: expected a positive number, got {arguments.max_errors}")
+    results = [_checked(name, arguments.stdin_filename) for name in _expand(arguments.paths)]
+    checked = _without_used(results)
+    shown = checked if arguments.max_errors is None else limited(checked, arguments.max_errors)
+    report = REPORTERS[arguments.format](shown, shows_color(sys.stdout))
     if report:
         print(report)
     failed = any(c.errors or (arguments.strict and c.warnings) for c in checked)
@@ -49,28 +63,47 @@ def _expand(paths: list[str]) -> Iterator[str]:
     """Yield each file once: a folder gives the YAML files under it, sorted; anything else stays as it is."""
     yielded = set()
     for path in paths:
-        names = [path]
-        if Path(path).is_dir():
-            names = sorted(str(p) for p in Path(path).rglob("*") if p.suffix in _SUFFIXES and p.is_file())
-            if not names:
-                raise UsageError(f"{path}: expected scenario files (*.yaml) in this folder, found none")
-        for name in names:
+        for name in yaml_files(path) if Path(path).is_dir() else [path]:
             if name not in yielded:
                 yielded.add(name)
                 yield name
 
 
-def _check(name: str) -> Checked:
+def _checked(name: str, stdin_filename: str) -> tuple[Checked, "CheckResult"]:
     from socialai_dsl import frontend
 
-    if Path(name).suffix in _SUFFIXES:
-        with open(name, "rb") as file:  # raises OSError where the file cannot be read: usage, not a finding
-            file.read(1)
-    result = frontend.check(name)
-    if result.has_errors and is_usage(result.diagnostics):
-        raise ScenarioError(result.diagnostics, result.sources)
+    if name == STDIN:
+        try:
+            texts = standard_input(stdin_filename)
+        except ScenarioError as error:  # no text at all, which is a finding in it as in a file
+            nothing = frontend.CheckResult(stdin_filename, None, None, error.diagnostics, error.sources, None)
+            return Checked(stdin_filename, error.diagnostics, error.sources), nothing
+        result = frontend.check(Path(stdin_filename).absolute(), texts)
+        name = stdin_filename
+    else:
+        if name.endswith((".yaml", ".yml")):
+            with open(name, "rb") as file:  # raises OSError where it cannot be read: usage, not a finding
+                file.read(1)
+        result = frontend.check(name)
+        if result.has_errors and is_usage(result.diagnostics):
+            raise ScenarioError(result.diagnostics, result.sources)
     found = (*result.diagnostics, *_misfits(result))
-    return Checked(name, found, dict(result.sources))
+    return Checked(name, found, dict(result.sources)), result
+
+
+def _without_used(results: Iterable[tuple[Checked, "CheckResult"]]) -> list[Checked]:
+    """What was checked, where a comment that is idle in its own file but silences a warning in another's is fine."""
+    from socialai_dsl.checking.ignored import UNUSED
+
+    results = list(results)
+    used = {span for _, result in results for span in result.used}
+    return [
+        replace(
+            checked,
+            diagnostics=tuple(d for d in checked.diagnostics if d.code != UNUSED or d.span not in used),
+        )
+        for checked, _ in results
+    ]
 
 
 def _misfits(result: "CheckResult") -> Iterator[Diagnostic]:

@@ -6,7 +6,7 @@ import os
 import re
 import stat
 from pathlib import Path
-from typing import Final
+from typing import IO, Final
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError
 from socialai_dsl.loader.limits import MAX_FILE_BYTES
@@ -49,6 +49,18 @@ def read_source(path: Path, name: str | None = None) -> Source:
     return decoded(_read_bytes(path, name), name)
 
 
+def read_stream(stream: IO[bytes], name: str) -> Source:
+    """The text of a stream, called `name` in messages.
+
+    Raises:
+        ScenarioError: S004 if it is too large, S006 and S007 if it is no text.
+    """
+    content = stream.read(MAX_FILE_BYTES + 1)
+    if len(content) > MAX_FILE_BYTES:
+        raise ScenarioError([_too_large(name)])
+    return decoded(content, name)
+
+
 def _read_bytes(path: Path, name: str) -> bytes:
     start = Span(name, 1, 1)
     try:
@@ -72,9 +84,12 @@ def _read_bytes(path: Path, name: str) -> bytes:
     finally:
         os.close(descriptor)
     if len(content) > MAX_FILE_BYTES:
-        message = f"the file is larger than {MAX_FILE_BYTES // 1024} KiB"
-        raise ScenarioError([Diagnostic("S004", message, start)])
+        raise ScenarioError([_too_large(name)])
     return content
+
+
+def _too_large(name: str) -> Diagnostic:
+    return Diagnostic("S004", f"the file is larger than {MAX_FILE_BYTES // 1024} KiB", Span(name, 1, 1))
 
 
 def _kind(mode: int) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, did_you_mean
@@ -19,15 +19,18 @@ from socialai_dsl.source import Source, Span
 class Library:
     """Reads the files of one scenario; none outside `roots` and the shipped folder is ever opened.
 
+    `texts` (resolved path -> text) stand for files that are not on the disk as they are meant.
+
     Attributes:
         shipped: the folder of the shipped scenarios, resolved.
         sources: name -> source, of all files read and of names that findings may point into.
     """
 
-    def __init__(self, roots: Iterable[Path]) -> None:
+    def __init__(self, roots: Iterable[Path], texts: Mapping[Path, Source] | None = None) -> None:
         self.shipped = shipped_folder().resolve()
         self._roots = [*(root.resolve() for root in roots), self.shipped]
         self.sources: dict[str, Source] = {}
+        self._texts = texts or {}
         self._documents: dict[Path, Document] = {}
         self._bytes = 0
 
@@ -68,7 +71,7 @@ class Library:
         for place in dict.fromkeys((folder, self.shipped)):
             for spelling in spellings:
                 real = self.resolved(place / spelling, asked)
-                if is_file(real):
+                if real in self._texts or is_file(real):
                     return real
         near = did_you_mean(text, self._names_in((folder / text).parent, text, asked))
         raise self.error(
@@ -118,7 +121,7 @@ class Library:
             self.resolved(path, asked)
         if len(self._documents) == MAX_FILES:
             raise self.error("S507", f"a scenario is made of at most {MAX_FILES} files", start)
-        source = read_source(path, display_name(path))
+        source = self._texts.get(path) or read_source(path, display_name(path))
         self._bytes += len(source.text)
         if self._bytes > MAX_TOTAL_BYTES:
             message = f"the files of a scenario have more than {MAX_TOTAL_BYTES >> 20} MiB together"

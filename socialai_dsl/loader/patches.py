@@ -57,10 +57,7 @@ def apply_patch(root: Node, patch: Node, found: DiagnosticBag) -> list[Edit]:
         if section is None:
             continue
         if not isinstance(section.children, dict):
-            message = f"`{verb}` is a mapping from paths to values, not {section.kind}"
-            found.add(
-                Diagnostic("S104", message, section.value_span(), hint=f"{verb}: {{cast.anna.name: Anna}}")
-            )
+            _not_a_mapping(verb, section, found)
             continue
         for path, value in section.children.items():
             edits += change(root, path, value, found)
@@ -231,3 +228,45 @@ def check_variant(root: Node, found: DiagnosticBag) -> None:
         )
     elif not isinstance(base.value, str):
         found.add(Diagnostic("S104", f"`of` names a file, it is not {base.kind}", base.value_span()))
+    for key in ("variant", "about", "notes"):
+        entry = root.entry(key)
+        if entry is not None and not isinstance(entry.value, str):
+            found.add(Diagnostic("S104", f"`{key}` is a text, not {entry.kind}", entry.value_span()))
+    for key in ("skills", "remove"):
+        _check_texts(root, key, found)
+    for key in ("set", "add"):
+        section = root.entry(key)
+        if section is not None and not isinstance(section.children, dict):
+            _not_a_mapping(key, section, found)
+        for path, node in section.walk() if section is not None else ():
+            if node.children is None and node.value is None and path:
+                found.add(_nothing_for(path[-1], node))
+
+
+def _nothing_for(key: str | int, node: Node) -> Diagnostic:
+    what = f"nothing is given for `{key}`" if isinstance(key, str) else "an item of this list is empty"
+    hint = "write a value, or leave the key out"
+    return Diagnostic("S104", what, node.key_span(), hint=hint)
+
+
+def _check_texts(root: Node, key: str, found: DiagnosticBag) -> None:
+    section = root.entry(key)
+    if section is None:
+        return
+    if not isinstance(section.children, list):
+        hint = "remove: [cast.anna]" if key == "remove" else None
+        what = "a list of paths" if key == "remove" else "a list of texts"
+        found.add(
+            Diagnostic("S104", f"`{key}` is {what}, not {section.kind}", section.value_span(), hint=hint)
+        )
+        return
+    for item in section.children:
+        if not isinstance(item.value, str):
+            what = "a path" if key == "remove" else "a skill"
+            found.add(Diagnostic("S104", f"{what} is a text, not {item.kind}", item.value_span()))
+
+
+def _not_a_mapping(verb: str, section: Node, found: DiagnosticBag) -> None:
+    message = f"`{verb}` is a mapping from paths to values, not {section.kind}"
+    hint = f"{verb}: {{cast.anna.name: Anna}}"
+    found.add(Diagnostic("S104", message, section.value_span(), hint=hint))

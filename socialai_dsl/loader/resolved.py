@@ -264,7 +264,7 @@ class Resolved(Positions):
         return Resolved(self._builder, self._build.copy(), {**self._given, **given})
 
 
-def resolve(name: str, base: Path | None = None) -> Resolved:
+def resolve(name: str, base: Path | None = None, texts: Mapping[Path, Source] | None = None) -> Resolved:
     """The scenario of a name: `NAME(+VARIANT)*(?parameter=value(&parameter=value)*)?`.
 
     Args:
@@ -272,6 +272,7 @@ def resolve(name: str, base: Path | None = None) -> Resolved:
         base: where relative paths start, by default the working directory. If given, files of the scenario may
             come from anywhere below it, else only from the folder of the named file; and always from the shipped
             ones.
+        texts: resolved path -> text that stands for the file, which need not exist.
 
     Raises:
         ScenarioError: with everything found up to the first file that cannot be used.
@@ -281,8 +282,8 @@ def resolve(name: str, base: Path | None = None) -> Resolved:
     folder = base if base is not None else Path()
     parsed = parse_name(name, source.span(1, 1), found, folder)
     found.raise_errors({source.name: source})
-    path = _named_file(parsed.base, folder, source)
-    library = Library([path.parent] if base is None else [base, path.parent])
+    path = _named_file(parsed.base, folder, source, texts or {})
+    library = Library([path.parent] if base is None else [base, path.parent], texts)
     library.sources[source.name] = source
     return _resolved(Builder(library), path, parsed)
 
@@ -307,7 +308,7 @@ def _folder(document: Document) -> Path:
     return document.path.parent
 
 
-def _named_file(part: Part, folder: Path, source: Source) -> Path:
+def _named_file(part: Part, folder: Path, source: Source, texts: Mapping[Path, Source]) -> Path:
     """The file that a name from outside means.
 
     Raises:
@@ -320,7 +321,7 @@ def _named_file(part: Part, folder: Path, source: Source) -> Path:
     else:
         candidates = [_with_suffix(shipped), _with_suffix(beside)]
     for candidate in candidates:
-        if is_file(candidate):
+        if is_file(candidate) or (texts and candidate.resolve() in texts):
             return candidate.resolve()
     if os.path.lexists(beside):
         # Reading it says what is wrong with it: a folder, a pipe, a link that leads nowhere.

@@ -11,6 +11,7 @@ from pydantic import BaseModel
 from socialai_dsl.schema.behaviour import (
     Belief,
     CastMember,
+    Character,
     FirstRule,
     Frame,
     Npc,
@@ -36,6 +37,7 @@ CALLED: Final[dict[type, str]] = {
     Step: "a step",
     CastMember: "a member of the cast",
     Npc: "an npc file",
+    Character: "`npc_defaults`",
     Role: "a role",
     WorldRule: "a rule of the world",
     Sequence: "a sequence",

@@ -9,9 +9,14 @@ from pydantic import BeforeValidator, Field, StringConstraints
 from socialai_dsl.schema.base import Expression, Model, Word, _as_tuple, _one_or_many
 from socialai_dsl.schema.behaviour import Probability
 
-_Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\[\d+\])?$", max_length=40)]
+_Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\[[0-9]+\])?$", max_length=40)]
 Names = Annotated[
-    tuple[_Name, ...], BeforeValidator(_as_tuple), BeforeValidator(_one_or_many), Field(min_length=1)
+    tuple[_Name, ...],
+    BeforeValidator(_as_tuple),
+    Field(min_length=1),
+    BeforeValidator(
+        _one_or_many, json_schema_input_type=_Name | Annotated[tuple[_Name, ...], Field(min_length=1)]
+    ),
 ]
 """One member or group of the cast, or a list of them."""
 

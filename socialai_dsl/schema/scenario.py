@@ -6,8 +6,17 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, StringConstraints
 
-from socialai_dsl.schema.base import Expression, Model, Word, _as_tuple
-from socialai_dsl.schema.behaviour import CastMember, Frame, Probability, Ranged, Role, WorldRule
+from socialai_dsl.schema.base import Expression, Model, Word, _as_tuple, as_written
+from socialai_dsl.schema.behaviour import (
+    CastMember,
+    Character,
+    Frame,
+    Probability,
+    Ranged,
+    Role,
+    WorldRule,
+    WrittenCast,
+)
 from socialai_dsl.schema.properties import Property
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
 
@@ -16,17 +25,21 @@ PRIMITIVES: tuple[Primitive, ...] = ("left", "right", "forward", "pickup", "drop
 """The agent's body actions in the order of the paper (appendix, action space)."""
 
 
-MemberName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\[\d+\])?$", max_length=40)]
+MemberName = Annotated[
+    str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\[[0-9]+\])?$", max_length=40)
+]
 """A member of the cast; those of a group are numbered from 0: `peers[0]`."""
 
 
 class Outcome(Model):
     """One way the episode ends: exactly one of `success` and `failure`."""
 
-    success: Expression | None = None
-    failure: Expression | None = None
+    success: Expression | None = Field(
+        None, description="a condition that ends the episode well", examples=["agent.at(exit)"]
+    )
+    failure: Expression | None = Field(None, description="a condition that ends the episode badly")
     reward: Expression = Field(100, description="per cent of the success reward; computed when it ends")
-    id: Word | None = None
+    id: Word | None = Field(None, description="names the outcome in figures, `check` and patches")
 
 
 class Reward(Model):
@@ -69,28 +82,43 @@ class Memory(Model):
 class Parameter(Model):
     """A parameter of the file, used as $name."""
 
-    default: int | bool | float | str
-    values: list[int | bool | float | str] | dict[str, int | bool | float | str] | None = None
+    default: int | bool | float | str = Field(description="its value unless `?name=value` gives another")
+    values: list[int | bool | float | str] | dict[str, int | bool | float | str] | None = Field(
+        None, description="what it may be: a list, or label: value"
+    )
 
 
 class Scenario(Model):
     """One environment: a room with objects, a cast that follows frames, and an outcome."""
 
-    scenario: Word
-    abstract: bool = False
-    about: str | None = None
-    notes: str | None = None
-    skills: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = ()
+    scenario: Word = Field(description="the name of the scenario")
+    abstract: bool = Field(False, description="others build on it by `extends`; it cannot be run itself")
+    about: str | None = Field(None, description="one sentence for people")
+    notes: str | None = Field(None, description="more for people")
+    skills: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = Field(
+        (), description="what it asks of an agent, for people"
+    )
     horizon: int = Field(100, ge=1, le=10_000, description="the episode ends at t == horizon")
     earshot: Expression = Field("next_to", description="next_to, room, or a Manhattan distance")
-    actions: Annotated[tuple[Primitive, ...], BeforeValidator(_as_tuple)] = Field(PRIMITIVES, min_length=1)
-    params: dict[Word, int | bool | float | str | Parameter] = Field(default_factory=dict)
-    grammar: UtteranceGrammar
-    room: Room
+    actions: Annotated[tuple[Primitive, ...], BeforeValidator(_as_tuple)] = Field(
+        PRIMITIVES, min_length=1, description="the agent's body actions; default all seven"
+    )
+    params: dict[Word, int | bool | float | str | Parameter] = Field(
+        default_factory=dict,
+        description="name: default of parameters, used as $name and given as ?name=value",
+    )
+    grammar: Annotated[UtteranceGrammar, as_written(UtteranceGrammar | Word)] = Field(
+        description="what the agent can say: written out, or the name of a grammar that all can use"
+    )
+    room: Room = Field(description="the walled room", examples=[{"size": "5..8"}])
     order: Annotated[tuple[Word, ...], BeforeValidator(_as_tuple)] = Field(
         (), description="order of placement"
     )
-    objects: dict[Word, ObjectGroup] = Field(default_factory=dict)
+    objects: dict[Word, ObjectGroup] = Field(
+        default_factory=dict,
+        description="name: what lies in the room",
+        examples=[{"exit": {"type": "door", "place": "wall(top)"}}],
+    )
     let: dict[Word, Expression | Sequence] = Field(
         default_factory=dict, description="drawn or computed once per episode"
     )
@@ -102,16 +130,23 @@ class Scenario(Model):
         default_factory=dict, description="name: {key: value}, or permuted(table): name(key) looks a value up"
     )
     memory: dict[Word, Memory] = Field(default_factory=dict, description="what the agent did last")
-    frames: dict[Word, Frame] = Field(default_factory=dict)
+    frames: dict[Word, Frame] = Field(
+        default_factory=dict, description="name: protocol of interaction, which members of the cast follow"
+    )
     roles: dict[Word, Role] = Field(default_factory=dict, description="parts that members of the cast play")
-    npc_defaults: CastMember = CastMember()
-    cast: dict[MemberName, CastMember]
+    npc_defaults: Character = Field(Character(), description="what NPCs have that do not say otherwise")
+    cast: Annotated[dict[MemberName, CastMember], as_written(WrittenCast)] = Field(
+        description="who is in the room: the `agent` and the NPCs by name",
+        examples=[{"guide": {"frame": "show_the_way"}, "agent": {"place": "anywhere"}}],
+    )
     rules: Annotated[tuple[WorldRule, ...], BeforeValidator(_as_tuple)] = Field(
         (), description="rules about the world, read once a step; each that holds takes effect"
     )
-    outcome: Annotated[tuple[Outcome, ...], BeforeValidator(_as_tuple)] = Field(min_length=1)
-    reward: Reward = Reward()
-    observe: Observe = Observe()
+    outcome: Annotated[tuple[Outcome, ...], BeforeValidator(_as_tuple)] = Field(
+        min_length=1, description="read top to bottom after every step; the first that holds ends the episode"
+    )
+    reward: Reward = Field(Reward(), description="what is earned")
+    observe: Observe = Field(Observe(), description="what the agent perceives")
     require: Annotated[tuple[Expression, ...], BeforeValidator(_as_tuple)] = Field(
         (), description="conditions on the drawn room, which is drawn again while one is false"
     )

@@ -46,7 +46,13 @@ class Shaped(Generic[M]):
 
 
 def model_of(
-    model: type[M], data: object, places: Positions, bag: DiagnosticBag, *, partial: bool = False
+    model: type[M],
+    data: object,
+    places: Positions,
+    bag: DiagnosticBag,
+    *,
+    partial: bool = False,
+    parameters: bool = True,
 ) -> Shaped[M]:
     """The model of a document; `bag` says what is wrong with its shape.
 
@@ -58,19 +64,26 @@ def model_of(
         places: where its parts stand.
         bag: takes the findings.
         partial: missing keys are fine, as in a base that others build on; the model is then None.
+        parameters: `$name` that is left may stand for anything: that there is no such parameter has been said, or a
+            scenario will give it.
     """
     repaired = Repaired(copied(data))
     fill_gaps(repaired, places, bag)
     try:
-        made: M | None = model.model_validate(repaired.data)
+        made: M | None = _made(model, repaired.data)
     except ValidationError as error:
-        _Report(model, repaired, places, bag, partial).add_all(error)
+        _Report(model, repaired, places, bag, partial, parameters).add_all(error)
         made = None
         with suppress(ValidationError):
-            made = model.model_validate(repaired.data)
+            made = _made(model, repaired.data)
     lost = any(_matters(path) for path in repaired.lost)
     kept: Positions = RenamedPlaces(places, repaired.renamed) if repaired.renamed else places
     return Shaped(made, repaired.data, kept, lost)
+
+
+def _made(model: type[M], data: object) -> M:
+    """The model of data; a field that has an alias (`for`, `with`) is known by that alone."""
+    return model.model_validate(data, by_alias=True, by_name=False)
 
 
 _INDIFFERENT: Final = frozenset(
@@ -79,8 +92,8 @@ _INDIFFERENT: Final = frozenset(
 )
 """Keys whose loss makes nothing else in the file wrong."""
 
-_PARAMETER: Final = re.compile(r"\$[A-Za-z_]\w*")
-"""A parameter that is a whole value; known ones have been put in before."""
+PARAMETER: Final = re.compile(r"\$[A-Za-z_]\w*")
+"""A parameter that is a whole value; known ones of scenarios have been put in before."""
 
 
 def _matters(path: DataPath) -> bool:
@@ -102,7 +115,13 @@ class _Report:
     """Words one validation's errors."""
 
     def __init__(
-        self, model: type[BaseModel], repaired: Repaired, places: Positions, bag: DiagnosticBag, partial: bool
+        self,
+        model: type[BaseModel],
+        repaired: Repaired,
+        places: Positions,
+        bag: DiagnosticBag,
+        partial: bool,
+        parameters: bool,
     ) -> None:
         self._model = model
         self._repaired = repaired
@@ -110,6 +129,7 @@ class _Report:
         self._places = places
         self._bag = bag
         self._partial = partial
+        self._parameters = parameters
         self._extra: dict[DataPath, list[str]] = {}
 
     def add_all(self, error: ValidationError) -> None:
@@ -124,6 +144,8 @@ class _Report:
         for (path, about_key), findings in by_path.items():
             if path in deeper and isinstance(findings[0].value, dict) and not about_key:
                 continue  # a mapping was meant, and the findings in it say what is wrong with it
+            if path in deeper and all(_counts_only_right_items(finding) for finding in findings):
+                continue
             self._add(findings)
 
     def _placed(self, error: Any) -> _Finding:
@@ -209,8 +231,8 @@ class _Report:
 
     def _wrong_value(self, findings: list[_Finding]) -> None:
         finding = findings[0]
-        if isinstance(finding.value, str) and _PARAMETER.fullmatch(finding.value):
-            return  # a parameter that does not exist, which has been said, or that a scenario will give
+        if self._parameters and isinstance(finding.value, str) and PARAMETER.fullmatch(finding.value):
+            return
         span = self._places.value_span(finding.path)
         for finding in findings:
             if finding.kind in ("greater_than_equal", "less_than_equal", "greater_than", "less_than"):
@@ -254,6 +276,14 @@ def _has(part: object, step: object) -> bool:
     return isinstance(part, list) and isinstance(step, int) and step < len(part)
 
 
+def _counts_only_right_items(finding: _Finding) -> bool:
+    """Whether a list is said to be too short only because pydantic does not count items that are wrong."""
+    long_enough = isinstance(finding.value, list) and len(finding.value) >= finding.context.get(
+        "min_length", 0
+    )
+    return finding.kind == "too_short" and long_enough
+
+
 def _bound(finding: _Finding) -> str:
     context = finding.context
     if "ge" in context:
@@ -269,6 +299,8 @@ def _length(finding: _Finding) -> str:
     many = "characters" if isinstance(finding.value, str) else "entries"
     if "max_length" in context:
         return f"`{key}` has more than {context['max_length']} {many}"
+    if context["min_length"] > 1:
+        return f"`{key}` has fewer than {context['min_length']} {many}"
     return f"`{key}` is empty"
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, JsonValue, StringConstraints, Tag
 
-from socialai_dsl.schema.base import Model, Word, _as_tuple
+from socialai_dsl.schema.base import WORD_SCHEMA, Model, Word, _as_tuple
 from socialai_dsl.schema.scenario import Primitive
 from socialai_dsl.schema.world import UtteranceGrammar
 
@@ -42,17 +42,17 @@ class Changes(Model):
 class Entry(Changes):
     """A member that the suite changes."""
 
-    scenario: MemberName
+    scenario: MemberName = Field(description="what is played, with variants and parameters")
     name: Word | None = Field(None, description="what the suite calls it; default the scenario's name")
 
 
 class Value(Changes):
     """A value of a parameter in a tree; every other key is a parameter below it, which has a value as well."""
 
-    model_config = ConfigDict(extra="allow")
+    model_config = ConfigDict(extra="allow", json_schema_extra={"propertyNames": WORD_SCHEMA})
     __pydantic_extra__: dict[Word, Values]
 
-    about: str | None = None
+    about: str | None = Field(None, description="one sentence for people")
     scenario: MemberName | None = Field(None, description="what is played; deeper ones replace it")
 
 
@@ -72,7 +72,9 @@ class Split(Model):
     replace: dict[MemberName, MemberName] = Field(
         default_factory=dict, description="member -> what is played in its place"
     )
-    members: MemberNames | None = Field(None, min_length=1, max_length=64)
+    members: MemberNames | None = Field(
+        None, min_length=1, max_length=64, description="all members of this split"
+    )
     only: dict[Word, Labels] | None = Field(
         None, description="parameter: value or values; leaves that have all of them"
     )
@@ -84,10 +86,12 @@ class Split(Model):
 class Suite(Model):
     """Several scenarios with one action space; each episode plays one of them."""
 
-    suite: Word
-    about: str | None = None
-    notes: str | None = None
-    skills: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = ()
+    suite: Word = Field(description="the name of the suite")
+    about: str | None = Field(None, description="one sentence for people")
+    notes: str | None = Field(None, description="more for people")
+    skills: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = Field(
+        (), description="what it asks of an agent, for people"
+    )
     draw: Literal["uniform", "in_sequence"] = Field(
         "uniform", description="uniform: an episode plays one member; in_sequence: all, one after another"
     )

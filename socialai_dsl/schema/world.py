@@ -23,16 +23,16 @@ class Room(Model):
         examples=[[{"lava": "column(W // 2)"}]],
     )
     occlusion: bool = Field(False, description="what is not transparent hides what lies behind it")
-    canvas: Annotated[tuple[int, int], BeforeValidator(_as_tuple)] | None = Field(
-        None, description="[width, height] of the grid the room lies on; default the largest room"
-    )
+    canvas: (
+        Annotated[tuple[int, ...], BeforeValidator(_as_tuple), Field(min_length=2, max_length=2)] | None
+    ) = Field(None, description="[width, height] of the grid the room lies on; default the largest room")
 
 
 class ObjectGroup(Model):
     """An object, or with `count` (or a list in `at`) a group of them."""
 
     type: Word = Field(description="an object type of the prelude", examples=["door"])
-    count: int | None = Field(None, ge=1, le=16)
+    count: int | None = Field(None, ge=1, le=16, description="a group of so many")
     place: Expressions | None = Field(None, description="where it is drawn; a list gives one each")
     at: (
         Annotated[
@@ -73,7 +73,9 @@ CHANNELS: tuple[Channel, ...] = ("type", "color", "status", "orientation", "poin
 class Observe(Model):
     """What the agent perceives; it never changes what happens."""
 
-    npcs: Literal["shown", "hidden"] = "shown"
+    npcs: Literal["shown", "hidden"] = Field(
+        "shown", description="hidden: NPCs are neither seen nor heard nor in the way"
+    )
     image: Literal["end", "before_npcs"] = Field("end", description="when in the step the picture is taken")
     names: Literal["shown", "hidden"] = Field("shown", description="speaker names in what is heard")
     own_voice: bool = Field(False, description="whether the agent hears itself")
@@ -90,10 +92,13 @@ class UtteranceGrammar(Model):
     """What the agent can say: every template with every noun."""
 
     templates: Annotated[tuple[TextLine, ...], BeforeValidator(_as_tuple)] = Field(
-        min_length=1, max_length=64
+        min_length=1,
+        max_length=64,
+        description="texts; <noun> stands for each noun",
+        examples=[["Where is <noun>"]],
     )
     nouns: Annotated[tuple[TextLine | int, ...], BeforeValidator(_as_tuple)] = Field(
-        min_length=1, max_length=256
+        min_length=1, max_length=256, description="what <noun> can be", examples=[["the exit", "the wall"]]
     )
 
     def utterance(self, template: int, noun: int) -> str:

@@ -77,7 +77,8 @@ def room_plan(resolver: Resolver) -> RoomPlan:
     symbols, findings = resolver.symbols, resolver.findings
     room = symbols.scenario.room
     (_, width), (_, height) = symbols.width, symbols.height
-    canvas = room.canvas or (width, height)
+    columns, rows = room.canvas or (width, height)
+    canvas = columns, rows
     if canvas[0] < width or canvas[1] < height:
         message = f"the canvas of {canvas[0]}x{canvas[1]} is smaller than the largest room, {width}x{height}"
         findings.error("S106", message, findings.at(("room", "canvas")))

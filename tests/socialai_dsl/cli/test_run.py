@@ -1,6 +1,7 @@
 """`socialai-run` and `socialai evaluate` from end to end, on a scenario that trains in seconds."""
 
 import json
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.cli.settings import Settings
 from trainer.config import configure, paper_preset
 
+DATA = Path(__file__).parents[2] / "data"
+
 Capture = pytest.CaptureFixture[str]
 
 QUICK = ["--frames", "1500", "--envs", "32", "--eval-episodes", "30", "--device", "cpu"]
@@ -21,9 +24,9 @@ QUICK = ["--frames", "1500", "--envs", "32", "--eval-episodes", "30", "--device"
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> Path:
-    """A folder with the scenario of `socialai new`."""
+    """A folder with a small scenario."""
     monkeypatch.chdir(tmp_path)
-    assert main(["new", "corridor"]) == 0
+    shutil.copy(DATA / "corridor.yaml", "corridor.yaml")
     capsys.readouterr()
     return tmp_path
 

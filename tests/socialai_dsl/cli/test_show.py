@@ -1,11 +1,14 @@
 """`socialai show`: the resolved scenario, its origins, its program."""
 
+import shutil
 from pathlib import Path
 
 import pytest
 import yaml
 
 from socialai_dsl.cli.main import main
+
+DATA = Path(__file__).parents[2] / "data"
 
 Capture = pytest.CaptureFixture[str]
 
@@ -14,7 +17,7 @@ Capture = pytest.CaptureFixture[str]
 def scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     """A scenario from `socialai new` and a variant of it that takes six steps off its time."""
     monkeypatch.chdir(tmp_path)
-    assert main(["new", "corridor"]) == 0
+    shutil.copy(DATA / "corridor.yaml", "corridor.yaml")
     Path("corridor_short.yaml").write_text(
         "variant: short\nof: corridor\nset:\n  horizon: 34\n", encoding="utf-8"
     )

@@ -1,0 +1,39 @@
+"""This module finds the files that commands on files are given: paths, folders of them, standard input."""
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from socialai_dsl.cli.errors import UsageError
+
+if TYPE_CHECKING:
+    from socialai_dsl.source import Source
+
+STDIN: Final = "-"
+
+_SUFFIXES: Final = frozenset({".yaml", ".yml"})
+
+
+def yaml_files(folder: str) -> list[str]:
+    """The YAML files under a folder, sorted.
+
+    Raises:
+        UsageError: there is none.
+    """
+    names = sorted(str(p) for p in Path(folder).rglob("*") if p.suffix in _SUFFIXES and p.is_file())
+    if not names:
+        raise UsageError(f"{folder}: expected scenario files (*.yaml) in this folder, found none")
+    return names
+
+
+def standard_input(name: str) -> Mapping[Path, "Source"]:
+    """The text on standard input as the text of the file called `name`, as `frontend.check` takes it.
+
+    Raises:
+        ScenarioError: it is too large, or no text.
+    """
+    from socialai_dsl.loader.files import display_name, read_stream
+
+    path = Path(name)
+    return {path.resolve(): read_stream(sys.stdin.buffer, display_name(path))}

@@ -1,0 +1,51 @@
+"""Whole files as authors write them: the models, with what the loader resolves before they are made."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from pydantic import Field, JsonValue
+
+from socialai_dsl.schema.base import Model
+from socialai_dsl.schema.behaviour import Npc
+from socialai_dsl.schema.scenario import Scenario
+from socialai_dsl.schema.suite import Suite
+
+_EXTENDS: Final[Any] = Field(
+    None, description="a file of the same kind that this one builds on; keys given here replace or add to its"
+)
+
+
+class ScenarioFile(Scenario):
+    """A scenario, perhaps built on another."""
+
+    extends: str | None = _EXTENDS
+
+
+class NpcFile(Npc):
+    """An NPC in a file of its own, perhaps built on another."""
+
+    extends: str | None = _EXTENDS
+
+
+class SuiteFile(Suite):
+    """A suite, perhaps built on another."""
+
+    extends: str | None = _EXTENDS
+
+
+class VariantFile(Model):
+    """A patch: what is removed from a scenario or suite, then set, then added."""
+
+    variant: str = Field(description="the name of the variant")
+    of: str = Field(description="the file it is a variant of, or `any`", examples=["talkitout.yaml", "any"])
+    about: str | None = Field(None, description="one sentence for people")
+    notes: str | None = Field(None, description="more for people")
+    skills: list[str] = Field(default_factory=list, description="what it asks of an agent, for people")
+    remove: list[str] = Field(
+        default_factory=list, description="paths of what is removed", examples=[["cast.liar"]]
+    )
+    set: dict[str, JsonValue] = Field(
+        default_factory=dict, description="path: value in place of what is there", examples=[{"horizon": 50}]
+    )
+    add: dict[str, JsonValue] = Field(default_factory=dict, description="path: items or keys that are added")

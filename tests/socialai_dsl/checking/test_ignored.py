@@ -1,0 +1,84 @@
+"""Comments silence the warnings they name, on their line, and are not to be idle."""
+
+from pathlib import Path
+
+import pytest
+
+import socialai_dsl as sd
+from socialai_dsl import frontend
+
+SCENARIO = """\
+scenario: a
+horizon: 50
+grammar: {{templates: [Open <noun>], nouns: [sesame]}}
+room: {{size: 6}}
+objects:
+  exit: {{type: door, place: wall(top)}}
+frames:
+  courtesy:
+    states:
+      stranger: {{do: face(agent)}}
+      gone: {{do: wander}}   {comment}
+cast:
+  honest: {{frame: courtesy}}
+  agent: {{}}
+outcome: [{{success: agent.at(exit)}}]
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def codes(name: str) -> list[str]:
+    return [d.code for d in frontend.check(name).diagnostics]
+
+
+@pytest.mark.parametrize(
+    ("comment", "expected"),
+    [
+        ("", ["W306"]),
+        ("# socialai: ignore=W306", []),
+        ("#socialai:ignore = W306 for a variant, which enters it", []),
+        ("# socialai: ignore=W306,W311", ["W008"]),
+        ("# socialai: ignore=W311", ["W306", "W008"]),
+        ("# socialai: ignore=S101", ["W306", "W008"]),
+        ("# socialai: ignore=W008", ["W306", "W008"]),
+        ("# socialai: ignore", ["W306", "W008"]),
+        ("# see also: socialai: ignore=W306", ["W306"]),
+    ],
+)
+def test_a_comment(comment: str, expected: list[str]) -> None:
+    Path("a.yaml").write_text(SCENARIO.format(comment=comment), encoding="utf-8")
+    assert codes("a.yaml") == expected
+    loaded = sd.load("a.yaml")
+    assert [d.code for d in loaded.warnings] == expected
+
+
+def test_errors_are_never_ignored_and_warnings_not_known_are_not_judged() -> None:
+    text = SCENARIO.format(comment="# socialai: ignore=W306").replace("horizon: 50", "horizn: 50")
+    Path("a.yaml").write_text(text.replace("50", "50 # socialai: ignore=S101"), encoding="utf-8")
+    assert codes("a.yaml") == ["S101", "W008"]
+
+
+def test_in_a_file_that_others_build_on() -> None:
+    Path("a.yaml").write_text(SCENARIO.format(comment="# socialai: ignore=W306"), encoding="utf-8")
+    Path("a_lost.yaml").write_text(
+        "variant: a_lost\nof: a.yaml\nadd:\n  frames.courtesy.states:\n"
+        "    lost: {do: stay}  # socialai: ignore=W306\n"
+    )
+    assert codes("a_lost.yaml") == []
+    assert codes("a.yaml+lost") == []
+    Path("base.yaml").write_text(
+        SCENARIO.format(comment="# socialai: ignore=W306").replace("horizon", "abstract: true\nhorizon")
+    )
+    assert codes("base.yaml") == [], "an abstract file has no warnings of its own"
+    Path("heir.yaml").write_text("scenario: heir\nextends: base.yaml\n")
+    assert codes("heir.yaml") == []
+
+
+def test_in_a_suite() -> None:
+    Path("a.yaml").write_text(SCENARIO.format(comment="# socialai: ignore=W306"), encoding="utf-8")
+    Path("all.yaml").write_text("suite: all\nmembers: [a.yaml]   # socialai: ignore=W311\n")
+    assert codes("all.yaml") == ["W008"]
