@@ -17,6 +17,7 @@ _COMMANDS: Final = (
     "run",
     "new",
     "validate",
+    "fmt",
     "schema",
     "show",
     "evaluate",

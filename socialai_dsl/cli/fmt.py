@@ -1,0 +1,98 @@
+"""This module is `socialai fmt`: it rewrites scenario files in one style; their meaning and comments stay."""
+
+import argparse
+import difflib
+import os
+import stat
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from socialai_dsl.cli.errors import Exit
+from socialai_dsl.cli.files import STDIN, standard_input, yaml_files
+from socialai_dsl.cli.terminal import shows_color
+from socialai_dsl.diagnostics import ScenarioError, render_text
+
+if TYPE_CHECKING:
+    from socialai_dsl.source import Source
+
+SUMMARY: Final = "rewrite scenario files in one style; comments stay"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this command."""
+    parser.add_argument(
+        "paths",
+        nargs="+",
+        metavar="PATH",
+        help="a file, a folder, or - for standard input to standard output",
+    )
+    parser.add_argument(
+        "--check", action="store_true", help="write nothing; exit with 1 if a file is not in this style"
+    )
+    parser.add_argument("--diff", action="store_true", help="write nothing; print what would change")
+
+
+def execute(arguments: argparse.Namespace) -> Exit:
+    """Format each file; one that cannot be read as YAML is reported and stays as it is."""
+    changed = failed = 0
+    names = [n for path in arguments.paths for n in (yaml_files(path) if Path(path).is_dir() else [path])]
+    for name in dict.fromkeys(names):
+        try:
+            changed += _format(name, arguments.check, arguments.diff)
+        except ScenarioError as error:
+            failed += 1
+            print(render_text(error.diagnostics, error.sources, shows_color(sys.stderr)), file=sys.stderr)
+    if names != [STDIN]:
+        verb = "would be changed" if arguments.check or arguments.diff else "changed"
+        others = len(dict.fromkeys(names)) - changed - failed
+        broken = f", {failed} cannot be read" if failed else ""
+        print(f"{changed} {verb}, {others} left as they are{broken}", file=sys.stderr)
+    return Exit.FINDINGS if failed or (arguments.check and changed) else Exit.GOOD
+
+
+def _format(name: str, check: bool, diff: bool) -> bool:
+    """Format one file; whether that changes it."""
+    from socialai_dsl.authoring.formatting import formatted
+
+    source, original = _read(name)
+    text = formatted(source)
+    changes = text.encode() != original
+    if diff and changes:
+        old, new = (t.splitlines(keepends=True) for t in (source.text, text))
+        sys.stdout.writelines(difflib.unified_diff(old, new, source.name, source.name))
+    if not check and not diff:
+        if name == STDIN:
+            sys.stdout.write(text)
+        elif changes:
+            _replace(Path(name), text)
+    elif check and changes and not diff:
+        print(source.name)
+    return changes
+
+
+def _read(name: str) -> tuple["Source", bytes]:
+    """A file as text and as it is on the disk."""
+    from socialai_dsl.loader.files import decoded, display_name, read_source
+
+    if name == STDIN:
+        (source,) = standard_input("stdin.yaml").values()
+        return source, source.text.encode()
+    read_source(Path(name))  # says what is wrong with what is no file, or too large to be one
+    original = Path(name).read_bytes()
+    return decoded(original, display_name(Path(name))), original
+
+
+def _replace(path: Path, text: str) -> None:
+    """Replace a file in one go, keeping who may read it; a link stays a link."""
+    path = path.resolve()
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        with open(temporary, "x", encoding="utf-8", newline="\n") as file:
+            os.chmod(temporary, stat.S_IMODE(path.stat().st_mode))
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
