@@ -1,8 +1,8 @@
 """Scenario files in one style: only white space changes, so that meaning and comments stay.
 
 Blocks are indented by two, lists as well; one blank stands after `:`, `,` and `-`, none within brackets; comments stand
-two blanks behind the text or where they stood, if that is further right, or with the lines they precede; no two empty lines
-follow each other. Texts, quotes and line breaks stay as they are written.
+two blanks behind the text or where they stood, if that is further right, or with the lines they precede; no two empty
+lines follow each other. Texts, quotes and line breaks stay as they are written.
 """
 
 from __future__ import annotations

@@ -19,6 +19,7 @@ _COMMANDS: Final = (
     "validate",
     "fmt",
     "schema",
+    "lsp",
     "show",
     "evaluate",
     "play",

@@ -1,0 +1,298 @@
+"""What an editor is told: what a word means, where it is declared, what can be written next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from pydantic import BaseModel
+
+from socialai_dsl.authoring.cursor import Cursor, completion_at, word_at
+from socialai_dsl.authoring.names import Name, frame_of, meant, part_at, visible
+from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
+from socialai_dsl.loader import Data, DataPath, Document
+from socialai_dsl.loader.library import yaml_files
+from socialai_dsl.schema.annotations import annotation_at, literals, model_at
+from socialai_dsl.schema.behaviour import CastGroup
+from socialai_dsl.schema.files import NpcFile, ScenarioFile, SuiteFile, VariantFile
+from socialai_dsl.semantics.signatures import (
+    ACTIVITIES,
+    EFFECTS,
+    PLACES,
+    QUANTIFIERS,
+    SIGNATURES,
+    VALUES,
+    Signature,
+)
+
+_FILES: Final[dict[str, type[BaseModel]]] = {
+    "scenario": ScenarioFile,
+    "npc": NpcFile,
+    "suite": SuiteFile,
+    "variant": VariantFile,
+}
+
+_NAMING_FILES: Final = ("extends", "of", "one_of", "members", "scenario")
+_EXPRESSIONS: Final = frozenset(
+    "when until after for while success failure reward set let define state start range of with earshot locked tagged "
+    "pressed opened color facing at require reachable never width height size count tables name".split()
+)
+_WORDS: Final = {
+    "agent": "the agent, whom a policy plays",
+    "self": "the NPC that follows the frame",
+    "speaker": "who said what is heard",
+    "here": "the cell a place is asked about",
+    "t": "the number of steps so far",
+    "W": "the width of the room, walls included",
+    "H": "the height of the room, walls included",
+    "cells": "the cells of the room without its walls",
+    "colors": "red, green, blue, purple, yellow, grey",
+    "nouns": "the nouns of the grammar",
+    "random": "drawn",
+}
+
+Kind = Literal["key", "name", "verb", "word", "file"]
+
+
+@dataclass(frozen=True)
+class Offer:
+    """Something that can be written: the text, what it is, and one line about it."""
+
+    text: str
+    kind: Kind
+    about: str
+
+
+# -- hover ---------------------------------------------------------------------------------------------------------
+
+
+def explain(document: Document, data: Data, line: int, column: int) -> tuple[str, Cursor] | None:
+    """What the word at a position means, as Markdown, and where it is; None if nothing is known about it.
+
+    Args:
+        document: the file.
+        data: what the file is with everything it builds on, or its own data.
+        line: from 1.
+        column: from 1.
+    """
+    cursor = word_at(document, line, column)
+    if cursor is None:
+        return None
+    about = _about_key(cursor, document.data) if cursor.is_key else None
+    about = about or _about_word(cursor, data)
+    return (about, cursor) if about else None
+
+
+def _about_key(cursor: Cursor, data: Data) -> str | None:
+    model = _model_of(data, cursor.path[:-1])
+    for name, field in model.model_fields.items() if model is not None else ():
+        if cursor.path[-1] == (field.alias or name) and field.description:
+            examples = "".join(f"\n\nfor example `{example}`" for example in (field.examples or [])[:1])
+            return f"**{cursor.path[-1]}**: {field.description}{examples}"
+    return None
+
+
+def _about_word(cursor: Cursor, data: Data) -> str | None:
+    word = cursor.word.removeprefix("$")
+    before = cursor.before + ("$" if cursor.word.startswith("$") else "")
+    for name in [*meant(data, cursor.path, cursor.is_key, before), *_declares(cursor)]:
+        if name.word == word:
+            return f"**{word}**: {name.kind}"
+    for signature in _signatures(cursor):
+        if signature.name == word:
+            return f"**{usage(signature)}**: {signature.doc}"
+    return f"**{word}**: {_WORDS[word]}" if word in _WORDS and not cursor.is_key else None
+
+
+def _declares(cursor: Cursor) -> Iterator[Name]:
+    """The name itself, at the place that declares it."""
+    if cursor.is_key:
+        yield from (name for name in visible(cursor.data, cursor.path) if name.path == cursor.path)
+
+
+def _signatures(cursor: Cursor) -> Iterable[Signature]:
+    """The instructions that a word may be, those that fit its place first."""
+    key = next((step for step in reversed(cursor.path) if isinstance(step, str)), "")
+    table = {"do": ACTIVITIES, "cause": EFFECTS, "place": PLACES}.get(key, VALUES)
+    return (
+        ()
+        if cursor.is_key or (key in ("say", "about", "notes") and "<" not in cursor.before)
+        else (
+            *table.values(),
+            *(s for s in SIGNATURES if s.name not in table),
+        )
+    )
+
+
+def usage(signature: Signature) -> str:
+    """How an instruction is written: `a.next_to(x)`."""
+    subject = "" if signature.subject == "none" else "a."
+    if signature.name in QUANTIFIERS:
+        return f"{signature.name}(d in group where ...)"
+    taken = ["x" if argument in ("entity", "entities") else argument for argument in signature.takes]
+    least = len(taken) - signature.optional
+    taken = taken[:least] + [f"{argument}?" for argument in taken[least:]]
+    return f"{subject}{signature.name}" + (f"({', '.join(taken)})" if taken else "")
+
+
+# -- definitions ---------------------------------------------------------------------------------------------------
+
+
+def declaration(document: Document, data: Data, line: int, column: int) -> DataPath | Path | None:
+    """Where the word at a position is declared: a path in `data`, or a file; None if nowhere."""
+    cursor = word_at(document, line, column)
+    if cursor is None:
+        return None
+    file = _named_file(document, cursor)
+    if file is not None:
+        return file
+    word = cursor.word.removeprefix("$")
+    before = cursor.before + ("$" if cursor.word.startswith("$") else "")
+    names = meant(data, cursor.path, cursor.is_key, before)
+    return next((name.path for name in names if name.word == word), None)
+
+
+def _named_file(document: Document, cursor: Cursor) -> Path | None:
+    key = next((step for step in reversed(cursor.path) if isinstance(step, str)), "")
+    value = part_at(document.data, cursor.path)
+    if document.path is None or cursor.is_key or key not in _NAMING_FILES or not isinstance(value, str):
+        return None
+    name = value.partition("+")[0].partition("?")[0]
+    for candidate in (document.path.parent / name, document.path.parent / f"{name}.yaml"):
+        if candidate.is_file() and len(cursor.path) <= 4:
+            return candidate
+    return None
+
+
+# -- completion ----------------------------------------------------------------------------------------------------
+
+
+def complete(text: str, whole: Data, folder: Path | None, line: int, column: int) -> list[Offer]:
+    """What can be written at a position.
+
+    Args:
+        text: the file as it is now, which need not be YAML.
+        whole: the last data known of it with everything it builds on; None if there was none.
+        folder: where it is.
+        line: from 1.
+        column: from 1.
+    """
+    cursor = completion_at(text, line, column)
+    if cursor is None:
+        return []
+    offers = list(_offers(cursor, whole if whole is not None else cursor.data, folder))
+    unique = {offer.text: offer for offer in reversed(offers)}
+    return [offer for offer in unique.values() if offer.text.startswith(cursor.word.lstrip("$"))][::-1]
+
+
+def _offers(cursor: Cursor, data: Data, folder: Path | None) -> Iterator[Offer]:
+    if cursor.is_key:
+        yield from _keys(cursor, cursor.path[:-1], data)
+        return
+    key = next((step for step in reversed(cursor.path) if isinstance(step, str)), "")
+    if not cursor.before.strip():
+        yield from _keys(cursor, cursor.path, data)
+        root = _root(cursor.data)
+        words = literals(annotation_at(root, cursor.path)) if root is not None else []
+        yield from (Offer(str(word), "word", "") for word in words)
+    if key in _NAMING_FILES and folder is not None and len(cursor.path) <= 4:
+        yield from (Offer(name, "file", "a file beside this one") for name in yaml_files(folder))
+    elif cursor.word.startswith("$"):
+        names = meant(data, cursor.path, False, "$")
+        yield from (Offer(name.word, "name", name.kind) for name in names)
+    elif key == "type":
+        yield from (Offer(name, "word", "an object type") for name in prelude().types)
+    elif key == "grammar":
+        yield from (Offer(name, "word", "a grammar that all can use") for name in shared_grammars())
+    elif key == "hears":
+        yield from _utterances(data)
+    elif key in ("say", "about", "notes", "skills") and cursor.before.rpartition("<")[2].count(">") != 0:
+        return
+    elif key not in ("about", "notes", "skills") and (key != "say" or "<" in cursor.before):
+        yield from _in_expression(cursor, data, key)
+
+
+def _keys(cursor: Cursor, path: DataPath, data: Data) -> Iterator[Offer]:
+    """The keys that the mapping at a path does not have yet."""
+    if cursor.is_key and path[:1] == ("cast",) and path[2:] == ("with",):
+        names = meant(data, (*path, ""), True, "")
+        yield from (Offer(name.word, "key", name.kind) for name in names)
+        return
+    given = part_at(cursor.data, path)
+    model = _model_of(cursor.data, path)
+    for name, field in model.model_fields.items() if model is not None else ():
+        key = field.alias or name
+        if not isinstance(given, dict) or key not in given:
+            yield Offer(key, "key", field.description or "")
+
+
+def _in_expression(cursor: Cursor, data: Data, key: str) -> Iterator[Offer]:
+    if cursor.before.endswith("."):
+        table = EFFECTS if key == "cause" else VALUES
+        subject = cursor.before.removesuffix(".").split(" ")[-1].lstrip("(!<")
+        yield from _verbs(table.values(), _kinds_of(subject, data))
+        return
+    yield from (Offer(n.word, "name", n.kind) for n in meant(data, cursor.path, False, cursor.before))
+    if key in ("goto", "goto_now", "start", "frame", "role", "order", "id") or cursor.before.endswith("is("):
+        return
+    tables: list[dict[str, Signature]] = []
+    tables += [ACTIVITIES] if key == "do" and "(" not in cursor.before else []
+    tables += [PLACES] if key in ("place", "build") else []
+    tables += [VALUES] if key in _EXPRESSIONS or "(" in cursor.before or "<" in cursor.before else []
+    for table in tables:
+        yield from _verbs(table.values(), {"none"} if table is not VALUES else {"none", "own"})
+    if VALUES in tables or key in ("cause", "place"):
+        yield from (Offer(word, "word", about) for word, about in _WORDS.items())
+
+
+def _kinds_of(subject: str, data: Data) -> set[str]:
+    """The kinds of subject that a name before a dot is."""
+    if subject == "agent":
+        return {"entity", "member", "agent", "cell"}
+    if subject == "here":
+        return {"cell"}
+    objects = part_at(data, ("objects",))
+    if isinstance(objects, dict) and subject.partition("[")[0] in objects:
+        return {"entity", "object"}
+    if frame_of(data, subject) is not None or part_at(data, ("cast", subject)) is not None:
+        return {"entity", "member"}
+    return {"entity", "member", "object", "agent"}
+
+
+def _verbs(signatures: Iterable[Signature], subjects: set[str]) -> Iterator[Offer]:
+    for signature in signatures:
+        own = "own" in subjects and signature.subject in ("entity", "member")
+        if signature.subject in subjects or own or (signature.cell and "cell" in subjects):
+            yield Offer(signature.name, "verb", f"{usage(signature)}: {signature.doc}")
+
+
+def _utterances(data: Data) -> Iterator[Offer]:
+    """What the agent can say."""
+    grammar = part_at(data, ("grammar",))
+    if isinstance(grammar, str):
+        grammar = shared_grammars().get(grammar)
+    templates, nouns = (part_at(grammar, (key,)) for key in ("templates", "nouns"))
+    for template in templates if isinstance(templates, list) else ():
+        for noun in nouns if isinstance(nouns, list) else ():
+            yield Offer(str(template).replace("<noun>", str(noun)), "word", "what the agent can say")
+
+
+def _root(data: Data) -> type[BaseModel] | None:
+    """The model of a whole file."""
+    if not isinstance(data, dict):
+        return None
+    if "library" in data:
+        return GrammarLibrary if data["library"] == "grammars" else ObjectLibrary
+    return next((model for kind, model in _FILES.items() if kind in data), None)
+
+
+def _model_of(data: Data, path: DataPath) -> Any:
+    """The model of the mapping at a path; of a member of the cast, that of a group of them."""
+    root = _root(data)
+    if root is None:
+        return ScenarioFile if not path else None
+    if root is ScenarioFile and len(path) == 2 and path[0] == "cast" and path[1] != "agent":
+        return CastGroup
+    return model_at(root, path)

@@ -1,0 +1,26 @@
+"""This module is `socialai lsp`: a language server for editors, on standard input and output."""
+
+import argparse
+from typing import Final
+
+from socialai_dsl.cli.errors import Exit, UsageError
+
+SUMMARY: Final = "run the language server for editors, on standard input and output"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this command."""
+    parser.add_argument("--stdio", action="store_true", help="what editors ask for; the only way there is")
+
+
+def execute(arguments: argparse.Namespace) -> Exit:
+    """Serve until the editor says goodbye."""
+    del arguments
+    try:
+        from socialai_dsl.authoring.server import make_server
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] not in ("pygls", "lsprotocol"):
+            raise
+        raise UsageError("the language server needs pygls: pip install 'socialai-dsl[lsp]'") from None
+    make_server().start_io()
+    return Exit.GOOD

@@ -1,0 +1,130 @@
+"""What can be written at a place, also while the file is no YAML; what a word means."""
+
+from pathlib import Path
+
+import pytest
+
+from socialai_dsl.authoring.assist import complete, explain, usage
+from socialai_dsl.loader import read_document
+from socialai_dsl.semantics.signatures import SIGNATURES
+from socialai_dsl.source import Source
+from tests.socialai_dsl.authoring.marked import marked
+
+TEXT = """\
+scenario: a
+grammar: {templates: [Where is <noun>], nouns: [the exit]}
+objects:
+  exit: {type: door, place: wall(top)}
+let:
+  shade: exit.color
+frames:
+  duty:
+    states:
+      waiting:
+        do: face(agent)
+        then: [{hears: Where is the exit, say: There., goto: content}]
+      content: {}
+cast:
+  ann: {frame: duty}
+  agent: {}
+outcome:
+  - success: agent.at(exit)
+"""
+
+
+def offered(text: str, folder: Path | None = None) -> list[str]:
+    plain, line, column = marked(text)
+    whole = read_document(Source("", TEXT)).data
+    return [offer.text for offer in complete(plain, whole, folder, line, column)]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("  - success: agent.at(exit)", "  - ^", "failure"),
+        ("  - success: agent.at(exit)", "  - success: agent.did(don^", None),
+        ("  - success: agent.at(exit)", "  - success: ag^", "agent"),
+        ("success: agent.at(exit)", "success: agent.at(exit) and ann.^", "sees"),
+        ("do: face(agent)", "do: fa^", "face"),
+        ("do: face(agent)", "do: face(^", "agent"),
+        ("do: face(agent)", "d^", "do"),
+        ("goto: content}]", "^", "goto_now"),
+        ("goto: content}]", "goto: c^", "content"),
+        ("say: There.", "say: The <^", "shade"),
+        ("say: There.", "say: The <exit.c^", "color"),
+        ("hears: Where is the exit", "hears: ^", "Where is the exit"),
+        ("type: door", "type: sw^", "switch"),
+        ("frame: duty", "frame: ^", "duty"),
+        ("ann: {frame: duty}", "ann: {frame: duty, co^}", "count"),
+        ("agent: {}", "agent: {pl^}", "place"),
+        ("place: wall(top)", "place: le^", "left_half"),
+        ("grammar: {", "hor^\ngrammar: {", "horizon"),
+        ("outcome:", "observe: {npcs: ^}\noutcome:", "hidden"),
+        ("outcome:", "actions: [t^]\noutcome:", "toggle"),
+    ],
+)
+def test_completion(old: str, new: str, expected: str | None) -> None:
+    assert old in TEXT
+    found = offered(TEXT.replace(old, new, 1))
+    if expected is not None:
+        assert expected in found
+
+
+def test_no_prose_is_completed() -> None:
+    assert offered(TEXT.replace("objects:", "about: The ^\nobjects:")) == []
+    assert offered(TEXT.replace("say: There.", "say: Th^")) == []
+
+
+def test_keys_that_are_there_are_not_offered() -> None:
+    found = offered(TEXT.replace("say: There.,", "^,"))
+    assert "say" in found
+    assert "hears" not in found
+    assert "goto" not in found
+
+
+def test_files_beside(tmp_path: Path) -> None:
+    (tmp_path / "base.yaml").write_text("")
+    assert "base.yaml" in offered("scenario: a\nextends: b^\n", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("face(agent)", "fa^ce(agent)", "turn towards x"),
+        ("do: face", "d^o: face", "an activity"),
+        ("agent.at(exit)", "agent.a^t(exit)", "on the same cell"),
+        ("agent.at(exit)", "agent.at(ex^it)", "an object"),
+        ("exit.color", "exit.co^lor", "its colour"),
+        ("  shade:", "  sh^ade:", "drawn or computed once per episode"),
+        ("frame: duty", "fr^ame: duty", "the frame it follows"),
+        ("frame: duty", "frame: d^uty", "a frame"),
+    ],
+)
+def test_hover(old: str, new: str, expected: str) -> None:
+    plain, line, column = marked(TEXT.replace(old, new, 1))
+    document = read_document(Source("a.yaml", plain))
+    found = explain(document, document.data, line, column)
+    assert found is not None
+    assert expected in found[0]
+
+
+def test_nothing_is_said_about_prose() -> None:
+    plain, line, column = marked(TEXT.replace("say: There.", "say: Th^ere."))
+    document = read_document(Source("a.yaml", plain))
+    assert explain(document, document.data, line, column) is None
+
+
+def test_every_position_is_survived() -> None:
+    """Completion and hover at each place of a file, and of one cut off there."""
+    document = read_document(Source("a.yaml", TEXT))
+    lines = TEXT.split("\n")
+    for number, content in enumerate(lines, 1):
+        for column in range(1, len(content) + 2, 3):
+            explain(document, document.data, number, column)
+            cut = "\n".join([*lines[: number - 1], content[: column - 1]])
+            complete(cut, document.data, None, number, column)
+    assert complete(TEXT, None, None, 99, 1) == []
+
+
+def test_every_instruction_has_a_usage() -> None:
+    assert {signature.name for signature in SIGNATURES if signature.name not in usage(signature)} == set()
