@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,7 +12,7 @@ from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
 from pygls.workspace import TextDocument
 
-from socialai_dsl import __version__, frontend
+from socialai_dsl import frontend
 from socialai_dsl.authoring import assist
 from socialai_dsl.authoring.formatting import formatted
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity
@@ -36,7 +37,7 @@ class Server(LanguageServer):
     """Checks open files as they are in the editor, and remembers how each last could be read."""
 
     def __init__(self) -> None:
-        super().__init__("socialai", __version__)
+        super().__init__("socialai", version("socialai-dsl"))
         self._resolved: dict[str, Resolved] = {}
 
     # -- findings ----------------------------------------------------------------------------------------------
