@@ -15,6 +15,7 @@ from socialai_dsl.checking import (
     check_scenario,
     check_suite,
     naming_the_patch,
+    said_once,
 )
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity
 from socialai_dsl.loader import Resolved, resolve
@@ -89,9 +90,10 @@ def check(name: str | Path) -> CheckResult:
     bag = DiagnosticBag()
     if resolved.kind == "suite":
         suite = check_suite(resolved, bag)
-        return CheckResult(name, None, None, tuple(bag), dict(resolved.files), resolved, suite)
+        once = tuple(said_once(bag))
+        return CheckResult(name, None, None, once, dict(resolved.files), resolved, suite)
     checked, scenario = _checked(resolved, bag)
-    found = DiagnosticBag(naming_the_patch(d, resolved) for d in bag)
+    found = DiagnosticBag(naming_the_patch(d, resolved) for d in said_once(bag))
     return CheckResult(name, checked, scenario, tuple(found), dict(resolved.files), resolved)
 
 
