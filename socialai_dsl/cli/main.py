@@ -10,8 +10,8 @@ from typing import Final
 from socialai_dsl.cli import (
     bench,
     check,
-    coverage,
     codes,
+    coverage,
     curves,
     evaluate,
     fidelity,

@@ -59,10 +59,30 @@ def _keys() -> Iterator[str]:
         yield _one_line(model.__doc__ or "") + "\n"
         yield "| key | value | default | meaning |\n|---|---|---|---|"
         for name, field in _fields(model):
-            value = _value(field.annotation, field)
+            value = _AS_WRITTEN.get((called, name)) or _value(field.annotation, field)
             meaning = _cell(field.description or "")
             yield f"| `{field.alias or name}` | {value} | {_default(field)} | {meaning} |"
+        yield from _READ_BEFORE.get(called, ())
         yield ""
+
+
+_AS_WRITTEN: Final = {
+    ("a member of the cast", "one_of"): "a file, or a list",
+    ("an npc file", "one_of"): "a file, or a list",
+    ("a scenario", "grammar"): "[a grammar](#grammar), or the name of [a shared one](#shared-grammars)",
+}
+"""What authors write where the models see something else."""
+
+_EXTENDS: Final = "| `extends` | a file |  | the file it builds on; its own keys win |"
+_READ_BEFORE: Final = {
+    "a scenario": (_EXTENDS,),
+    "an npc file": (_EXTENDS,),
+    "a member of the cast": (
+        "| `count` | a whole number, 1 to 16 |  | makes a group; `name`, `color`, `place`, `facing`, `at` may then be "
+        "lists |",
+    ),
+}
+"""Keys that are gone when the models see a file."""
 
 
 def _fields(model: type) -> list[tuple[str, "FieldInfo"]]:

@@ -34,7 +34,8 @@ def test_every_key_has_a_row_under_its_model(printed: str) -> None:
     sections = printed.split("\n### ")[1:]
     for section, model in zip(sections, CALLED, strict=False):
         rows = re.findall(r"^\| `([^`]+)` \|", section.split("\n## ")[0], re.MULTILINE)
-        assert rows == keys_of(model), section.splitlines()[0]
+        assert rows[: len(keys_of(model))] == keys_of(model), section.splitlines()[0]
+        assert set(rows[len(keys_of(model)) :]) <= {"extends", "count"}
 
 
 def test_every_word_has_a_row(printed: str) -> None:
