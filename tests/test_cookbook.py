@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 import socialai_dsl
+from socialai_dsl.cli import main
 from socialai_dsl.frontend import check
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -44,3 +45,11 @@ def test_the_page_shows_every_file() -> None:
     shown = re.findall(r"^```\{literalinclude\} (\S+)$", page, re.MULTILINE)
     assert sorted(shown) == [str(path.relative_to(DOCS)) for path in FILES]
     assert len(re.findall("^## ", page, re.MULTILINE)) == 15
+
+
+@pytest.mark.slow
+def test_what_the_recipes_claim_holds(capsys: pytest.CaptureFixture[str]) -> None:
+    """In many rooms."""
+    claiming = [str(path) for path in PLAYED if "\ncheck: [{" in path.read_text(encoding="utf-8")]
+    assert len(claiming) >= 15
+    assert main.main(["check", *claiming, "--rooms", "300", "--strict"]) == 0, capsys.readouterr().out
