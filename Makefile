@@ -10,7 +10,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 ARGS ?=
 
-.PHONY: help run test test-long lint format bench fidelity update-goldens clean
+.PHONY: help run test test-long lint format bench docs fidelity update-goldens clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -38,6 +38,10 @@ bench: $(STAMP) ## measure the engine's speed on this machine
 
 fidelity: $(STAMP) ## compare the scenarios with the paper's code, under a random policy; writes docs/fidelity.md
 	$(BIN)/socialai fidelity --write docs/fidelity.md $(ARGS)
+
+docs: $(STAMP) ## build the pages of docs/ as a site, in build/site
+	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[docs]'
+	$(BIN)/python -m sphinx -q -W -n --keep-going docs build/site
 
 update-goldens: $(STAMP) ## rewrite the golden files; review the diff before committing it
 	$(BIN)/python -m pytest --update-goldens $(ARGS)

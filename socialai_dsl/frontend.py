@@ -15,6 +15,7 @@ from socialai_dsl.checking import (
     check_scenario,
     check_suite,
     naming_the_patch,
+    said_once,
     sift,
 )
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity
@@ -98,9 +99,11 @@ def check(name: str | Path, texts: Mapping[Path, Source] | None = None) -> Check
     bag = DiagnosticBag()
     if resolved.kind == "suite":
         suite = check_suite(resolved, bag)
-        return _sifted(CheckResult(name, None, None, tuple(bag), dict(resolved.files), resolved, suite))
+        return _sifted(
+            CheckResult(name, None, None, tuple(said_once(bag)), dict(resolved.files), resolved, suite)
+        )
     checked, scenario = _checked(resolved, bag)
-    found = tuple(DiagnosticBag(naming_the_patch(d, resolved) for d in bag))
+    found = tuple(DiagnosticBag(naming_the_patch(d, resolved) for d in said_once(bag)))
     return _sifted(CheckResult(name, checked, scenario, found, dict(resolved.files), resolved))
 
 

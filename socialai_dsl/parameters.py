@@ -45,8 +45,8 @@ def _values(resolved: Resolved, bag: DiagnosticBag) -> dict[str, Value]:
     declared = _declared(resolved)
     values: dict[str, Value] = {}
     for name, declaration in declared.items():
-        default = declaration.get("default") if isinstance(declaration, dict) else declaration
-        choices = declaration.get("values") if isinstance(declaration, dict) else None
+        default = _entry(declaration, "default") if isinstance(declaration, dict) else declaration
+        choices = _entry(declaration, "values") if isinstance(declaration, dict) else None
         if default is not None and choices is not None:
             default = _chosen(name, default, choices, resolved, bag)
         if name in resolved.params:
@@ -64,8 +64,15 @@ def _values(resolved: Resolved, bag: DiagnosticBag) -> dict[str, Value]:
 
 def _declared(resolved: Resolved) -> dict[str, Data]:
     assert isinstance(resolved.data, dict), "internal: a file is a mapping"
-    declared = resolved.data.get("params")
+    declared = _entry(resolved.data, "params")
     return declared if isinstance(declared, dict) else {}
+
+
+def _entry(mapping: Mapping[str, Data], key: str) -> Data:
+    """The value of a key, also of one that is misspelt: the models report that, and no parameter is unknown for it."""
+    if key in mapping:
+        return mapping[key]
+    return next((value for word, value in mapping.items() if did_you_mean(word, [key])), None)
 
 
 def _chosen(name: str, default: Data, choices: Data, resolved: Resolved, bag: DiagnosticBag) -> Data:

@@ -3,6 +3,7 @@
 from socialai_dsl.checking.ignored import sift
 from socialai_dsl.checking.libraries import check_library, check_npc
 from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite, Start
+from socialai_dsl.checking.repetitions import said_once
 from socialai_dsl.checking.scenarios import check_scenario, naming_the_patch
 from socialai_dsl.checking.suites import check_suite
 
@@ -16,5 +17,6 @@ __all__ = [
     "check_scenario",
     "check_suite",
     "naming_the_patch",
+    "said_once",
     "sift",
 ]

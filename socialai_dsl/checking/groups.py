@@ -55,6 +55,7 @@ def spread(
             message = f"`{name}` is not a name"
             hint = "a group is written once, with `count:`"
             bag.error("S104", message, places.key_span(("cast", name)), hint=hint)
+        member = _with_one_frame(name, member, places, bag)
         if not isinstance(member, dict) or "count" not in member or name == _AGENT:
             written[name] = _alone(name, member, places, bag)
             continue
@@ -67,6 +68,28 @@ def spread(
     spread_places = _SpreadPlaces(places, origins)
     moved = {copy for copy in _all_paths(written) if spread_places.written(copy) in paths}
     return Spread({**data, "cast": written}, spread_places, paths | moved)
+
+
+def _with_one_frame(name: str, member: object, places: Positions, bag: DiagnosticBag) -> object:
+    """A member that is given several frames with the first of them only."""
+    if not isinstance(member, dict):
+        return member
+    for key in ("frames", "frame"):
+        given = member.get(key)
+        if not isinstance(given, list):
+            continue
+        made = {other: value for other, value in member.items() if other != key}
+        words = [str(word) for word in given]
+        if len(words) > 1:
+            message = f"`{words[0]}` and `{words[1]}` would both move `{name}`: a member follows one frame"
+            hint = "join them in one frame, or let two members follow them"
+            bag.error("S313", message, places.value_span(("cast", name, key, 1)), hint=hint)
+        else:
+            hint = f"write `frame: {words[0]}`" if words else "leave it out: without a frame it stays"
+            message = "`frame` names one frame, here is a list"
+            bag.error("S104", message, places.value_span(("cast", name, key)), hint=hint)
+        return {**made, "frame": words[0]} if words else made
+    return member
 
 
 def _alone(name: str, member: object, places: Positions, bag: DiagnosticBag) -> object:

@@ -14,8 +14,26 @@ from socialai_dsl.schema.shape import Shaped, model_of
 from socialai_dsl.semantics.check import check_meaning
 from socialai_dsl.semantics.terms import Checked
 
+_OF_THE_GRAMMAR = frozenset({"S401", "S402"})
+"""What may be wrong because a patch changed the grammar."""
+
 _MAY_FOLLOW = frozenset(
-    {"S105", "S201", "S204", "S205", "S206", "S301", "S302", "S303", "S305", "S310", "S401", "S402"}
+    {
+        "S105",
+        "S201",
+        "S204",
+        "S205",
+        "S206",
+        "S213",
+        "S301",
+        "S302",
+        "S303",
+        "S305",
+        "S310",
+        "S315",
+        "S401",
+        "S402",
+    }
 )
 """What may be wrong only because a part of the file was left out, which has been reported."""
 
@@ -114,6 +132,9 @@ def naming_the_patch(finding: Diagnostic, resolved: Resolved) -> Diagnostic:
     """A mistake in a patched scenario says what it was patched by, since its file alone may be right."""
     if not resolved.edits or finding.severity is not Severity.ERROR:
         return finding
-    patches = sorted({edit.span.file for edit in resolved.edits})
-    note = f"in `{resolved.name}`, patched by {', '.join(patches)}"
+    edits = (
+        [e for e in resolved.edits if e.path.startswith("grammar")] if finding.code in _OF_THE_GRAMMAR else []
+    )
+    patches = {f"{e.span.file}:{e.span.line}" for e in edits} or {e.span.file for e in resolved.edits}
+    note = f"in `{resolved.name}`, patched by {', '.join(sorted(patches))}"
     return replace(finding, hint=f"{finding.hint}; {note}" if finding.hint else note)

@@ -20,7 +20,7 @@ def check_suite(resolved: Resolved, bag: DiagnosticBag) -> LoadedSuite | None:
     """A suite with its members; None if something is wrong with it or with one of them. `bag` takes the findings."""
     own = DiagnosticBag()
     suite = _right_shape(resolved, own)
-    members = _members(resolved, own) if suite is not None else ()
+    members = _members(suite, resolved, own) if suite is not None else ()
     loaded = _loaded(suite, members, bag) if suite is not None else ()
     made = None
     if suite is not None and not bag.has_errors:
@@ -55,7 +55,6 @@ def _right_shape(resolved: Resolved, own: DiagnosticBag) -> Suite | None:
         return None
     if not _is_of_one_kind(shaped.model, resolved, own):
         return None
-    _check_splits(shaped.model, resolved, own)
     return shaped.model
 
 
@@ -148,18 +147,26 @@ class _Found:
             draft = draft.with_horizon(horizon)
         checked = meaning_of(draft, self.own) if draft is not None else None
         findings = tuple(naming_the_patch(finding, self.member.scenario) for finding in self.own)
-        bag.extend(findings)
+        # What is wrong with a part that members share is said once, though each names the patches of its own.
+        said = {(d.code, d.span, d.text) for d in bag}
+        bag.extend(d for d in findings if (d.code, d.span, d.text) not in said)
         if checked is None or draft is None:
             return None
         return LoadedScenario(checked.name, checked, draft.scenario, self.member.scenario, findings)
 
 
-def _members(resolved: Resolved, own: DiagnosticBag) -> Sequence[Member]:
+def _members(suite: Suite, resolved: Resolved, own: DiagnosticBag) -> Sequence[Member]:
+    """The members, which `own` says what is wrong with, as with the splits and sweeps that name them."""
+    about = DiagnosticBag()
+    _check_splits(suite, resolved, about)
     try:
         members = resolved.members()
     except ScenarioError as error:
         own.extend(error.diagnostics)
+        misspelt = [d.message for d in error.diagnostics]
+        own.extend(d for d in about if not any(f"`{d.suggestion}`" in message for message in misspelt))
         return ()
+    own.extend(about)
     seen: set[str] = set()
     for member in members:
         if member.name in seen:

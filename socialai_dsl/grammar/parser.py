@@ -228,7 +228,7 @@ def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
     assert isinstance(error, UnexpectedToken), "internal: an unknown kind of lark error"
     token, offset = error.token, error.token.start_pos or 0
     if token.type == "CMP" and "CMP" not in error.expected:
-        return ParseProblem("S207", "comparisons do not chain: write `a < b and b < c`", offset)
+        return ParseProblem("S207", f"comparisons do not chain: write `{_unchained(text, offset)}`", offset)
     if text.startswith("||", offset - 1):
         return _wrong_symbol(text, offset - 1)
     if token.type == "WHERE":
@@ -239,6 +239,41 @@ def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
     if token.type == "NAME":
         hint = "between two names stands a dot, an operator, or a word such as `and`: `agent.next_to(exit)`"
     return ParseProblem("S210", f"did not expect `{token}` here", offset, hint)
+
+
+_WORDS = re.compile(r"\"[^\"]*\"|[<>=!]=|[<>()]|,|\b(?:and|or|not|where|to)\b|[^<>=!()\",\s]+|\s+|.")
+"""The pieces of an expression, as far as they say where a comparison begins and ends."""
+
+_COMPARES = frozenset({"==", "!=", "<=", ">=", "<", ">"})
+_BOUNDS = frozenset({"and", "or", "not", "where", "to", ","})
+
+
+def _unchained(text: str, offset: int) -> str:
+    """`a < b and b < c` for the chain `a < b < c` whose second comparison stands at `offset`."""
+    pieces = [(found.start(), found.group()) for found in _WORDS.finditer(text)]
+    second = next(i for i, (start, _) in enumerate(pieces) if start == offset)
+    first = _same_level(pieces, second, -1, _COMPARES)
+    left = _same_level(pieces, first, -1, _BOUNDS)
+    right = _same_level(pieces, second, 1, _BOUNDS | _COMPARES)
+
+    def words(begin: int, end: int) -> str:
+        return " ".join("".join(piece for _, piece in pieces[begin:end]).split())
+
+    shared = words(first + 1, second)
+    return f"{words(left + 1, second)} and {shared} {words(second, right)}"
+
+
+def _same_level(pieces: list[tuple[int, str]], start: int, step: int, ends: frozenset[str]) -> int:
+    """The first of `ends` on one side of `start` that is not in brackets; else the bracket around, or the end."""
+    opening, closing = ("(", ")") if step > 0 else (")", "(")
+    depth, i = 0, start + step
+    while 0 <= i < len(pieces):
+        piece = pieces[i][1]
+        if depth == 0 and (piece in ends or piece == closing):
+            return i
+        depth += (piece == opening) - (piece == closing)
+        i += step
+    return i
 
 
 _NUMBERED = re.compile(r"(?<=\w)\[\s*\d+\s*\]")

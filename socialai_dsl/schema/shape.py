@@ -20,9 +20,10 @@ from socialai_dsl.schema.annotations import (
     literals,
     model_at,
 )
-from socialai_dsl.schema.behaviour import State, ThenRule
+from socialai_dsl.schema.behaviour import Npc, State, ThenRule
 from socialai_dsl.schema.positions import DataPath, Positions
 from socialai_dsl.schema.repair import RenamedPlaces, Repaired, copied, fill_gaps
+from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.source import Span
 
 M = TypeVar("M", bound=BaseModel)
@@ -91,6 +92,9 @@ _INDIFFERENT: Final = frozenset(
     "image names own_voice canvas actions do".split()
 )
 """Keys whose loss makes nothing else in the file wrong."""
+
+_BUILDING: Final = (Scenario, Npc)
+"""What can build on another file."""
 
 PARAMETER: Final = re.compile(r"\$[A-Za-z_]\w*")
 """A parameter that is a whole value; known ones of scenarios have been put in before."""
@@ -184,6 +188,8 @@ class _Report:
         span = self._places.key_span(finding.path)
         owner = model_at(self._model, finding.path[:-1])
         known = keys_of(owner) if owner is not None else []
+        if owner in _BUILDING:
+            known = [*known, "extends"]  # which is gone when the models see a file
         called = CALLED.get(owner, "this mapping") if owner is not None else "this mapping"
         if owner is ThenRule and key == "do":
             message = "the body has already moved when `then` is read: put `do` in the state or in `first`"
@@ -192,7 +198,7 @@ class _Report:
         else:
             near = did_you_mean(key, known)
             self._unknown_word(key, owner, called, known, near, span)
-        if near is None or not self._repaired.rename(finding.path, near):
+        if near is None or near == "extends" or not self._repaired.rename(finding.path, near):
             self._repaired.leave_out(finding.path)
 
     def _unknown_word(
@@ -212,8 +218,13 @@ class _Report:
 
     def _missing_key(self, finding: _Finding) -> None:
         key, parent = str(finding.path[-1]), finding.path[:-1]
-        if self._partial or any(did_you_mean(extra, [key]) for extra in self._extra.get(parent, ())):
+        extra = self._extra.get(parent, ())
+        if self._partial or any(did_you_mean(word, [key]) for word in extra):
             return
+        if finding.path in self._repaired.lost:
+            return  # it is there without a value, which has been reported
+        if any(did_you_mean(word, ["extends"]) for word in self._extra.get((), ())):
+            return  # the file it builds on may have it
         owner = model_at(self._model, parent)
         called = CALLED.get(owner, "this mapping") if owner is not None else "this mapping"
         if parent:

@@ -20,16 +20,29 @@ _TAKES_AWAY: Final = {"at": 1, "in_front_of": 1, "next_to": 4}
 
 def check_placements(checked: Checked, findings: Findings) -> None:
     """Report S601: an error where no room of a size has a cell for something, a warning where some may have none."""
-    reported: set[int] = set()
+    certain: dict[str, tuple[Placing, Size, Sequence[int]]] = {}
+    possible: dict[str, tuple[Placing, Size, Sequence[int]]] = {}
     for size in product(_sizes(checked.room.width), _sizes(checked.room.height)):
         room = _Room(checked, size)
+        crowded = False
         for number, placing in enumerate(room.placings):
-            if number in reported or _is_sure(placing):
+            key = checked.entities[placing.entity].key
+            if key in certain or _is_sure(placing):
                 continue
             most, least = room.cells_for(number)
-            if most == 0 or least <= 0:
-                reported.add(number)
-                _report(checked, findings, placing, size, [] if most == 0 else room.rivals(number))
+            if least > 0:
+                continue
+            rivals: Sequence[int] = room.rivals(number) if room.has_cells(number) else ()
+            if rivals and crowded:
+                continue  # for want of the same cells
+            if most == 0:
+                certain[key] = (placing, size, rivals)
+                crowded = crowded or bool(rivals)
+            else:
+                possible.setdefault(key, (placing, size, rivals))
+    # Once for a group, of which the last ones lack a cell.
+    for key, (placing, size, rivals) in (possible | certain).items():
+        _report(checked, findings, placing, size, rivals, key in certain)
 
 
 def _is_sure(placing: Placing) -> bool:
@@ -42,17 +55,24 @@ def _sizes(bounds: tuple[int, int]) -> range:
 
 
 def _report(
-    checked: Checked, findings: Findings, placing: Placing, size: Size, rivals: Sequence[int]
+    checked: Checked,
+    findings: Findings,
+    placing: Placing,
+    size: Size,
+    rivals: Sequence[int],
+    certain: bool,
 ) -> None:
-    """`rivals` may take its cells; without any it has none in the first place."""
+    """`rivals` may take its cells, or are certain to."""
     name = _called(checked, placing.entity)
     where = f"a room of {size[0]}x{size[1]}"
-    if not rivals:
-        message = f"`{name}` has no free cell in {where}"
-        findings.error("S601", message, placing.span, hint="widen its place, or the room")
+    before = ", ".join(f"`{key}`" for key in dict.fromkeys(checked.entities[number].key for number in rivals))
+    if certain:
+        taken = f"; {before} take all there are" if before else ""
+        message = f"`{name}` has no free cell in {where}{taken}"
+        report = findings.warning if before else findings.error
+        report("S601", message, placing.span, hint="widen its place, or the room")
         return
     message = f"`{name}` can be left without a free cell in {where}"
-    before = ", ".join(f"`{key}`" for key in dict.fromkeys(checked.entities[number].key for number in rivals))
     hint = f"{before} may take all of its place; place it earlier (`order:`), or widen its place"
     findings.warning("S601", message, placing.span, hint=hint)
 
@@ -89,7 +109,31 @@ class _Room:
             least = len(kept)
         if least == 0:
             return 0, 0
-        return len(kept) if cells is not None else least, least - excluded - len(self.rivals(number))
+        rivals = self.rivals(number)
+        if cells is None:
+            return least, least - excluded - len(rivals)
+        most = len(kept) - (self._surely_taken(number, kept) if len(rivals) >= len(kept) else 0)
+        return max(0, most), least - excluded - len(rivals)
+
+    def _surely_taken(self, number: int, cells: set[Cell]) -> int:
+        """How many of these cells are taken in every room: what must be on one of them is on one of its own."""
+        return sum(
+            self._is_within(other, cells) and self.cells_for(earlier)[1] > 0
+            for earlier, other in enumerate(self.placings[:number])
+            if not (_is_sure(other) or other.overlap)
+        )
+
+    def _is_within(self, placing: Placing, cells: set[Cell]) -> bool:
+        try:
+            return self._homes(placing) <= cells
+        except UnknownError:
+            return False
+
+    def has_cells(self, number: int) -> bool:
+        """Whether an empty room has a cell for a placement."""
+        placing = self.placings[number]
+        cells, least = self._region_cells(placing)
+        return least > 0 and (cells is None or bool(self._conditions(placing.where, cells)[0]))
 
     def rivals(self, number: int) -> list[int]:
         """The entities that are put down before and may lie on a cell of this placement."""

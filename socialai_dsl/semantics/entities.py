@@ -87,8 +87,7 @@ def symbols_of(
         count = _count(group.count, group.at)
         type_ = types.get(group.type)
         if type_ is None:
-            _unknown_type(group.type, types, findings, ("objects", name, "type"))
-            type_ = next(iter(types.values()))
+            type_ = _probably(group.type, types, findings, ("objects", name, "type"))
         type_ = _own_type(type_, group)
         objects[name] = Objects(name, type_, range(following, following + (count or 1)), count is None)
         following += count or 1
@@ -162,12 +161,14 @@ def _count(count: int | None, at: Items[object] | None) -> int | None:
     return count
 
 
-def _unknown_type(name: str, types: Mapping[str, ObjectType], findings: Findings, path: DataPath) -> None:
+def _probably(name: str, types: Mapping[str, ObjectType], findings: Findings, path: DataPath) -> ObjectType:
+    """The type that was meant by a name that is none, which is reported."""
     near = did_you_mean(name, types)
     hint = None if near else "types are " + ", ".join(types)
     findings.error(
         "S309", f"unknown object type `{name}`", findings.at(path, 0, len(name)), suggestion=near, hint=hint
     )
+    return types[near] if near else next(iter(types.values()))
 
 
 def _defines(written: Mapping[str, object], path: DataPath, findings: Findings) -> dict[str, Define]:

@@ -11,7 +11,7 @@ from socialai_dsl.schema import Property
 from socialai_dsl.schema.base import Expression
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.build import draws, walk
-from socialai_dsl.semantics.findings import dotted, surviving
+from socialai_dsl.semantics.findings import FailedError, dotted, surviving
 from socialai_dsl.semantics.scope import at_every_step, reset_scope
 from socialai_dsl.semantics.terms import (
     BOOL,
@@ -153,6 +153,8 @@ class _Entry:
 
     def _let(self, path: DataPath, word: str, lets: dict[str, Drawn]) -> str:
         if f"let.{word}" not in lets:
+            if word in self._resolver.symbols.scenario.let and self._findings.bag.has_errors:
+                raise FailedError  # its value means nothing, which has been reported
             near = did_you_mean(word, [known.removeprefix("let.") for known in lets])
             message = f"`{word}` is not drawn in `let`"
             raise self._findings.fail(

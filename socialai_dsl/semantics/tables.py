@@ -77,7 +77,10 @@ def _no_key(
         hint = None if near else "it has " + ", ".join(keys)
         message = f"the table `{name}` has no `{word}`"
         return resolver.fail("S402", message, node, scope, suggestion=near, hint=hint)
-    message = f"`{quoted(node)}` can be {word}, which the table `{name}` does not have"
+    lacks = f" can be {word}, which the table `{name}` does not have"
+    if any(finding.message.endswith(lacks) for finding in resolver.findings.bag):
+        return FailedError()  # wherever else it is looked up, that is no other mistake
+    message = f"`{quoted(node)}`{lacks}"
     hint = f"it has `{near}`; is that meant?" if near else "it has " + ", ".join(keys)
     return resolver.fail("S402", message, node, scope, hint=hint)
 

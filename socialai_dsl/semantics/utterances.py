@@ -51,6 +51,7 @@ class Utterances:
         self._resolver = resolver
         self._grammar = grammar
         self._pairs: dict[str, set[tuple[int, int]]] = {}
+        self._written: dict[int, tuple[ast.Text, Span]] = {}
         for t, n in product(range(len(grammar.templates)), range(len(grammar.nouns))):
             self._pairs.setdefault(normal(grammar.utterance(t, n)), set()).add((t, n))
 
@@ -111,7 +112,7 @@ class Utterances:
         if paths is None:
             raise FailedError  # nobody fills it, which is reported where it is left empty
         described = self._resolver.symbols.alternatives[frame.member]
-        return [
+        fillings = [
             _Filling(
                 frame.member,
                 name,
@@ -121,18 +122,29 @@ class Utterances:
             )
             for raw, numbers in by_value([str(one.with_[name]) for one in described]).items()
         ]
+        for filling in fillings:
+            span = self._resolver.findings.at(filling.path)
+            self._written[id(filling.text)] = (filling.text, span)
+        return fillings
+
+    def _place(self, text: ast.Text, span: Span) -> Span:
+        """Where a text is written: one that fills a slot elsewhere than where it is used."""
+        known = self._written.get(id(text))
+        return known[1] if known is not None else span
 
     def patterns(
         self, text: ast.Text, scope: Scope, span: Span, from_npcs: bool
     ) -> list[tuple[Pattern, Term | None]]:
         """The utterances that a text means, each with the condition on the values in it; `<noun>` is any noun.
 
-        Reports S401 if nobody can say it and S402 if some value in it cannot be said.
+        Reports S401 if nobody can say it and S402 if some value in it cannot be said, where a text that fills a slot
+        is written.
         """
+        span = self._place(text, span)
         return [
             found
-            for spliced in self._spliced(text, scope)
-            for found in self._meant(*spliced, scope, span, from_npcs)
+            for parts, drawn, filling in self._spliced(text, scope)
+            for found in self._meant(parts, drawn, scope, span if filling is None else filling, from_npcs)
         ]
 
     def _meant(
@@ -162,16 +174,25 @@ class Utterances:
             self._report_unsayable(unsayable, parts, bool(found), span, from_npcs)
         return found
 
-    def _spliced(self, text: ast.Text, scope: Scope) -> Iterator[tuple[list[str | ast.Expr], list[Term]]]:
+    def _spliced(
+        self, text: ast.Text, scope: Scope
+    ) -> Iterator[tuple[list[str | ast.Expr], list[Term], Span | None]]:
         """The parts of a text, with texts that fill slots put in their place; all ways to do so, where files that
-        `one_of` draws differ, each with its conditions.
+        `one_of` draws differ, each with its conditions, and with the place of what fills a text that is one slot.
         """
-        choices: list[list[tuple[tuple[str | ast.Expr, ...], Term | None]]] = []
+        choices: list[list[tuple[tuple[str | ast.Expr, ...], Term | None, Span | None]]] = []
+        findings = self._resolver.findings
         for part in text.parts:
             slot = None if isinstance(part, str) else self._slot(part, scope)
-            choices.append([((part,), None)] if slot is None else [(f.text.parts, f.drawn) for f in slot])
+            if slot is None:
+                choices.append([((part,), None, None)])
+                continue
+            alone = len(text.parts) == 1
+            choices.append([(f.text.parts, f.drawn, findings.at(f.path) if alone else None) for f in slot])
         for choice in product(*choices):
-            yield [part for parts, _ in choice for part in parts], [d for _, d in choice if d is not None]
+            parts = [part for parts, _, _ in choice for part in parts]
+            place = next((span for _, _, span in choice if span is not None), None)
+            yield parts, [d for _, d, _ in choice if d is not None], place
 
     def _spoken_part(self, part: str | ast.Expr, scope: Scope) -> str | Term | None:
         """A piece of text, a value in it, or None for any noun."""
@@ -233,7 +254,9 @@ class Utterances:
             message = f'{name} can be {word}, but "{said}" cannot be said with this grammar'
             drawn_once = isinstance(value, Read) and not self._resolver.registers.is_set(value.path)
             report = findings.error if drawn_once else findings.warning
-            report("S402", message, span, hint="add what is missing to the nouns, or narrow what is drawn")
+            nouns = [str(noun) for noun in self._grammar.nouns]
+            missing = f"`{word}`" if word not in nouns else "what is missing"
+            report("S402", message, span, hint=f"add {missing} to the nouns, or narrow what is drawn")
             return
         near = did_you_mean(said, [*self.all_texts(), *(self._resolver.npc_texts if from_npcs else ())])
         raise findings.fail(

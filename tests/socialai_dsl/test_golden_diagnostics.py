@@ -18,8 +18,6 @@ NOT_FROM_ONE_FILE = {
     "S503": "about a name on the command line",
     "S507": "needs dozens of files",
     "S508": "about a name on the command line",
-    "S313": "a member follows one frame",
-    "S601": "found when the program is made, for each size of the room",
 }
 
 

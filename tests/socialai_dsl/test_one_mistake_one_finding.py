@@ -1,0 +1,150 @@
+"""One mistake in a file that is right gives one error, where the mistake is, and nothing that follows from it."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from socialai_dsl.frontend import check
+from socialai_dsl.loader.names import shipped_folder
+from socialai_dsl.schema.annotations import CALLED, keys_of
+
+SCENARIOS = sorted(
+    str(path.relative_to(shipped_folder()))
+    for path in (*shipped_folder().glob("*.yaml"), *shipped_folder().glob("novel/*.yaml"))
+    if path.read_text(encoding="utf-8").startswith("scenario:")
+)
+KEYS = {key for model in CALLED for key in keys_of(model) if len(key) > 3}
+PROSE = re.compile(r"^(about|notes|skills):.*\n(?:  .*\n)*", re.MULTILINE)
+"""What no machine reads."""
+
+Site = tuple[int, int, str]
+"""Where a mistake can be made: from here to there, and what is written instead."""
+
+
+def keys_misspelt(text: str) -> Iterator[Site]:
+    """Two letters of a key change places."""
+    for found in re.finditer(r"(?:^ *(?:- )?|[{,] *)([a-z_]+):(?= |$)", text, re.MULTILINE):
+        if found[1] in KEYS and f"${found[1]}" not in text:  # a parameter may be called like a key
+            yield found.start(1), found.end(1), slip(found[1])
+
+
+def names_misspelt(text: str) -> Iterator[Site]:
+    """Two letters of a name that something is done with change places."""
+    for found in re.finditer(r"\b([a-z_]{4,})\.(?:is|color|at|next_to|gone)\b", text):
+        yield found.start(1), found.end(1), slip(found[1])
+
+
+def verbs_misspelt(text: str) -> Iterator[Site]:
+    """Two letters of a verb change places; values of a parameter are looked at where they are chosen."""
+    for found in re.finditer(r"\b(next_to|eye_contact|turn_to|face|pick|count)\(", text):
+        if "values:" not in text[text.rindex("\n", 0, found.start()) : found.start()]:
+            yield found.start(1), found.end(1), slip(found[1])
+
+
+def states_misspelt(text: str) -> Iterator[Site]:
+    """Two letters of the state that a rule leads to change places."""
+    for found in re.finditer(r"\bgoto(?:_now)?: ([a-z_]{4,})", text):
+        yield found.start(1), found.end(1), slip(found[1])
+
+
+def types_misspelt(text: str) -> Iterator[Site]:
+    """Two letters of an object's type change places."""
+    for found in re.finditer(r"\btype: ([a-z]{4,})", text):
+        yield found.start(1), found.end(1), slip(found[1])
+
+
+def brackets_left_open(text: str) -> Iterator[Site]:
+    """A closing bracket at the end of a value is forgotten."""
+    for found in re.finditer(r"^ .*\w(\))$", text, re.MULTILINE):
+        yield found.start(1), found.end(1), ""
+
+
+def keys_twice(text: str) -> Iterator[Site]:
+    """A line is there twice."""
+    for found in re.finditer(r"^ *[a-z_]+: \S.*[^,\n]\n", text, re.MULTILINE):
+        yield found.end(), found.end(), found[0]
+
+
+def values_left_out(text: str) -> Iterator[Site]:
+    """A key is written, and nothing after it."""
+    for found in re.finditer(
+        r"^ *(?:horizon|earshot|facing|color|kind|view|type):( .+)$", text, re.MULTILINE
+    ):
+        yield found.start(1), found.end(1), ""
+
+
+def symbols_of_other_languages(text: str) -> Iterator[Site]:
+    """A word of the language is written as elsewhere."""
+    other = {" and ": " && ", " or ": " || ", " == ": " = ", "not ": "!"}
+    for found in re.finditer(r"^ .*?\w( and | or | == |not )", text, re.MULTILINE):
+        if "say" not in found[0]:
+            yield found.start(1), found.end(1), other[found[1]]
+
+
+KINDS: list[Callable[[str], Iterator[Site]]] = [
+    keys_misspelt,
+    names_misspelt,
+    verbs_misspelt,
+    states_misspelt,
+    types_misspelt,
+    brackets_left_open,
+    keys_twice,
+    values_left_out,
+    symbols_of_other_languages,
+]
+
+
+def slip(word: str) -> str:
+    """The word with two neighbours exchanged that differ, not at its beginning."""
+    i = next(i for i in range(1, len(word) - 1) if word[i] != word[i + 1])
+    return word[:i] + word[i + 1] + word[i] + word[i + 2 :]
+
+
+def sites(kind: Callable[[str], Iterator[Site]], text: str) -> list[Site]:
+    """Where a kind of mistake can be made in a file."""
+    read = PROSE.sub(lambda found: re.sub(r"[^\n]", "#", found[0]), text)
+    return list(kind(re.sub(r"#.*", lambda found: " " * len(found[0]), read)))
+
+
+@pytest.fixture
+def scenarios(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the shipped scenarios, in which we work."""
+    copy = tmp_path / "scenarios"
+    shutil.copytree(shipped_folder(), copy)
+    monkeypatch.chdir(copy)
+    return copy
+
+
+def check_mistakes(folder: Path, kind: Callable[[str], Iterator[Site]], most: int) -> int:
+    """Make up to `most` mistakes of a kind in each scenario, one at a time; how many were made."""
+    made = 0
+    for name in SCENARIOS:
+        path = folder / name
+        text = path.read_text(encoding="utf-8")
+        found = sites(kind, text)
+        for start, end, wrong in Random(f"{kind.__name__} {name}").sample(found, min(most, len(found))):
+            path.write_text(text[:start] + wrong + text[end:], encoding="utf-8")
+            line = text.count("\n", 0, start) + 1
+            said = [str(d) for d in check(name).diagnostics]
+            assert len(said) == 1, (name, line, wrong, said)
+            assert said[0].startswith(f"{name}:{line}:"), (name, line, wrong, said)
+            made += 1
+        path.write_text(text, encoding="utf-8")
+    return made
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+def test_one_mistake_gives_one_error(scenarios: Path, kind: Callable[[str], Iterator[Site]]) -> None:
+    assert check_mistakes(scenarios, kind, most=1) >= 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+def test_one_mistake_anywhere_gives_one_error(scenarios: Path, kind: Callable[[str], Iterator[Site]]) -> None:
+    assert check_mistakes(scenarios, kind, most=1000) >= 10
