@@ -55,6 +55,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"numpy", "gymnasium", "PIL"},
     ),
     "_gymnasium_hook": ({"envs"}, set()),
+    "__main__": ({"cli"}, set()),
     "": (
         TEXT_SIDE | {"program", "program_suite", "compilation", "engine", "envs", "_gymnasium_hook"},
         set(),

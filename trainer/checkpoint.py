@@ -39,6 +39,7 @@ class CheckpointMeta(BaseModel):
         program_sha256: digest of the compiled scenario.
         scenario: its name. actions, templates, nouns: what the choices of the agent's action mean in it.
         frames, update: how far the run had come.
+        processes: how many trained together; what only one of them knows lies under `rank1.` and so on.
         torch_version: version that wrote it.
     """
 
@@ -56,12 +57,17 @@ class CheckpointMeta(BaseModel):
     nouns: list[str] = Field(default_factory=list, max_length=10_000)
     frames: int = Field(ge=0)
     update: int = Field(ge=0)
+    processes: int = Field(1, ge=1)
     torch_version: str = Field(max_length=100)
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A checkpoint in memory: metadata and tensors by dotted name (`net.*`, `adam.*`, `state.*`, `rng`, `envs`)."""
+    """A checkpoint in memory: metadata, and tensors by dotted name.
+
+    Names: `net.*`, `adam.*`, `rng`, `curriculum`, and for each process `state.*`, `bonus.*`, `envs`, which those of
+    process r > 0 have under `rank<r>.`.
+    """
 
     meta: CheckpointMeta
     tensors: dict[str, Tensor]
@@ -74,6 +80,26 @@ class Checkpoint:
         }
 
 
+def pack(tensors: dict[str, Tensor]) -> bytes:
+    """Tensors as bytes, for sending."""
+    return safetensors.torch.save({name: _plain(value) for name, value in tensors.items()})
+
+
+def unpack(data: bytes) -> dict[str, Tensor]:
+    """The tensors of `pack`."""
+    tensors: dict[str, Tensor] = safetensors.torch.load(data)
+    return tensors
+
+
+def _plain(value: Tensor) -> Tensor:
+    return value.detach().cpu().contiguous()
+
+
+def path_of(directory: Path, meta: CheckpointMeta) -> Path:
+    """The file of a checkpoint."""
+    return directory / f"{meta.frames:015d}.safetensors"
+
+
 def write(directory: Path, checkpoint: Checkpoint) -> Path:
     """Write `directory/<frames>.safetensors`, keep the `KEPT` newest, and sweep leftovers of writes that were killed.
 
@@ -83,7 +109,7 @@ def write(directory: Path, checkpoint: Checkpoint) -> Path:
         OSError: it cannot be written, for example because the disk is full; earlier checkpoints are untouched.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    path = directory / f"{checkpoint.meta.frames:015d}.safetensors"
+    path = path_of(directory, checkpoint.meta)
     temporary = path.with_suffix(".tmp")
     try:
         with temporary.open("wb") as file:
@@ -111,7 +137,7 @@ def _sync_directory(directory: Path) -> None:
 
 def _encode(checkpoint: Checkpoint) -> bytes:
     """The file's bytes; the digest is that of the same bytes with zeros in its place."""
-    tensors = {name: value.detach().cpu().contiguous() for name, value in checkpoint.tensors.items()}
+    tensors = {name: _plain(value) for name, value in checkpoint.tensors.items()}
     metadata = {"meta": checkpoint.meta.model_dump_json(), "sha256": _NO_DIGEST}
     blank = safetensors.torch.save(tensors, metadata)
     return _with_digest(blank, hashlib.sha256(blank).hexdigest())

@@ -23,6 +23,11 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def automatic_threads(processes: int = 1) -> int:
+    """Threads of a process where nobody says how many, if so many processes share this machine's cores."""
+    return max(1, min(available_cores() // processes, _AUTOMATIC_LIMIT))
+
+
 class Crew:
     """Threads that each differentiate their share of a minibatch.
 
@@ -35,7 +40,7 @@ class Crew:
     """
 
     def __init__(self, threads: int, divisible: bool = True) -> None:
-        wanted = threads or min(available_cores(), _AUTOMATIC_LIMIT)
+        wanted = threads or automatic_threads()
         self.threads = wanted if divisible else 1
         self._inside = 1 if divisible else wanted
         self._before = torch.get_num_threads()
@@ -54,12 +59,15 @@ class Crew:
         torch.set_num_threads(self._before)
 
     def shares(self, envs: Tensor) -> list[Tensor]:
-        """Split environments, int64 (B,), evenly among the threads; no share is empty."""
-        return list(envs.tensor_split(min(self.threads, len(envs))))
+        """Split environments, int64 (B,), evenly among the threads; no share is empty, so there may be none."""
+        return list(envs.tensor_split(min(self.threads, len(envs)))) if len(envs) else []
 
     def map(self, function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
         """Apply the function to all items at once, one thread each, the caller's taking the first."""
-        first, *others = items
+        queue = list(items)
+        if not queue:
+            return []
+        first, *others = queue
         futures = [self._pool.submit(function, item) for item in others]
         try:
             result = function(first)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from types import TracebackType
+from typing import Any, Protocol, Self
+
+import torch
 
 from trainer.rollout import EpisodeTally
+from trainer.team import Team
 
 FILE_NAME = "metrics.jsonl"
 
@@ -44,6 +49,23 @@ def episode_metrics(
         "outcomes": rates("outcomes"),
         "rules": rates("rules"),
     }
+
+
+def add_up(
+    team: Team, tally: EpisodeTally, bonus: float, counters: Mapping[str, Any]
+) -> tuple[EpisodeTally, float, dict[str, Any]]:
+    """The tally and the counters of the environments of all processes, and the mean of their bonuses."""
+    if team.size == 1:
+        return tally, bonus, dict(counters)
+    kinds = [(kind, name) for kind in ("outcomes", "rules") for name in counters[kind]]
+    own = [*vars(tally).values(), bonus / team.size, *(counters[kind][name] for kind, name in kinds)]
+    sums = team.sum(torch.tensor([*own, counters["episodes"]], dtype=torch.float64)).tolist()
+    episodes, successes, timeouts, total_return, total_length, bonus, *counts, ended = sums
+    whole = EpisodeTally(int(episodes), int(successes), int(timeouts), total_return, int(total_length))
+    summed: dict[str, Any] = {"outcomes": {}, "rules": {}, "episodes": int(ended)}
+    for (kind, name), count in zip(kinds, counts, strict=True):
+        summed[kind][name] = int(count)
+    return whole, bonus, summed
 
 
 class Tracker(Protocol):
@@ -109,11 +131,18 @@ class MetricsLog:
         if self._events is not None:
             self._events.flush()
 
-    def close(self) -> None:
-        """Close the files."""
-        self._file.close()
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the files; where something went wrong before, that they cannot be closed either is no news."""
+        with contextlib.suppress(OSError) if error is not None else contextlib.nullcontext():
+            self._file.close()
         if self._events is not None:
-            self._events.close()
+            with contextlib.suppress(OSError) if error is not None else contextlib.nullcontext():
+                self._events.close()
         if self._tracker is not None:
             self._tracker.close()
 
@@ -130,14 +159,23 @@ def scalars(row: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
 
 
 def _cut_back(path: Path, update: int) -> None:
-    """Drop the rows after `update`, and a last line that was not finished."""
+    """Drop the rows after `update`, and what a killed or failing machine left unfinished."""
     if not path.exists():
         return
     kept = []
-    for line in path.read_text(encoding="utf-8").splitlines(keepends=True):
-        if not line.endswith("\n") or json.loads(line)["update"] > update:
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True):
+        if not line.endswith("\n") or not 0 < _update_of(line) <= update:
             break
         kept.append(line)
     temporary = path.with_suffix(".tmp")
     temporary.write_text("".join(kept), encoding="utf-8")
     temporary.replace(path)
+
+
+def _update_of(line: str) -> int:
+    """The number of the update a row is of; 0 if it is no row."""
+    try:
+        number = json.loads(line)["update"]
+    except (ValueError, KeyError, TypeError):
+        return 0
+    return number if isinstance(number, int) else 0

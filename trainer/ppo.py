@@ -18,6 +18,7 @@ from trainer.errors import TrainingStopped
 from trainer.minibatch import Batch, Minibatch, make_minibatch
 from trainer.nets import ActorCritic
 from trainer.rollout import Rollout
+from trainer.team import ALONE, Team
 
 
 def compute_gae(
@@ -135,11 +136,13 @@ def update(
     config: TrainConfig,
     generator: torch.Generator,
     crew: Crew,
+    team: Team = ALONE,
 ) -> dict[str, float]:
     """Improve the network on one rollout: `epochs` passes over `minibatches` groups of whole environments.
 
-    The groups are drawn anew for each rollout and visited in a new order in each epoch. The threads of the crew
-    share each group's environments between them.
+    The groups are drawn anew for each rollout and visited in a new order in each epoch. A group's environments are
+    shared by the processes of the team, which hold some of them each, and there by the threads of the crew; their
+    gradients are added up, so that every process makes the same step.
 
     Returns:
         Means over the minibatches of `LossParts` and of the gradient's norm before clipping, by name, and the
@@ -150,21 +153,23 @@ def update(
     """
     raw = estimate_advantages(actor, rollout, config)
     returns = raw + rollout.values
-    advantages = scale_advantages(raw, config)
+    whole, acting = team.gather(raw, 1), team.gather(rollout.values, 1)
+    advantages = team.mine(scale_advantages(whole, config), 1)
     stretch = config.bptt or config.horizon
 
     def prepare(envs: Tensor) -> Minibatch:
         return make_minibatch(actor, rollout, advantages, returns, envs, stretch)
 
     order = torch.randperm(config.num_envs, generator=generator)
-    parts = [crew.shares(group) for group in order.tensor_split(config.minibatches)]
-    groups = [crew.map(prepare, part) for part in parts]
+    chosen = [team.own(group, config.num_envs) for group in order.tensor_split(config.minibatches)]
+    groups = [crew.map(prepare, crew.shares(envs)) for envs in chosen]
+    frames = team.sum(torch.tensor([sum(len(share.batch.returns) for share in group) for group in groups]))
     steps = [
-        _step(actor.net, optimizer, groups[index], config, crew)
+        _step(actor.net, optimizer, groups[index], int(frames[index]), config, crew, team)
         for _ in range(config.epochs)
         for index in torch.randperm(len(groups), generator=generator).tolist()
     ]
-    return summarize(steps, rollout.values, returns)
+    return summarize(steps, acting, whole + acting)
 
 
 def summarize(steps: list[Tensor], values: Tensor, returns: Tensor) -> dict[str, float]:
@@ -201,12 +206,13 @@ def _step(
     net: ActorCritic,
     optimizer: torch.optim.Optimizer,
     shares: list[Minibatch],
+    total: int,
     config: TrainConfig,
     crew: Crew,
+    team: Team,
 ) -> Tensor:
-    """One gradient step on a group of environments, given in shares; returns `STATISTICS`."""
+    """One gradient step on a group of environments with `total` frames, given in shares; returns `STATISTICS`."""
     parameters = list(net.parameters())
-    total = sum(len(share.batch.returns) for share in shares)
 
     def differentiate(share: Minibatch) -> tuple[Tensor, Sequence[Tensor | None]]:
         logits, values = share.evaluate(net)
@@ -216,10 +222,12 @@ def _step(
         return loss.row() * weight, gradients
 
     results = crew.map(differentiate, shares)
-    statistics = torch.stack([share[0] for share in results]).sum(0)
+    statistics = torch.zeros(len(STATISTICS) - 1, device=parameters[0].device)
+    for share_statistics, _ in results:
+        statistics += share_statistics
     for parameter, *gradients in zip(parameters, *(share[1] for share in results), strict=True):
         _add_up(parameter, gradients)
-    return descend(net, optimizer, statistics, config)
+    return descend(net, optimizer, _add_up_team(parameters, statistics, team), config)
 
 
 def descend(
@@ -257,3 +265,23 @@ def _add_up(parameter: Tensor, gradients: Sequence[Tensor | None]) -> None:
     parameter.grad.copy_(present[0])
     for gradient in present[1:]:
         parameter.grad.add_(gradient)
+
+
+def _add_up_team(parameters: Sequence[Tensor], statistics: Tensor, team: Team) -> Tensor:
+    """Replace the gradients by their sums over the team, in one message with the statistics, whose sum is returned."""
+    if team.size == 1:
+        return statistics
+    present = torch.tensor([float(parameter.grad is not None) for parameter in parameters])
+    flat = [_gradient(parameter).reshape(-1) for parameter in parameters]
+    sums = team.sum(torch.cat([*flat, statistics, present.to(statistics.device)]))
+    sizes = [parameter.numel() for parameter in parameters]
+    *gradients, statistics, used = torch.split(sums, [*sizes, len(statistics), len(present)])
+    for parameter, gradient, is_used in zip(parameters, gradients, used.tolist(), strict=True):
+        # Adam passes over parameters without a gradient, which a zero would not be.
+        _add_up(parameter, [gradient.view(parameter.shape)] if is_used else [])
+    return statistics
+
+
+def _gradient(parameter: Tensor) -> Tensor:
+    """The gradient of a parameter, zeros where it has none."""
+    return torch.zeros_like(parameter) if parameter.grad is None else parameter.grad

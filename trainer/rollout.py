@@ -17,6 +17,7 @@ from trainer.config import TrainConfig
 from trainer.curricula import Tutor
 from trainer.distinct import Int64
 from trainer.errors import TrainingStopped
+from trainer.team import ALONE, Team
 
 
 @dataclass
@@ -121,8 +122,9 @@ def collect(
     generator: torch.Generator,
     bonus: Bonus | None,
     tutor: Tutor | None = None,
+    team: Team = ALONE,
 ) -> Rollout:
-    """Play `config.horizon` steps in every environment; `state` is advanced in place.
+    """Play `config.horizon` steps in every environment of this process; `state` is advanced in place.
 
     Raises:
         ObservationError: an observation is outside its bounds.
@@ -131,7 +133,9 @@ def collect(
     net, sizes = actor.net, actor.net.spec.action_sizes
     stretch = config.bptt or config.horizon
     rollout = _allocate(actor, config, len(state.starts))
-    noise = heads.gumbel_noise((*rollout.values.shape, sum(sizes)), generator).to(actor.device)
+    # Every process draws the noise of all environments, so that what each samples does not depend on their number.
+    drawn = heads.gumbel_noise((config.horizon, team.size * len(state.starts), sum(sizes)), generator)
+    noise = team.mine(drawn, 1).to(actor.device)
     logits = torch.empty_like(noise)
     actor.begin()
     with torch.no_grad():
@@ -203,8 +207,8 @@ def _step(
         rollout.bootstrap[t, which] = _value(actor, final_observation(infos, which), state.memory[:, which])
     if ended.any():
         _count(rollout.tally, state, ended, cut, infos)
-        if tutor is not None:
-            tutor.step(ended, ended_info(infos, "success", ended & False).astype(np.bool_))
+    if tutor is not None:
+        tutor.step(ended, ended_info(infos, "success", ended & False).astype(np.bool_))
     if bonus is not None:
         paid = bonus.step(envs, observation["image"], ended)
         rollout.rewards[t] += paid

@@ -18,6 +18,7 @@ from trainer.curricula import Leaves, Tutor, build_curriculum
 from trainer.errors import CheckpointError
 from trainer.nets import NetSpec, build_net
 from trainer.rollout import RolloutState
+from trainer.team import ALONE, Team
 
 _ADAM = ("step", "exp_avg", "exp_avg_sq")
 
@@ -28,7 +29,8 @@ class Session:
 
     Attributes:
         update: updates made. frames: environment steps made.
-        generator: the one source of the trainer's randomness.
+        generator: the one source of the trainer's randomness, the same in every process.
+        team: the processes that train together; environments, memory and bonus are this process's share.
     """
 
     config: TrainConfig
@@ -39,6 +41,7 @@ class Session:
     generator: torch.Generator
     bonus: Bonus | None
     tutor: Tutor | None = None
+    team: Team = ALONE
     update: int = 0
 
     @property
@@ -47,20 +50,32 @@ class Session:
         return self.update * self.config.frames_per_update
 
     @classmethod
-    def start(cls, config: TrainConfig, envs: Any) -> Session:
+    def start(cls, config: TrainConfig, envs: Any, team: Team = ALONE) -> Session:
         """Begin a run: fresh weights, environments reset with the run's seed.
 
         Raises:
             ValueError: the environments do not fit the configuration, or are not of the form the trainer learns.
         """
-        if envs.num_envs != config.num_envs:
-            raise ValueError(f"envs: got {envs.num_envs} environments, expected num_envs = {config.num_envs}")
+        share = team.share(config.num_envs)
+        if envs.num_envs != share:
+            part = "" if team.size == 1 else f" / {team.size} processes = {share}"
+            raise ValueError(
+                f"envs: got {envs.num_envs} environments, expected num_envs = {config.num_envs}{part}"
+            )
         spec = net_spec(envs)
         net = build_net(config.net, spec, config.seed, config.precision).to(config.device)
+        if team.size > 1 and not net.distinct:
+            raise ValueError(
+                f"net: {config.net} normalises over the batch, which {team.size} processes do not share; "
+                "train it with one"
+            )
+        if team.size > 1 and config.update == "chunks":
+            raise ValueError(f"update: chunks are not shared by {team.size} processes; train with one")
         tutor = None
         if config.curriculum != "none":
-            tutor = Tutor(build_curriculum(config.curriculum, Leaves.of(envs)), envs)
-        observation, _ = envs.reset(seed=config.seed)
+            tutor = Tutor(build_curriculum(config.curriculum, Leaves.of(envs)), envs, team)
+        seats = range(team.rank * share, (team.rank + 1) * share)
+        observation, _ = envs.reset(seed=config.seed, options={"index": list(seats)})
         if tutor is not None:
             tutor.begin()
         return cls(
@@ -68,30 +83,44 @@ class Session:
             envs,
             Actor(net, observation["tokens"].shape[1]),
             torch.optim.Adam(net.parameters(), lr=config.lr, eps=config.adam_eps, fused=True),
-            RolloutState.initial(observation, net.memory.initial(config.num_envs)),
+            RolloutState.initial(observation, net.memory.initial(share)),
             torch.Generator().manual_seed(config.seed),
-            Bonus(config, config.num_envs) if config.explo != "none" else None,
+            Bonus(config, share) if config.explo != "none" else None,
             tutor,
+            team,
         )
 
     def checkpoint(self) -> Checkpoint:
-        """Everything needed to continue exactly."""
-        net, state = self.actor.net, self.state
+        """Everything needed to continue exactly; of a team, complete on the process that writes.
+
+        Raises:
+            TrainingStopped: the processes of the team have come apart, or one is gone.
+        """
+        net = self.actor.net
         tensors: dict[str, Tensor] = {f"net.{name}": value for name, value in net.state_dict().items()}
         for name, parameter in net.named_parameters():
             for key, value in self.optimizer.state.get(parameter, {}).items():
                 tensors[f"adam.{key}.{name}"] = value
-        tensors["state.memory"] = state.memory
-        for name in ("image", "tokens", "starts", "returns", "lengths"):
-            tensors[f"state.{name}"] = torch.from_numpy(getattr(state, name))
-        if self.bonus is not None:
-            for name, array in self.bonus.state().items():
-                tensors[f"bonus.{name}"] = torch.from_numpy(array)
         if self.tutor is not None:
             tensors["curriculum"] = torch.from_numpy(self.tutor.state())
         tensors["rng"] = self.generator.get_state()
-        tensors["envs"] = torch.frombuffer(bytearray(self.envs.snapshot()), dtype=torch.uint8)
+        if self.team.size == 1:
+            return Checkpoint(self._meta(), tensors | self._share())
+        self.team.agree("weights, optimiser and random numbers are", checkpoints.pack(tensors))
+        for rank, share in enumerate(self.team.gather_bytes(checkpoints.pack(self._share()))):
+            tensors |= {_of_rank(rank) + name: value for name, value in checkpoints.unpack(share).items()}
         return Checkpoint(self._meta(), tensors)
+
+    def _share(self) -> dict[str, Tensor]:
+        """What this process alone remembers: its environments, and what goes with them."""
+        tensors = {"state.memory": self.state.memory}
+        for name in ("image", "tokens", "starts", "returns", "lengths"):
+            tensors[f"state.{name}"] = torch.from_numpy(getattr(self.state, name))
+        if self.bonus is not None:
+            for name, array in self.bonus.state().items():
+                tensors[f"bonus.{name}"] = torch.from_numpy(array)
+        tensors["envs"] = torch.frombuffer(bytearray(self.envs.snapshot()), dtype=torch.uint8)
+        return tensors
 
     def _meta(self) -> CheckpointMeta:
         spec, program = self.actor.net.spec, self.envs.program
@@ -107,6 +136,7 @@ class Session:
             nouns=list(program.nouns),
             frames=self.frames,
             update=self.update,
+            processes=self.team.size,
             torch_version=str(torch.__version__),
         )
 
@@ -123,13 +153,14 @@ class Session:
         try:
             self.actor.net.load_state_dict(net.state_dict())
             self._load_adam(checkpoint)
-            self._load_state(checkpoint.part("state"))
+            mine = _of_rank(self.team.rank)
+            self._load_state(checkpoint.part(mine + "state"))
             if self.bonus is not None:
                 self.bonus.load_state(
-                    {name: value.numpy() for name, value in checkpoint.part("bonus").items()}
+                    {name: value.numpy() for name, value in checkpoint.part(mine + "bonus").items()}
                 )
             self.generator.set_state(checkpoint.tensors["rng"])
-            self.envs.restore(checkpoint.tensors["envs"].numpy().tobytes())
+            self.envs.restore(checkpoint.tensors[mine + "envs"].numpy().tobytes())
             if self.tutor is not None:
                 self.tutor.load_state(checkpoint.tensors["curriculum"].numpy())
         except (KeyError, ValueError, TypeError, RuntimeError) as error:
@@ -140,6 +171,11 @@ class Session:
         if meta.program_sha256 != self.envs.program.sha256:
             raise CheckpointError(
                 "the scenario has changed since this checkpoint; a run resumes only on the same one"
+            )
+        if meta.processes != self.team.size:
+            raise CheckpointError(
+                f"the run was made by {meta.processes} processes and resumes only with as many, got "
+                f"{self.team.size}: torchrun --nproc-per-node {meta.processes}"
             )
         old, new = meta.config.model_dump(), self.config.model_dump()
         changed = [name for name in new if name not in RESUMABLE_FIELDS and old[name] != new[name]]
@@ -180,6 +216,11 @@ class Session:
                 f"state.memory: got {tuple(stored['memory'].shape)}, expected {tuple(state.memory.shape)}"
             )
         state.memory = stored["memory"].to(state.memory)
+
+
+def _of_rank(rank: int) -> str:
+    """What the names of a process's own tensors begin with in a checkpoint."""
+    return f"rank{rank}." if rank else ""
 
 
 def net_spec(envs: Any) -> NetSpec:

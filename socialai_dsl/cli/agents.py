@@ -1,5 +1,7 @@
 """This module trains agents for the commands, by way of the trainer."""
 
+import contextlib
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Final, Literal
@@ -11,6 +13,7 @@ if TYPE_CHECKING:
     from trainer.config import TrainConfig
     from trainer.metrics import Tracker
     from trainer.nets import Precision
+    from trainer.team import Team
 
 _DEFAULT_EXPLO_C: Final = {"lang": 7.0, "cell": 3.0}
 
@@ -109,6 +112,8 @@ def train_config(settings: "Settings") -> "TrainConfig":
             precision=settings.precision,
             curriculum=settings.curriculum,
             device=settings.device,
+            threads=settings.threads,
+            checkpoint_every=settings.checkpoint_every,
         )
     except ValidationError as error:
         first = error.errors()[0]
@@ -116,8 +121,38 @@ def train_config(settings: "Settings") -> "TrainConfig":
         raise UsageError(f"{place}: {first['msg']}, got {first['input']!r}") from None
 
 
-def train_agent(settings: "Settings", folder: Path, resume: bool, stream: IO[str]) -> Path:
+@contextlib.contextmanager
+def joined_team(settings: "Settings") -> Iterator["Team"]:
+    """The processes that torchrun started to train together, or this one alone.
+
+    Raises:
+        UsageError: there are several, but nothing to train.
+        RunFailed: another process is gone.
+    """
+    from trainer.errors import TrainingStopped
+    from trainer.team import joined, started_together
+
+    if started_together()[0] > 1 and settings.agent != "ppo":
+        raise UsageError(f"the agent {settings.agent!r} is not trained, so torchrun can do nothing for it")
+    try:
+        with joined(settings.device) as team:
+            yield team
+    except TrainingStopped as error:
+        raise RunFailed(str(error)) from error
+
+
+def resolve_threads(threads: int) -> int:
+    """So many CPU threads, or for 0 as many as the cores of this process's share of the machine, at most 4."""
+    from trainer.crew import automatic_threads
+    from trainer.team import started_together
+
+    return threads or automatic_threads(started_together()[1])
+
+
+def train_agent(settings: "Settings", folder: Path, resume: bool, stream: IO[str], team: "Team") -> Path:
     """Train, show the progress on `stream`, and return the path of the final checkpoint.
+
+    All processes of the team call it; the one that writes shows the progress.
 
     Raises:
         UsageError: the run cannot start, or its folder cannot be written.
@@ -130,18 +165,22 @@ def train_agent(settings: "Settings", folder: Path, resume: bool, stream: IO[str
     from trainer.train import Progress, train
 
     config = train_config(settings)
-    envs = socialai_dsl.make_vec(
-        settings.scenario, num_envs=settings.envs, copy=False, autoreset_mode="SameStep"
-    )
+    try:
+        share = team.share(settings.envs)
+    except ValueError as error:
+        raise UsageError(f"--envs: {error}") from None
+    envs = socialai_dsl.make_vec(settings.scenario, num_envs=share, copy=False, autoreset_mode="SameStep")
     total = config.updates * config.frames_per_update
     try:
+        if not team.writes:
+            return train(config, envs, folder, resume=resume, team=team)
         with TrainingProgress(total, stream) as shown:
 
             def report(progress: Progress) -> None:
                 shown.update(progress.frames, progress.success_rate, progress.frames_per_second)
 
             tracker = _tracker(settings, config, folder)
-            return train(config, envs, folder, progress=report, resume=resume, tracker=tracker)
+            return train(config, envs, folder, progress=report, resume=resume, team=team, tracker=tracker)
     except TrainingStopped as error:
         if isinstance(error.__cause__, OSError):
             raise UsageError(str(error)) from error
@@ -151,7 +190,10 @@ def train_agent(settings: "Settings", folder: Path, resume: bool, stream: IO[str
     ) as error:  # what the trainer says about a configuration or a checkpoint that does not fit
         raise UsageError(str(error)) from error
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted; go on with: socialai-run --resume {folder}") from None
+        command = f"socialai-run --resume {folder}"
+        if team.size > 1:
+            command = f"torchrun --nproc-per-node {team.here} --no-python {command}"
+        raise KeyboardInterrupt(f"interrupted; go on with: {command}") from None
     finally:
         envs.close()
 

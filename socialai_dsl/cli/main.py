@@ -4,6 +4,7 @@ import argparse
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Sequence
 from importlib import import_module
 from typing import Final
@@ -76,6 +77,9 @@ def _add_debug(parser: argparse.ArgumentParser) -> None:
 def _guarded(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
     """Parse and execute; every error is answered with one message and its exit code."""
     debug = False
+    usual = warnings.formatwarning
+    # Users want to know what to look out for, not which line of ours says so.
+    warnings.formatwarning = lambda message, *_, **__: f"{parser.prog}: warning: {message}\n"
     try:
         try:
             arguments = parser.parse_args(argv)
@@ -94,6 +98,8 @@ def _guarded(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> int
         if debug:
             traceback.print_exc()
         return _explain(parser.prog, error)
+    finally:
+        warnings.formatwarning = usual
 
 
 def _explain(program: str, error: Exception) -> Exit:

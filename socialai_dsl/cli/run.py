@@ -6,7 +6,7 @@ import json
 import sys
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import IO, TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.arguments import natural, positive
 from socialai_dsl.cli.errors import Exit, UsageError
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from socialai_dsl.checking import Loaded
     from socialai_dsl.cli.evaluation import Evaluation
     from socialai_dsl.program_suite import Playable
+    from trainer.team import Team
 
 SUMMARY: Final = "train an agent on a scenario, evaluate it and write pictures and figures"
 
@@ -81,6 +82,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help="default: auto")
     parser.add_argument(
+        "--threads",
+        type=natural,
+        default=0,
+        metavar="N",
+        help="CPU threads that train, in each process (default: one per core, at most 4)",
+    )
+    parser.add_argument(
+        "--checkpoint-every",
+        type=positive,
+        default=50,
+        metavar="N",
+        help="updates between checkpoints (default: 50)",
+    )
+    parser.add_argument(
         "--eval-episodes", type=positive, default=500, metavar="N", help="of the test set (default: 500)"
     )
     parser.add_argument(
@@ -98,7 +113,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(arguments: argparse.Namespace) -> Exit:
     """Do the whole run."""
     import socialai_dsl
-    from socialai_dsl.cli.agents import require_trainer, train_agent
+    from socialai_dsl.cli.agents import joined_team, require_trainer
     from socialai_dsl.cli.evaluation import Player, evaluate_agent
 
     require_trainer()
@@ -106,19 +121,21 @@ def execute(arguments: argparse.Namespace) -> Exit:
     loaded = socialai_dsl.load(settings.scenario)
     program = socialai_dsl.compile(loaded)
     written = _written(settings)
-    folder = arguments.resume or create_run_folder(arguments.out, settings.scenario, settings.seed)
-    write_json(folder / SETTINGS, written)
     # With --json, standard output belongs to the result alone.
     stream = sys.stderr if arguments.json else sys.stdout
-    print(f"{settings.scenario}: {_size(program)}; writing to {folder}", file=stream, flush=True)
-
     agent, training = settings.agent, _NOT_TRAINED
+    with joined_team(settings) as team:
+        folder = arguments.resume
+        if team.writes:
+            folder = folder or create_run_folder(arguments.out, settings.scenario, settings.seed)
+            write_json(folder / SETTINGS, written)
+            print(f"{settings.scenario}: {_size(program)}; writing to {folder}", file=stream, flush=True)
+        folder = Path(team.tell(str(folder)))
+        if settings.agent == "ppo":
+            agent = _train(settings, folder, bool(arguments.resume), stream, team)
+    if not team.writes:
+        return Exit.GOOD
     if settings.agent == "ppo":
-        try:
-            agent = str(train_agent(settings, folder, bool(arguments.resume), stream))
-        except UsageError:
-            _discard_unstarted(folder)
-            raise
         training = _training_figures(folder)
     player = Player(agent, settings.device, net=settings.net)
     evaluation = evaluate_agent(player, settings.scenario, settings.eval_episodes)
@@ -144,15 +161,29 @@ def execute(arguments: argparse.Namespace) -> Exit:
     return Exit.GOOD
 
 
+def _train(settings: Settings, folder: Path, resume: bool, stream: IO[str], team: "Team") -> str:
+    """Train in the run's folder and return the path of the final checkpoint."""
+    from socialai_dsl.cli.agents import train_agent
+
+    try:
+        return str(train_agent(settings, folder, resume, stream, team))
+    except UsageError:
+        if team.writes:
+            _discard_unstarted(folder)
+        raise
+
+
 _NOT_TRAINED: Final = {"frames": 0, "train_seconds": 0.0, "frames_per_second": None}
 
 
 def _discard_unstarted(folder: Path) -> None:
     """Take back the folder of a run that could not even begin, so that the same command can be given again."""
-    if not (folder / "checkpoints").exists():
+    checkpoints = folder / "checkpoints"
+    if not any(checkpoints.glob("*.safetensors")):
         (folder / SETTINGS).unlink(missing_ok=True)
-        with contextlib.suppress(OSError):  # it holds files of the user's
-            folder.rmdir()
+        for empty in (checkpoints, folder):
+            with contextlib.suppress(OSError):  # it is not there, or holds files of the user's
+                empty.rmdir()
 
 
 def _written(settings: Settings) -> dict[str, Any]:
@@ -185,6 +216,7 @@ def _started(arguments: argparse.Namespace) -> Settings:
         resolve_device,
         resolve_exploration,
         resolve_precision,
+        resolve_threads,
     )
 
     if arguments.scenario is None:
@@ -216,6 +248,8 @@ def _started(arguments: argparse.Namespace) -> Settings:
         eval_episodes=arguments.eval_episodes,
         precision=resolve_precision(arguments.precision, arguments.net, device),
         curriculum=arguments.curriculum,
+        threads=resolve_threads(arguments.threads) if trains else 0,
+        checkpoint_every=arguments.checkpoint_every,
         wandb=arguments.wandb,
     )
 

@@ -20,6 +20,9 @@ class Settings:
         device: where the network runs.
         precision: number type of the network's bulk of arithmetic, with `auto` resolved.
         curriculum: who chooses the members of a suite while training, as the trainer names it; `none`: chance.
+        threads: CPU threads that train, in each process; bits depend on them, so "one per core" is resolved. 0 for
+            agents that are not trained here.
+        checkpoint_every: updates between checkpoints.
         wandb: project of Weights & Biases that is sent the figures; None: they stay here.
         eval_episodes: how many episodes of the test set are played, from the first on.
     """
@@ -36,4 +39,6 @@ class Settings:
     eval_episodes: int
     precision: Literal["float32", "bfloat16"] = "float32"
     curriculum: str = "none"
+    threads: int = 0
+    checkpoint_every: int = 50
     wandb: str | None = None

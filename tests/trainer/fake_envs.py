@@ -95,7 +95,8 @@ class EchoEnvs(gym.vector.VectorEnv):
         if options and "test_episode" in options:
             s["seed"][chosen], s["episode"][chosen] = 2**40, np.asarray(options["test_episode"])[chosen]
         elif seed is not None:
-            s["seed"][:], s["episode"][:] = np.arange(self.num_envs) + 1000 * np.asarray(seed), 0
+            index = (options or {}).get("index", np.arange(self.num_envs))
+            s["seed"][:], s["episode"][:] = np.asarray(index) + 1000 * np.asarray(seed), 0
         else:
             s["episode"] += 1
         return self._observe(), {}

@@ -1,9 +1,16 @@
 """Checkpoints survive what may happen to files, and refuse what is not theirs without running any of it."""
 
+import errno
 import hashlib
+import io
 import json
+import os
 import pickle
+import stat
+import subprocess
 import sys
+import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +19,7 @@ import pytest
 import safetensors.torch
 import torch
 
+from socialai_dsl.cli.main import main
 from tests.trainer.fake_envs import EchoEnvs
 from trainer import checkpoint as checkpoints
 from trainer.checkpoint import Checkpoint, read, restore_net, write
@@ -20,6 +28,8 @@ from trainer.errors import CheckpointError
 from trainer.ppo import update
 from trainer.rollout import collect
 from trainer.session import Session, net_spec
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture
@@ -186,33 +196,180 @@ def test_a_run_does_not_resume_from_incomplete_or_odd_state(
 
 
 class Payload:
+    """Unpickling it writes a file."""
+
+    def __init__(self, mark: Path) -> None:
+        self.mark = mark
+
     def __reduce__(self) -> Any:
-        return exec, ("import os; os.environ['PWNED'] = '1'",)
+        return exec, (f"open({str(self.mark)!r}, 'w').close()",)
+
+
+def write_bombs(folder: Path, mark: Path) -> list[Path]:
+    """Files that run code when they are unpickled, and others that are not what they are called."""
+    bomb = pickle.dumps(Payload(mark))
+    files = {
+        "plain.safetensors": bomb,
+        "plain.pt": bomb,
+        "old_protocol.safetensors": pickle.dumps(Payload(mark), 0),
+        "behind_a_header.safetensors": (2).to_bytes(8, "little") + b"{}" + bomb,
+        "in_the_header.safetensors": len(bomb).to_bytes(8, "little") + bomb,
+        "nothing.safetensors": b"",
+        "json.safetensors": b"{}",
+        "deep.safetensors": b"[" * 100_000,
+        "lies.safetensors": (2**60).to_bytes(8, "little") + b"{}",
+    }
+    nested = b'{"__metadata__":' + b"[" * 200_000 + b"}"
+    files["nested.safetensors"] = len(nested).to_bytes(8, "little") + nested
+    for name, data in files.items():
+        (folder / name).write_bytes(data)
+    torch.save({"weights": Payload(mark)}, folder / "zip.pt")
+    torch.save({"weights": Payload(mark)}, folder / "zip.safetensors")
+    torch.save(Payload(mark), folder / "legacy.safetensors", _use_new_zipfile_serialization=False)
+    with zipfile.ZipFile(folder / "archive.safetensors", "w") as archive:
+        archive.writestr("data.pkl", bomb)
+    return sorted(folder.iterdir())
 
 
 def test_pickles_are_never_opened(tmp_path: Path) -> None:
     opened: list[str] = []
-    watching = True
+    watching = False
 
     def audit(event: str, args: tuple[Any, ...]) -> None:
-        if watching and event in ("pickle.find_class", "exec", "compile"):
+        if watching and event in ("pickle.find_class", "exec", "compile", "os.system", "subprocess.Popen"):
             opened.append(event)
 
-    files = {"pickle": pickle.dumps(Payload()), "nothing": b"", "json": b"{}", "deep": b"[" * 100_000}
-    torch.save({"a": torch.zeros(2)}, tmp_path / "torch")
-    for name, data in files.items():
-        (tmp_path / name).write_bytes(data)
-    (tmp_path / "lies").write_bytes((2**60).to_bytes(8, "little") + b"{}")
-    nested = b'{"__metadata__":' + b"[" * 200_000 + b"}"
-    (tmp_path / "nested").write_bytes(len(nested).to_bytes(8, "little") + nested)
     sys.addaudithook(audit)
+    folder, mark = tmp_path / "bombs", tmp_path / "mark"
+    folder.mkdir()
+    bombs = write_bombs(folder, mark)
+    watching = True
     try:
-        for name in (*files, "torch", "lies", "nested"):
-            with pytest.raises(CheckpointError):
-                read(tmp_path / name)
+        for bomb in bombs:
+            with pytest.raises(CheckpointError) as caught:
+                read(bomb)
+            assert str(bomb) in str(caught.value)
+        with pytest.raises(CheckpointError):
+            read(folder)
     finally:
         watching = False
     assert opened == []
+    assert not mark.exists()
+    pickle.loads((folder / "plain.pt").read_bytes())
+    assert mark.exists(), "the bombs are live"
+
+
+def test_the_command_line_refuses_a_bomb(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder, mark = tmp_path / "bombs", tmp_path / "mark"
+    folder.mkdir()
+    write_bombs(folder, mark)
+    for name in ("plain.pt", "zip.safetensors"):
+        assert main(["run", "help", "--agent", str(folder / name), "--out", str(tmp_path / name)]) == 2
+        said = capsys.readouterr().err
+        assert str(folder / name) in said
+        assert "Traceback" not in said
+    assert not mark.exists()
+
+
+# --- writing ---
+
+
+KILLED_WHILE_WRITING = f"""
+import json, os, random, signal, sys, time, warnings
+sys.path.insert(0, {str(ROOT)!r})
+from pathlib import Path
+from tests.trainer.fake_envs import EchoEnvs
+from trainer.checkpoint import Checkpoint, read, write
+from trainer.config import TrainConfig
+from trainer.session import Session
+
+folder, kills = Path(sys.argv[1]), int(sys.argv[2])
+config = TrainConfig(num_envs=8, horizon=8, minibatches=2, threads=1)
+good = Session.start(config, EchoEnvs(8)).checkpoint()
+rng = random.Random(0)
+warnings.simplefilter("error")  # to fall back to an older file is only a warning
+
+def numbered(number):
+    changes = {{"frames": number, "update": number}}
+    return Checkpoint(good.meta.model_copy(update=changes), good.tensors)
+
+def whole(number):
+    return (folder / f"{{number:015d}}.safetensors").exists()
+
+last, hit = 0, 0
+write(folder, numbered(last))
+for _ in range(kills):
+    child = os.fork()
+    if child == 0:
+        number = last
+        while True:
+            number += 1
+            write(folder, numbered(number))
+    # By what has been written, not by time, because a busy machine may take long: in the first or second file.
+    wanted, begun = last + rng.randrange(2), time.monotonic()
+    while not (whole(wanted) and any(folder.glob("*.tmp"))) and time.monotonic() < begun + 60:
+        time.sleep(0.0005)
+    time.sleep(rng.random() * 0.01)
+    os.kill(child, signal.SIGKILL)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGKILL
+    hit += any(folder.glob("*.tmp"))
+    newest = read(folder)
+    assert newest.meta.frames >= last, "what was there is still there"
+    assert all((value == good.tensors[name]).all() for name, value in newest.tensors.items())
+    last = newest.meta.frames
+write(folder, numbered(last + 1))
+print(json.dumps({{"hit": hit, "written": last, "files": sorted(path.name for path in folder.iterdir())}}))
+"""
+
+
+def test_kills_while_writing_leave_no_unreadable_file(tmp_path: Path) -> None:
+    """A process that does nothing but write is killed 50 times, many of them in the middle of a file."""
+    result = subprocess.run(
+        [sys.executable, "-c", KILLED_WHILE_WRITING, str(tmp_path), "50"],
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+    found = json.loads(result.stdout)
+    assert found["hit"] >= 10, "the kills landed in the middle of writing"
+    assert found["written"] >= 10, "whole files were written between the kills"
+    assert found["files"] == [f"{found['written'] + n:015d}.safetensors" for n in (0, 1)]
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO, errno.EROFS, errno.EDQUOT])
+@pytest.mark.parametrize("operation", ["open", "write", "fsync", "rename", "fsync of the folder"])
+def test_a_write_that_fails_leaves_the_last_one_valid(
+    operation: str, number: int, session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path, session.checkpoint())
+    session.update = 2
+
+    def fail(*_: Any, **__: Any) -> Any:
+        raise OSError(number, os.strerror(number))
+
+    class Full(io.BytesIO):
+        write = fail
+
+    def fail_on_folders(descriptor: int) -> None:
+        if stat.S_ISDIR(os.fstat(descriptor).st_mode):
+            fail()
+
+    with monkeypatch.context() as broken:
+        if operation in ("open", "write"):
+            broken.setattr(Path, "open", fail if operation == "open" else lambda *_, **__: Full())
+        elif operation == "rename":
+            broken.setattr(Path, "replace", fail)
+        else:
+            broken.setattr(checkpoints.os, "fsync", fail if operation == "fsync" else fail_on_folders)
+        with pytest.raises(OSError, match=os.strerror(number)):
+            write(tmp_path, session.checkpoint())
+    kept = read(tmp_path)
+    assert kept.meta.update == (2 if operation == "fsync of the folder" else 1)
+    assert not list(tmp_path.glob("*.tmp"))
+    write(tmp_path, session.checkpoint())
+    assert read(tmp_path).meta.update == 2
 
 
 def test_missing_files_and_empty_folders_are_checkpoint_errors(tmp_path: Path) -> None:
@@ -278,6 +435,13 @@ def test_a_vocabulary_that_the_network_has_no_room_for_is_refused(small_config: 
         restore_net(
             Checkpoint(meta, good.tensors), net_spec(session.envs), list(session.envs.program.vocabulary)
         )
+
+
+def test_images_of_another_shape_are_refused(session: Session, tmp_path: Path) -> None:
+    path = write(tmp_path, session.checkpoint())
+    spec = replace(net_spec(session.envs), image_shape=(7, 7, 6), image_high=(12, 5, 3, 3, 1, 1))
+    with pytest.raises(CheckpointError, match=r"images \(7, 7, 4\).*has \(7, 7, 6\)"):
+        restore_net(read(path), spec, session.envs.vocabulary)
 
 
 def test_another_order_of_the_same_words_changes_nothing_but_the_rows(

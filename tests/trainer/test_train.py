@@ -197,6 +197,44 @@ def test_numbers_that_are_not_finite_stop_the_run_at_once(
     check_stopped(tmp_path, message, caught)
 
 
+@pytest.mark.parametrize("name", ["film.bias", "image_conv.1.running_var"])
+def test_weights_that_a_step_spoils_are_not_saved(
+    name: str, tmp_path: Path, small_config: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The last step of an update may do it, when nothing computes with them before the checkpoint is due."""
+    config = small_config(
+        net="fast" if name == "film.bias" else "paper-reference", epochs=1, checkpoint_every=1
+    )
+    real = training.update
+
+    def spoiling(actor: Any, optimizer: Any, *rest: Any) -> Any:
+        losses = real(actor, optimizer, *rest)
+        if next(iter(optimizer.state.values()))["step"] == 3 * config.minibatches:
+            actor.net.state_dict()[name][0] = torch.inf
+        return losses
+
+    monkeypatch.setattr(training, "update", spoiling)
+    with pytest.raises(TrainingStopped) as caught:
+        train(config, EchoEnvs(8), tmp_path)
+    check_stopped(tmp_path, f"the network's {name} holds numbers that are not finite", caught)
+
+
+def test_figures_that_are_not_finite_stop_the_run(
+    tmp_path: Path, small_config: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, calls = training.update, 0
+
+    def diverging(*everything: Any) -> Any:
+        nonlocal calls
+        calls += 1
+        return real(*everything) | ({"approx_kl": float("inf")} if calls == 3 else {})
+
+    monkeypatch.setattr(training, "update", diverging)
+    with pytest.raises(TrainingStopped) as caught:
+        train(small_config(), EchoEnvs(8), tmp_path)
+    check_stopped(tmp_path, "approx_kl of the update is not a finite number", caught)
+
+
 def test_a_full_disk_stops_the_run_and_spares_the_last_checkpoint(tmp_path: Path) -> None:
     """A child process may write files of 100 kB at most from its second checkpoint on, as on a full disk."""
     script = f"""

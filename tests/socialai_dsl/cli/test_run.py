@@ -43,6 +43,7 @@ def test_a_run_leaves_everything_it_promises(capsys: Capture) -> None:
     left = {path.name.split(".out.tfevents")[0] for path in run.iterdir()}
     assert left == {
         "config.json",
+        "starts.jsonl",
         "metrics.jsonl",
         "checkpoints",
         "events",
@@ -97,10 +98,7 @@ def test_a_resumed_run_equals_one_that_never_stopped() -> None:
     assert result_of("stopped")["eval"] == result_of("straight")["eval"]
 
 
-def test_a_preset_brings_its_numbers_and_options_override_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        "trainer.crew.available_cores", lambda: 1
-    )  # threads of torch would wait for busy cores
+def test_a_preset_brings_its_numbers_and_options_override_them() -> None:
     few = [
         "--net",
         "paper-reference",
@@ -108,6 +106,8 @@ def test_a_preset_brings_its_numbers_and_options_override_them(monkeypatch: pyte
         "80",
         "--envs",
         "2",
+        "--threads",
+        "1",  # more would wait for busy cores
         "--eval-episodes",
         "4",
         "--device",
@@ -115,7 +115,9 @@ def test_a_preset_brings_its_numbers_and_options_override_them(monkeypatch: pyte
     ]
     assert run_main(["corridor.yaml", *few, "--seed", "5", "--out", "here"]) == 0
     written = json.loads(Path("here", "config.json").read_text())
-    assert written["trainer"] == paper_preset(frames=80, num_envs=2, seed=5, explo_c=0.0).model_dump()
+    assert (
+        written["trainer"] == paper_preset(frames=80, num_envs=2, seed=5, explo_c=0.0, threads=1).model_dump()
+    )
     assert run_main(["--resume", "here", "--frames", "160"]) == 0
     assert result_of("here")["frames"] == 160
     assert main(["evaluate", "here", "--on", "corridor.yaml", "--episodes", "4", "--device", "cpu"]) == 0
@@ -138,7 +140,10 @@ def test_the_number_of_environments_is_the_preset_s_unless_given(
     (settings,) = trained
     assert settings.envs == envs
     config = train_config(settings)
-    assert config == configure(net, frames=settings.frames, num_envs=envs, explo="cell", explo_c=3.0)
+    assert config == configure(
+        net, frames=settings.frames, num_envs=envs, explo="cell", explo_c=3.0, threads=settings.threads
+    )
+    assert settings.threads >= 1
 
 
 def test_random_play_is_the_same_every_time() -> None:
