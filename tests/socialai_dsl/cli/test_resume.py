@@ -1,0 +1,112 @@
+"""A run killed at random moments and resumed ends as one that never stopped: weights, log and results, to the bit."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from trainer.checkpoint import KEPT, read
+
+ROOT = Path(__file__).parents[3]
+HORIZONS = {"fast": 32, "paper-reference": 40}  # steps of each environment in an update
+TIMES = ("frames_per_second", "train_seconds")
+
+FAST = ["--net", "fast", "--threads", "2", "--envs", "8", "--checkpoint-every", "2"]
+SUITE = ["social_env", "--explo", "lang", "--curriculum", "progress", *FAST]
+CELLS = ["help", "--explo", "cell", *FAST]
+BATCH_NORM = ["help", "--net", "paper-reference", "--threads", "1", "--envs", "2", "--checkpoint-every", "1"]
+LONG = [pytest.mark.slow, pytest.mark.timeout(1800)]
+
+
+def started(*arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "socialai_dsl", "run", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        cwd=ROOT,
+    )
+
+
+def finish(process: subprocess.Popen[str]) -> None:
+    output, _ = process.communicate(timeout=900)
+    assert process.returncode == 0, output
+
+
+def lines(path: Path) -> list[str]:
+    return path.read_text().splitlines() if path.exists() else []
+
+
+def kill_after(run: Path, process: subprocess.Popen[str], starts: int, updates: int, delay: float) -> None:
+    """Kill the process some moment after its log has that many updates."""
+    while process.poll() is None and (
+        len(lines(run / "starts.jsonl")) < starts or len(lines(run / "metrics.jsonl")) < updates
+    ):
+        time.sleep(0.002)
+    time.sleep(delay)
+    process.send_signal(signal.SIGKILL)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == -signal.SIGKILL, f"the kill came too late: {output}"
+
+
+def without_times(content: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in content.items() if key not in TIMES}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "updates", "kills"),
+    [
+        pytest.param(SUITE, 8, 2, id="suite-2"),
+        pytest.param(SUITE, 40, 20, id="suite-20", marks=LONG),
+        pytest.param(CELLS, 40, 20, id="cells-20", marks=LONG),
+        pytest.param(BATCH_NORM, 22, 20, id="batch_norm-20", marks=LONG),
+    ],
+)
+def test_a_killed_run_ends_as_one_that_never_stopped(
+    arguments: list[str], updates: int, kills: int, tmp_path: Path
+) -> None:
+    envs = int(arguments[arguments.index("--envs") + 1])
+    frames = envs * HORIZONS[arguments[arguments.index("--net") + 1]] * updates
+    command = [*arguments, "--frames", str(frames), "--eval-episodes", "20", "--seed", "3"]
+    whole, killed = tmp_path / "whole", tmp_path / "killed"
+    finish(started(*command, "--out", str(whole)))
+
+    rng = np.random.default_rng(0)
+    moments = sorted(rng.integers(0, updates - 1, kills).tolist())
+    process = started(*command, "--out", str(killed))
+    for number, moment in enumerate(moments):
+        kill_after(killed, process, number + 1, moment, float(rng.random()) * 0.3)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # a damaged newest file would only be a warning
+            assert read(killed / "checkpoints").meta.update <= updates
+        process = started("--resume", str(killed))
+    finish(process)
+
+    starts = [json.loads(line) for line in lines(killed / "starts.jsonl")]
+    assert len(starts) == kills + 1, "each kill landed in a run of its own"
+    assert len({start["update"] for start in starts}) > 1, "progress was made between the kills"
+    one, other = read(whole / "checkpoints"), read(killed / "checkpoints")
+    assert other.meta == one.meta
+    assert other.tensors.keys() == one.tensors.keys()
+    for name, value in one.tensors.items():
+        assert torch.equal(other.tensors[name], value), f"{name} differs after kills at {moments}"
+    logs = [
+        [without_times(json.loads(line)) for line in lines(run / "metrics.jsonl")] for run in (whole, killed)
+    ]
+    assert logs[0] == logs[1]
+    assert [row["update"] for row in logs[0]] == list(range(1, updates + 1))
+    results = [
+        without_times(json.loads((run / "result.json").read_text(encoding="utf-8")))
+        for run in (whole, killed)
+    ]
+    assert results[0] == results[1]
+    assert (whole / "transcript.txt").read_bytes() == (killed / "transcript.txt").read_bytes()
+    assert len(list((killed / "checkpoints").iterdir())) == KEPT
