@@ -1,0 +1,53 @@
+"""On a graphics card the same code runs: nothing mixes tensors of the computer with those of the card.
+
+There is no card where the tests run, so one is pretended; that the arithmetic is right there is not tested.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from gymnasium.vector import AutoresetMode
+
+from tests.trainer.fake_envs import EchoEnvs
+from tests.trainer.pretend import DevicesMixed, PretendedCard
+from trainer.checkpoint import read
+from trainer.evaluate import evaluate
+from trainer.policies import CheckpointPolicy
+from trainer.train import train
+
+
+@pytest.mark.parametrize("net", ["fast", "paper", "paper-reference"])
+def test_training_on_a_card_moves_everything_there(net: str, tmp_path: Path, small_config: Any) -> None:
+    """It also does the same arithmetic as on the CPU, because the pretended card computes there."""
+    settings = {"net": net, "explo": "lang", "bootstrap_timeouts": True, "bptt": 4, "frames": 64 * 2}
+    here = read(train(small_config(**settings), EchoEnvs(8, chatter=0.3), tmp_path / "here"))
+    # PyTorch for CPUs has no cuDNN, which it would look for.
+    with torch.backends.cudnn.flags(enabled=False), PretendedCard() as card:
+        config = small_config(**settings, device="cuda")
+        train(config.model_copy(update={"frames": 64}), EchoEnvs(8, chatter=0.3), tmp_path / "there")
+        path = train(config, EchoEnvs(8, chatter=0.3), tmp_path / "there", resume=True)
+        envs = EchoEnvs(8, mode=AutoresetMode.DISABLED)
+        evaluate(CheckpointPolicy.load(path, envs, device="cuda"), envs, 8)
+    assert card.moved["there"] > 0
+    there = read(path)
+    for name, value in here.tensors.items():
+        assert torch.equal(there.tensors[name], value), name
+
+
+def test_the_pretended_card_refuses_what_a_real_one_does() -> None:
+    with PretendedCard():
+        here, there = torch.ones(3), torch.ones(3).to("cuda")
+        assert there.device.type == "cuda"
+        assert (there + there).device.type == "cuda"
+        assert torch.zeros_like(there).device.type == "cuda"
+        assert there.cpu().device.type == "cpu"
+        with pytest.raises(DevicesMixed):
+            here + there
+        with pytest.raises(DevicesMixed):
+            here[there.long()]
+        with pytest.raises(TypeError, match="numpy"):
+            there.numpy()
+        assert np.array_equal(there.cpu().numpy(), [1, 1, 1])
