@@ -13,6 +13,7 @@ from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.frontend import LoadedScenario, load
 from socialai_dsl.program import Program
 from tests.reference.interpreter import Action, Reference, Result, plain
+from tests.reference.vocabulary import LONGEST, Words
 
 BOOKKEEPING = ("pending", "kept", "aim", "reset.")
 """Registers of the compiler's own: what a turn keeps until its end."""
@@ -31,11 +32,18 @@ class Pair:
     scripted: bool
 
     @classmethod
-    def of(cls, loaded: LoadedScenario, program: Program | None = None) -> Pair:
-        """A pair for a loaded scenario; `program` replaces what the compiler makes of it."""
+    def of(cls, loaded: LoadedScenario, program: Program | None = None, number_words: bool = True) -> Pair:
+        """A pair for a loaded scenario; `program` replaces what the compiler makes of it.
+
+        With `number_words` the reference numbers the words by itself, which it can if the values in texts are simple.
+        """
         program = program or compile_scenario(loaded.checked)
-        pair = cls(ScenarioEnv(program), Reference(loaded.resolved), "agent" in _frames(loaded))
-        pair._compare_words()
+        known = None
+        if not number_words:
+            known = Words({word: number for number, word in enumerate(program.vocabulary)}, LONGEST)
+        pair = cls(ScenarioEnv(program), Reference(loaded.resolved, known), "agent" in _frames(loaded))
+        if number_words:
+            pair._compare_words()
         return pair
 
     def _compare_words(self) -> None:

@@ -27,7 +27,7 @@ def has_aim(activity: Activity) -> bool:
     """Whether what an activity is about is computed anew in each turn, so that its end must know what it was."""
     if activity.name in ACTS:
         return True
-    return activity.name in GOING and not isinstance(activity.args[0], Const)
+    return activity.name in (*GOING, "turn_to") and not isinstance(activity.args[0], Const)
 
 
 class Activities:
@@ -80,7 +80,7 @@ class Activities:
             case "face":
                 self._turn_towards(self._present(activity.args[0]))
             case "turn_to":
-                block.emit(Op.TURN_TO, own, to.value(activity.args[0]), self.turn)
+                block.emit(Op.TURN_TO, own, self._aimed_at(activity), self.turn)
             case "turn":
                 self._turn(activity.args[0])
             case "go_to":
@@ -261,7 +261,7 @@ class Activities:
         If its argument finds nothing, on to `nothing`.
         """
         to, block = self.to, self.to.block
-        if activity.name not in (*GOING, "use", "push", "perform"):
+        if activity.name not in (*GOING, *ACTS, "turn_to", "perform"):
             return
         to.site, block.span = activity.site, activity.span
         own = constant(self.entity)
@@ -276,6 +276,9 @@ class Activities:
             # A scripted agent's frame follows what the agent has really done.
             act = Body.TOGGLE if activity.name == "use" else Body.FORWARD
             block.test(Op.IF_EQ, entity_register(self.entity, Field.LAST), constant(act), otherwise)
+        elif activity.name == "turn_to":
+            facing = entity_register(self.entity, Field.DIR)
+            block.test(Op.IF_EQ, facing, self._goal(activity, nothing), otherwise)
         else:
             op = Op.IF_NEXT_TO if activity.name == "go_next_to" else Op.IF_SAME_CELL
             block.test(op, own, self._goal(activity, nothing), otherwise)

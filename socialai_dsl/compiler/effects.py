@@ -100,11 +100,20 @@ class Effects:
             self._change(effect, term, entity)
         elif effect.name == "become":
             block.emit(Op.BECOME, entity, value)
-        else:
+        elif effect.name == "move_into":
             block.emit(Op.PLACE, entity, value)
-            if effect.name == "move_into":
-                block.emit(Op.VANISH, entity)
-                block.emit(Op.SET_FIELD, entity, Field.INSIDE, value)
+            block.emit(Op.VANISH, entity)
+            block.emit(Op.SET_FIELD, entity, Field.INSIDE, value)
+        else:
+            block.emit(Op.PLACE, entity, self._cell(effect, value))
+
+    def _cell(self, effect: Effect, value: int) -> int:
+        """Where to put something: what has left the room is on no cell any more."""
+        assert effect.value is not None, "internal: `put` says where"
+        entity = effect.value.type.kind == "entity"
+        if entity and self.to.absent.intersection(numbers_of(effect.value)):
+            return self.to.into_temporary(Op.CELL_OF, value)
+        return value
 
     def _change(self, effect: Effect, term: Term, entity: int) -> None:
         """Open, close, lock, reveal; unlock only what is locked."""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import cached_property
 
 from socialai_dsl.compiler.assembler import Block, Label, Sites, constant
 from socialai_dsl.compiler.cells import LoopCell, coordinate, count_cells, one_cell
 from socialai_dsl.compiler.classes import SILENCE, Classes
 from socialai_dsl.compiler.folding import TRUE, Facts, fold, substitute
+from socialai_dsl.compiler.mobility import sometimes_absent
 from socialai_dsl.compiler.quantifiers import count_things, first_thing, nearest_thing, picked_thing
 from socialai_dsl.compiler.registers import Registers, entity_register, said_path, state_names
 from socialai_dsl.compiler.selects import among, asks, selected_condition, selected_value
@@ -90,6 +92,11 @@ class Expressions:
         self.facts = Facts()
         self.loop: LoopCell | None = None
         self.failed: Label | None = None
+
+    @cached_property
+    def absent(self) -> frozenset[int]:
+        """The entities that may not be in the room."""
+        return sometimes_absent(self.checked)
 
     # --- conditions ---
 
@@ -268,7 +275,9 @@ class Expressions:
                 return coordinate(self, term)
             case terms.FieldOf(name="inside"):
                 return self._container(term)
-            case terms.FieldOf(entity=Const(value=entity)):
+            case terms.FieldOf(entity=Const(value=entity)) if not (
+                term.name in ("x", "y") and entity in self.absent
+            ):
                 return entity_register(entity, _FIELDS[term.name])
             case terms.FieldOf():
                 entity = self.value(term.entity)

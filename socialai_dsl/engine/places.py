@@ -144,7 +144,9 @@ def next_cell(row: Row, a: int, x: int, y: int) -> int:
 
 @inline
 def _nearest_cell(row: Row, a: int, thing: int) -> int:
-    """The cell of board a nearest to a thing, the first of equally near ones; as `next_cell`."""
+    """The cell of board a nearest to a thing in the room, the first of equally near ones; as `next_cell`."""
+    if not is_somewhere(row, thing):
+        return NOTHING
     x = x_of(row, thing)
     y = y_of(row, thing)
     nearest = NOTHING

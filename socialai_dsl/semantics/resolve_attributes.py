@@ -213,7 +213,7 @@ def _attribute(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: 
             return FieldOf(DIRECTION, who, "dir")
         case "x" | "y":
             high = (resolver.symbols.width if name == "x" else resolver.symbols.height)[1]
-            return FieldOf(Type("int", 0, high - 1), who, "x" if name == "x" else "y")
+            return FieldOf(Type("int", -1, high - 1), who, "x" if name == "x" else "y")
         case "gone":
             return FieldOf(BOOL, who, "gone")
         case "was_poked":

@@ -110,7 +110,7 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
     assert subject is not None, "internal: only relations have the candidate cell as a subject"
     if node.name == "distance":
         (_, width), (_, height) = resolver.symbols.width, resolver.symbols.height
-        return Measure(Type("int", 0, width + height - 2), "distance", (subject, other))
+        return Measure(Type("int", 0, width + height), "distance", (subject, other))
     assert node.name == "dir_to", f"internal: no meaning for `{node.name}`"
     return Measure(DIRECTION, "dir_to", (subject, other))
 

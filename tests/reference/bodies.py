@@ -194,8 +194,9 @@ def go_next_to(world: World, me: Entity, goal: Any) -> str:
 
 
 def along(world: World, me: Entity, goals: list[Cell]) -> str:
-    """The next action on a shortest path to any of the goals: breadth first, ties down, up, right, left."""
-    steps = {goal: 0 for goal in goals if not (me is not world.agent and world.deadly(goal))}
+    """The next action on a shortest path to any of the goals, which need not be free themselves: breadth first, ties
+    down, up, right, left."""
+    steps = dict.fromkeys(goals, 0)
     queue = list(steps)
     for cell in queue:
         for direction in SEARCH_ORDER:

@@ -9,7 +9,7 @@ from socialai_dsl.grammar import ast
 from tests.reference import geometry
 from tests.reference.evaluate import Context, evaluate, of
 from tests.reference.source import Sources
-from tests.reference.world import TYPES, Entity, World, as_list, where
+from tests.reference.world import TYPES, Cell, Entity, World, as_list, where
 
 Cause = tuple[str, list[Entity], Any]
 
@@ -61,7 +61,7 @@ def affect(world: World, target: Entity, verb: str, status: Any) -> None:
     elif verb == "reset":
         reset(world, target)
     elif verb == "put":
-        target.cell = where(status)
+        put(world, target, where(status))
     elif verb == "move_into":
         target.cell, target.inside = None, status
     elif verb == "reveal":
@@ -76,6 +76,15 @@ def affect(world: World, target: Entity, verb: str, status: Any) -> None:
     else:
         target.status = {"open": "open", "close": "closed", "lock": "locked"}[verb]
     assert target.sort != "object" or target.status in TYPES[target.type].states
+
+
+def put(world: World, target: Entity, cell: Cell | None) -> None:
+    """It comes to a cell; somebody only where he can stand. What is not in the room has no cell to come to."""
+    taken = any(member is not target and member.cell == cell for member in world.cast.values())
+    if cell is None:
+        return
+    if target.sort == "object" or (world.walkable(cell) and not world.deadly(cell) and not taken):
+        target.cell = cell
 
 
 def remember(entity: Entity) -> None:

@@ -77,7 +77,9 @@ def _text(node: ast.Text, context: Context) -> str:
 
 
 def spelled(value: Any) -> str:
-    """A value inside a text."""
+    """A value inside a text. While somebody is silent his noun is not there to be said."""
+    if value is None:
+        raise NothingFoundError
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, Entity):

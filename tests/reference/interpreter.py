@@ -17,7 +17,7 @@ from tests.reference.room import Setup, sizes
 from tests.reference.script import Outcome, script_of
 from tests.reference.settling import Settling
 from tests.reference.source import Sources
-from tests.reference.vocabulary import Vocabulary
+from tests.reference.vocabulary import Vocabulary, Words
 from tests.reference.world import Entity, Performance, World, as_list
 
 Action = tuple[int, int, int, int]
@@ -39,12 +39,15 @@ class Result:
 
 
 class Reference:
-    """Plays one scenario, slowly. It takes a name, a resolved scenario, its models or its plain data."""
+    """Plays one scenario, slowly. It takes a name, a resolved scenario, its models or its plain data.
 
-    def __init__(self, source: Any) -> None:
+    `words` are the numbers of words; without them it works out itself which words the scenario has.
+    """
+
+    def __init__(self, source: Any, words: Words | None = None) -> None:
         self.scenario = script_of(source)
         self.sources = Sources(self.scenario)
-        self.vocabulary = Vocabulary(self.scenario, self.sources)
+        self.vocabulary = words or Vocabulary(self.scenario, self.sources)
         self.looks_back = "prev(" in repr(self.scenario)
         self.canvas = self.scenario.room.canvas or (
             max(sizes(self.scenario, self.sources, "width")),

@@ -58,9 +58,9 @@ def shown(world: World, cell: Cell, canvas: tuple[int, int]) -> tuple[int, int, 
     thing = world.object_at(cell)
     if thing is not None:
         type_ = TYPES[thing.type]
-        tag = 1 if thing.status == "tagged" else 0
-        status = 0 if thing.dark else type_.states.index(thing.status)
-        return type_.code, COLORS.index(str(thing.color)), status, tag
+        seen = type_.initial if thing.dark else thing.status
+        tag = 1 if seen == "tagged" else 0
+        return type_.code, COLORS.index(str(thing.color)), type_.states.index(seen), tag
     ground = world.terrain.get(cell)
     if ground is not None:
         return TYPES[ground].code, COLORS.index(str(TYPES[ground].color)), 0, 0
