@@ -12,7 +12,7 @@ from socialai_dsl.compiler.classes import SILENCE, Classes
 from socialai_dsl.compiler.folding import TRUE, Facts, fold, substitute
 from socialai_dsl.compiler.mobility import sometimes_absent
 from socialai_dsl.compiler.quantifiers import count_things, first_thing, nearest_thing, picked_thing
-from socialai_dsl.compiler.registers import Registers, entity_register, said_path, state_names
+from socialai_dsl.compiler.registers import Registers, entity_register, found_path, said_path, state_names
 from socialai_dsl.compiler.selects import among, asks, selected_condition, selected_value
 from socialai_dsl.program import CONSTANT, TEMPORARY, Field, Op, Register
 from socialai_dsl.semantics import terms
@@ -26,9 +26,9 @@ _FIELDS = {
     "status": Field.STATUS,
     "gone": Field.GONE,
     "poked": Field.POKED,
-    "last": Field.LAST,
     "pointing": Field.POINTING,
     "inside": Field.INSIDE,
+    "toggled": Field.TOGGLED,
 }
 _WORLD = {
     "t": Register.T,
@@ -263,7 +263,7 @@ class Expressions:
             case Const():
                 return constant(term.value)
             case terms.Read():
-                return self.registers.by_path[term.path]
+                return self._read(term.path)
             case terms.World(name="noun"):
                 return self._found(Register.NOUN)
             case terms.World():
@@ -315,6 +315,13 @@ class Expressions:
                 return self._loop(term.name).cell
             case _:
                 return self._truth_value(term)
+
+    def _read(self, path: str) -> int:
+        """A register; there may be nothing in it."""
+        found = self.registers.by_path.get(found_path(path))
+        if found is not None and self.failed is not None:
+            self.block.test(Op.IF_NE, found, constant(0), self.failed)
+        return self.registers.by_path[path]
 
     def _found(self, number: int) -> int:
         """Something's number, where -1 is nothing: that fails, or else is as good as the first."""

@@ -49,7 +49,9 @@ def _first_that_holds(to: Expressions, checked: Checked, probes: Probes) -> None
         asked.condition(to, "outcome", outcome.condition, following)
         if outcome.graded is not None and outcome.success:
             mark = block.taken
+            to.failed = following
             block.emit(Op.END_GRADED, number, to.sited_value(outcome.graded))
+            to.failed = None
             block.release(mark)
         else:
             block.emit(Op.END, number, outcome.percent if outcome.success else 0)

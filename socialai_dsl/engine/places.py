@@ -4,7 +4,7 @@ import numpy as np
 
 from socialai_dsl.engine.bits import count_bits, lowest_bit, nth_bit
 from socialai_dsl.engine.boards import copy_room, room_table
-from socialai_dsl.engine.entities import field, front_x, front_y, is_present, set_field
+from socialai_dsl.engine.entities import field, front_direction, is_present, set_field, step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.operands import assign, draw_below, value
 from socialai_dsl.engine.sets import add_cell, clear, count_cells, fill_next_to, get_line, set_line
@@ -109,7 +109,10 @@ def _fill_next_to(row: Row, a: int, thing: int) -> None:
 def _fill_in_front_of(row: Row, a: int, entity: int) -> None:
     clear(row, a)
     if entity < NO_CELL and is_present(row, entity):
-        add_cell(row, a, front_x(row, entity), front_y(row, entity))
+        direction = front_direction(row, entity)
+        if direction >= 0:
+            x = field(row, entity, Field.X) + step_x(direction)
+            add_cell(row, a, x, field(row, entity, Field.Y) + step_y(direction))
 
 
 @inline

@@ -273,7 +273,7 @@ class Resolver:
 
     def _among(self, left: Term, option: ast.Expr, node: ast.Expr, scope: Scope) -> Term:
         if isinstance(option, ast.Interval):
-            self.fit(left, INT, option, scope)
+            left = self.fit(left, INT, option, scope)
             return between(left, self.value(option.low, INT, scope), self.value(option.high, INT, scope))
         if resolve_groups.is_group(self, option, scope):
             group = resolve_groups.group(self, option, left.type, scope)

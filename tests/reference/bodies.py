@@ -246,8 +246,6 @@ def push(world: World, me: Entity, goal: Any, way: str) -> str:
 
 def enter(world: World, me: Entity, goal: Any) -> str:
     """Uses x while it is closed, goes through once it is open."""
-    cell = where(goal)
-    assert cell is not None
     if geometry.at(world, me, goal):
         return "none"
-    return go_to(world, me, goal) if world.walkable(cell) else use(world, me, goal)
+    return go_to(world, me, goal) if goal.status in TYPES[goal.type].walkable else use(world, me, goal)

@@ -89,14 +89,14 @@ def put(world: World, target: Entity, cell: Cell | None) -> None:
 
 def remember(entity: Entity) -> None:
     """Keeps what `reset` will bring back."""
-    entity.at_reset = (entity.status, entity.cell, entity.facing, entity.blocked, entity.inside)
+    entity.at_reset = (entity.status, entity.cell, entity.facing, entity.inside)
 
 
 def reset(world: World, target: Entity) -> None:
-    """As at the end of the reset of this episode; an NPC turns back, and goes back if its place is free."""
-    status, cell, facing, blocked, inside = target.at_reset
+    """As it was put down in this episode; an NPC turns back, and goes back if its place is free."""
+    status, cell, facing, inside = target.at_reset
     if target.sort == "object":
-        target.status, target.blocked, target.inside = status, blocked, inside
+        target.status, target.inside = status, inside
     else:
         target.pointing, target.facing = None, facing
         if cell is None or not geometry.free(world, cell, target):

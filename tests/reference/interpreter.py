@@ -106,14 +106,14 @@ class Reference:
         setup = Setup(scenario, self.sources, self.world, layout)
         setup.run()
         self.world.always_audible = frozenset(n for n, m in setup.members.items() if m.audible == "always")
+        for entity in self.world.entities():
+            remember(entity)
         self.settling = Settling(scenario, self.sources, self.world)
         self.settling.all()
         for member in self.world.cast.values():
             frame = self.sources.frame_of(member.frame)
             if frame is not None and frame.steps is not None:
                 FrameRunner(self.sources, self.world, member).skip_empty(frame)
-        for entity in self.world.entities():
-            remember(entity)
 
     def accepted(self) -> bool:
         """Whether the room is as `require` wants it."""
@@ -137,6 +137,7 @@ class Reference:
         # Step 1: the agent's body action. A scripted agent reads its `first` before.
         runner = FrameRunner(self.sources, world, world.agent)
         turn = runner.begin()
+        runner.perform_utterance(turn)
         turn.activity.primitive(world, world.agent)  # what its frame asks for, whatever the agent does
         bodies.act(world, world.agent, self.primitive(action))
         # Links are direct consequences and part of an early picture; computed statuses are not.
@@ -193,7 +194,13 @@ class Reference:
             member.action, member.poked = "none", False
             member.bumped = False
         for thing in self.world.things():
-            thing.toggled_by, thing.poked = [], False
+            thing.poked = False
+        self.forget_use(self.world.agent)
+
+    def forget_use(self, user: Entity) -> None:
+        """What somebody toggled at is toggled until his next turn."""
+        for thing in self.world.things():
+            thing.toggled_by = [other for other in thing.toggled_by if other is not user]
 
     def primitive(self, action: Action) -> str:
         """The word for the first number of an action."""
@@ -216,12 +223,15 @@ class Reference:
 
     def npc_turn(self, npc: Entity) -> None:
         """Step 4 for one NPC: `first`, the activity, `then`; its utterance carries from where it stands after it."""
+        self.forget_use(npc)
         if npc.gone:
+            npc.inbox.clear()
             return
         runner = FrameRunner(self.sources, self.world, npc)
         turn = runner.begin()
         # What `first` caused may have made it vanish; what has vanished does nothing.
         if not npc.gone:
+            runner.perform_utterance(turn)
             bodies.act(self.world, npc, turn.activity.primitive(self.world, npc))
             self.settling.all()
             runner.end(turn)
@@ -245,13 +255,13 @@ class Reference:
             return Result(nothing, [], terminated=True, outcome="deadly")
         for number, outcome in enumerate(self.scenario.outcome):
             kind = "success" if outcome.success is not None else "failure"
-            value = self.sources.expression(f"outcome[{outcome.id or number}].{kind}", getattr(outcome, kind))
+            value = self.sources.expression(f"outcome[{number}].{kind}", getattr(outcome, kind))
             try:
                 if not holds(value, Context(world)):
                     continue
+                paid = self.paid(outcome, number) if kind == "success" else 0.0
             except NothingFoundError:
                 continue
-            paid = self.paid(outcome, number) if kind == "success" else 0.0
             return Result(
                 nothing, [], paid, terminated=True, outcome=number if outcome.id is None else outcome.id
             )
@@ -261,7 +271,7 @@ class Reference:
 
     def paid(self, outcome: Outcome, number: int) -> float:
         """The reward of a success: a share of what is left of it by now."""
-        path = f"outcome[{outcome.id or number}].reward"
+        path = f"outcome[{number}].reward"
         per_cent = evaluate(self.sources.expression(path, outcome.reward), Context(self.world))
         left = 1 - self.scenario.reward.slope * self.world.t / self.scenario.horizon
         return float(min(max(per_cent, 0), 100) / 100 * left)
@@ -278,6 +288,7 @@ class Reference:
             self.begin_step()
             runner = FrameRunner(self.sources, world, world.agent)
             turn: Turn = runner.begin()
+            runner.perform_utterance(turn)
             primitive = turn.activity.primitive(world, world.agent)
             bodies.act(world, world.agent, primitive)
             self.settling.all()

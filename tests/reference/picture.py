@@ -44,7 +44,9 @@ def gestures(world: World, cell: Cell) -> tuple[int, int]:
         return NOTHING, NOTHING
     towards = NOTHING if npc.pointing is None else direction_shown(world, npc.pointing)
     act = LAST_ACTS[npc.last_act]
-    return towards, act + towards if npc.last_act == "point" else act
+    # Who was reset after pointing has taken its arm down.
+    points = npc.last_act == "point" and npc.pointing is not None
+    return towards, act + towards if points else act
 
 
 def shown(world: World, cell: Cell, canvas: tuple[int, int]) -> tuple[int, int, int, int]:

@@ -184,7 +184,7 @@ class Setup:
     def needs(self, name: str) -> list[str]:
         """The entities that somebody's place or position speaks of, through lets and facings too, as mentioned."""
         found: dict[str, None] = {}
-        for value in self.values_of(name, ("place", "at")):
+        for value in self.values_of(name, ("place", "at", "inside")):
             self.collect(value.tree, found, {name})
         return [need for need in found if need != name]
 
@@ -380,7 +380,7 @@ class Setup:
         if source is None or thing.inside is not None:
             return
         found = evaluate(
-            self.sources.expression(f"objects.{thing.key}.inside", source), self.context(thing, it=thing)
+            self.sources.expression(f"{site_of(thing)}.inside", source), self.context(thing, it=thing)
         )
         thing.inside = found[thing.index] if isinstance(found, list) else found
 
@@ -424,8 +424,8 @@ class Setup:
             context = self.context(member)
             context.value = value
             goal = where(of(value.tree.args[0], context))
-            if member.cell is not None and goal is not None:
-                member.facing = quadrant(member.cell, goal)
+            there = member.cell is not None and goal is not None
+            member.facing = quadrant(member.cell, goal) if there else "down"
         else:
             member.facing = evaluate(value, self.context(member))
 

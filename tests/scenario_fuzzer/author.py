@@ -291,7 +291,7 @@ class _Author:
             name: {"start": self.rng.choice((0, 2, "pick(0..2)")), "range": f"0..{self.rng.randint(3, 6)}"}
             for name in frame.numbers
         }
-        lets |= {name: "pick(colors)" for name in frame.colors}
+        lets |= dict.fromkeys(frame.colors, "pick(colors)")
         lets |= {name: f"pick({group})" for name, group in frame.things.items()}
         if lets:
             made["let"] = lets

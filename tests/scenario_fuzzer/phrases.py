@@ -360,7 +360,7 @@ class Phrases:
         """How something was when the step began."""
         earlier = replace(where, still=True, heard=False, noun=False)
         return self.one_of(
-            lambda: f"prev({self.condition(earlier, 1)})",
+            lambda: f"prev(({self.condition(earlier, 1)}))",
             lambda: f"prev({self.number(earlier, 1)}) {self.rng.choice(('<', '!='))} {self.number(where, 0)}",
             lambda: f"prev({self.color(earlier)}) != {self.color(where)}",
         )
