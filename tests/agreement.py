@@ -200,6 +200,7 @@ def _flatten(node: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 def _state_of_reference(env: ScenarioEnv, reference: Reference) -> dict[str, Any]:
     """The same from the reference, of what the engine holds."""
     held = {name.path for name in env.program.registers}
+    nouns = {name.path for name in env.program.registers if name.kind == "noun"}  # the engine calls 3 "3"
     state = reference.describe()
     for name, member in state["cast"].items():
         del member["kind_code"], member["was_poked"], member["once"]
@@ -212,7 +213,9 @@ def _state_of_reference(env: ScenarioEnv, reference: Reference) -> dict[str, Any
             member["state"] = f"step{member['state']}"
         slots = {k: plain(v) for k, v in reference.world.cast[name].slots.items()}
         member["registers"] = {
-            k: v for k, v in {**slots, **member["registers"]}.items() if f"{name}.{k}" in held
+            k: str(v) if f"{name}.{k}" in nouns else v
+            for k, v in {**slots, **member["registers"]}.items()
+            if f"{name}.{k}" in held
         }
         believed = member.pop("believes")
         member["registers"] |= {

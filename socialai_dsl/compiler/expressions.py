@@ -9,7 +9,7 @@ from functools import cached_property
 from socialai_dsl.compiler.assembler import Block, Label, Sites, constant
 from socialai_dsl.compiler.cells import LoopCell, coordinate, count_cells, one_cell
 from socialai_dsl.compiler.classes import SILENCE, Classes
-from socialai_dsl.compiler.folding import TRUE, Facts, fold, substitute
+from socialai_dsl.compiler.folding import TRUE, Facts, fold, fold_whole, substitute
 from socialai_dsl.compiler.mobility import sometimes_absent
 from socialai_dsl.compiler.quantifiers import count_things, first_thing, nearest_thing, picked_thing
 from socialai_dsl.compiler.registers import Registers, entity_register, found_path, said_path, state_names
@@ -104,7 +104,7 @@ class Expressions:
         """A condition with its own site and place in the source. It is false if something in it finds nothing."""
         self.site, self.block.span = sited.site, sited.span
         failed, self.failed = self.failed, otherwise
-        self.condition(fold(sited.term, self.facts, self.classes), otherwise)
+        self.condition(fold_whole(sited.term, self.facts, self.classes), otherwise)
         self.failed = failed
 
     def condition(self, term: Term, otherwise: Label) -> None:

@@ -44,6 +44,18 @@ def fold(term: Term, facts: Facts, classes: Classes) -> Term:
     return _decide(rebuild(term, lambda part: fold(part, facts, classes)))
 
 
+def fold_whole(term: Term, facts: Facts, classes: Classes) -> Term:
+    """As `fold`, for a condition as a whole, which is false as well if something in it finds nothing."""
+    folded = fold(term, facts, classes)
+    return FALSE if _never_true(folded) else folded
+
+
+def _never_true(term: Term) -> bool:
+    if isinstance(term, terms.Logic):
+        return (any if term.op == "and" else all)(map(_never_true, term.args))
+    return term == FALSE
+
+
 def rebuild(term: Term, change: Callable[[Term], Term]) -> Term:
     """The same kind of node with `change` applied to the terms right below it."""
     changes: dict[str, Any] = {}
@@ -114,7 +126,10 @@ def _decide_logic(term: terms.Logic) -> Term:
         if not isinstance(arg, Const):
             rest.append(arg)
         elif bool(arg.value) == bool(decisive):
-            return _truth(bool(decisive))
+            if not any(map(may_find_nothing, rest)):
+                return _truth(bool(decisive))
+            rest.append(arg)  # what stands before it is still asked: if it finds nothing, all of it is false
+            break
     if not rest:
         return _truth(not decisive)
     return rest[0] if len(rest) == 1 else replace(term, args=tuple(rest))

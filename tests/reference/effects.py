@@ -7,7 +7,7 @@ from typing import Any
 
 from socialai_dsl.grammar import ast
 from tests.reference import geometry
-from tests.reference.evaluate import Context, evaluate, of
+from tests.reference.evaluate import Context, evaluate, of, there
 from tests.reference.source import Sources
 from tests.reference.world import TYPES, Cell, Entity, World, as_list, where
 
@@ -41,7 +41,7 @@ def assignments(
 ) -> dict[str, Any]:
     """What a rule gives to registers, computed before anything is done."""
     return {
-        name: evaluate(sources.expression(f"{path}.set.{name}", source, frame), context)
+        name: there(evaluate(sources.expression(f"{path}.set.{name}", source, frame), context))
         for name, source in rule.set.items()
     }
 
@@ -96,7 +96,7 @@ def reset(world: World, target: Entity) -> None:
     """As it was put down in this episode; an NPC turns back, and goes back if its place is free."""
     status, cell, facing, inside = target.at_reset
     if target.sort == "object":
-        target.status, target.inside = status, inside
+        target.status, target.inside, target.counted = status, inside, 0
     else:
         target.pointing, target.facing = None, facing
         if cell is None or not geometry.free(world, cell, target):

@@ -11,6 +11,7 @@ from tests.reference.evaluate import Context, evaluate, of
 from tests.reference.places import region
 from tests.reference.script import Group, Member, Script, Sequence
 from tests.reference.source import Sources, Value
+from tests.reference.speech import noun_value
 from tests.reference.world import (
     COLORS,
     DIRECTIONS,
@@ -504,6 +505,8 @@ class Setup:
                 member.slots[name] = self.sources.text(path, source)
             elif type_ == "bool":
                 member.slots[name] = self.sources.expression(path, source)
+            elif type_ == "noun" and str(source) in map(str, self.scenario.grammar.nouns):
+                member.slots[name] = noun_value(source)
             else:
                 member.slots[name] = evaluate(self.sources.expression(path, source), self.context(member))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from random import Random
 from typing import Any
 
@@ -63,13 +64,20 @@ class _Author:
         made |= {"tables": tables} if tables else {}
         made |= {"let": lets} if lets else {}
         made |= {"state": state} if state else {}
+        defines = self.definitions()
+        made |= {"define": defines} if defines else {}
         self.finish_objects(objects)
         memory = self.memory(lets)
         made |= {"memory": memory} if memory else {}
         played = {frame.name: self.frame(frame, behaviour) for frame in frames}
-        say_somewhere(list(played.values()), SAYINGS)
+        say_somewhere([played[frame.name] for frame in frames if not frame.of_agent], SAYINGS)
         made |= {"frames": played} if played else {}
         made["cast"] = self.cast()
+        if self.often(0.25):
+            names = [*objects, *self.declared.members, "agent"]
+            made["order"] = self.rng.sample(names, self.rng.randint(1, len(names)))
+        if self.often(0.15):
+            made["require"] = ["agent.distance(ann) > 1"]
         if self.often(0.6):
             made["rules"] = [behaviour.world_rule() for _ in range(self.rng.randint(1, 3))]
         made["outcome"] = self.outcome()
@@ -227,6 +235,15 @@ class _Author:
             self.declared.registers.append(name)
         return made
 
+    def definitions(self) -> dict[str, str]:
+        """Conditions with names, one of them with an argument."""
+        if not self.often(0.4):
+            return {}
+        where = Where(acts=self.acts)
+        found = {"odd_one": self.phrases.condition(replace(where, still=True), 1), "near_by(x)": "agent.distance(x) < 3"}
+        self.declared.truths, self.declared.relations = ["odd_one"], ["near_by"]
+        return found
+
     def memory(self, lets: dict[str, Any]) -> dict[str, Any]:
         """What the agent did last."""
         if not self.declared.sequences or not self.often(0.7):
@@ -256,6 +273,10 @@ class _Author:
                 self.declared.beliefs[name] = self.sorts_of_beliefs()
         if not frames:
             self.declared.says = []
+        if self.often(0.15):
+            frames.append(self.new_frame("frame_9", False))
+            frames[-1].of_agent = True
+            self.declared.follows["agent"] = frames[-1]
         return frames
 
     def new_frame(self, name: str, of_group: bool) -> Frame:
@@ -272,6 +293,15 @@ class _Author:
                 frame.things["thing_" + name[-1]] = thing.name
         if self.often(0.4):
             frame.slots["greeting"] = "text"
+        for name, type_, known in (
+            ("way", "direction", frame.directions),
+            ("goal", "cell", frame.cells),
+            ("wish", "noun", frame.nouns),
+            ("ready", "bool", frame.truths),
+        ):
+            if self.often(0.15):
+                frame.slots[f"{name}_{frame.name[-1]}"] = type_
+                known.append(f"{name}_{frame.name[-1]}")
         return frame
 
     def sorts_of_beliefs(self) -> dict[str, str]:
@@ -309,15 +339,31 @@ class _Author:
             if frame is not None:
                 member["frame"] = frame.name
                 if frame.slots:
-                    where = Where(reset=True)
-                    member["with"] = {"greeting": self.rng.choice((*self.declared.says, f"I like <{self.phrases.color(where)}>"))}
+                    member["with"] = {slot: self.filling(type_) for slot, type_ in frame.slots.items()}
             if name in self.declared.beliefs:
                 member["beliefs"] = {key: self.belief(sort) for key, sort in self.declared.beliefs[name].items()}
             made[name] = member
         made["agent"] = {"place": "anywhere"}
+        if "agent" in self.declared.follows:
+            frame = self.declared.follows["agent"]
+            made["agent"]["frame"] = frame.name
+            if frame.slots:
+                made["agent"]["with"] = {slot: self.filling(type_) for slot, type_ in frame.slots.items()}
         if self.often(0.3):
             made["agent"]["facing"] = self.rng.choice(("up", "random", "left"))
         return made
+
+    def filling(self, type_: str) -> str:
+        """What fills a slot."""
+        once, always = Where(reset=True), Where(acts=self.acts, still=True)
+        fillings: dict[str, Callable[[], str]] = {
+            "text": lambda: self.rng.choice((*self.declared.says, f"I like <{self.phrases.in_text(self.phrases.color, once)}>")),
+            "direction": lambda: self.phrases.direction(once),
+            "cell": lambda: self.rng.choice(("agent.cell", "ann.cell", *self.declared.cells)),
+            "noun": lambda: str(self.rng.choice(self.declared.nouns)),
+            "bool": lambda: self.phrases.condition(always, 1),
+        }
+        return fillings[type_]()
 
     def look(self) -> dict[str, Any]:
         """Where somebody is put and how he looks."""
@@ -363,7 +409,7 @@ class _Author:
             kind = self.rng.choice(("success", "success", "failure"))
             entry: dict[str, Any] = {kind: f"t > {self.rng.randint(5, 15)} and ({self.phrases.condition(where, 1)})"}
             if kind == "success" and self.often(0.5):
-                entry["reward"] = self.rng.choice((30, "100 - 10 * (" + self.phrases.number(where) + ")"))
+                entry["reward"] = self.rng.choice((30, "100 - 10 * (t + " + self.phrases.number(where) + ")"))
             if self.often(0.3):
                 entry["id"] = f"end_{number}"
             entries.append(entry)

@@ -94,8 +94,8 @@ class Behaviour:
             if template is not None:
                 return template, replace(where, heard=True, noun=True)
         if kind == "several":
-            return [self.phrases.heard(), self.phrases.heard()], replace(where, heard=True)
-        return self.phrases.heard(), replace(where, heard=True)
+            return [self.phrases.heard_of_now(), self.phrases.heard_of_now()], replace(where, heard=True)
+        return self.phrases.heard_of_now(), replace(where, heard=True)
 
     def effects(self, where: Where, probability: float) -> dict[str, Any]:
         """Some of: what is set, caused and said."""
@@ -131,7 +131,9 @@ class Behaviour:
     def activity(self, where: Where) -> str:
         """What to do in a turn."""
         rng, phrases = self.rng, self.phrases
-        plain = ["left", "right", "forward", "forward", "toggle", "wander", "stop_pointing", "stay"]
+        plain = ["left", "right", "forward", "forward", "toggle", "wander", "stay"]
+        points = where.is_npcs
+        plain += ["stop_pointing"] if points else []
         options: list[Callable[[], str]] = [
             lambda: rng.choice(plain),
             lambda: rng.choice(("choose(left | 2 * forward | stay)", "choose(toggle | forward)", "turn(left)")),
@@ -139,7 +141,7 @@ class Behaviour:
             lambda: f"face({phrases.spot(where)})",
             lambda: f"go_to({phrases.reachable(where)})",
             lambda: f"go_next_to({phrases.reachable(where)})",
-            lambda: f"{rng.choice(('follow', 'flee', 'point'))}({phrases.entity(where)})",
+            lambda: f"{rng.choice(('follow', 'flee', *(['point'] if points else [])))}({phrases.entity(where)})",
         ]
         usable = phrases.thing(where, "door", "switch", "lever", "box", "apple")
         if usable is not None:
@@ -186,7 +188,7 @@ class Behaviour:
 
     def effect_on_somebody(self, where: Where) -> str:
         """An effect on the agent or an NPC."""
-        who = self.rng.choice([*self.declared.members, *(["self"] * 2 if where.frame else []), "agent"])
+        who = self.rng.choice([*self.declared.members, *(["self"] * 2 if where.is_npcs else []), "agent"])
         if who == "agent" or self.often(0.5):
             return f"{who}.put({self.phrases.spot(where)})"
         return f"{who}.{self.rng.choice(('reset', 'reset', 'vanish'))}"

@@ -41,7 +41,12 @@ class Frame:
     colors: list[str] = field(default_factory=list)  # registers that hold a colour
     things: dict[str, str] = field(default_factory=dict)  # registers and slots: one of this group
     slots: dict[str, str] = field(default_factory=dict)  # name: type
-    of_group: bool = False  # whether it is followed by the members of a group, which have `it.index`
+    directions: list[str] = field(default_factory=list)  # slots that hold a direction
+    cells: list[str] = field(default_factory=list)  # slots that hold a cell
+    nouns: list[str] = field(default_factory=list)  # slots that hold a noun
+    truths: list[str] = field(default_factory=list)  # slots that hold a condition
+    of_group: bool = False  # whether it is followed by the members of a group, which have an index
+    of_agent: bool = False  # whether the agent follows it, who says what its grammar has and never points
 
 
 @dataclass
@@ -65,6 +70,8 @@ class Declared:
     contents: dict[str, str] = field(default_factory=dict)  # what lies in things: the containers
     templates: list[str] = field(default_factory=list)
     nouns: list[str | int] = field(default_factory=list)
+    truths: list[str] = field(default_factory=list)  # definitions without arguments
+    relations: list[str] = field(default_factory=list)  # definitions with somebody or something as their argument
     says: list[str] = field(default_factory=list)  # what NPCs say without values
 
     def group(self, name: str) -> Thing:
@@ -82,6 +89,11 @@ class Declared:
         return [thing for thing in self.things if thing.count is not None]
 
     @property
-    def frames_of_numbers(self) -> bool:
+    def nouns_are_numbers(self) -> bool:
         """Whether nouns can be counted with."""
         return all(isinstance(noun, int) for noun in self.nouns)
+
+    @property
+    def nouns_are_colors(self) -> bool:
+        """Whether any colour can be said."""
+        return "purple" in self.nouns

@@ -33,6 +33,12 @@ class Where:
     acts: tuple[str, ...] = ("left", "right", "forward", "toggle", "done")
 
 
+    @property
+    def is_npcs(self) -> bool:
+        """Whether it stands in a frame that NPCs follow."""
+        return self.frame is not None and not self.frame.of_agent
+
+
 class Phrases:
     """Makes expressions; every choice is drawn from `rng`."""
 
@@ -116,9 +122,9 @@ class Phrases:
     def spot(self, where: Where) -> str:
         """Something with a place: somebody, something, or a cell."""
         options: list[str | Callable[[], str]] = [lambda: self.entity(where)] * 4
-        if self.declared.cells:
-            options.append(self.rng.choice(self.declared.cells))
-        options.append(lambda: f"{self.dotted(self.entity(where))}.cell")
+        options += self.declared.cells
+        options += where.frame.cells if where.frame else []
+        options.append(lambda: f"{self.entity(where)}.cell")
         if not (where.searching or where.reset or where.variables):
             options.append(lambda: f"nearest(c in cells where {self.of_cell(where)} to {self.anchor(where)})")
         return self.one_of(*options)
@@ -133,11 +139,6 @@ class Phrases:
             f"c.in_line({who}) or c.y == {self.rng.randint(1, 4)}",
             "not agent.sees(c)",
         )
-
-    @staticmethod
-    def dotted(what: str) -> str:
-        """What can stand before a dot."""
-        return what
 
     def reachable(self, where: Where) -> str:
         """A goal: one thing, or somebody."""
@@ -173,8 +174,9 @@ class Phrases:
                 lambda: f"({self.number(where, depth - 1)} {rng.choice('+-*')} {self.number(where, 0)})",
                 lambda: f"({self.number(where, depth - 1)} {rng.choice(('//', '%'))} {rng.randint(1, 4)})",
             ]
-        if where.noun and known.frames_of_numbers:
-            options += ["noun", "noun"]
+        if known.nouns_are_numbers:
+            options += ["noun", "noun"] if where.noun else []
+            options += ["agent.noun"] if not where.reset else []
         return self.one_of(*options)
 
     def counted(self, where: Where) -> str:
@@ -193,6 +195,7 @@ class Phrases:
     def direction(self, where: Where) -> str:
         """A direction."""
         return self.one_of(
+            *(where.frame.directions if where.frame else []),
             self.rng.choice(("right", "down", "left", "up")),
             lambda: f"{self.member(where)}.facing",
             lambda: f"opposite({self.member(where)}.facing)",
@@ -213,6 +216,7 @@ class Phrases:
         simple = [self.plain_condition] * 6
         simple += [self.of_this_step, self.of_speech, self.of_this_step, self.of_frames] if not where.reset else []
         simple += [self.quantified, self.quantified] if not where.searching else []
+        simple += [self.defined] if self.declared.truths and not (where.reset or where.searching or where.still) else []
         if not (where.reset or where.still):
             simple.append(self.looking_back)
         return self.rng.choice(simple)(where)
@@ -238,7 +242,7 @@ class Phrases:
         others: list[str | Callable[[], str]] = [lambda: self.entity(where)] * 3
         others += [thing.name for thing in self.declared.several] + list(self.declared.groups)
         if verb == "points_at":
-            npcs = [*self.declared.members, *(["self"] if where.frame else [])]
+            npcs = [*self.declared.members, *(["self"] if where.is_npcs else [])]
             if not npcs:
                 return f"agent.next_to({self.entity(where)})"
             who = self.rng.choice(npcs)
@@ -279,6 +283,12 @@ class Phrases:
             lambda: f"{self.number(where, 0)} in {self.rng.randint(0, 3)}..{self.rng.randint(3, 7)}",
         )
 
+    def defined(self, where: Where) -> str:
+        """What has a name of its own."""
+        own = where.frame.truths if where.frame else []
+        relations = [f"{name}({self.entity(where)})" for name in self.declared.relations]
+        return self.rng.choice([*self.declared.truths, *own, *relations])
+
     def quantified(self, where: Where) -> str:
         """Of one or each of a group, or of cells."""
         known = self.declared
@@ -310,7 +320,7 @@ class Phrases:
         if self.declared.members:
             npc = self.rng.choice(self.declared.members)
             options += [f"{npc}.was_poked", f"{npc}.poked", f"{npc}.gone", f"{npc}.pointing"]
-        options += ["poked", "was_poked", "pointing"] if where.frame else []
+        options += ["poked", "was_poked", "pointing"] if where.is_npcs else []
         for memory, sequence in self.declared.memories.items():
             options.append(f"{memory} == {sequence}")
         return self.one_of(*options)
@@ -327,8 +337,11 @@ class Phrases:
         options += [f"{npc}.spoke" for npc in known.members if npc in known.follows]
         if where.frame is not None and not (where.searching or where.still):
             options += [lambda: f'heard("{self.heard()}")'] * 2
+            options += [f"agent.noun == {name}" for name in where.frame.nouns]
         if where.noun:
             options += [lambda: f"noun == {self.noun()}", lambda: f"noun != {self.entity(where)}.color"]
+        if known.nouns_are_numbers:
+            options.append(lambda: f"agent.noun {self.rng.choice(('<', '==', '!=', '>='))} {self.number(where, 0)}")
         if where.heard:
             options += ["speaker == agent", f"speaker.color == {self.rng.choice(COLORS)}", "speaker.next_to(self)"]
         return self.one_of(*options)
@@ -383,9 +396,18 @@ class Phrases:
             return self.rng.choice(self.declared.says)
         return self.utterance()
 
+    def heard_of_now(self) -> str:
+        """As `heard`, perhaps with a value in it that has to be the one that is said."""
+        template = self.rng.choice(self.declared.templates)
+        if self.declared.nouns_are_colors and self.often(0.4):
+            return template.replace("<noun>", f"<{self.rng.choice(('agent', *self.declared.members))}.color>")
+        return self.heard()
+
     def words(self, where: Where) -> str:
-        """A text of few possible values for an NPC to say."""
+        """A text of few possible values to say."""
         known = self.declared
+        if where.frame is not None and where.frame.of_agent:
+            return self.rng.choice(known.templates).replace("<noun>", str(self.rng.choice(known.nouns)))
         options: list[str | Callable[[], str]] = [*known.says, *known.says]
         options += [
             lambda: f"It is <{self.in_text(self.color, where)}>",
