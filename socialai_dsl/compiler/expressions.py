@@ -255,7 +255,8 @@ class Expressions:
 
     def _compared(self, term: Term) -> int:
         """A value that is only compared: no noun at all is unlike any noun."""
-        return Register.NOUN if term == terms.World(term.type, "noun") else self.value(term)
+        unlike_any = isinstance(term, terms.World) and term.name == "noun" and term.type.kind == "noun"
+        return Register.NOUN if unlike_any else self.value(term)
 
     def value(self, term: Term) -> int:
         """Emit what computes the term; the operand it is in afterwards."""

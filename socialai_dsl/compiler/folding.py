@@ -89,7 +89,7 @@ def mentions(term: Any, kind: type) -> bool:
 def may_find_nothing(term: Term) -> bool:
     """Whether a term may need one of a group when none is what is wanted, or the noun of somebody who is silent."""
     for part in walk(term):
-        if isinstance(part, terms.World | terms.HeardNoun) and part.type.kind == "noun":
+        if isinstance(part, terms.HeardNoun) or (isinstance(part, terms.World) and part.name == "noun"):
             return True
         if isinstance(part, terms.Quantified) and part.op in ("first", "pick", "nearest"):
             return True

@@ -26,7 +26,7 @@ from socialai_dsl.engine.turns import (
     notice,
     settle,
 )
-from socialai_dsl.program import Flag, FrameColumn, Header, Register
+from socialai_dsl.program import Body, Flag, FrameColumn, Header, Register
 
 
 @inline
@@ -40,6 +40,7 @@ def _play(row: Row, link: int) -> None:
     line = 0
     begin(row)
     be_silent(row)
+    row.registers[Register.ACTION] = Body.NONE
     if program[Header.FLAGS] & Flag.AGENT_FRAME:
         frame = program[Header.FRAME_AT]
         heard = inbox_class(row, program[frame + FrameColumn.INBOX])

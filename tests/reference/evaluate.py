@@ -416,14 +416,14 @@ def _prev(node: ast.Call, context: Context) -> Any:
     """An expression as it was at the start of the step, before the agent acted."""
     before = context.world.before
     if before is None:
-        return of(node.args[0], context)
+        return there(of(node.args[0], context))
     earlier = replace(
         context,
         world=before,
         me=moved(context.me, before),
         variables={name: moved(value, before) for name, value in context.variables.items()},
     )
-    return moved(of(node.args[0], earlier), context.world)
+    return moved(there(of(node.args[0], earlier)), context.world)
 
 
 def moved(value: Any, world: World) -> Any:

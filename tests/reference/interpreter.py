@@ -134,6 +134,7 @@ class Reference:
         # Step 0: what is asked of the state that the last step left, then the clock.
         self.look_back()
         self.begin_step()
+        self.note(action)
         # Step 1: the agent's body action. A scripted agent reads its `first` before.
         runner = FrameRunner(self.sources, world, world.agent)
         turn = runner.begin()
@@ -206,6 +207,15 @@ class Reference:
         """The word for the first number of an action."""
         return self.scenario.actions[action[0]] if action[0] < len(self.scenario.actions) else "none"
 
+    def note(self, action: Action) -> None:
+        """What the agent does and says in this step is known from its start."""
+        agent, grammar = self.world.agent, self.scenario.grammar
+        _, speaks, template, noun = action
+        agent.action = self.primitive(action)
+        if speaks:
+            agent.pair = 1 + grammar.pairs().index((template, noun))
+            agent.utterance, agent.noun = speech.pair(grammar, agent.pair)
+
     def go_on(self) -> None:
         """Timers, then things that roll, in object order; then the world settles."""
         motion.count_down(self.world)
@@ -218,7 +228,6 @@ class Reference:
         if speaks:
             text = self.scenario.grammar.utterance(template, noun)
             value = speech.noun_value(self.scenario.grammar.nouns[noun])
-            self.world.agent.pair = 1 + self.scenario.grammar.pairs().index((template, noun))
             speech.speak(self.world, self.world.agent, text, value)
 
     def npc_turn(self, npc: Entity) -> None:
