@@ -326,7 +326,8 @@ class Op(IntEnum):
     B_FLOOR = 60  # board a = cells of plain floor
     B_WALL = 61  # board a = cells of wall side b (literal Side), at least c (literal) cells from its corners
     B_RECT = (
-        62  # board a = floor cells with v(b) <= x <= v(b + 1) and v(b + 2) <= y <= v(b + 3); b is a temporary
+        62  # board a = floor cells with v(b) <= x <= v(b + 1) and v(b + 2) <= y <= v(b + 3); b is a temporary; with
+        # c (literal) 1 what is built counts as floor
     )
     B_NEXT_TO = 63  # board a = cells with Manhattan distance 1 to e(b)
     B_IN_FRONT_OF = 64  # board a = the cell in front of e(b)

@@ -85,7 +85,9 @@ class _FrameCompiler:
             if rule.once
         }
         self.aims = {
-            k: shared.registers.add(f"{frame.member}.aim[{k}]", self._range_of_aim(step.activity), fleeting=True)
+            k: shared.registers.add(
+                f"{frame.member}.aim[{k}]", self._range_of_aim(step.activity), fleeting=True
+            )
             for k, step in enumerate(frame.steps)
             if has_aim(step.activity) and step.until is None and step.duration is None
         }

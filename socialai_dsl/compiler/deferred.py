@@ -107,7 +107,9 @@ class Deferred:
             return _Kept(None, low, high)
         path = f"{self.member}.kept[{self._count}]"
         self._count += 1
-        return _Kept(self.registers.add(path, Type("int", min(0, low), max(0, high)), fleeting=True), low, high)
+        return _Kept(
+            self.registers.add(path, Type("int", min(0, low), max(0, high)), fleeting=True), low, high
+        )
 
 
 def _has_more(rule: RulePlan) -> bool:

@@ -33,7 +33,10 @@ def place(row: Row, op: int, a: int, b: int, c: int) -> None:
     elif op >= Op.HEARD_FROM:
         assign(row, a, first_heard(row, b, c, op - Op.HEARD_FROM + 1))
     elif op == Op.B_FLOOR or op == Op.B_RECT:
-        _fill_floor(row, a)
+        if op == Op.B_RECT and c == 1:
+            _fill_inside(row, a)
+        else:
+            _fill_floor(row, a)
         if op == Op.B_RECT:
             _cut(row, a, b - TEMPORARY)
     elif op == Op.B_WALL:
@@ -68,6 +71,15 @@ def _fill_floor(row: Row, a: int) -> None:
     table = room_table(row) + row.program[Header.CANVAS_WIDTH] * height + 1 + height
     for y in range(height):
         set_line(row, a, y, row.program[table + y])
+
+
+@inline
+def _fill_inside(row: Row, a: int) -> None:
+    """All cells inside the walls, whatever is built there."""
+    clear(row, a)
+    columns = (np.int64(1) << (row.registers[Register.WIDTH] - 1)) - 2
+    for y in range(1, row.registers[Register.HEIGHT] - 1):
+        set_line(row, a, y, columns)
 
 
 @inline

@@ -38,6 +38,7 @@ class Setup:
         self.drawn_cells: set[str] = set()
         self.facing_known: set[str] = set()
         self.status_known: set[str] = set()
+        self.building = False
 
     # -- the whole of it -----------------------------------------------------------------------------------
 
@@ -90,12 +91,14 @@ class Setup:
             setattr(self.world, side, pinned.get(side) or chosen)
 
     def build(self) -> None:
-        """Fixed things stand in place of floor."""
+        """Fixed things stand in place of floor, or of what was built there before."""
+        self.building = True
         for number, entry in enumerate(self.scenario.room.build):
             for type_, place in entry.items():
                 value = self.sources.expression(f"room.build[{number}].{type_}", place)
                 for cell in region(value, self.context()):
                     self.world.terrain[cell] = type_
+        self.building = False
 
     # -- entities ------------------------------------------------------------------------------------------
 
@@ -284,7 +287,10 @@ class Setup:
             _, source = written[entity.index % len(written)]
             value = self.sources.expression(f"{site_of(entity)}.place", source)
             found = region(value, self.context(entity, it=entity))
-            cells = [c for c in found if c not in self.world.terrain and not self.shared(c, holder)]
+            overlaps = isinstance(holder, Group) and holder.overlap
+            cells = [
+                c for c in found if overlaps or (c not in self.world.terrain and not self.shared(c, holder))
+            ]
         if cells:
             entity.cell = cells[self.draw(f"{path}.cell", number_of(entity), len(cells))]
 

@@ -96,7 +96,9 @@ class _Author:
         """What can be said; some of it NPCs say as well."""
         self.declared.nouns = list(self.rng.choice(NOUNS))
         self.declared.templates = self.rng.sample(TEMPLATES, self.rng.randint(1, 2))
-        said = [t.replace("<noun>", str(self.rng.choice(self.declared.nouns))) for t in self.declared.templates]
+        said = [
+            t.replace("<noun>", str(self.rng.choice(self.declared.nouns))) for t in self.declared.templates
+        ]
         self.declared.says = [*SAYINGS, *said]
         return {"templates": list(self.declared.templates), "nouns": list(self.declared.nouns)}
 
@@ -128,13 +130,17 @@ class _Author:
         made: dict[str, Any] = {"type": thing.type}
         if thing.count is not None:
             made["count"] = thing.count
-        in_wall = thing.type in ("door", "remote_door") or (thing.type in ("switch", "lever") and self.often(0.4))
+        in_wall = thing.type in ("door", "remote_door") or (
+            thing.type in ("switch", "lever") and self.often(0.4)
+        )
         made["place"] = self.place(thing, in_wall)
         if self.often(0.6):
             several = ("distinct", "random") if thing.count else ("random",)
             made["color"] = self.rng.choice((*several, *COLORS))
         if thing.type in ("door", "box") and self.often(0.3):
             made["state"] = "locked"
+        if not in_wall and self.often(0.2):
+            made["overlap"] = True
         if thing.type == "switch" and self.often(0.2):
             made["one_way"] = True
         if thing.type in ("switch", "box", "door") and self.often(0.15):
@@ -150,7 +156,15 @@ class _Author:
         if in_wall:
             return "each_wall(2)" if thing.count else f"wall({self.rng.choice(('top', 'left', 'right'))})"
         return self.rng.choice(
-            ("anywhere", "anywhere", "left_half", "right_half", "anywhere where here.x > 1", "rect(2, 2, 4, 4)")
+            (
+                "anywhere",
+                "anywhere",
+                "left_half",
+                "right_half",
+                "anywhere where here.x > 1",
+                "rect(2, 2, 4, 4)",
+                "column(2) | row(3)",
+            )
         )
 
     def link(self, made: dict[str, dict[str, Any]]) -> None:
@@ -230,7 +244,10 @@ class _Author:
         """Registers of the world."""
         made: dict[str, Any] = {}
         for name in self.rng.sample(("price", "round"), self.rng.randint(0, 2)):
-            made[name] = {"start": self.rng.choice((0, 1, "pick(0..2)")), "range": f"0..{self.rng.randint(3, 7)}"}
+            made[name] = {
+                "start": self.rng.choice((0, 1, "pick(0..2)")),
+                "range": f"0..{self.rng.randint(3, 7)}",
+            }
             self.declared.numbers.append(name)
             self.declared.registers.append(name)
         return made
@@ -240,7 +257,10 @@ class _Author:
         if not self.often(0.4):
             return {}
         where = Where(acts=self.acts)
-        found = {"odd_one": self.phrases.condition(replace(where, still=True), 1), "near_by(x)": "agent.distance(x) < 3"}
+        found = {
+            "odd_one": self.phrases.condition(replace(where, still=True), 1),
+            "near_by(x)": "agent.distance(x) < 3",
+        }
         self.declared.truths, self.declared.relations = ["odd_one"], ["near_by"]
         return found
 
@@ -282,7 +302,9 @@ class _Author:
     def new_frame(self, name: str, of_group: bool) -> Frame:
         """A frame without its content."""
         in_steps = self.often(0.3)
-        states = [f"{part}_{name[-1]}" for part in ("start", "middle", "end", "last")[: self.rng.randint(2, 4)]]
+        states = [
+            f"{part}_{name[-1]}" for part in ("start", "middle", "end", "last")[: self.rng.randint(2, 4)]
+        ]
         frame = Frame(name, [*states, "finished"] if in_steps else states, of_group=of_group)
         if self.often(0.6):
             frame.numbers.append("count_" + name[-1])
@@ -325,7 +347,9 @@ class _Author:
         lets |= {name: f"pick({group})" for name, group in frame.things.items()}
         if lets:
             made["let"] = lets
-        return made | (behaviour.by_steps(frame) if "finished" in frame.states else behaviour.by_states(frame))
+        return made | (
+            behaviour.by_steps(frame) if "finished" in frame.states else behaviour.by_states(frame)
+        )
 
     def cast(self) -> dict[str, Any]:
         """Everybody."""
@@ -341,7 +365,9 @@ class _Author:
                 if frame.slots:
                     member["with"] = {slot: self.filling(type_) for slot, type_ in frame.slots.items()}
             if name in self.declared.beliefs:
-                member["beliefs"] = {key: self.belief(sort) for key, sort in self.declared.beliefs[name].items()}
+                member["beliefs"] = {
+                    key: self.belief(sort) for key, sort in self.declared.beliefs[name].items()
+                }
             made[name] = member
         made["agent"] = {"place": "anywhere"}
         if "agent" in self.declared.follows:
@@ -357,7 +383,9 @@ class _Author:
         """What fills a slot."""
         once, always = Where(reset=True), Where(acts=self.acts, still=True)
         fillings: dict[str, Callable[[], str]] = {
-            "text": lambda: self.rng.choice((*self.declared.says, f"I like <{self.phrases.in_text(self.phrases.color, once)}>")),
+            "text": lambda: self.rng.choice(
+                (*self.declared.says, f"I like <{self.phrases.in_text(self.phrases.color, once)}>")
+            ),
             "direction": lambda: self.phrases.direction(once),
             "cell": lambda: self.rng.choice(("agent.cell", "ann.cell", *self.declared.cells)),
             "noun": lambda: str(self.rng.choice(self.declared.nouns)),
@@ -371,7 +399,9 @@ class _Author:
         if self.often(0.3):
             made["kind"] = self.rng.choice(("guide", "child"))
         if self.often(0.4):
-            made["place"] = self.rng.choice(("left_half", "right_half", "anywhere where not here.in_line(agent)"))
+            made["place"] = self.rng.choice(
+                ("left_half", "right_half", "anywhere where not here.in_line(agent)")
+            )
         if self.often(0.4):
             made["facing"] = self.rng.choice(("down", "pick(left | up)", "toward(agent)"))
         if self.often(0.3):
@@ -385,12 +415,14 @@ class _Author:
     def belief(self, sort: str) -> dict[str, Any]:
         """What is believed, and when it is looked at."""
         where = Where(reset=True, still=True, searching=True)
-        what, box = self.rng.choice(sorted(self.declared.contents.items()) or [("", "")])
+        what, _ = self.rng.choice(sorted(self.declared.contents.items()) or [("", "")])
         of: dict[str, Callable[[], str]] = {
             "truth": lambda: self.phrases.relation(where),
-            "color": lambda: f"nearest(o in {self.declared.several[0].name} to agent).color"
-            if self.declared.several
-            else "agent.color",
+            "color": lambda: (
+                f"nearest(o in {self.declared.several[0].name} to agent).color"
+                if self.declared.several
+                else "agent.color"
+            ),
             "cell": lambda: "agent.cell",
             "thing": lambda: f"{self.phrases.one(self.declared.group(what), where)}.inside",
         }
@@ -407,7 +439,9 @@ class _Author:
         entries: list[dict[str, Any]] = []
         for number in range(self.rng.randint(1, 3)):
             kind = self.rng.choice(("success", "success", "failure"))
-            entry: dict[str, Any] = {kind: f"t > {self.rng.randint(5, 15)} and ({self.phrases.condition(where, 1)})"}
+            entry: dict[str, Any] = {
+                kind: f"t > {self.rng.randint(5, 15)} and ({self.phrases.condition(where, 1)})"
+            }
             if kind == "success" and self.often(0.5):
                 entry["reward"] = self.rng.choice((30, "100 - 10 * (t + " + self.phrases.number(where) + ")"))
             if self.often(0.3):

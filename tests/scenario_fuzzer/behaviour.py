@@ -29,7 +29,9 @@ class Behaviour:
     def by_states(self, frame: Frame) -> dict[str, Any]:
         """A frame with states."""
         where = Where(frame, acts=self.acts)
-        return {"states": {name: self.state(number, frame, where) for number, name in enumerate(frame.states)}}
+        return {
+            "states": {name: self.state(number, frame, where) for number, name in enumerate(frame.states)}
+        }
 
     def state(self, number: int, frame: Frame, where: Where) -> dict[str, Any]:
         """One state: what comes later can be entered at once."""
@@ -41,7 +43,9 @@ class Behaviour:
         if self.often(0.85):
             made["do"] = self.activity(where)
         if self.often(0.9) or not made:
-            made["then"] = [self.rule(where, frame.states, later, False) for _ in range(self.rng.randint(1, 3))]
+            made["then"] = [
+                self.rule(where, frame.states, later, False) for _ in range(self.rng.randint(1, 3))
+            ]
         return made
 
     def by_steps(self, frame: Frame) -> dict[str, Any]:
@@ -136,12 +140,16 @@ class Behaviour:
         plain += ["stop_pointing"] if points else []
         options: list[Callable[[], str]] = [
             lambda: rng.choice(plain),
-            lambda: rng.choice(("choose(left | 2 * forward | stay)", "choose(toggle | forward)", "turn(left)")),
+            lambda: rng.choice(
+                ("choose(left | 2 * forward | stay)", "choose(toggle | forward)", "turn(left)")
+            ),
             lambda: f"turn_to({phrases.direction(where)})",
             lambda: f"face({phrases.spot(where)})",
             lambda: f"go_to({phrases.reachable(where)})",
             lambda: f"go_next_to({phrases.reachable(where)})",
-            lambda: f"{rng.choice(('follow', 'flee', *(['point'] if points else [])))}({phrases.entity(where)})",
+            lambda: (
+                f"{rng.choice(('follow', 'flee', *(['point'] if points else [])))}({phrases.entity(where)})"
+            ),
         ]
         usable = phrases.thing(where, "door", "switch", "lever", "box", "apple")
         if usable is not None:

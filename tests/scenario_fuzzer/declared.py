@@ -71,7 +71,9 @@ class Declared:
     templates: list[str] = field(default_factory=list)
     nouns: list[str | int] = field(default_factory=list)
     truths: list[str] = field(default_factory=list)  # definitions without arguments
-    relations: list[str] = field(default_factory=list)  # definitions with somebody or something as their argument
+    relations: list[str] = field(
+        default_factory=list
+    )  # definitions with somebody or something as their argument
     says: list[str] = field(default_factory=list)  # what NPCs say without values
 
     def group(self, name: str) -> Thing:

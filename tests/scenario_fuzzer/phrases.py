@@ -18,9 +18,10 @@ class Where:
     """Where an expression stands.
 
     Attributes:
-        frame: whose it is, if it stands in a frame. reset: whether it is computed at reset. heard: whether something was
-        heard, and whether a noun with it. variables: bound ones, with the group they run through. still: whether it may
-        neither draw nor look back. acts: body actions of the agent.
+        frame: whose it is, if it stands in a frame. reset: whether it is computed at reset. heard, noun: whether
+        something was heard, and whether with a noun. variables: bound ones, with the group they run through.
+        still: whether it may neither draw nor look back. searching: whether it stands in a search.
+        acts: body actions of the agent.
     """
 
     frame: Frame | None = None
@@ -31,7 +32,6 @@ class Where:
     still: bool = False
     searching: bool = False
     acts: tuple[str, ...] = ("left", "right", "forward", "toggle", "done")
-
 
     @property
     def is_npcs(self) -> bool:
@@ -169,7 +169,9 @@ class Phrases:
             options.append(lambda: f"prev({self.number(replace(where, still=True, heard=False), 0)})")
         if depth > 0:
             options += [
-                lambda: f"{rng.choice(('min', 'max'))}({self.number(where, depth - 1)}, {self.number(where, 0)})",
+                lambda: (
+                    f"{rng.choice(('min', 'max'))}({self.number(where, depth - 1)}, {self.number(where, 0)})"
+                ),
                 lambda: f"abs({self.number(where, depth - 1)} - {self.number(where, 0)})",
                 lambda: f"({self.number(where, depth - 1)} {rng.choice('+-*')} {self.number(where, 0)})",
                 lambda: f"({self.number(where, depth - 1)} {rng.choice(('//', '%'))} {rng.randint(1, 4)})",
@@ -214,9 +216,15 @@ class Phrases:
                 lambda: f"not ({self.condition(where, depth - 1)})",
             )
         simple = [self.plain_condition] * 6
-        simple += [self.of_this_step, self.of_speech, self.of_this_step, self.of_frames] if not where.reset else []
+        simple += (
+            [self.of_this_step, self.of_speech, self.of_this_step, self.of_frames] if not where.reset else []
+        )
         simple += [self.quantified, self.quantified] if not where.searching else []
-        simple += [self.defined] if self.declared.truths and not (where.reset or where.searching or where.still) else []
+        simple += (
+            [self.defined]
+            if self.declared.truths and not (where.reset or where.searching or where.still)
+            else []
+        )
         if not (where.reset or where.still):
             simple.append(self.looking_back)
         return self.rng.choice(simple)(where)
@@ -237,7 +245,9 @@ class Phrases:
 
     def relation(self, where: Where) -> str:
         """A condition between two things, or of somebody and a place."""
-        verb = self.rng.choice(("at", "next_to", "in_line", "unobstructed", "can_reach", "in_front_of", "faces", *SEARCHING))
+        verb = self.rng.choice(
+            ("at", "next_to", "in_line", "unobstructed", "can_reach", "in_front_of", "faces", *SEARCHING)
+        )
         who = self.member(where)
         others: list[str | Callable[[], str]] = [lambda: self.entity(where)] * 3
         others += [thing.name for thing in self.declared.several] + list(self.declared.groups)
@@ -276,7 +286,9 @@ class Phrases:
     def comparison(self, where: Where) -> str:
         """Two values compared."""
         return self.one_of(
-            lambda: f"{self.number(where)} {self.rng.choice(('<', '<=', '==', '!=', '>', '>='))} {self.number(where, 0)}",
+            lambda: (
+                f"{self.number(where)} {self.rng.choice(('<', '<=', '==', '!=', '>', '>='))} {self.number(where, 0)}"
+            ),
             lambda: f"{self.color(where)} {self.rng.choice(('==', '!='))} {self.entity(where)}.color",
             lambda: f"{self.member(where)}.facing == {self.direction(where)}",
             lambda: f"{self.entity(where)}.color in red | {self.rng.choice(COLORS[1:])}",
@@ -296,13 +308,20 @@ class Phrases:
         for thing in known.several:
             inner = self.bound("o", thing, where)
             options.append(
-                lambda thing=thing, inner=inner: f"{self.rng.choice(('any', 'all'))}(o in {thing.name} where "
-                f"{self.condition(inner, 1)})"
+                lambda thing=thing, inner=inner: (
+                    f"{self.rng.choice(('any', 'all'))}(o in {thing.name} where {self.condition(inner, 1)})"
+                )
             )
         for group in known.groups:
-            options.append(lambda group=group: f"any(n in {group} where n.next_to({self.anchor(where)}) or n.color == red)")
+            options.append(
+                lambda group=group: (
+                    f"any(n in {group} where n.next_to({self.anchor(where)}) or n.color == red)"
+                )
+            )
         if not (where.reset or where.variables):
-            options.append(lambda: f"any(c in cells where c.next_to({self.anchor(where)}) and {self.of_cell(where)})")
+            options.append(
+                lambda: f"any(c in cells where c.next_to({self.anchor(where)}) and {self.of_cell(where)})"
+            )
         return self.one_of(*options) if options else self.relation(where)
 
     def of_this_step(self, where: Where) -> str:
@@ -316,7 +335,11 @@ class Phrases:
         found = self.thing(where)
         if found is not None:
             what = found[0]
-            options += [f"{what}.poked", f"{what}.toggled", lambda: f"{what}.toggled_by({self.member(where)})"]
+            options += [
+                f"{what}.poked",
+                f"{what}.toggled",
+                lambda: f"{what}.toggled_by({self.member(where)})",
+            ]
         if self.declared.members:
             npc = self.rng.choice(self.declared.members)
             options += [f"{npc}.was_poked", f"{npc}.poked", f"{npc}.gone", f"{npc}.pointing"]
@@ -341,16 +364,25 @@ class Phrases:
         if where.noun:
             options += [lambda: f"noun == {self.noun()}", lambda: f"noun != {self.entity(where)}.color"]
         if known.nouns_are_numbers:
-            options.append(lambda: f"agent.noun {self.rng.choice(('<', '==', '!=', '>='))} {self.number(where, 0)}")
+            options.append(
+                lambda: f"agent.noun {self.rng.choice(('<', '==', '!=', '>='))} {self.number(where, 0)}"
+            )
         if where.heard:
-            options += ["speaker == agent", f"speaker.color == {self.rng.choice(COLORS)}", "speaker.next_to(self)"]
+            options += [
+                "speaker == agent",
+                f"speaker.color == {self.rng.choice(COLORS)}",
+                "speaker.next_to(self)",
+            ]
         return self.one_of(*options)
 
     def of_frames(self, where: Where) -> str:
         """In which state somebody is, and what he holds or believes."""
         options: list[str | Callable[[], str]] = []
         for npc, frame in self.declared.follows.items():
-            made = (f"X.is({self.rng.choice(frame.states)})", *(f"X.{n} > {self.rng.randint(0, 3)}" for n in frame.numbers))
+            made = (
+                f"X.is({self.rng.choice(frame.states)})",
+                *(f"X.{n} > {self.rng.randint(0, 3)}" for n in frame.numbers),
+            )
             options += [self.asked_of(npc, condition) for condition in made]
         for npc, beliefs in self.declared.beliefs.items():
             for belief, sort in beliefs.items():
@@ -388,7 +420,11 @@ class Phrases:
     def utterance(self) -> str:
         """Something the agent can say, or with any noun."""
         template = self.rng.choice(self.declared.templates)
-        return template if self.often(0.4) else template.replace("<noun>", str(self.rng.choice(self.declared.nouns)))
+        return (
+            template
+            if self.often(0.4)
+            else template.replace("<noun>", str(self.rng.choice(self.declared.nouns)))
+        )
 
     def heard(self) -> str:
         """Something that can be heard: of the agent or of an NPC."""
@@ -424,7 +460,9 @@ class Phrases:
         if not where.reset:
             options += ["Was it <agent.noun>"]
         if known.tables:
-            options += [lambda: f"They say <{self.rng.choice(known.tables)}({self.in_text(self.color, where)})>"]
+            options += [
+                lambda: f"They say <{self.rng.choice(known.tables)}({self.in_text(self.color, where)})>"
+            ]
         return self.one_of(*options)
 
     def in_text(self, value: Callable[[Where], str], where: Where) -> str:
