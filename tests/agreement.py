@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,8 @@ class Pair:
     env: ScenarioEnv
     reference: Reference
     scripted: bool
+    trail: list[Action] = field(default_factory=list)
+    where: str = ""
 
     @classmethod
     def of(cls, loaded: LoadedScenario, program: Program | None = None, number_words: bool = True) -> Pair:
@@ -59,24 +61,30 @@ class Pair:
 
     def play(self, seed: int, episode: int, rng: np.random.Generator) -> int:
         """One episode with actions drawn from `rng`; the number of steps. Raises Disagreement."""
-        env, reference = self.env, self.reference
-        observation, info = env.reset(seed=seed) if episode == 0 else env.reset()
-        expected = reference.reset(seed=seed, episode=episode)
-        trail: list[Action] = []
-        where = f"{env.program.name}, seed {seed}, episode {episode}"
-        self._compare(observation, info, 0.0, False, False, expected, where, trail)
+        self.reset(seed, episode)
         while True:
-            action = self._action(rng, where, trail)
-            trail.append(action)
-            observation, reward, terminated, truncated, info = env.step(np.array(action))
-            expected = reference.step(action)
-            self._compare(observation, info, reward, terminated, truncated, expected, where, trail)
-            if terminated or truncated:
-                return len(trail)
+            action = self._action(rng)
+            if self.step(action):
+                return len(self.trail)
 
-    def _action(self, rng: np.random.Generator, where: str, trail: list[Action]) -> Action:
+    def reset(self, seed: int, episode: int = 0) -> None:
+        """Begin an episode; those after the first come one after the other. Raises Disagreement."""
+        observation, info = self.env.reset(seed=seed) if episode == 0 else self.env.reset()
+        expected = self.reference.reset(seed=seed, episode=episode)
+        self.trail = []
+        self.where = f"{self.env.program.name}, seed {seed}, episode {episode}"
+        self._compare(observation, info, 0.0, False, False, expected)
+
+    def step(self, action: Action) -> bool:
+        """One step; whether the episode has ended. Raises Disagreement."""
+        self.trail.append(action)
+        observation, reward, terminated, truncated, info = self.env.step(np.array(action))
+        self._compare(observation, info, reward, terminated, truncated, self.reference.step(action))
+        return terminated or truncated
+
+    def _action(self, rng: np.random.Generator) -> Action:
         """Usually what the agent's frame would do, where it has one; else anything, moving more often than not."""
-        scripted = self._scripted(where, trail) if self.scripted else None
+        scripted = self._scripted() if self.scripted else None
         if scripted is not None and rng.random() < 0.85:
             return scripted
         primitives, _, templates, nouns = (int(n) for n in self.env.action_space.nvec)
@@ -88,13 +96,15 @@ class Pair:
         move = int(rng.choice(moves)) if moves and rng.random() < 0.85 else int(rng.integers(primitives))
         return move, int(rng.integers(2)), int(rng.integers(templates)), int(rng.integers(nouns))
 
-    def _scripted(self, where: str, trail: list[Action]) -> Action:
+    def _scripted(self) -> Action:
         expected = self.reference.scripted_action()
         action = tuple(int(part) for part in self.env.scripted_action())
         # Template and noun mean nothing in silence.
         got = action if action[1] else (*action[:2], 0, 0)
         if got != expected:
-            raise Disagreement(f"{where}: scripted action {got}, expected {expected}, after {trail}")
+            raise Disagreement(
+                f"{self.where}: scripted action {got}, expected {expected}, after {self.trail}"
+            )
         return expected
 
     def _compare(
@@ -105,8 +115,6 @@ class Pair:
         terminated: bool,
         truncated: bool,
         expected: Result,
-        where: str,
-        trail: list[Action],
     ) -> None:
         tokens = observation["tokens"]
         differences = [
@@ -126,9 +134,9 @@ class Pair:
         if differences:
             details = _difference(_state_of_env(self.env), _state_of_reference(self.env, self.reference))
             raise Disagreement(
-                f"{where}, step {len(trail)}: {', '.join(differences)} differ.\n{details}\n"
+                f"{self.where}, step {len(self.trail)}: {', '.join(differences)} differ.\n{details}\n"
                 f"heard {info['utterance']!r}, expected {expected.heard}; outcome {self._outcome(info)}, "
-                f"expected {expected.outcome}; reward {reward}, expected {expected.reward}\nactions {trail}"
+                f"expected {expected.outcome}; reward {reward}, expected {expected.reward}\nactions {self.trail}"
             )
 
     def _words(self, tokens: np.ndarray) -> list[str]:
