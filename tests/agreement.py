@@ -189,8 +189,6 @@ def _object(described: dict[str, Any]) -> dict[str, Any]:
 def _member(described: dict[str, Any]) -> dict[str, Any]:
     """A cast member; what does not vary (a fixed name) the engine does not hold."""
     kept = ("at", "color", "facing", "clock", "name", "state")
-    if described.get("state") == "looks on":  # the frame that the checker gives to who only believes
-        kept = ("at", "color", "facing", "name")
     gone = described.get("gone", False)
     return {key: described[key] for key in kept if key in described and not (gone and key == "clock")} | {
         "gone": gone

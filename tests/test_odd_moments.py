@@ -108,6 +108,18 @@ def test_a_box_is_toggled_by_who_opened_it_though_its_content_stands_there(tmp_p
     assert (state["box"].get("gone"), state["apple"]["at"]) == (True, [4, 5])
 
 
+@pytest.mark.parametrize(("npcs", "heard"), [("shown", 1), ("hidden", 0)])
+def test_a_scripted_agent_does_not_hear_who_is_hidden(tmp_path: Path, npcs: str, heard: int) -> None:
+    text = f"""
+    observe: {{npcs: {npcs}}}
+    frames:
+      talk: {{states: {{s: {{then: [{{say: Good day}}]}}}}}}
+      listen: {{let: {{heard_it: 0}}, states: {{s: {{then: [{{hears: Good day, set: {{heard_it: 1}}}}]}}}}}}
+    cast: {{agent: {{at: [1, 1], frame: listen}}, ann: {{at: [5, 5], frame: talk}}}}
+    """
+    assert registers(play(tmp_path, text, [STILL] * 3), "agent")["heard_it"] == heard
+
+
 def test_turning_lasts_until_it_is_done(tmp_path: Path) -> None:
     text = """
     frames: {look: {let: {since: 0}, steps: [{do: turn_to(left)}, {for: 1, set: {since: t}}]}}
@@ -197,3 +209,23 @@ def test_the_speaker_is_who_said_the_value_that_was_waited_for(tmp_path: Path) -
         [(None, "Say 1")],
     )
     assert state["heard"][-1] == "Bob: Sold to Ann"
+
+
+@pytest.mark.parametrize("what", ["one", "pick(apples)", "first(apples)", "moved"])
+def test_whatever_is_moved_into_a_box_comes_out_of_it(tmp_path: Path, what: str) -> None:
+    state = play(
+        tmp_path,
+        f"""
+        objects: {{box: {{type: box, at: [3, 3]}}, apples: {{type: apple, count: 2, at: [[1, 5], [5, 1]]}}}}
+        let: {{one: first(apples)}}
+        define: {{moved: first(a in apples where a.index == 1)}}
+        state: {{inside: false}}
+        rules:
+          - {{when: t == 1, cause: ["{what}.move_into(box)"]}}
+          - {{when: t == 2, set: {{inside: "any(a in apples where a.gone)"}}, cause: [box.reveal]}}
+        """,
+        [STILL] * 3,
+    )
+    assert state["state"]["inside"] is True
+    assert state["box"].get("gone")
+    assert [3, 3] in [apple.get("at") for apple in state["apples"]]

@@ -37,10 +37,11 @@ class Registers:
             if isinstance(item, Drawn):
                 registers.add(item.path, item.type)
         for frame in checked.frames:
+            states = Type("status", 0, len(state_names(frame)) - 1, state_names(frame))
+            registers.add(f"{frame.member}.frame", states, fleeting=not frame.written)
             registers.add(
-                f"{frame.member}.frame", Type("status", 0, len(state_names(frame)) - 1, state_names(frame))
+                f"{frame.member}.clock", Type("int", 0, checked.horizon), fleeting=not frame.written
             )
-            registers.add(f"{frame.member}.clock", Type("int", 0, checked.horizon))
         for item in checked.remembered:
             registers.add(item.path, item.type, fleeting=True)
             if may_find_nothing(item.value.term):

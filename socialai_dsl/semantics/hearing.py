@@ -153,13 +153,13 @@ def asks_for_noun(parts: object) -> bool:
     return any(isinstance(term, HeardNoun) for term in walk(parts))
 
 
-def with_nouns(resolver: Resolver, heard: Iterable[Alternative], span: Span) -> list[Alternative]:
+def with_nouns(resolver: Resolver, heard: Sequence[Alternative], span: Span) -> list[Alternative]:
     """Only what has a noun: a rule that asks for it does not hear anything else."""
     found = [
         [(kept, condition) for pattern, condition in alternative if (kept := _with_noun(resolver, pattern))]
         for alternative in heard
     ]
-    if not any(found):
+    if any(heard) and not any(found):  # what is not understood has been reported
         message = "nothing that this rule hears has a noun, and it asks for `noun`"
         hint = "write `<noun>` where it stands in the text"
         raise resolver.findings.fail("S211", message, span, hint=hint)

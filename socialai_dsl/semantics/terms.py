@@ -536,6 +536,8 @@ class FramePlan:
     start: str = ""
     states: tuple[StatePlan, ...] = ()
     steps: tuple[StepPlan, ...] = ()
+    written: bool = True
+    """False: nobody wrote it; it is there for who only believes something."""
 
 
 @dataclass(frozen=True, slots=True)
