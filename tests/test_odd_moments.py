@@ -219,13 +219,13 @@ def test_whatever_is_moved_into_a_box_comes_out_of_it(tmp_path: Path, what: str)
         objects: {{box: {{type: box, at: [3, 3]}}, apples: {{type: apple, count: 2, at: [[1, 5], [5, 1]]}}}}
         let: {{one: first(apples)}}
         define: {{moved: first(a in apples where a.index == 1)}}
-        state: {{inside: false}}
+        state: {{lay_in_it: false}}
         rules:
           - {{when: t == 1, cause: ["{what}.move_into(box)"]}}
-          - {{when: t == 2, set: {{inside: "any(a in apples where a.gone)"}}, cause: [box.reveal]}}
+          - {{when: t == 2, set: {{lay_in_it: "any(a in apples where a.gone)"}}, cause: [box.reveal]}}
         """,
         [STILL] * 3,
     )
-    assert state["state"]["inside"] is True
+    assert state["state"]["lay_in_it"] is True
     assert state["box"].get("gone")
     assert [3, 3] in [apple.get("at") for apple in state["apples"]]
