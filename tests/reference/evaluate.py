@@ -166,7 +166,7 @@ def _slot(word: str, context: Context) -> tuple[bool, Any]:
         return False, None
     slot = me.slots[word]
     if isinstance(slot, Value):
-        return True, evaluate(slot, replace(context, in_frame=False, variables={}, take_first=True))
+        return True, evaluate(slot, replace(context, in_frame=False, variables={}))
     return True, slot
 
 

@@ -277,9 +277,7 @@ class FrameRunner:
         values = [self.expression(f"{path}.asked", source) for source in written if source is not None]
         if rule.say is not None:
             values.append(self.sources.text(f"{path}.asked", rule.say, frame))
-        return any(
-            isinstance(node, ast.Name) and node.id == "noun" for value in values for node in value.tree.walk()
-        )
+        return any(asks_for_noun(value.tree) for value in values)
 
     def consequence(self, rule: Any, path: str, context: Context) -> Consequence:
         """ "A rule computes first, then acts": all values from the state in which its condition held."""
@@ -321,3 +319,12 @@ class FrameRunner:
             return bodies.plan(self.expression(site, source), context or self.context())
         except NothingFoundError:
             return bodies.Activity("stay")
+
+
+def asks_for_noun(node: Any) -> bool:
+    """Whether an expression needs the noun that was heard; in what is said or heard `<noun>` is any noun."""
+    if isinstance(node, ast.Call) and node.name in ("said", "heard"):
+        return node.subject is not None and asks_for_noun(node.subject)
+    if isinstance(node, ast.Name) and node.id == "noun":
+        return True
+    return any(asks_for_noun(part) for part in node.children())

@@ -166,7 +166,9 @@ class Phrases:
         if known.several and not where.searching:
             options.append(lambda: self.counted(where))
         if not where.reset and not where.still and depth > 0 and self.often(0.5):
-            options.append(lambda: f"prev({self.number(replace(where, still=True, heard=False), 0)})")
+            options.append(
+                lambda: f"prev({self.number(replace(where, still=True, heard=False, noun=False), 0)})"
+            )
         if depth > 0:
             options += [
                 lambda: (
