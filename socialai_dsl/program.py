@@ -27,7 +27,6 @@ only rules that what was heard can fire.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -181,6 +180,7 @@ class Field(IntEnum):
     LAST = 7  # Body of its last turn
     POINTING = 8  # NPC: 0 not pointing, else 1 + direction; it lasts until it stops
     INSIDE = 9  # object that may lie in another: number of that object
+    TOGGLED = 9  # NPC: number of the object that it toggled at in its last turn, 0 if none
 
 
 class Body(IntEnum):
@@ -206,10 +206,9 @@ class EntityColumn(IntEnum):
     NEAR = 2  # least and greatest Manhattan distance at which its voice is heard
     FAR = 3
     AUDIBLE = 4  # 1: heard even while NPCs are hidden
-    IN_WALL = 5  # object: 1 if it lies in a wall (then "in front" is the cell one step into the room)
-    VIEW = 6  # side of its view square
-    PUSHED_BY = 7  # who can push it: 0 anybody, 1 only what rolls
-    COLUMNS = 8
+    VIEW = 5  # side of its view square
+    PUSHED_BY = 6  # who can push it: 0 anybody, 1 only what rolls
+    COLUMNS = 7
 
 
 class TypeColumn(IntEnum):
@@ -327,7 +326,8 @@ class Op(IntEnum):
     B_FLOOR = 60  # board a = cells of plain floor
     B_WALL = 61  # board a = cells of wall side b (literal Side), at least c (literal) cells from its corners
     B_RECT = (
-        62  # board a = floor cells with v(b) <= x <= v(b + 1) and v(b + 2) <= y <= v(b + 3); b is a temporary
+        62  # board a = floor cells with v(b) <= x <= v(b + 1) and v(b + 2) <= y <= v(b + 3); b is a temporary; with
+        # c (literal) 1 what is built counts as floor
     )
     B_NEXT_TO = 63  # board a = cells with Manhattan distance 1 to e(b)
     B_IN_FRONT_OF = 64  # board a = the cell in front of e(b)
@@ -410,6 +410,7 @@ class RegisterName:
         low, high: range of its values.
         kind: what its values are: int, bool, color, direction, action, entity (by number), text, noun, status,
             utterance (0 silence, else 1 + template * nouns + noun), cell (CELL + 32 * y + x).
+        fleeting: whether it is written in every step before it is read, so that it tells nothing between steps.
     """
 
     path: str
@@ -418,14 +419,7 @@ class RegisterName:
     low: int = 0
     high: int = 0
     kind: str = "int"
-
-    @property
-    def fleeting(self) -> bool:
-        """Whether it is written in every step before it is read, so that it tells nothing between steps."""
-        return _FLEETING.fullmatch(self.path) is not None
-
-
-_FLEETING = re.compile(r"prev\..*|memory\.\w+\.open|.*\.(pending|said|(kept|aim)\[\d+\])")
+    fleeting: bool = False
 
 
 @dataclass(frozen=True, slots=True)

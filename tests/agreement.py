@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.frontend import LoadedScenario, load
 from socialai_dsl.program import Program
 from tests.reference.interpreter import Action, Reference, Result, plain
+from tests.reference.vocabulary import LONGEST, Words
 
 BOOKKEEPING = ("pending", "kept", "aim", "reset.")
 """Registers of the compiler's own: what a turn keeps until its end."""
@@ -29,13 +30,22 @@ class Pair:
     env: ScenarioEnv
     reference: Reference
     scripted: bool
+    trail: list[Action] = field(default_factory=list)
+    where: str = ""
 
     @classmethod
-    def of(cls, loaded: LoadedScenario, program: Program | None = None) -> Pair:
-        """A pair for a loaded scenario; `program` replaces what the compiler makes of it."""
+    def of(cls, loaded: LoadedScenario, program: Program | None = None, number_words: bool = True) -> Pair:
+        """A pair for a loaded scenario; `program` replaces what the compiler makes of it.
+
+        With `number_words` the reference numbers the words by itself, which it can if the values in texts are simple.
+        """
         program = program or compile_scenario(loaded.checked)
-        pair = cls(ScenarioEnv(program), Reference(loaded.resolved), "agent" in _frames(loaded))
-        pair._compare_words()
+        known = None
+        if not number_words:
+            known = Words({word: number for number, word in enumerate(program.vocabulary)}, LONGEST)
+        pair = cls(ScenarioEnv(program), Reference(loaded.resolved, known), "agent" in _frames(loaded))
+        if number_words:
+            pair._compare_words()
         return pair
 
     def _compare_words(self) -> None:
@@ -51,24 +61,30 @@ class Pair:
 
     def play(self, seed: int, episode: int, rng: np.random.Generator) -> int:
         """One episode with actions drawn from `rng`; the number of steps. Raises Disagreement."""
-        env, reference = self.env, self.reference
-        observation, info = env.reset(seed=seed) if episode == 0 else env.reset()
-        expected = reference.reset(seed=seed, episode=episode)
-        trail: list[Action] = []
-        where = f"{env.program.name}, seed {seed}, episode {episode}"
-        self._compare(observation, info, 0.0, False, False, expected, where, trail)
+        self.reset(seed, episode)
         while True:
-            action = self._action(rng, where, trail)
-            trail.append(action)
-            observation, reward, terminated, truncated, info = env.step(np.array(action))
-            expected = reference.step(action)
-            self._compare(observation, info, reward, terminated, truncated, expected, where, trail)
-            if terminated or truncated:
-                return len(trail)
+            action = self._action(rng)
+            if self.step(action):
+                return len(self.trail)
 
-    def _action(self, rng: np.random.Generator, where: str, trail: list[Action]) -> Action:
+    def reset(self, seed: int, episode: int = 0) -> None:
+        """Begin an episode; those after the first come one after the other. Raises Disagreement."""
+        observation, info = self.env.reset(seed=seed) if episode == 0 else self.env.reset()
+        expected = self.reference.reset(seed=seed, episode=episode)
+        self.trail = []
+        self.where = f"{self.env.program.name}, seed {seed}, episode {episode}"
+        self._compare(observation, info, 0.0, False, False, expected)
+
+    def step(self, action: Action) -> bool:
+        """One step; whether the episode has ended. Raises Disagreement."""
+        self.trail.append(action)
+        observation, reward, terminated, truncated, info = self.env.step(np.array(action))
+        self._compare(observation, info, reward, terminated, truncated, self.reference.step(action))
+        return terminated or truncated
+
+    def _action(self, rng: np.random.Generator) -> Action:
         """Usually what the agent's frame would do, where it has one; else anything, moving more often than not."""
-        scripted = self._scripted(where, trail) if self.scripted else None
+        scripted = self._scripted() if self.scripted else None
         if scripted is not None and rng.random() < 0.85:
             return scripted
         primitives, _, templates, nouns = (int(n) for n in self.env.action_space.nvec)
@@ -80,13 +96,15 @@ class Pair:
         move = int(rng.choice(moves)) if moves and rng.random() < 0.85 else int(rng.integers(primitives))
         return move, int(rng.integers(2)), int(rng.integers(templates)), int(rng.integers(nouns))
 
-    def _scripted(self, where: str, trail: list[Action]) -> Action:
+    def _scripted(self) -> Action:
         expected = self.reference.scripted_action()
         action = tuple(int(part) for part in self.env.scripted_action())
         # Template and noun mean nothing in silence.
         got = action if action[1] else (*action[:2], 0, 0)
         if got != expected:
-            raise Disagreement(f"{where}: scripted action {got}, expected {expected}, after {trail}")
+            raise Disagreement(
+                f"{self.where}: scripted action {got}, expected {expected}, after {self.trail}"
+            )
         return expected
 
     def _compare(
@@ -97,8 +115,6 @@ class Pair:
         terminated: bool,
         truncated: bool,
         expected: Result,
-        where: str,
-        trail: list[Action],
     ) -> None:
         tokens = observation["tokens"]
         differences = [
@@ -118,9 +134,9 @@ class Pair:
         if differences:
             details = _difference(_state_of_env(self.env), _state_of_reference(self.env, self.reference))
             raise Disagreement(
-                f"{where}, step {len(trail)}: {', '.join(differences)} differ.\n{details}\n"
+                f"{self.where}, step {len(self.trail)}: {', '.join(differences)} differ.\n{details}\n"
                 f"heard {info['utterance']!r}, expected {expected.heard}; outcome {self._outcome(info)}, "
-                f"expected {expected.outcome}; reward {reward}, expected {expected.reward}\nactions {trail}"
+                f"expected {expected.outcome}; reward {reward}, expected {expected.reward}\nactions {self.trail}"
             )
 
     def _words(self, tokens: np.ndarray) -> list[str]:
@@ -173,8 +189,6 @@ def _object(described: dict[str, Any]) -> dict[str, Any]:
 def _member(described: dict[str, Any]) -> dict[str, Any]:
     """A cast member; what does not vary (a fixed name) the engine does not hold."""
     kept = ("at", "color", "facing", "clock", "name", "state")
-    if described.get("state") == "looks on":  # the frame that the checker gives to who only believes
-        kept = ("at", "color", "facing", "name")
     gone = described.get("gone", False)
     return {key: described[key] for key in kept if key in described and not (gone and key == "clock")} | {
         "gone": gone
@@ -192,6 +206,7 @@ def _flatten(node: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 def _state_of_reference(env: ScenarioEnv, reference: Reference) -> dict[str, Any]:
     """The same from the reference, of what the engine holds."""
     held = {name.path for name in env.program.registers}
+    nouns = {name.path for name in env.program.registers if name.kind == "noun"}  # the engine calls 3 "3"
     state = reference.describe()
     for name, member in state["cast"].items():
         del member["kind_code"], member["was_poked"], member["once"]
@@ -204,7 +219,9 @@ def _state_of_reference(env: ScenarioEnv, reference: Reference) -> dict[str, Any
             member["state"] = f"step{member['state']}"
         slots = {k: plain(v) for k, v in reference.world.cast[name].slots.items()}
         member["registers"] = {
-            k: v for k, v in {**slots, **member["registers"]}.items() if f"{name}.{k}" in held
+            k: str(v) if f"{name}.{k}" in nouns else v
+            for k, v in {**slots, **member["registers"]}.items()
+            if f"{name}.{k}" in held
         }
         believed = member.pop("believes")
         member["registers"] |= {

@@ -86,7 +86,6 @@ class Assembly:
     objects: Sequence[str] = ()
     size: tuple[int, int] = (5, 5)
     canvas: tuple[int, int] = (6, 7)
-    in_wall: bool = True
     registers: int = 8
     reset: Sequence[Instruction] = ()
     settle: Sequence[Instruction] = ()
@@ -271,7 +270,6 @@ class Assembly:
             row[EntityColumn.KIND] = entity if kind == "npc" else 0
             row[EntityColumn.NEAR], row[EntityColumn.FAR] = self.earshot
             row[EntityColumn.AUDIBLE] = int(entity in self.audible)
-            row[EntityColumn.IN_WALL] = int(kind == "door" and self.in_wall)
             row[EntityColumn.VIEW] = self.view
             rows += row
         return rows

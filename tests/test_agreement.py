@@ -15,6 +15,7 @@ SAMPLES = sorted(str(path) for path in (Path(__file__).parent / "data" / "agreem
 SCENARIOS = Path(__file__).parent.parent / "scenarios"
 FOLDERS = [f"{path.parent.name}/{path.stem}" for path in sorted(SCENARIOS.glob("[ns]*/*.yaml"))]
 CUES = ("+color", "+pointing", "+feedback", "+emulation", "+scaffolding")
+ALONE = ("+alone", "+asocial+oracle")
 VARIANTS = ("+unsocial", "+oracle", "+as_coded", "+as_coded+unsocial")
 
 
@@ -24,7 +25,7 @@ def shipped() -> Iterator[str]:
         if not alone(name) or name.endswith(("_oracle", "_as_coded")):
             continue
         yield name
-        variants = ("+oracle", *CUES) if name in FOLDERS else VARIANTS
+        variants = ("+oracle", *CUES, *ALONE) if name in FOLDERS else VARIANTS
         yield from (name + variant for variant in variants if exists(name + variant))
         yield from (f"{name}?{choice}" for choice in choices(resolve(name).data.get("params", {})))  # type: ignore[union-attr]
 

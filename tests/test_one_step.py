@@ -291,6 +291,18 @@ def test_2_3_zero_in_any_other_status(play: Folder) -> None:
     """).step("toggle")
     assert [run.step().state["lever"]["timer"] for _ in range(2)] == [2, 0]
     assert run.step("toggle").state["lever"]["timer"] == 1
+    again = play("""
+        objects: {lever: {type: lever, at: [2, 1], timer: 2, state: up}}
+        rules: [{when: t in 2..3, cause: [lever.become(up)]}]
+    """)
+    assert [again.step().state["lever"]["timer"] for _ in range(4)] == [1, 0, 1, 0], (
+        "expired, and up once more"
+    )
+    anew = play("""
+        objects: {lever: {type: lever, at: [2, 1], timer: 3, state: up}}
+        rules: [{when: t == 2, cause: [lever.reset, lever.become(up)]}]
+    """)
+    assert [anew.step().state["lever"]["timer"] for _ in range(4)] == [1, 0, 1, 2], "reset"
 
 
 @pytest.mark.parametrize(
@@ -1393,6 +1405,32 @@ def test_5_54_on_one_cell_is_neither_next_to_nor_eye_contact(play: Folder) -> No
     run.step("forward")
     assert run.at("agent") == run.at("ann")
     assert (run.value("ann.beside"), run.value("ann.eyes")) == (False, False)
+
+
+def test_5_55_no_notice_of_what_has_no_noun(play: Folder) -> None:
+    run = play("""
+        frames:
+          talk: {states: {s: {then: [{say: Good day}]}}}
+          ask: {states: {s: {then: [{say: Say bye}]}}}
+          listen: {states: {s: {then: [{hears: any, say: "<speaker.name> said <noun>"}]}}}
+        cast:
+          ann: {at: [3, 5], frame: talk}
+          bob: {at: [4, 5], frame: ask}
+          cal: {at: [5, 5], frame: listen}
+    """)
+    assert run.step().info["utterance"].splitlines()[-1] == "Cal: Bob said bye"
+    assert run.step(None, "Say hello").info["utterance"].splitlines()[-1] == "Cal: Agent said hello"
+
+
+def test_5_56_put_to_what_is_not_in_the_room(play: Folder) -> None:
+    run = play("""
+        objects: {ball: {type: ball, at: [3, 3]}, coin: {type: ball, at: [4, 4]}}
+        cast: {ann: {at: [5, 5]}}
+        rules:
+          - {when: t == 1, cause: [coin.vanish]}
+          - {when: t == 2, cause: [ball.put(coin), ann.put(coin)]}
+    """).steps(2)
+    assert (run.at("ball"), run.at("ann"), run.at("coin")) == ([3, 3], [5, 5], None)
 
 
 # -- 6. memories -----------------------------------------------------------------------------------

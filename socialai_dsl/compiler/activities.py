@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from socialai_dsl.compiler.assembler import Label, constant
+from socialai_dsl.compiler.cells import NOWHERE
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.mobility import numbers_of
 from socialai_dsl.compiler.registers import entity_register, label
 from socialai_dsl.program import Body, Field, Op
-from socialai_dsl.semantics.terms import Activity, Checked, Const, Measure, ObjectType, Term
+from socialai_dsl.semantics.terms import Activity, CellOf, Checked, Const, Measure, ObjectType, Read, Term
 
 _BODIES = {"left": Body.LEFT, "right": Body.RIGHT, "forward": Body.FORWARD, "toggle": Body.TOGGLE}
 GOING = ("go_to", "go_next_to", "enter")
@@ -27,7 +28,7 @@ def has_aim(activity: Activity) -> bool:
     """Whether what an activity is about is computed anew in each turn, so that its end must know what it was."""
     if activity.name in ACTS:
         return True
-    return activity.name in GOING and not isinstance(activity.args[0], Const)
+    return activity.name in (*GOING, "turn_to") and not isinstance(activity.args[0], Const)
 
 
 class Activities:
@@ -80,7 +81,7 @@ class Activities:
             case "face":
                 self._turn_towards(self._present(activity.args[0]))
             case "turn_to":
-                block.emit(Op.TURN_TO, own, to.value(activity.args[0]), self.turn)
+                block.emit(Op.TURN_TO, own, self._aimed_at(activity), self.turn)
             case "turn":
                 self._turn(activity.args[0])
             case "go_to":
@@ -118,6 +119,9 @@ class Activities:
         if goal.type.kind == "entity" and self.absent.intersection(numbers_of(goal)):
             assert to.failed is not None, "internal: an activity can always come to nothing"
             to.block.test(Op.IF_EQ, to.into_temporary(Op.FIELD, entity, Field.GONE), constant(0), to.failed)
+        elif isinstance(goal, CellOf | Read):
+            assert to.failed is not None, "internal: an activity can always come to nothing"
+            to.block.test(Op.IF_NE, entity, constant(NOWHERE), to.failed)
         return entity
 
     def _aimed_at(self, activity: Activity) -> int:
@@ -166,10 +170,14 @@ class Activities:
         block.bind(done)
 
     def _enter(self, activity: Activity) -> None:
-        """Use it while it cannot be walked on, then go there."""
+        """Use it while it cannot be walked on, then go there; who is there stays there."""
         block = self.to.block
         entity = self._aimed_at(activity)
-        shut, done = Label(), Label()
+        shut, done, away = Label(), Label(), Label()
+        block.test(Op.IF_SAME_CELL, constant(self.entity), entity, away)
+        block.emit(Op.BODY, constant(Body.NONE))
+        block.skip(done)
+        block.bind(away)
         walkable = sorted(_kind_of(self.checked, activity.args[0]).walkable)
         status = block.temporary()
         block.emit(Op.FIELD, status, entity, Field.STATUS)
@@ -261,7 +269,7 @@ class Activities:
         If its argument finds nothing, on to `nothing`.
         """
         to, block = self.to, self.to.block
-        if activity.name not in (*GOING, "use", "push", "perform"):
+        if activity.name not in (*GOING, *ACTS, "turn_to", "perform"):
             return
         to.site, block.span = activity.site, activity.span
         own = constant(self.entity)
@@ -276,6 +284,9 @@ class Activities:
             # A scripted agent's frame follows what the agent has really done.
             act = Body.TOGGLE if activity.name == "use" else Body.FORWARD
             block.test(Op.IF_EQ, entity_register(self.entity, Field.LAST), constant(act), otherwise)
+        elif activity.name == "turn_to":
+            facing = entity_register(self.entity, Field.DIR)
+            block.test(Op.IF_EQ, facing, self._goal(activity, nothing), otherwise)
         else:
             op = Op.IF_NEXT_TO if activity.name == "go_next_to" else Op.IF_SAME_CELL
             block.test(op, own, self._goal(activity, nothing), otherwise)

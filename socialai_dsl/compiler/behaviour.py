@@ -13,7 +13,7 @@ from socialai_dsl.compiler.classes import Classes
 from socialai_dsl.compiler.deferred import Deferred
 from socialai_dsl.compiler.effects import Effects
 from socialai_dsl.compiler.expressions import Expressions, chance_word
-from socialai_dsl.compiler.folding import FALSE, SEVERAL, Facts, fold
+from socialai_dsl.compiler.folding import FALSE, SEVERAL, Facts, fold, fold_whole
 from socialai_dsl.compiler.homes import Homes
 from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.mobility import sometimes_absent
@@ -85,7 +85,9 @@ class _FrameCompiler:
             if rule.once
         }
         self.aims = {
-            k: shared.registers.add(f"{frame.member}.aim[{k}]", self._range_of_aim(step.activity))
+            k: shared.registers.add(
+                f"{frame.member}.aim[{k}]", self._range_of_aim(step.activity), fleeting=True
+            )
             for k, step in enumerate(frame.steps)
             if has_aim(step.activity) and step.until is None and step.duration is None
         }
@@ -202,7 +204,7 @@ class _FrameCompiler:
         """Rules top to bottom; the first that holds fires. `clock` is known right after a goto_now."""
         for rule in rules:
             heard = fold(terms.Heard(rule.hears), to.facts, self.shared.classes) if rule.hears else None
-            when = fold(rule.when.term, to.facts, self.shared.classes) if rule.when else None
+            when = fold_whole(rule.when.term, to.facts, self.shared.classes) if rule.when else None
             if FALSE not in (heard, when) and (clock is None or rule.after <= clock):
                 self._rule(to, rule, follow)
             elif self.shared.probes.recording:

@@ -62,7 +62,7 @@ def count_cells(to: Expressions, term: terms.Quantified, opposite: bool = False)
 
 
 def one_cell(to: Expressions, term: terms.Quantified) -> int:
-    """The cell that `first`, `pick` or `nearest` chooses; none: on to `to.failed`, or NOWHERE."""
+    """The cell that `first`, `pick` or `nearest` chooses; none: on to `to.failed`, or at a reset the first of all."""
     block = to.block
     boards = block.boards_taken
     board = _cells_of(to, term)
@@ -74,9 +74,15 @@ def one_cell(to: Expressions, term: terms.Quantified) -> int:
     else:
         assert term.to is not None
         block.emit(Op.NEAREST_CELL, x, board, to.value(term.to))
-    block.release_boards(boards)
     if to.failed is not None:
         block.test(Op.IF_LE, constant(0), x, to.failed)
+    else:
+        found = Label()
+        block.test(Op.IF_LT, x, constant(0), found)
+        block.emit(Op.B_FLOOR, board)
+        block.emit(Op.FIRST_CELL, x, board)
+        block.bind(found)
+    block.release_boards(boards)
     result = block.temporary()
     block.emit(Op.MUL, result, x + 1, constant(ROW))
     block.emit(Op.ADD, result, result, x)

@@ -49,7 +49,9 @@ class Deferred:
         self._count = 0
         self._kept = [self._room(rule) for rule in self.rules]
         self._pending = (
-            registers.add(f"{frame.member}.pending", Type("int", 0, len(self.rules))) if self.rules else 0
+            registers.add(f"{frame.member}.pending", Type("int", 0, len(self.rules)), fleeting=True)
+            if self.rules
+            else 0
         )
 
     def note(self, to: Expressions, rule: RulePlan, operands: Operands) -> None:
@@ -105,7 +107,9 @@ class Deferred:
             return _Kept(None, low, high)
         path = f"{self.member}.kept[{self._count}]"
         self._count += 1
-        return _Kept(self.registers.add(path, Type("int", min(0, low), max(0, high))), low, high)
+        return _Kept(
+            self.registers.add(path, Type("int", min(0, low), max(0, high)), fleeting=True), low, high
+        )
 
 
 def _has_more(rule: RulePlan) -> bool:

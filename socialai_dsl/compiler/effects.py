@@ -10,7 +10,7 @@ from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.homes import Homes
 from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.mobility import numbers_of
-from socialai_dsl.compiler.registers import Registers
+from socialai_dsl.compiler.registers import Registers, label
 from socialai_dsl.program import TEMPORARY, Field, Op
 from socialai_dsl.semantics.terms import Effect, Entity, RulePlan, Sited, StepPlan, Term
 
@@ -100,11 +100,20 @@ class Effects:
             self._change(effect, term, entity)
         elif effect.name == "become":
             block.emit(Op.BECOME, entity, value)
-        else:
+        elif effect.name == "move_into":
             block.emit(Op.PLACE, entity, value)
-            if effect.name == "move_into":
-                block.emit(Op.VANISH, entity)
-                block.emit(Op.SET_FIELD, entity, Field.INSIDE, value)
+            block.emit(Op.VANISH, entity)
+            block.emit(Op.SET_FIELD, entity, Field.INSIDE, value)
+        else:
+            block.emit(Op.PLACE, entity, self._cell(effect, value))
+
+    def _cell(self, effect: Effect, value: int) -> int:
+        """Where to put something: what has left the room is on no cell any more."""
+        assert effect.value is not None, "internal: `put` says where"
+        entity = effect.value.type.kind == "entity"
+        if entity and self.to.absent.intersection(numbers_of(effect.value)):
+            return self.to.into_temporary(Op.CELL_OF, value)
+        return value
 
     def _change(self, effect: Effect, term: Term, entity: int) -> None:
         """Open, close, lock, reveal; unlock only what is locked."""
@@ -127,7 +136,8 @@ class Effects:
         numbers = numbers_of(term)
         things = [self.checked.entities[number] for number in numbers]
         fixed = all(self.homes.is_fixed(thing) and thing.initial is None for thing in things)
-        if fixed and len({thing.status for thing in things}) == 1:
+        alike = len({thing.status for thing in things}) == 1 and not any(thing.timer for thing in things)
+        if fixed and (alike or len(things) == 1):
             self._become_initial(things[0], entity)
             return
         done = Label()
@@ -140,11 +150,18 @@ class Effects:
         self._put_back(things[-1], entity)
         block.bind(done)
 
+    def _restart(self, thing: Entity) -> None:
+        """Its timer counts from the beginning."""
+        timer = self.registers.by_path.get(f"{label(thing)}.timer")
+        if timer is not None:
+            self.to.block.emit(Op.LOAD, timer, constant(0))
+
     def _put_back(self, thing: Entity, entity: int) -> None:
         self._become_initial(thing, entity)
         self.homes.put_back(self.to.block, thing.number)
 
     def _become_initial(self, thing: Entity, entity: int) -> None:
+        self._restart(thing)
         if thing.role == "object":
             status = constant(thing.status) if thing.initial is None else self.to.value(thing.initial)
             self.to.block.emit(Op.BECOME, entity, status)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import cached_property
 
 from socialai_dsl.compiler.assembler import Block, Label, Sites, constant
 from socialai_dsl.compiler.cells import LoopCell, coordinate, count_cells, one_cell
 from socialai_dsl.compiler.classes import SILENCE, Classes
-from socialai_dsl.compiler.folding import TRUE, Facts, fold, substitute
+from socialai_dsl.compiler.folding import TRUE, Facts, fold, fold_whole, substitute
+from socialai_dsl.compiler.mobility import sometimes_absent
 from socialai_dsl.compiler.quantifiers import count_things, first_thing, nearest_thing, picked_thing
-from socialai_dsl.compiler.registers import Registers, entity_register, said_path, state_names
+from socialai_dsl.compiler.registers import Registers, entity_register, found_path, said_path, state_names
 from socialai_dsl.compiler.selects import among, asks, selected_condition, selected_value
 from socialai_dsl.program import CONSTANT, TEMPORARY, Field, Op, Register
 from socialai_dsl.semantics import terms
@@ -24,9 +26,9 @@ _FIELDS = {
     "status": Field.STATUS,
     "gone": Field.GONE,
     "poked": Field.POKED,
-    "last": Field.LAST,
     "pointing": Field.POINTING,
     "inside": Field.INSIDE,
+    "toggled": Field.TOGGLED,
 }
 _WORLD = {
     "t": Register.T,
@@ -91,13 +93,18 @@ class Expressions:
         self.loop: LoopCell | None = None
         self.failed: Label | None = None
 
+    @cached_property
+    def absent(self) -> frozenset[int]:
+        """The entities that may not be in the room."""
+        return sometimes_absent(self.checked)
+
     # --- conditions ---
 
     def sited_condition(self, sited: terms.Sited, otherwise: Label) -> None:
         """A condition with its own site and place in the source. It is false if something in it finds nothing."""
         self.site, self.block.span = sited.site, sited.span
         failed, self.failed = self.failed, otherwise
-        self.condition(fold(sited.term, self.facts, self.classes), otherwise)
+        self.condition(fold_whole(sited.term, self.facts, self.classes), otherwise)
         self.failed = failed
 
     def condition(self, term: Term, otherwise: Label) -> None:
@@ -248,7 +255,8 @@ class Expressions:
 
     def _compared(self, term: Term) -> int:
         """A value that is only compared: no noun at all is unlike any noun."""
-        return Register.NOUN if term == terms.World(term.type, "noun") else self.value(term)
+        unlike_any = isinstance(term, terms.World) and term.name == "noun" and term.type.kind == "noun"
+        return Register.NOUN if unlike_any else self.value(term)
 
     def value(self, term: Term) -> int:
         """Emit what computes the term; the operand it is in afterwards."""
@@ -256,7 +264,7 @@ class Expressions:
             case Const():
                 return constant(term.value)
             case terms.Read():
-                return self.registers.by_path[term.path]
+                return self._read(term.path)
             case terms.World(name="noun"):
                 return self._found(Register.NOUN)
             case terms.World():
@@ -268,7 +276,9 @@ class Expressions:
                 return coordinate(self, term)
             case terms.FieldOf(name="inside"):
                 return self._container(term)
-            case terms.FieldOf(entity=Const(value=entity)):
+            case terms.FieldOf(entity=Const(value=entity)) if not (
+                term.name in ("x", "y") and entity in self.absent
+            ):
                 return entity_register(entity, _FIELDS[term.name])
             case terms.FieldOf():
                 entity = self.value(term.entity)
@@ -306,6 +316,13 @@ class Expressions:
                 return self._loop(term.name).cell
             case _:
                 return self._truth_value(term)
+
+    def _read(self, path: str) -> int:
+        """A register; there may be nothing in it."""
+        found = self.registers.by_path.get(found_path(path))
+        if found is not None and self.failed is not None:
+            self.block.test(Op.IF_NE, found, constant(0), self.failed)
+        return self.registers.by_path[path]
 
     def _found(self, number: int) -> int:
         """Something's number, where -1 is nothing: that fails, or else is as good as the first."""

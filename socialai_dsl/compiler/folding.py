@@ -8,6 +8,7 @@ from typing import Any
 
 from socialai_dsl.compiler.classes import SILENCE, Classes
 from socialai_dsl.semantics import terms
+from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.terms import BOOL, Const, Term
 
 TRUE = Const(BOOL, 1)
@@ -43,6 +44,18 @@ def fold(term: Term, facts: Facts, classes: Classes) -> Term:
     return _decide(rebuild(term, lambda part: fold(part, facts, classes)))
 
 
+def fold_whole(term: Term, facts: Facts, classes: Classes) -> Term:
+    """As `fold`, for a condition as a whole, which is false as well if something in it finds nothing."""
+    folded = fold(term, facts, classes)
+    return FALSE if _never_true(folded) else folded
+
+
+def _never_true(term: Term) -> bool:
+    if isinstance(term, terms.Logic):
+        return (any if term.op == "and" else all)(map(_never_true, term.args))
+    return term == FALSE
+
+
 def rebuild(term: Term, change: Callable[[Term], Term]) -> Term:
     """The same kind of node with `change` applied to the terms right below it."""
     changes: dict[str, Any] = {}
@@ -71,6 +84,16 @@ def mentions(term: Any, kind: type) -> bool:
     if isinstance(term, tuple):
         return any(mentions(part, kind) for part in term)
     return is_dataclass(term) and any(mentions(getattr(term, item.name), kind) for item in fields(term))
+
+
+def may_find_nothing(term: Term) -> bool:
+    """Whether a term may need one of a group when none is what is wanted, or the noun of somebody who is silent."""
+    for part in walk(term):
+        if isinstance(part, terms.HeardNoun) or (isinstance(part, terms.World) and part.name == "noun"):
+            return True
+        if isinstance(part, terms.Quantified) and part.op in ("first", "pick", "nearest"):
+            return True
+    return False
 
 
 def _truth(value: bool) -> Const:
@@ -103,7 +126,10 @@ def _decide_logic(term: terms.Logic) -> Term:
         if not isinstance(arg, Const):
             rest.append(arg)
         elif bool(arg.value) == bool(decisive):
-            return _truth(bool(decisive))
+            if not any(map(may_find_nothing, rest)):
+                return _truth(bool(decisive))
+            rest.append(arg)  # what stands before it is still asked: if it finds nothing, all of it is false
+            break
     if not rest:
         return _truth(not decisive)
     return rest[0] if len(rest) == 1 else replace(term, args=tuple(rest))

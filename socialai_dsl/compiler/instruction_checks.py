@@ -302,10 +302,10 @@ class _Instruction:
     def wall(self, a: int, b: int, c: int) -> str | None:
         return self.literal(b, 0, 3) or self.literal(c, 0, _BOUNDS) or self.fill(a)
 
-    def rectangle(self, a: int, b: int, _c: int) -> str | None:
+    def rectangle(self, a: int, b: int, c: int) -> str | None:
         corners = range(b, b + 4)
         problem = next(filter(None, (self.value(t, -_BOUNDS, _BOUNDS) for t in corners)), None)
-        return self.temporaries(b, 4) or problem or self.fill(a)
+        return self.literal(c, 0, 1) or self.temporaries(b, 4) or problem or self.fill(a)
 
     def near_place(self, a: int, b: int, _c: int) -> str | None:
         return self.place(b) or self.fill(a)

@@ -249,7 +249,9 @@ def note_what_is_said(checked: Checked, lines: Lines, registers: Registers) -> N
                 lines.first_performed(speaker)
     for number in sorted({term.entity for term in asked}):
         if number in lines.speakers:
-            registers.add(said_path(checked.entities[number]), Type("int", 0, len(lines.texts)))
+            registers.add(
+                said_path(checked.entities[number]), Type("int", 0, len(lines.texts)), fleeting=True
+            )
     for term in asked:
         lines.classes_of.said[term.entity, term.pattern] = lines.said_by(term.entity, term.pattern)
 

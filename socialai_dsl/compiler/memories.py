@@ -5,9 +5,9 @@ from __future__ import annotations
 from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.effects import store
 from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.compiler.registers import said_path
+from socialai_dsl.compiler.registers import found_path, said_path
 from socialai_dsl.program import Op, Register
-from socialai_dsl.semantics.terms import MemoryPlan
+from socialai_dsl.semantics.terms import Drawn, MemoryPlan
 
 
 def remember(to: Expressions) -> None:
@@ -17,16 +17,30 @@ def remember(to: Expressions) -> None:
     """
     block = to.block
     for item in to.checked.remembered:
-        mark = block.taken
-        value = to.into_temporary(Op.LOAD, to.sited_value(item.value))
-        store(to.registers, block.emit, item.path, value)
-        block.release(mark)
+        _remember(to, item)
     for memory in to.checked.memories:
         _ask_whether_open(to, memory)
     for entity in to.checked.entities:
         said = to.registers.by_path.get(said_path(entity))
         if said is not None:
             block.emit(Op.LOAD, said, constant(0))
+
+
+def _remember(to: Expressions, item: Drawn) -> None:
+    """One value, and whether there is one, unless there always is."""
+    block = to.block
+    mark = block.taken
+    found, missing = to.registers.by_path.get(found_path(item.path)), Label()
+    if found is not None:
+        block.emit(Op.LOAD, found, constant(0))
+        to.failed = missing
+    value = to.into_temporary(Op.LOAD, to.sited_value(item.value))
+    to.failed = None
+    store(to.registers, block.emit, item.path, value)
+    if found is not None:
+        block.emit(Op.LOAD, found, constant(1))
+    block.bind(missing)
+    block.release(mark)
 
 
 def _ask_whether_open(to: Expressions, memory: MemoryPlan) -> None:

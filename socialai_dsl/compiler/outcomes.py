@@ -5,7 +5,7 @@ from __future__ import annotations
 from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Sites
 from socialai_dsl.compiler.classes import Classes
 from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.compiler.folding import FALSE, Facts, fold
+from socialai_dsl.compiler.folding import FALSE, Facts, fold_whole
 from socialai_dsl.compiler.probes import NO_PROBES, Probes
 from socialai_dsl.compiler.registers import Registers
 from socialai_dsl.program import Body, Op
@@ -42,14 +42,17 @@ def outcome_table(
 def _first_that_holds(to: Expressions, checked: Checked, probes: Probes) -> None:
     block = to.block
     for number, outcome in enumerate(checked.outcomes):
-        if fold(outcome.condition.term, to.facts, to.classes) == FALSE and not probes.recording:
+        never = fold_whole(outcome.condition.term, to.facts, to.classes) == FALSE
+        if never and not probes.recording:
             continue
         following = Label()
         asked = probes.outcome(to, number, outcome)
         asked.condition(to, "outcome", outcome.condition, following)
         if outcome.graded is not None and outcome.success:
             mark = block.taken
+            to.failed = asked.nothing("values", following)
             block.emit(Op.END_GRADED, number, to.sited_value(outcome.graded))
+            to.failed = None
             block.release(mark)
         else:
             block.emit(Op.END, number, outcome.percent if outcome.success else 0)

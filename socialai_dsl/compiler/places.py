@@ -8,6 +8,7 @@ from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import mentions
 from socialai_dsl.program import Field, Op, Register, Side
 from socialai_dsl.semantics import terms
+from socialai_dsl.semantics.geometry import EXACT
 from socialai_dsl.semantics.terms import Placing, Region, Term
 
 _SIDES = {"top": Side.TOP, "bottom": Side.BOTTOM, "left": Side.LEFT, "right": Side.RIGHT}
@@ -41,7 +42,7 @@ class Places:
         else:
             to.site = placing.where_site
             boards = block.boards_taken
-            board = self._union(placing.regions)
+            board = self._union(placing.regions, placing.overlap)
             if not placing.overlap:
                 block.emit(Op.B_FREE, board)
             if placing.where is not None:
@@ -73,14 +74,14 @@ class Places:
             block.emit(Op.MAX, target, target, constant(-1))
             block.emit(Op.MIN, target, target, constant(size - 1))
 
-    def _union(self, regions: tuple[Region, ...]) -> int:
-        first, *rest = [self._region(region) for region in regions]
+    def _union(self, regions: tuple[Region, ...], overlap: bool) -> int:
+        first, *rest = [self._region(region, overlap) for region in regions]
         for board in rest:
             self.to.block.emit(Op.B_OR, first, board)
         self.to.block.release_boards(first + 1)
         return first
 
-    def _region(self, region: Region) -> int:
+    def _region(self, region: Region, overlap: bool) -> int:
         block = self.to.block
         board = block.board()
         match region.name:
@@ -95,7 +96,7 @@ class Places:
                 block.emit(Op.B_IN_FRONT_OF, board, self.to.value(region.args[0]))
                 self._only_floor(board)
             case _:
-                self._rectangle(board, region)
+                self._rectangle(board, region, overlap and region.name in EXACT)
         return board
 
     def _wall(self, board: int, region: Region) -> None:
@@ -122,8 +123,11 @@ class Places:
         self.to.block.emit(Op.B_AND, board, floor)
         self.to.block.release_boards(floor)
 
-    def _rectangle(self, board: int, region: Region) -> None:
-        """Halves, rows, columns and rectangles: x from corner to corner + 1, y from corner + 2 to corner + 3."""
+    def _rectangle(self, board: int, region: Region, built: bool) -> None:
+        """Halves, rows, columns and rectangles: x from corner to corner + 1, y from corner + 2 to corner + 3.
+
+        With `built` also where something is built.
+        """
         block = self.to.block
         mark = block.taken
         corner = block.temporary(4)
@@ -138,7 +142,7 @@ class Places:
             self._half(region.name, bounds)
         for i, bound in enumerate(bounds):
             block.emit(Op.LOAD, corner + i, bound)
-        block.emit(Op.B_RECT, board, corner)
+        block.emit(Op.B_RECT, board, corner, int(built))
         block.release(mark)
 
     def _half(self, name: str, bounds: list[int]) -> None:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from socialai_dsl.compiler.assembler import Label, constant
-from socialai_dsl.compiler.registers import entity_register
-from socialai_dsl.program import Field, Op
+from socialai_dsl.program import Op, Register
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.terms import Const
 
@@ -111,13 +110,14 @@ def nearest_thing(to: Expressions, term: terms.Quantified) -> int:
     assert term.to is not None
     block = to.block
     result = to.into_temporary(Op.LOAD, constant(term.items[0].value))
-    least = to.into_temporary(Op.LOAD, constant(4096))
+    # What is not in the room is as far away as this, and so is everything from it.
+    least = to.into_temporary(Op.ADD, Register.WIDTH, Register.HEIGHT)
+    nothing = to.into_temporary(Op.LOAD, least)
     goal = to.value(term.to)
     for item in term.items:
         following = Label()
         mark = block.taken
         to.condition(to.instance(term, item), following)
-        block.test(Op.IF_EQ, entity_register(item.value, Field.GONE), constant(0), following)
         distance = to.into_temporary(Op.DISTANCE, constant(item.value), goal)
         block.test(Op.IF_LT, distance, least, following)
         block.emit(Op.LOAD, least, distance)
@@ -125,5 +125,5 @@ def nearest_thing(to: Expressions, term: terms.Quantified) -> int:
         block.bind(following)
         block.release(mark)
     if to.failed is not None:
-        block.test(Op.IF_LT, least, constant(4096), to.failed)
+        block.test(Op.IF_LT, least, nothing, to.failed)
     return result

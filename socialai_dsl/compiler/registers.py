@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from socialai_dsl.compiler.cells import NOWHERE
+from socialai_dsl.compiler.folding import may_find_nothing
 from socialai_dsl.program import CELL, ENTITY_FIELDS, FIRST_ENTITY, Field, RegisterName
 from socialai_dsl.semantics.terms import ACTION, BOOL, Checked, Drawn, Entity, FramePlan, MemoryPlan, Type
 
@@ -36,12 +37,15 @@ class Registers:
             if isinstance(item, Drawn):
                 registers.add(item.path, item.type)
         for frame in checked.frames:
+            states = Type("status", 0, len(state_names(frame)) - 1, state_names(frame))
+            registers.add(f"{frame.member}.frame", states, fleeting=not frame.written)
             registers.add(
-                f"{frame.member}.frame", Type("status", 0, len(state_names(frame)) - 1, state_names(frame))
+                f"{frame.member}.clock", Type("int", 0, checked.horizon), fleeting=not frame.written
             )
-            registers.add(f"{frame.member}.clock", Type("int", 0, checked.horizon))
         for item in checked.remembered:
-            registers.add(item.path, item.type)
+            registers.add(item.path, item.type, fleeting=True)
+            if may_find_nothing(item.value.term):
+                registers.add(found_path(item.path), BOOL, fleeting=True)
         for memory in checked.memories:
             registers._add_memory(memory)
         for entity in checked.entities:
@@ -55,14 +59,15 @@ class Registers:
             self.add(f"{memory.path}[{k}].utterance", memory.utterances)
         self.add(f"{memory.path}.filled", Type("int", 0, memory.length))
         if memory.open is not None:
-            self.add(f"{memory.path}.open", BOOL)
+            self.add(f"{memory.path}.open", BOOL, fleeting=True)
 
-    def add(self, path: str, type_: Type) -> int:
+    def add(self, path: str, type_: Type, fleeting: bool = False) -> int:
         """A named register. One of a cell may hold any cell of the canvas, and none."""
         type_ = self.cut(type_)
         register = self.reserve(1)
         self.by_path[path] = register
-        self.names.append(RegisterName(path, register, type_.words, type_.low, type_.high, type_.kind))
+        name = RegisterName(path, register, type_.words, type_.low, type_.high, type_.kind, fleeting)
+        self.names.append(name)
         return register
 
     def cut(self, type_: Type) -> Type:
@@ -82,6 +87,11 @@ class Registers:
 def label(entity: Entity) -> str:
     """What an entity is called in the path of a register of its own."""
     return entity.key if entity.index is None else f"{entity.key}[{entity.index}]"
+
+
+def found_path(path: str) -> str:
+    """The register of whether there was a value for another register."""
+    return f"{path}.found"
 
 
 def said_path(speaker: Entity) -> str:

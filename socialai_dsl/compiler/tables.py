@@ -278,7 +278,6 @@ def _entity_row(entity: Entity, types: _TypeTable) -> list[int]:
         EntityColumn.NEAR: entity.near,
         EntityColumn.FAR: entity.far,
         EntityColumn.AUDIBLE: int(entity.audible),
-        EntityColumn.IN_WALL: int(entity.in_wall),
         EntityColumn.VIEW: entity.view,
         EntityColumn.PUSHED_BY: int(entity.pushed_by_rolling),
     }

@@ -3,7 +3,7 @@
 import numpy as np
 
 from socialai_dsl.engine import rng
-from socialai_dsl.engine.entities import column, front_x, front_y, quadrant
+from socialai_dsl.engine.entities import column, is_in_front, quadrant
 from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.operands import draw_at, value
 from socialai_dsl.engine.paths import find_way
@@ -49,7 +49,7 @@ def _relates(row: Row, op: int, a: int, b: int) -> bool:
     x = x_of(row, a)
     y = y_of(row, a)
     if op == Op.IF_IN_FRONT_OF:
-        return b < NO_CELL and x == front_x(row, b) and y == front_y(row, b)
+        return b < NO_CELL and is_in_front(row, x, y, b)
     dx = x_of(row, b) - x
     dy = y_of(row, b) - y
     away = abs(dx) + abs(dy)

@@ -99,28 +99,26 @@ def quadrant(dx: int, dy: int) -> int:
 
 @inline
 def front_direction(row: Row, entity: int) -> int:
-    """Direction of the cell in front of an entity: into the room if it lies in a wall, else where it faces."""
-    if column(row, entity, EntityColumn.IN_WALL) == 1:
-        x = field(row, entity, Field.X)
-        y = field(row, entity, Field.Y)
-        if y == 0:
-            return 1
-        if y == row.registers[Register.HEIGHT] - 1:
-            return 3
-        if x == 0:
-            return 0
-        if x == row.registers[Register.WIDTH] - 1:
-            return 2
-    return field(row, entity, Field.DIR) & 3
+    """Direction of the cell in front: where somebody faces, from a wall into the room; of other objects -1."""
+    if entity <= row.program[Header.NPCS]:
+        return field(row, entity, Field.DIR) & 3
+    x = field(row, entity, Field.X)
+    y = field(row, entity, Field.Y)
+    if y == 0:
+        return 1
+    if y == row.registers[Register.HEIGHT] - 1:
+        return 3
+    if x == 0:
+        return 0
+    return 2 if x == row.registers[Register.WIDTH] - 1 else -1
 
 
 @inline
-def front_x(row: Row, entity: int) -> int:
-    """X of the cell in front of an entity."""
-    return field(row, entity, Field.X) + step_x(front_direction(row, entity))
-
-
-@inline
-def front_y(row: Row, entity: int) -> int:
-    """Y of the cell in front of an entity."""
-    return field(row, entity, Field.Y) + step_y(front_direction(row, entity))
+def is_in_front(row: Row, x: int, y: int, entity: int) -> bool:
+    """Whether a cell is the one in front of an entity."""
+    direction = front_direction(row, entity)
+    return (
+        direction >= 0
+        and x == field(row, entity, Field.X) + step_x(direction)
+        and y == field(row, entity, Field.Y) + step_y(direction)
+    )

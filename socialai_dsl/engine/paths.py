@@ -53,9 +53,7 @@ def _find_free(row: Row, mover: int) -> None:
         for npc in range(1, row.program[Header.NPCS] + 1):
             if npc != mover and is_present(row, npc):
                 drop_cell(row, FREE, field(row, npc, Field.X), field(row, npc, Field.Y))
-    if mover == 0:
-        return
-    if is_present(row, AGENT):
+    if mover > 0 and is_present(row, AGENT):
         drop_cell(row, FREE, field(row, AGENT, Field.X), field(row, AGENT, Field.Y))
     if row.program[Header.DEADLY] != 0:
         for y in range(height):

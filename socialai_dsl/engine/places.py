@@ -4,7 +4,7 @@ import numpy as np
 
 from socialai_dsl.engine.bits import count_bits, lowest_bit, nth_bit
 from socialai_dsl.engine.boards import copy_room, room_table
-from socialai_dsl.engine.entities import field, front_x, front_y, is_present, set_field
+from socialai_dsl.engine.entities import field, front_direction, is_present, set_field, step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.operands import assign, draw_below, value
 from socialai_dsl.engine.sets import add_cell, clear, count_cells, fill_next_to, get_line, set_line
@@ -33,7 +33,10 @@ def place(row: Row, op: int, a: int, b: int, c: int) -> None:
     elif op >= Op.HEARD_FROM:
         assign(row, a, first_heard(row, b, c, op - Op.HEARD_FROM + 1))
     elif op == Op.B_FLOOR or op == Op.B_RECT:
-        _fill_floor(row, a)
+        if op == Op.B_RECT and c == 1:
+            _fill_inside(row, a)
+        else:
+            _fill_floor(row, a)
         if op == Op.B_RECT:
             _cut(row, a, b - TEMPORARY)
     elif op == Op.B_WALL:
@@ -68,6 +71,15 @@ def _fill_floor(row: Row, a: int) -> None:
     table = room_table(row) + row.program[Header.CANVAS_WIDTH] * height + 1 + height
     for y in range(height):
         set_line(row, a, y, row.program[table + y])
+
+
+@inline
+def _fill_inside(row: Row, a: int) -> None:
+    """All cells inside the walls, whatever is built there."""
+    clear(row, a)
+    columns = (np.int64(1) << (row.registers[Register.WIDTH] - 1)) - 2
+    for y in range(1, row.registers[Register.HEIGHT] - 1):
+        set_line(row, a, y, columns)
 
 
 @inline
@@ -109,7 +121,10 @@ def _fill_next_to(row: Row, a: int, thing: int) -> None:
 def _fill_in_front_of(row: Row, a: int, entity: int) -> None:
     clear(row, a)
     if entity < NO_CELL and is_present(row, entity):
-        add_cell(row, a, front_x(row, entity), front_y(row, entity))
+        direction = front_direction(row, entity)
+        if direction >= 0:
+            x = field(row, entity, Field.X) + step_x(direction)
+            add_cell(row, a, x, field(row, entity, Field.Y) + step_y(direction))
 
 
 @inline
@@ -144,7 +159,9 @@ def next_cell(row: Row, a: int, x: int, y: int) -> int:
 
 @inline
 def _nearest_cell(row: Row, a: int, thing: int) -> int:
-    """The cell of board a nearest to a thing, the first of equally near ones; as `next_cell`."""
+    """The cell of board a nearest to a thing in the room, the first of equally near ones; as `next_cell`."""
+    if not is_somewhere(row, thing):
+        return NOTHING
     x = x_of(row, thing)
     y = y_of(row, thing)
     nearest = NOTHING

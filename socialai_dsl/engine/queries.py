@@ -15,7 +15,7 @@ from socialai_dsl.engine.pointers import int16_of, int64_of, uint16_of, uint32_o
 from socialai_dsl.engine.rows import copy, open_row
 from socialai_dsl.engine.speech import inbox_class
 from socialai_dsl.engine.state import STILL, ZERO, Book, Link, Row, Size, Trait
-from socialai_dsl.engine.step import begin
+from socialai_dsl.engine.step import be_silent, begin
 from socialai_dsl.engine.turns import (
     act,
     compute_statuses,
@@ -26,7 +26,7 @@ from socialai_dsl.engine.turns import (
     notice,
     settle,
 )
-from socialai_dsl.program import Flag, FrameColumn, Header, Register
+from socialai_dsl.program import Body, Flag, FrameColumn, Header, Register
 
 
 @inline
@@ -39,6 +39,8 @@ def _play(row: Row, link: int) -> None:
     body = STILL
     line = 0
     begin(row)
+    be_silent(row)
+    row.registers[Register.ACTION] = Body.NONE
     if program[Header.FLAGS] & Flag.AGENT_FRAME:
         frame = program[Header.FRAME_AT]
         heard = inbox_class(row, program[frame + FrameColumn.INBOX])

@@ -78,11 +78,10 @@ def _find_free(row: Row, mover: int) -> np.uint64:
         for npc in range(1, row.program[Header.NPCS] + 1):
             if npc != mover and is_present(row, npc):
                 free &= ~_cell_of(row, npc)
-    if mover > 0:
-        if is_present(row, AGENT):
-            free &= ~_cell_of(row, AGENT)
-        if row.program[Header.DEADLY] != 0:
-            free &= ~_deadly_cells(row)
+    if mover > 0 and is_present(row, AGENT):
+        free &= ~_cell_of(row, AGENT)
+    if row.program[Header.DEADLY] != 0:
+        free &= ~_deadly_cells(row)
     return free
 
 

@@ -165,13 +165,24 @@ def first_heard(row: Row, inbox: int, classes: int, part: int) -> int:
 
 
 @inline
+def _agent_may_hear(row: Row, speaker: int) -> bool:
+    """Whether the agent hears an NPC at all: not while NPCs are hidden, but for who is always audible."""
+    return not npcs_are_hidden(row) or column(row, speaker, EntityColumn.AUDIBLE) == 1
+
+
+@inline
 def deliver(row: Row, speaker: int, utterance: int, noun: int) -> None:
     """Put what was said into the inbox of everybody else with a frame who is within earshot."""
     table = row.program[Header.FRAME_AT]
     last = NOTHING
     for _ in range(row.program[Header.FRAMES]):
         entity = row.program[table + FrameColumn.ENTITY]
-        if entity not in (last, speaker) and is_present(row, entity) and within_earshot(row, speaker, entity):
+        if (
+            entity not in (last, speaker)
+            and is_present(row, entity)
+            and within_earshot(row, speaker, entity)
+            and (entity != AGENT or _agent_may_hear(row, speaker))
+        ):
             put_into_inbox(row, row.program[table + FrameColumn.INBOX], utterance, speaker, noun)
         last = entity
         table += FrameColumn.COLUMNS
@@ -181,8 +192,7 @@ def deliver(row: Row, speaker: int, utterance: int, noun: int) -> None:
 def speak(row: Row, speaker: int, line: int) -> None:
     """An NPC says a line: the agent hears it if it may and is near, and so do NPCs for whom it means something."""
     stay_outline()
-    audible = not npcs_are_hidden(row) or column(row, speaker, EntityColumn.AUDIBLE) == 1
-    if audible and is_present(row, AGENT) and within_earshot(row, speaker, AGENT):
+    if _agent_may_hear(row, speaker) and is_present(row, AGENT) and within_earshot(row, speaker, AGENT):
         hear(row, line)
     utterance = _line(row, line, LineColumn.CLASS)
     if utterance > 1:

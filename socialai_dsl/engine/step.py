@@ -43,16 +43,23 @@ def begin(row: Row) -> None:
 
 
 @inline
+def be_silent(row: Row) -> None:
+    """The agent has said nothing in this step."""
+    registers = row.registers
+    registers[Register.TEMPLATE] = -1
+    registers[Register.NOUN] = -1
+    registers[Register.CLASS] = 0
+    registers[Register.UTTERANCE] = 0
+
+
+@inline
 def decode(row: Row, link: int) -> None:
     """Note the agent's body action and utterance. A pair that its grammar lacks is silence."""
     registers = row.registers
     program = row.program
     table = link + Link.END
     registers[Register.ACTION] = program[table + row.action[0]]
-    registers[Register.TEMPLATE] = -1
-    registers[Register.NOUN] = -1
-    registers[Register.CLASS] = 0
-    registers[Register.UTTERANCE] = 0
+    be_silent(row)
     if row.action[1] == 1:
         table += program[link + Link.ACTIONS]
         template = program[table + row.action[2]]

@@ -134,7 +134,7 @@ def move_npc(row: Row, npc: int, action: int) -> None:
             draw_cell(row, x, y)
             draw_cell(row, ahead_x, ahead_y)
     elif action == Body.TOGGLE:
-        _toggle_object(row, ahead_x, ahead_y)
+        set_field(row, npc, Field.TOGGLED, _toggle_object(row, ahead_x, ahead_y))
     elif action == Body.STOP_POINTING:
         set_field(row, npc, Field.POINTING, ZERO)
 
@@ -227,6 +227,7 @@ def take_turns(row: Row) -> None:
         npc = row.program[frame + FrameColumn.ENTITY]
         if npc != last:
             set_field(row, npc, Field.LAST, STILL)
+            set_field(row, npc, Field.TOGGLED, ZERO)
             last = npc
         if is_present(row, npc):
             _follow(row, frame, npc, flags)

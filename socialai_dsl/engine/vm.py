@@ -18,7 +18,7 @@ from socialai_dsl.engine.separate import Separate
 from socialai_dsl.engine.sets import drop_cell
 from socialai_dsl.engine.sight import is_in_view
 from socialai_dsl.engine.state import NO_PATH, NOTHING, ONE, RESETTING, STILL, ZERO, Row
-from socialai_dsl.engine.whereabouts import attribute, cell_beside, cell_of, x_of, y_of
+from socialai_dsl.engine.whereabouts import attribute, cell_beside, cell_of, is_somewhere, x_of, y_of
 from socialai_dsl.program import CELL, Body, Field, FrameColumn, Header, Op, Register
 
 _NO_CELL = -1
@@ -54,7 +54,10 @@ def _compute(row: Row, op: int, a: int, b: int, c: int) -> None:
 
 @inline
 def _measure(row: Row, op: int, a: int, b: int) -> int:
-    """Numbers between two entities or cells."""
+    """Numbers between two entities or cells; to and from what is not in the room it is far, and that way is down."""
+    if not (is_somewhere(row, a) and is_somewhere(row, b)):
+        far = row.registers[Register.WIDTH] + row.registers[Register.HEIGHT]
+        return np.int64(far) if op == Op.DISTANCE else ONE
     dx = x_of(row, b) - x_of(row, a)
     dy = y_of(row, b) - y_of(row, a)
     return abs(dx) + abs(dy) if op == Op.DISTANCE else quadrant(dx, dy)

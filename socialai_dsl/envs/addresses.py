@@ -64,6 +64,8 @@ class Addresses:
             self._add(name, entities)
 
     def _add(self, name: RegisterName, entities: set[str]) -> None:
+        if name.fleeting:
+            return
         owner, _, rest = name.path.rpartition(".")
         if element := _ELEMENT.fullmatch(name.path):
             group, key, index, part = element.groups()
@@ -79,5 +81,5 @@ class Addresses:
             self.one_of[owner] = name
         elif owner in entities and rest in _OF_ENTITY:
             self.owned[owner, _OF_ENTITY[rest]] = name
-        elif not name.fleeting:
+        else:
             self.plain[name.path.removeprefix("let.")] = name

@@ -94,7 +94,9 @@ def _entity(program: Program, registers: Row, number: int) -> dict[str, Any]:
             described["last"] = TURN_WORDS[field[Field.LAST]]
         if field[Field.POINTING]:
             described["pointing"] = DIRECTIONS[field[Field.POINTING] - 1]
-    if field[Field.INSIDE]:
+        if field[Field.TOGGLED]:
+            described["toggled"] = str(program.entities[field[Field.TOGGLED]])
+    elif field[Field.INSIDE]:
         described["inside"] = str(program.entities[field[Field.INSIDE]])
     return described
 

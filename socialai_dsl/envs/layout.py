@@ -53,6 +53,7 @@ _KEYS = {
         "pointing",
         "poked",
         "state",
+        "toggled",
     ),
     "object": ("at", "color", "facing", "gone", "initial", "inside", "state", "timer"),
 }
@@ -177,6 +178,9 @@ class _Layout:
             self._set(number, Field.POKED, 1)
         if given.get("last") is not None:
             self._set(number, Field.LAST, word(f"{key}.last", given["last"], TURN_WORDS))
+        if given.get("toggled") is not None:
+            objects = [str(entity) for entity in self.program.entities]
+            self._set(number, Field.TOGGLED, word(f"{key}.toggled", given["toggled"], objects))
         if given.get("pointing") is not None:
             self._set(number, Field.POINTING, 1 + word(f"{key}.pointing", given["pointing"], DIRECTIONS))
 

@@ -66,6 +66,7 @@ _READ: dict[Op, tuple[int, ...]] = {
 }
 """Positions of the operands that are read; of other instructions all may be."""
 
+_LAST_TURN = (Field.LAST, Field.TOGGLED)
 _COMPARISONS = (Op.IF_EQ, Op.IF_NE, Op.IF_LT, Op.IF_LE)
 _DRAWS = (Op.DRAW, Op.PICK_BIT, Op.PICK_CELL)
 _CHANCY = (Op.IF_CHANCE, Op.TURN_TO, Op.GO_TO, Op.GO_NEXT_TO)
@@ -169,14 +170,16 @@ def _limits(blocks: list[list[Instruction]]) -> dict[int, int]:
 
 
 def _of_entities(program: Program, blocks: list[list[Instruction]]) -> dict[int, int]:
-    """What instructions read of entities by name of the field; the last turn is the only one that may be left out."""
-    if any(op == Op.FIELD and operands[2] == Field.LAST for block in blocks for op, operands in block):
+    """What instructions read of entities by name of the field; only what was done in the last turn may be left out."""
+    if any(op == Op.FIELD and operands[2] in _LAST_TURN for block in blocks for op, operands in block):
         return dict.fromkeys(_lasts(program), _UNLIMITED)
     return {}
 
 
 def _lasts(program: Program) -> list[int]:
-    return [FIRST_ENTITY + ENTITY_FIELDS * number + Field.LAST for number in range(len(program.entities))]
+    """Registers of what members of the cast did in their last turns."""
+    members = [number for number, entity in enumerate(program.entities) if entity.role != "object"]
+    return [FIRST_ENTITY + ENTITY_FIELDS * number + field for number in members for field in _LAST_TURN]
 
 
 def _clocks(program: Program) -> list[int]:

@@ -276,13 +276,16 @@ def _same_level(pieces: list[tuple[int, str]], start: int, step: int, ends: froz
     return i
 
 
-_NUMBERED = re.compile(r"(?<=\w)\[\s*\d+\s*\]")
-"""`doors[0]`"""
+_NUMBERED = re.compile(r"(?P<group>\w+)\[\s*(?P<index>[^\[\]]+?)\s*\]")
+"""`doors[0]`, `doors[turn + 1]`"""
 
 
 def _wrong_symbol(text: str, offset: int) -> ParseProblem:
-    if _NUMBERED.match(text, offset):
-        cure = "one of a group is found by `first(d in doors where d.index == 0)`"
+    numbered = next((found for found in _NUMBERED.finditer(text) if found.end("group") == offset), None)
+    if numbered is not None:
+        letter = "o" if numbered["group"] == "d" else "d"
+        found = f"first({letter} in {numbered['group']} where {letter}.index == {numbered['index']})"
+        cure = f"one of a group is found by `{found}`"
         return ParseProblem("S203", f"`[` is not used here: {cure}", offset, cure)
     for symbol, cure in _SYMBOLS.items():
         if text.startswith(symbol, offset):

@@ -74,7 +74,9 @@ def _unclosed(problem: str, place: _Place, context: _Place) -> Diagnostic | None
         return context.finding(f"not YAML: the `{context.character}` is not closed with `{closing}`")
     if place.character and place.character in "[]{}":
         message = f"not YAML: `{place.character}` in a text inside {{ }} or [ ]; quote the text"
-        return place.finding(message)
+        indexed = re.search(r"(\w+)$", place.before) if place.character == "[" else None
+        hint = f"one of a group is `first(d in {indexed[1]} where d.index == 0)`" if indexed else None
+        return place.finding(message, hint)
     return None
 
 

@@ -13,7 +13,7 @@ from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.activities import activity, effect
 from socialai_dsl.semantics.build import all_of, any_of
 from socialai_dsl.semantics.findings import FailedError, dotted, surviving
-from socialai_dsl.semantics.hearing import binding, bound
+from socialai_dsl.semantics.hearing import Alternative, asks_for_noun, binding, bound, with_nouns
 from socialai_dsl.semantics.scope import Draws, PlayedFrame, Scope
 from socialai_dsl.semantics.terms import (
     BOOL,
@@ -24,7 +24,6 @@ from socialai_dsl.semantics.terms import (
     FramePlan,
     Heard,
     Line,
-    Pattern,
     Read,
     RulePlan,
     Sited,
@@ -137,53 +136,62 @@ class _Planner:
 
     def _rule(self, rule: ThenRule, path: DataPath, place: str) -> RulePlan:
         address = self.addresses[path]
-        patterns, heard = self._hears(rule, path, address)
+        heard = self._hears(rule, path, address)
         when = self._condition((*path, "when"), rule.when, address)
-        if heard is not None:
-            term = heard if when is None else all_of([heard, when.term])
-            span = self.resolver.findings.at((*path, "hears"))
-            when = Sited(term, f"{self.played.member}/{address}.when", when.span if when else span)
-        after, when = self._after(rule, path, when, address)
         do = rule.do if isinstance(rule, FirstRule) else None
+        doing = self._activity((*path, "do"), do, address) if do is not None else None
+        sets, causes = self._sets(rule, path, address), self._causes(rule, path, address)
+        say = self.spoken.lines.get(path)
+        if asks_for_noun((when, doing, sets, causes, say)):
+            heard = with_nouns(self.resolver, heard, self.resolver.findings.at((*path, "hears")))
+        patterns = tuple(pattern for alternative in heard for pattern, _ in alternative)
+        compared = any(condition is not None for alternative in heard for _, condition in alternative)
+        if compared:
+            term = any_of(
+                all_of([Heard((pattern,)), *([condition] if condition is not None else [])])
+                for alternative in heard
+                for pattern, condition in alternative
+            )
+            span = self.resolver.findings.at((*path, "hears"))
+            both = term if when is None else all_of([term, when.term])
+            when = Sited(both, f"{self.played.member}/{address}.when", when.span if when else span)
+        after, when = self._after(rule, path, when, address)
         plan = RulePlan(
             name=rule.id or f"{self.played.member}.{self.played.name}.{place}",
             site=f"{self.played.member}/{address}",
             span=self.resolver.findings.places.value_span(path),
-            hears=patterns if heard is None else (),
+            hears=() if compared else patterns,
             when=when,
             after=after,
             chance=rule.chance,
             once=rule.once,
-            do=self._activity((*path, "do"), do, address) if do is not None else None,
-            sets=self._sets(rule, path, address),
-            causes=self._causes(rule, path, address),
-            say=self.spoken.lines.get(path),
+            do=doing,
+            sets=sets,
+            causes=causes,
+            say=say,
             goto=self._target(rule.goto, (*path, "goto")),
             goto_now=self._target(rule.goto_now, (*path, "goto_now")),
         )
         if patterns:
-            self.resolver.readings.change(f"{plan.site}.when", binding(patterns))
+            self.resolver.readings.change(f"{plan.site}.when", binding(heard))
         self.resolver.readings.entries[plan.site] = rule
-        return bound(plan, patterns)
+        return bound(plan, heard)
 
-    def _hears(self, rule: Rule, path: DataPath, address: str) -> tuple[tuple[Pattern, ...], Term | None]:
-        """The patterns of `hears:`; if values in them have to be compared, a condition as well."""
-        found: list[tuple[Pattern, Term | None]] = []
+    def _hears(self, rule: Rule, path: DataPath, address: str) -> list[Alternative]:
+        """What `hears:` waits for: the patterns of each of its texts."""
+        found: list[Alternative] = []
         resolver = self.resolver
         single = not self.resolver.findings.is_list((*path, "hears"))
         for i, raw in enumerate(rule.hears):
             place: DataPath = (*path, "hears") if single else (*path, "hears", i)
             if raw == ANYTHING:
-                found.append((resolver.utterances.anything(), None))
+                found.append([(resolver.utterances.anything(), None)])
                 continue
             with surviving():
                 text = resolver.findings.text(place, raw)
                 scope = _scope(self.played, place, f"{address}.hears")
-                found += resolver.utterances.patterns(text, scope, resolver.findings.at(place), True)
-        patterns = tuple(pattern for pattern, _ in found)
-        if all(condition is None for _, condition in found):
-            return patterns, None
-        return patterns, any_of(all_of([Heard((p,)), *([c] if c is not None else [])]) for p, c in found)
+                found.append(resolver.utterances.patterns(text, scope, resolver.findings.at(place), True))
+        return found
 
     def _after(
         self, rule: Rule, path: DataPath, when: Sited | None, address: str

@@ -62,8 +62,8 @@ def beliefs(resolver: Resolver) -> Iterator[BeliefPlan]:
 
 def watching(member: str, number: int, span: Span) -> FramePlan:
     """What a member does who believes something but follows no frame: it stays, and looks."""
-    state = StatePlan("looks on", (), Activity("stay", (), "", span), (), span)
-    return FramePlan(member, "looks on", number, span, state.name, (state,))
+    state = StatePlan("looking", (), Activity("stay", (), "", span), (), span)
+    return FramePlan(member, "looks on", number, span, state.name, (state,), written=False)
 
 
 def believed(resolver: Resolver, owner: ast.Attribute, node: ast.Attribute, scope: Scope) -> Term:

@@ -146,7 +146,7 @@ class _Run:
         colors, turned = list(setup.colorings(resolver)), list(setup.facings(resolver))
         computed, rules = statuses.computed(resolver), tuple(world.rules(resolver))
         remembered, required = tuple(sequences.memories(resolver)), tuple(world.requirements(resolver))
-        inhabitants = tuple(entities_of(resolver, placed))
+        inhabitants = tuple(entities_of(resolver))
         believed = tuple(beliefs.beliefs(resolver))
         drawn = resolver.registers.drawn()
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)

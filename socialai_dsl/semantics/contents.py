@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from socialai_dsl.grammar import ast
-from socialai_dsl.schema import Scenario
+from socialai_dsl.grammar import ParseProblem, ast, parse_expression
+from socialai_dsl.schema import Frame, Scenario
+from socialai_dsl.schema.behaviour import Effects, Ranged
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.findings import surviving
 from socialai_dsl.semantics.scope import Objects, Scope, frames_of, object_scope
@@ -68,10 +68,55 @@ def container(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Te
 def can_lie_inside(resolver: Resolver, objects: Objects) -> bool:
     """Whether objects of this name ever lie in others: at first, or because an effect moves them there."""
     scenario = resolver.symbols.scenario
-    if scenario.objects[objects.name].inside is not None:
-        return True
-    moved = re.compile(rf"\s*{re.escape(objects.name)}\s*\.\s*move_into\b")
-    return any(moved.match(str(effect)) for effect in _effects(scenario))
+    return scenario.objects[objects.name].inside is not None or objects.name in _moved_inside(scenario)
+
+
+def _moved_inside(scenario: Scenario) -> set[str]:
+    """All names in what is moved into something, and in what these names stand for."""
+    subjects = [
+        node.subject
+        for effect in _effects(scenario)
+        for node in _nodes(effect)
+        if isinstance(node, ast.Call) and node.name == "move_into" and node.subject is not None
+    ]
+    waiting = [node.id for subject in subjects for node in subject.walk() if isinstance(node, ast.Name)]
+    sources, found = _sources(scenario), set[str]()
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            nodes = (node for source in sources.get(name, ()) for node in _nodes(source))
+            waiting += [node.id for node in nodes if isinstance(node, ast.Name)]
+    return found
+
+
+def _nodes(source: object) -> list[ast.Node]:
+    """The nodes of an expression; none of what is not one, which is reported elsewhere."""
+    try:
+        return list(parse_expression(str(source)).walk())
+    except ParseProblem:
+        return []
+
+
+def _sources(scenario: Scenario) -> dict[str, list[object]]:
+    """Name -> the expressions that it may stand for: lets, definitions, registers with what they are set to, slots."""
+    found: dict[str, list[object]] = {}
+    declared: list[Mapping[str, object]] = [scenario.let, scenario.define]
+    declared += [member.with_ for name in scenario.cast for member in scenario.alternatives(name)]
+    for _, frame in frames_of(scenario):
+        declared += [frame.let, frame.define, *(entry.set for entry in _entries(frame))]
+    for mapping in declared:
+        for name, source in mapping.items():
+            value = source.start if isinstance(source, Ranged) else source
+            found.setdefault(name.partition("(")[0].strip(), []).append(value)
+    return found
+
+
+def _entries(frame: Frame) -> Iterator[Effects]:
+    """Every rule and step of a frame."""
+    yield from frame.steps or ()
+    for state in (frame.states or {}).values():
+        yield from (*state.first, *state.then)
 
 
 def _effects(scenario: Scenario) -> Iterator[object]:
@@ -79,11 +124,8 @@ def _effects(scenario: Scenario) -> Iterator[object]:
     for rule in scenario.rules:
         yield from rule.cause
     for _, frame in frames_of(scenario):
-        for step in frame.steps or ():
-            yield from step.cause
-        for state in (frame.states or {}).values():
-            for entry in (*state.first, *state.then):
-                yield from entry.cause
+        for entry in _entries(frame):
+            yield from entry.cause
 
 
 def contained(resolver: Resolver) -> dict[int, tuple[int, ...]]:

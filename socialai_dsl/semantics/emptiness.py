@@ -10,7 +10,7 @@ from typing import Final
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.findings import Findings
-from socialai_dsl.semantics.geometry import Cell, Size, UnknownError, interior_cells, value
+from socialai_dsl.semantics.geometry import EXACT, Cell, Size, UnknownError, interior_cells, value
 from socialai_dsl.semantics.terms import Checked, Const, Placing, Region, Term
 
 _AROUND: Final = ((0, -1), (0, 1), (-1, 0), (1, 0))
@@ -69,8 +69,11 @@ def _report(
     if certain:
         taken = f"; {before} take all there are" if before else ""
         message = f"`{name}` has no free cell in {where}{taken}"
+        hint = "widen its place, or the room"
+        if not before and checked.room.build and any(region.name in EXACT for region in placing.regions):
+            hint = "with `overlap: true` it can stand where the room builds something"
         report = findings.warning if before else findings.error
-        report("S601", message, placing.span, hint="widen its place, or the room")
+        report("S601", message, placing.span, hint=hint)
         return
     message = f"`{name}` can be left without a free cell in {where}"
     hint = f"{before} may take all of its place; place it earlier (`order:`), or widen its place"
@@ -172,12 +175,15 @@ class _Room:
             return None, min(self._least_around(region) for region in around)
         found: set[Cell] = set()
         for region in placing.regions:
-            found |= self._fixed(region)
+            found |= self._fixed(region, placing.overlap)
         return found, len(found)
 
-    def _fixed(self, region: Region) -> set[Cell]:
-        """Cells of a region that only the size decides and on which nothing is built."""
-        return self._wall(region) if region.name == "wall" else self._inside(region) - self._built()
+    def _fixed(self, region: Region, overlap: bool) -> set[Cell]:
+        """Cells of a region that only the size decides, without those where something built is in the way."""
+        if region.name == "wall":
+            return self._wall(region)
+        inside = self._inside(region)
+        return inside if overlap and region.name in EXACT else inside - self._built()
 
     def _wall(self, region: Region) -> set[Cell]:
         width, height = self.size
@@ -210,7 +216,7 @@ class _Room:
             return self.floor()
         found: set[Cell] = set()
         for region in placing.regions:
-            found |= self._fixed(region)
+            found |= self._fixed(region, placing.overlap)
         return self._conditions(placing.where, found)[0]
 
     # -- conditions --------------------------------------------------------------------------------------------------

@@ -10,6 +10,9 @@ from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.build import compute
 from socialai_dsl.semantics.terms import Region, Term
 
+EXACT: Final = frozenset({"column", "row", "rect"})
+"""Regions that name their cells: what may overlap can be put there where the room builds something, too."""
+
 Cell = tuple[int, int]
 Size = tuple[int, int]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import resolve_attributes
-from socialai_dsl.semantics.build import all_of, any_of, changed
+from socialai_dsl.semantics.build import all_of, any_of, changed, walk
 from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.scope import Scope
 from socialai_dsl.semantics.signatures import VALUES
@@ -20,6 +20,7 @@ from socialai_dsl.semantics.terms import (
     RulePlan,
     Said,
     SaidBy,
+    Select,
     Speaker,
     Spoke,
     Term,
@@ -32,6 +33,10 @@ from socialai_dsl.source import Span
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
+
+Patterns = tuple[Pattern, ...]
+Alternative = list[tuple[Pattern, Term | None]]
+"""What one text of `hears:` stands for: patterns, each with a condition on values, of which at most one holds."""
 
 _MOST_LISTED = 4
 """So many texts are listed in a message."""
@@ -143,20 +148,73 @@ def speakers(
     ]
 
 
-def bound(plan: RulePlan, patterns: Sequence[Pattern]) -> RulePlan:
+def asks_for_noun(parts: object) -> bool:
+    """Whether something in a rule is made of the noun that was heard."""
+    return any(isinstance(term, HeardNoun) for term in walk(parts))
+
+
+def with_nouns(resolver: Resolver, heard: Sequence[Alternative], span: Span) -> list[Alternative]:
+    """Only what has a noun: a rule that asks for it does not hear anything else."""
+    found = [
+        [(kept, condition) for pattern, condition in alternative if (kept := _with_noun(resolver, pattern))]
+        for alternative in heard
+    ]
+    if any(heard) and not any(found):  # what is not understood has been reported
+        message = "nothing that this rule hears has a noun, and it asks for `noun`"
+        hint = "write `<noun>` where it stands in the text"
+        raise resolver.findings.fail("S211", message, span, hint=hint)
+    return found
+
+
+def _with_noun(resolver: Resolver, pattern: Pattern) -> Pattern | None:
+    """The part of a pattern that has a noun: what is caught by `<noun>`, and what the grammar can say."""
+    if pattern.nouns or "<noun>" in pattern.text:
+        return pattern
+    known = ((text, resolver.utterances.noun_in(text)) for text in sorted(pattern.said_by_npcs))
+    nouns = tuple((text, noun) for text, noun in known if noun is not None)
+    if not (pattern.pairs or nouns):
+        return None
+    return Pattern(pattern.pairs, pattern.text, frozenset(text for text, _ in nouns), nouns)
+
+
+def bound(plan: RulePlan, heard: Sequence[Alternative]) -> RulePlan:
     """A rule whose `speaker` and `noun` know what it hears."""
-    return changed(plan, binding(patterns))  # type: ignore[no-any-return]
+    return changed(plan, binding(heard))  # type: ignore[no-any-return]
 
 
-def binding(patterns: Sequence[Pattern]) -> Callable[[Term], Term | None]:
+def binding(heard: Sequence[Alternative]) -> Callable[[Term], Term | None]:
     """What `speaker` and `noun` are where these are heard; what only the agent says needs no search."""
-    only_agent = not any(pattern.said_by_npcs for pattern in patterns)
+    only_agent = not any(pattern.said_by_npcs for alternative in heard for pattern, _ in alternative)
 
     def change(term: Term) -> Term | None:
         if isinstance(term, Speaker):
-            return Const(Type("entity", 0, 0), 0) if only_agent else Speaker(term.type, tuple(patterns))
+            who = Type("entity", 0, 0)
+            return Const(who, 0) if only_agent else _of_what_is_meant(Speaker, term.type, heard, ())
         if isinstance(term, HeardNoun):
-            return World(term.type, "noun") if only_agent else HeardNoun(term.type, tuple(patterns))
+            noun = World(term.type, "noun")
+            return noun if only_agent else _of_what_is_meant(HeardNoun, term.type, heard, ())
         return None
 
     return change
+
+
+def _of_what_is_meant(
+    kind: type[Speaker] | type[HeardNoun], type_: Type, heard: Sequence[Alternative], patterns: Patterns
+) -> Term:
+    """Something of the first utterance that fits; what fits may depend on values, of which each text has one."""
+    if not heard:
+        return kind(type_, patterns)
+    alternative, *others = heard
+    always = tuple(pattern for pattern, condition in alternative if condition is None)
+    sometimes = [(pattern, condition) for pattern, condition in alternative if condition is not None]
+    otherwise = _of_what_is_meant(kind, type_, others, (*patterns, *always))
+    if not sometimes:
+        return otherwise
+    return Select(
+        type_,
+        tuple(condition for _, condition in sometimes),
+        tuple(
+            _of_what_is_meant(kind, type_, others, (*patterns, *always, pattern)) for pattern, _ in sometimes
+        ),
+        otherwise,
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
@@ -13,10 +13,9 @@ from socialai_dsl.semantics.alternatives import select
 from socialai_dsl.semantics.build import number as number_of
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.findings import surviving
-from socialai_dsl.semantics.places import lies_in_wall
 from socialai_dsl.semantics.scope import Objects, reset_scope
 from socialai_dsl.semantics.statuses import initial
-from socialai_dsl.semantics.terms import Const, Entity, Placing, Read, Term, Type
+from socialai_dsl.semantics.terms import Const, Entity, Read, Term, Type
 from socialai_dsl.semantics.wording import with_article
 
 if TYPE_CHECKING:
@@ -26,7 +25,7 @@ VIEW = 7
 """Side of the view square where none is given."""
 
 
-def entities_of(resolver: Resolver, placings: Mapping[int, Sequence[Placing]]) -> Iterator[Entity]:
+def entities_of(resolver: Resolver) -> Iterator[Entity]:
     """The agent, the NPCs in cast order, the objects in file order."""
     symbols = resolver.symbols
     kinds: list[str] = []
@@ -56,12 +55,11 @@ def entities_of(resolver: Resolver, placings: Mapping[int, Sequence[Placing]]) -
                 near=near,
                 far=far,
                 audible=member.audible == "always",
-                in_wall=_in_wall(resolver, placings.get(number, ())),
                 view=member.view if member.view is not None else VIEW,
             )
     statuses = initial(resolver)
     for objects in symbols.objects.values():
-        yield from _objects(resolver, objects, placings, statuses)
+        yield from _objects(resolver, objects, statuses)
 
 
 def _code(member: CastMember, kinds: list[str]) -> int:
@@ -86,14 +84,9 @@ def _check_shared(resolver: Resolver, name: str) -> None:
             raise resolver.findings.fail("S315", message, span, hint=hint)
 
 
-def _in_wall(resolver: Resolver, placings: Sequence[Placing]) -> bool:
-    return bool(placings) and all(lies_in_wall(resolver, placing) for placing in placings)
-
-
 def _objects(
     resolver: Resolver,
     objects: Objects,
-    placings: Mapping[int, Sequence[Placing]],
     statuses: Mapping[int, int | Read],
 ) -> Iterator[Entity]:
     described = resolver.symbols.scenario.objects[objects.name]
@@ -117,7 +110,6 @@ def _objects(
             exclusive=tuple(objects.numbers) if described.exclusive else (),
             pushed_by_rolling=rolled,
             contains=holding.get(number, ()),
-            in_wall=_in_wall(resolver, placings.get(number, ())),
         )
 
 

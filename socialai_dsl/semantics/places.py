@@ -1,4 +1,4 @@
-"""Where things are put: the regions of `place:`, the coordinates of `at:`, and what lies in a wall."""
+"""Where things are put: the regions of `place:`, the coordinates of `at:`."""
 
 from __future__ import annotations
 
@@ -18,12 +18,10 @@ from socialai_dsl.semantics.terms import (
     BOOL,
     SIDE,
     Const,
-    Operation,
     Placing,
     Region,
     Term,
     Type,
-    World,
 )
 from socialai_dsl.semantics.wording import quoted
 
@@ -173,21 +171,3 @@ def _unknown(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> Fai
     near = did_you_mean(name, [*PLACES, "next_to", "in_front_of"])
     hint = None if near else "places are " + ", ".join([*PLACES, "next_to", "in_front_of"])
     return resolver.fail("S205", f"unknown place `{name}`", node, scope, suggestion=near, hint=hint)
-
-
-def lies_in_wall(resolver: Resolver, placing: Placing) -> bool:
-    """Whether a placement is provably in a wall, whatever the size of the room."""
-    if placing.at is not None:
-        x, y = placing.at
-        return _is_edge(x, "width", resolver.symbols.width) or _is_edge(y, "height", resolver.symbols.height)
-    return bool(placing.regions) and all(region.name == "wall" for region in placing.regions)
-
-
-def _is_edge(coordinate: Term, size: str, sizes: tuple[int, int]) -> bool:
-    low, high = sizes
-    match coordinate:
-        case Const(value=value):
-            return value == 0 or (low == high and value == high - 1)
-        case Operation(op="-", args=(World(name=name), Const(value=1))):
-            return name == size
-    return False

@@ -273,7 +273,7 @@ class Resolver:
 
     def _among(self, left: Term, option: ast.Expr, node: ast.Expr, scope: Scope) -> Term:
         if isinstance(option, ast.Interval):
-            self.fit(left, INT, option, scope)
+            left = self.fit(left, INT, option, scope)
             return between(left, self.value(option.low, INT, scope), self.value(option.high, INT, scope))
         if resolve_groups.is_group(self, option, scope):
             group = resolve_groups.group(self, option, left.type, scope)
@@ -348,10 +348,11 @@ def _number_of(noun: Term) -> Term | None:
     type_ = Type("int", min(values), max(values))
     if isinstance(noun, Const):
         return number(values[noun.value])
+    # As a number it is needed: where there is no noun, nothing is found.
+    place = replace(noun, type=Type("int", 0, len(words) - 1))
     if values == list(range(values[0], values[0] + len(values))):
-        place = replace(noun, type=Type("int", 0, len(words) - 1))
         return arithmetic("+", place, number(values[0])) if values[0] else place
-    cases = [Compare("==", noun, Const(noun.type, i)) for i in range(len(values) - 1)]
+    cases = [Compare("==", place, number(i)) for i in range(len(values) - 1)]
     return Select(type_, tuple(cases), tuple(Const(type_, v) for v in values[:-1]), Const(type_, values[-1]))
 
 

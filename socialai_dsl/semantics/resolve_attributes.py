@@ -9,7 +9,7 @@ from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import beliefs, contents, hearing, links, resolve_groups, resolve_names
 from socialai_dsl.semantics.alternatives import of_each
-from socialai_dsl.semantics.build import all_of, any_of, arithmetic, number
+from socialai_dsl.semantics.build import any_of, arithmetic, number
 from socialai_dsl.semantics.findings import FailedError
 from socialai_dsl.semantics.scope import Scope
 from socialai_dsl.semantics.signatures import VALUE_SYNONYMS, VALUES, Signature
@@ -26,7 +26,6 @@ from socialai_dsl.semantics.terms import (
     Here,
     PokedNow,
     Term,
-    Test,
     Type,
     World,
 )
@@ -49,8 +48,7 @@ def toggled_by(who: Const, what: Term) -> Term:
     """Whether the agent toggled at something in this step, or an NPC did so in its last turn."""
     if who.value == 0:
         return PokedNow(what)
-    toggle = Const(ACTION, ACTION.words.index("toggle"))
-    return all_of([Compare("==", FieldOf(ACTION, who, "last"), toggle), Test("faces", who, what)])
+    return Compare("==", FieldOf(what.type, who, "toggled"), what)
 
 
 def check_points(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: Scope) -> None:
@@ -213,7 +211,7 @@ def _attribute(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: 
             return FieldOf(DIRECTION, who, "dir")
         case "x" | "y":
             high = (resolver.symbols.width if name == "x" else resolver.symbols.height)[1]
-            return FieldOf(Type("int", 0, high - 1), who, "x" if name == "x" else "y")
+            return FieldOf(Type("int", -1, high - 1), who, "x" if name == "x" else "y")
         case "gone":
             return FieldOf(BOOL, who, "gone")
         case "was_poked":

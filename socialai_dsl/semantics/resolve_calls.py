@@ -42,6 +42,7 @@ from socialai_dsl.semantics.terms import (
     HeardNoun,
     InState,
     Measure,
+    Not,
     Operation,
     Sees,
     Sited,
@@ -110,7 +111,7 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
     assert subject is not None, "internal: only relations have the candidate cell as a subject"
     if node.name == "distance":
         (_, width), (_, height) = resolver.symbols.width, resolver.symbols.height
-        return Measure(Type("int", 0, width + height - 2), "distance", (subject, other))
+        return Measure(Type("int", 0, width + height), "distance", (subject, other))
     assert node.name == "dir_to", f"internal: no meaning for `{node.name}`"
     return Measure(DIRECTION, "dir_to", (subject, other))
 
@@ -268,7 +269,8 @@ def _points_at(subject: Term, other: Term) -> Term:
     way = arithmetic(
         "+", replace(Measure(DIRECTION, "dir_to", (subject, other)), type=Type("int", 0, 3)), number(1)
     )
-    return all_of([Compare("==", FieldOf(ways, subject, "pointing"), way), Test("in_line", subject, other)])
+    straight = (Test("in_line", subject, other), Not(Test("at", subject, other)))
+    return all_of([Compare("==", FieldOf(ways, subject, "pointing"), way), *straight])
 
 
 def _each(resolver: Resolver, node: ast.Expr, scope: Scope, relation: Callable[[Term], Term]) -> Term:

@@ -90,7 +90,7 @@ class FieldOf:
 
     type: Type
     entity: Term
-    name: Literal["x", "y", "dir", "color", "status", "gone", "poked", "last", "pointing", "inside"]
+    name: Literal["x", "y", "dir", "color", "status", "gone", "poked", "pointing", "inside", "toggled"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -536,6 +536,8 @@ class FramePlan:
     start: str = ""
     states: tuple[StatePlan, ...] = ()
     steps: tuple[StepPlan, ...] = ()
+    written: bool = True
+    """False: nobody wrote it; it is there for who only believes something."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -614,7 +616,7 @@ class Entity:
     Attributes:
         number: its place in the order agent, NPCs, objects. key, index: `doors`, 2 for doors[2]; index None if single.
         type: of an object. status: initial. kind, kind_code: of an NPC. name: type and term of its name (cast members).
-        near, far: Manhattan distances at which its voice is heard. in_wall: it lies in a wall.
+        near, far: Manhattan distances at which its voice is heard.
         view: side of its view square. kind_drawn: the status code of an NPC whose kind is drawn; `kind_code` is then
             the greatest it can be.
         initial: initial status of an object where it is drawn or computed (then `status` is the type's).
@@ -634,7 +636,6 @@ class Entity:
     near: int = 1
     far: int = 1
     audible: bool = False
-    in_wall: bool = False
     view: int = 7
     kind_drawn: Term | None = None
     initial: Read | None = None

@@ -233,6 +233,15 @@ class Utterances:
         wanted = {normal(said.replace("<noun>", str(noun))): i for i, noun in enumerate(self._grammar.nouns)}
         return {text: wanted[normal(text)] for text in self._resolver.npc_texts if normal(text) in wanted}
 
+    def noun_in(self, said: str) -> int | None:
+        """The noun of what the grammar can say; None where it cannot, or the template has no place for a noun."""
+        found = [
+            noun
+            for template, noun in self._pairs.get(normal(said), ())
+            if "<noun>" in self._grammar.templates[template]
+        ]
+        return min(found, default=None)
+
     def anything(self) -> Pattern:
         """Whatever anybody can say."""
         pairs = frozenset(pair for found in self._pairs.values() for pair in found)

@@ -194,8 +194,9 @@ def go_next_to(world: World, me: Entity, goal: Any) -> str:
 
 
 def along(world: World, me: Entity, goals: list[Cell]) -> str:
-    """The next action on a shortest path to any of the goals: breadth first, ties down, up, right, left."""
-    steps = {goal: 0 for goal in goals if not (me is not world.agent and world.deadly(goal))}
+    """The next action on a shortest path to any of the goals, which need not be free themselves: breadth first, ties
+    down, up, right, left."""
+    steps = dict.fromkeys(goals, 0)
     queue = list(steps)
     for cell in queue:
         for direction in SEARCH_ORDER:
@@ -245,8 +246,6 @@ def push(world: World, me: Entity, goal: Any, way: str) -> str:
 
 def enter(world: World, me: Entity, goal: Any) -> str:
     """Uses x while it is closed, goes through once it is open."""
-    cell = where(goal)
-    assert cell is not None
     if geometry.at(world, me, goal):
         return "none"
-    return go_to(world, me, goal) if world.walkable(cell) else use(world, me, goal)
+    return go_to(world, me, goal) if goal.status in TYPES[goal.type].walkable else use(world, me, goal)

@@ -7,9 +7,9 @@ from typing import Any
 
 from socialai_dsl.grammar import ast
 from tests.reference import geometry
-from tests.reference.evaluate import Context, evaluate, of
+from tests.reference.evaluate import Context, evaluate, of, there
 from tests.reference.source import Sources
-from tests.reference.world import TYPES, Entity, World, as_list, where
+from tests.reference.world import TYPES, Cell, Entity, World, as_list, where
 
 Cause = tuple[str, list[Entity], Any]
 
@@ -41,7 +41,7 @@ def assignments(
 ) -> dict[str, Any]:
     """What a rule gives to registers, computed before anything is done."""
     return {
-        name: evaluate(sources.expression(f"{path}.set.{name}", source, frame), context)
+        name: there(evaluate(sources.expression(f"{path}.set.{name}", source, frame), context))
         for name, source in rule.set.items()
     }
 
@@ -61,7 +61,7 @@ def affect(world: World, target: Entity, verb: str, status: Any) -> None:
     elif verb == "reset":
         reset(world, target)
     elif verb == "put":
-        target.cell = where(status)
+        put(world, target, where(status))
     elif verb == "move_into":
         target.cell, target.inside = None, status
     elif verb == "reveal":
@@ -78,16 +78,25 @@ def affect(world: World, target: Entity, verb: str, status: Any) -> None:
     assert target.sort != "object" or target.status in TYPES[target.type].states
 
 
+def put(world: World, target: Entity, cell: Cell | None) -> None:
+    """It comes to a cell; somebody only where he can stand. What is not in the room has no cell to come to."""
+    taken = any(member is not target and member.cell == cell for member in world.cast.values())
+    if cell is None:
+        return
+    if target.sort == "object" or (world.walkable(cell) and not world.deadly(cell) and not taken):
+        target.cell = cell
+
+
 def remember(entity: Entity) -> None:
     """Keeps what `reset` will bring back."""
-    entity.at_reset = (entity.status, entity.cell, entity.facing, entity.blocked, entity.inside)
+    entity.at_reset = (entity.status, entity.cell, entity.facing, entity.inside)
 
 
 def reset(world: World, target: Entity) -> None:
-    """As at the end of the reset of this episode; an NPC turns back, and goes back if its place is free."""
-    status, cell, facing, blocked, inside = target.at_reset
+    """As it was put down in this episode; an NPC turns back, and goes back if its place is free."""
+    status, cell, facing, inside = target.at_reset
     if target.sort == "object":
-        target.status, target.blocked, target.inside = status, blocked, inside
+        target.status, target.inside, target.counted = status, inside, 0
     else:
         target.pointing, target.facing = None, facing
         if cell is None or not geometry.free(world, cell, target):

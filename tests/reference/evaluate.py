@@ -77,7 +77,8 @@ def _text(node: ast.Text, context: Context) -> str:
 
 
 def spelled(value: Any) -> str:
-    """A value inside a text."""
+    """A value inside a text. While somebody is silent his noun is not there to be said."""
+    value = there(value)
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, Entity):
@@ -165,7 +166,7 @@ def _slot(word: str, context: Context) -> tuple[bool, Any]:
         return False, None
     slot = me.slots[word]
     if isinstance(slot, Value):
-        return True, evaluate(slot, replace(context, in_frame=False, variables={}, take_first=True))
+        return True, evaluate(slot, replace(context, in_frame=False, variables={}))
     return True, slot
 
 
@@ -246,11 +247,19 @@ def same(a: Any, b: Any) -> bool:
     return bool(a == b)
 
 
+def there(value: Any) -> Any:
+    """A value that is needed. The noun of somebody who is silent can be compared, and nothing else."""
+    if value is None:
+        raise NothingFoundError
+    return value
+
+
 def _compare(node: ast.Compare, context: Context) -> bool:
     left, right = of(node.left, context), of(node.right, context)
     if node.op in ("==", "!="):
         equal = any(same(a, b) for a in as_list(left) for b in as_list(right))
         return equal == (node.op == "==")
+    left, right = there(left), there(right)
     if not isinstance(left, int) or not isinstance(right, int):
         return False  # a noun that is no number is neither more nor less than anything
     return {"<": left < right, "<=": left <= right, ">": left > right, ">=": left >= right}[node.op]
@@ -258,6 +267,8 @@ def _compare(node: ast.Compare, context: Context) -> bool:
 
 def _member(node: ast.Member, context: Context) -> bool:
     left, group = of(node.left, context), as_list(of(node.right, context))
+    if isinstance(node.right, ast.Interval):
+        left = there(left)
     return any(same(left, item) for item in group) != node.negated
 
 
@@ -285,7 +296,7 @@ def _interval(node: ast.Interval, context: Context) -> list[int]:
 
 
 def _arithmetic(node: ast.Arithmetic, context: Context) -> Any:
-    left, right = of(node.left, context), of(node.right, context)
+    left, right = there(of(node.left, context)), there(of(node.right, context))
     if isinstance(left, str):
         # "A direction plus a turn is modulo 4 (left -1, right +1)."
         quarter = {"left": -1, "right": 1}[right]
@@ -405,14 +416,14 @@ def _prev(node: ast.Call, context: Context) -> Any:
     """An expression as it was at the start of the step, before the agent acted."""
     before = context.world.before
     if before is None:
-        return of(node.args[0], context)
+        return there(of(node.args[0], context))
     earlier = replace(
         context,
         world=before,
         me=moved(context.me, before),
         variables={name: moved(value, before) for name, value in context.variables.items()},
     )
-    return moved(of(node.args[0], earlier), context.world)
+    return moved(there(of(node.args[0], earlier)), context.world)
 
 
 def moved(value: Any, world: World) -> Any:
@@ -429,9 +440,9 @@ FUNCTIONS: dict[str, Callable[[ast.Call, Context], Any]] = {
     "prev": _prev,
     "first": _first,
     "count": lambda node, context: len(as_list(of(node.args[0], context))),
-    "min": lambda node, context: min(of(argument, context) for argument in node.args),
-    "max": lambda node, context: max(of(argument, context) for argument in node.args),
-    "abs": lambda node, context: abs(of(node.args[0], context)),
+    "min": lambda node, context: min(there(of(argument, context)) for argument in node.args),
+    "max": lambda node, context: max(there(of(argument, context)) for argument in node.args),
+    "abs": lambda node, context: abs(there(of(node.args[0], context))),
     "opposite": lambda node, context: turned(of(node.args[0], context), 2),
 }
 
@@ -450,5 +461,5 @@ HANDLERS: dict[type, Callable[[Any, Context], Any]] = {
     ast.Alternatives: _alternatives,
     ast.Interval: _interval,
     ast.Arithmetic: _arithmetic,
-    ast.Negative: lambda node, context: -of(node.operand, context),
+    ast.Negative: lambda node, context: -there(of(node.operand, context)),
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from socialai_dsl.grammar import ast
 from tests.reference import bodies, chance, speech
 from tests.reference.effects import Cause, affect, assign, assignments, causes
 from tests.reference.evaluate import Context, NothingFoundError, evaluate, holds, pattern
@@ -70,13 +71,22 @@ class FrameRunner:
             return Turn(bodies.Activity("stay"))
         return self.begin_step(frame) if frame.states is None else self.begin_state(frame)
 
+    def perform_utterance(self, turn: Turn) -> None:
+        """What is performed is said with the body action; a `say` of the same turn comes too late."""
+        spoken = turn.activity.utterance(self.me)
+        if spoken:
+            self.say(turn, *speech.pair(self.sources.scenario.grammar, spoken))
+
+    def say(self, turn: Turn, text: str, noun: str | int | None = None) -> None:
+        """The first thing that is said in a turn counts. That an NPC said it is known at once; it is heard later."""
+        if turn.say is None:
+            turn.say, turn.noun = text, noun
+            if self.me.sort == "npc":
+                self.me.utterance = text
+
     def end(self, turn: Turn) -> str | None:
         """Step 4b, second part, after the body action: `then`, or the end of an entry; returns what is said."""
         frame = self.frame
-        spoken = turn.activity.utterance(self.me)
-        if spoken and turn.say is None:
-            # What is performed is said with the body action; a `say` of the same turn comes too late.
-            turn.say, turn.noun = speech.pair(self.sources.scenario.grammar, spoken)
         if frame is not None:
             self.me.clock += 1
             if frame.states is None:
@@ -244,16 +254,30 @@ class FrameRunner:
         context = self.context()
         if not rule.hears:
             return context
+        wants_noun = self.wants_noun(rule, path)
         for heard in speech.in_speaking_order(self.world, self.me.inbox):
             for number, source in enumerate(rule.hears):
-                if source == "any":
-                    return context.knowing(speaker=heard.speaker)
-                value = self.sources.text(f"{path}.hears[{number}]", source, self.me.frame)
-                context.value = value
-                captured = speech.match(pattern(value.tree, context), heard.text, self.world)
-                if captured is not None:
-                    return context.knowing(speaker=heard.speaker, **captured)
+                captured: dict[str, Any] | None = {}
+                if source != "any":
+                    value = self.sources.text(f"{path}.hears[{number}]", source, self.me.frame)
+                    context.value = value
+                    captured = speech.match(pattern(value.tree, context), heard.text, self.world)
+                if captured is None:
+                    continue
+                known = {"noun": speech.noun_of(self.sources.scenario.grammar, heard), **captured}
+                # A rule that asks for the noun takes no notice of what has none.
+                if known["noun"] is not None or not wants_noun:
+                    return context.knowing(speaker=heard.speaker, **known)
         return None
+
+    def wants_noun(self, rule: Rule, path: str) -> bool:
+        """Whether a rule asks for the noun that was heard."""
+        frame = self.me.frame
+        written = [rule.when, rule.do, *rule.set.values(), *rule.cause]
+        values = [self.expression(f"{path}.asked", source) for source in written if source is not None]
+        if rule.say is not None:
+            values.append(self.sources.text(f"{path}.asked", rule.say, frame))
+        return any(asks_for_noun(value.tree) for value in values)
 
     def consequence(self, rule: Any, path: str, context: Context) -> Consequence:
         """ "A rule computes first, then acts": all values from the state in which its condition held."""
@@ -272,8 +296,8 @@ class FrameRunner:
         for verb, targets, status in found.causes:
             for target in targets:
                 affect(self.world, target, verb, status)
-        if found.say is not None and turn.say is None:
-            turn.say = found.say
+        if found.say is not None:
+            self.say(turn, found.say)
         if isinstance(found.rule, Rule):
             goal = found.rule.goto or found.rule.goto_now
             if goal is not None:
@@ -295,3 +319,12 @@ class FrameRunner:
             return bodies.plan(self.expression(site, source), context or self.context())
         except NothingFoundError:
             return bodies.Activity("stay")
+
+
+def asks_for_noun(node: Any) -> bool:
+    """Whether an expression needs the noun that was heard; in what is said or heard `<noun>` is any noun."""
+    if isinstance(node, ast.Call) and node.name in ("said", "heard"):
+        return node.subject is not None and asks_for_noun(node.subject)
+    if isinstance(node, ast.Name) and node.id == "noun":
+        return True
+    return any(asks_for_noun(part) for part in node.children())

@@ -17,7 +17,7 @@ from tests.reference.room import Setup, sizes
 from tests.reference.script import Outcome, script_of
 from tests.reference.settling import Settling
 from tests.reference.source import Sources
-from tests.reference.vocabulary import Vocabulary
+from tests.reference.vocabulary import Vocabulary, Words
 from tests.reference.world import Entity, Performance, World, as_list
 
 Action = tuple[int, int, int, int]
@@ -39,12 +39,15 @@ class Result:
 
 
 class Reference:
-    """Plays one scenario, slowly. It takes a name, a resolved scenario, its models or its plain data."""
+    """Plays one scenario, slowly. It takes a name, a resolved scenario, its models or its plain data.
 
-    def __init__(self, source: Any) -> None:
+    `words` are the numbers of words; without them it works out itself which words the scenario has.
+    """
+
+    def __init__(self, source: Any, words: Words | None = None) -> None:
         self.scenario = script_of(source)
         self.sources = Sources(self.scenario)
-        self.vocabulary = Vocabulary(self.scenario, self.sources)
+        self.vocabulary = words or Vocabulary(self.scenario, self.sources)
         self.looks_back = "prev(" in repr(self.scenario)
         self.canvas = self.scenario.room.canvas or (
             max(sizes(self.scenario, self.sources, "width")),
@@ -103,14 +106,14 @@ class Reference:
         setup = Setup(scenario, self.sources, self.world, layout)
         setup.run()
         self.world.always_audible = frozenset(n for n, m in setup.members.items() if m.audible == "always")
+        for entity in self.world.entities():
+            remember(entity)
         self.settling = Settling(scenario, self.sources, self.world)
         self.settling.all()
         for member in self.world.cast.values():
             frame = self.sources.frame_of(member.frame)
             if frame is not None and frame.steps is not None:
                 FrameRunner(self.sources, self.world, member).skip_empty(frame)
-        for entity in self.world.entities():
-            remember(entity)
 
     def accepted(self) -> bool:
         """Whether the room is as `require` wants it."""
@@ -131,9 +134,11 @@ class Reference:
         # Step 0: what is asked of the state that the last step left, then the clock.
         self.look_back()
         self.begin_step()
+        self.note(action)
         # Step 1: the agent's body action. A scripted agent reads its `first` before.
         runner = FrameRunner(self.sources, world, world.agent)
         turn = runner.begin()
+        runner.perform_utterance(turn)
         turn.activity.primitive(world, world.agent)  # what its frame asks for, whatever the agent does
         bodies.act(world, world.agent, self.primitive(action))
         # Links are direct consequences and part of an early picture; computed statuses are not.
@@ -190,11 +195,26 @@ class Reference:
             member.action, member.poked = "none", False
             member.bumped = False
         for thing in self.world.things():
-            thing.toggled_by, thing.poked = [], False
+            thing.poked = False
+        self.forget_use(self.world.agent)
+
+    def forget_use(self, user: Entity) -> None:
+        """What somebody toggled at is toggled until his next turn."""
+        for thing in self.world.things():
+            thing.toggled_by = [other for other in thing.toggled_by if other is not user]
 
     def primitive(self, action: Action) -> str:
         """The word for the first number of an action."""
         return self.scenario.actions[action[0]] if action[0] < len(self.scenario.actions) else "none"
+
+    def note(self, action: Action) -> None:
+        """What the agent does and says in this step is known from its start."""
+        agent, grammar = self.world.agent, self.scenario.grammar
+        _, speaks, template, noun = action
+        agent.action = self.primitive(action)
+        if speaks:
+            agent.pair = 1 + grammar.pairs().index((template, noun))
+            agent.utterance, agent.noun = speech.pair(grammar, agent.pair)
 
     def go_on(self) -> None:
         """Timers, then things that roll, in object order; then the world settles."""
@@ -208,17 +228,19 @@ class Reference:
         if speaks:
             text = self.scenario.grammar.utterance(template, noun)
             value = speech.noun_value(self.scenario.grammar.nouns[noun])
-            self.world.agent.pair = 1 + self.scenario.grammar.pairs().index((template, noun))
             speech.speak(self.world, self.world.agent, text, value)
 
     def npc_turn(self, npc: Entity) -> None:
         """Step 4 for one NPC: `first`, the activity, `then`; its utterance carries from where it stands after it."""
+        self.forget_use(npc)
         if npc.gone:
+            npc.inbox.clear()
             return
         runner = FrameRunner(self.sources, self.world, npc)
         turn = runner.begin()
         # What `first` caused may have made it vanish; what has vanished does nothing.
         if not npc.gone:
+            runner.perform_utterance(turn)
             bodies.act(self.world, npc, turn.activity.primitive(self.world, npc))
             self.settling.all()
             runner.end(turn)
@@ -242,13 +264,13 @@ class Reference:
             return Result(nothing, [], terminated=True, outcome="deadly")
         for number, outcome in enumerate(self.scenario.outcome):
             kind = "success" if outcome.success is not None else "failure"
-            value = self.sources.expression(f"outcome[{outcome.id or number}].{kind}", getattr(outcome, kind))
+            value = self.sources.expression(f"outcome[{number}].{kind}", getattr(outcome, kind))
             try:
                 if not holds(value, Context(world)):
                     continue
+                paid = self.paid(outcome, number) if kind == "success" else 0.0
             except NothingFoundError:
                 continue
-            paid = self.paid(outcome, number) if kind == "success" else 0.0
             return Result(
                 nothing, [], paid, terminated=True, outcome=number if outcome.id is None else outcome.id
             )
@@ -258,7 +280,7 @@ class Reference:
 
     def paid(self, outcome: Outcome, number: int) -> float:
         """The reward of a success: a share of what is left of it by now."""
-        path = f"outcome[{outcome.id or number}].reward"
+        path = f"outcome[{number}].reward"
         per_cent = evaluate(self.sources.expression(path, outcome.reward), Context(self.world))
         left = 1 - self.scenario.reward.slope * self.world.t / self.scenario.horizon
         return float(min(max(per_cent, 0), 100) / 100 * left)
@@ -275,6 +297,7 @@ class Reference:
             self.begin_step()
             runner = FrameRunner(self.sources, world, world.agent)
             turn: Turn = runner.begin()
+            runner.perform_utterance(turn)
             primitive = turn.activity.primitive(world, world.agent)
             bodies.act(world, world.agent, primitive)
             self.settling.all()

@@ -17,14 +17,15 @@ def push(world: World, cell: Cell, direction: str, rolled: bool = False) -> None
 
 
 def count_down(world: World) -> None:
-    """Timers: an active status expires after its steps; in any other the count starts anew."""
+    """Timers: an active status expires after its steps; in any other, and then, the count starts anew."""
     for thing in world.things():
-        if thing.timer is None or thing.gone:
+        if thing.timer is None:
             continue
         type_ = TYPES[thing.type]
         thing.counted = thing.counted + 1 if thing.status in type_.active else 0
         if thing.counted == thing.timer:
             thing.status = type_.expired.get(thing.status, thing.status)
+            thing.counted = 0
 
 
 def roll(world: World) -> None:

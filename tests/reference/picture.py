@@ -44,7 +44,9 @@ def gestures(world: World, cell: Cell) -> tuple[int, int]:
         return NOTHING, NOTHING
     towards = NOTHING if npc.pointing is None else direction_shown(world, npc.pointing)
     act = LAST_ACTS[npc.last_act]
-    return towards, act + towards if npc.last_act == "point" else act
+    # Who was reset after pointing has taken its arm down.
+    points = npc.last_act == "point" and npc.pointing is not None
+    return towards, act + towards if points else act
 
 
 def shown(world: World, cell: Cell, canvas: tuple[int, int]) -> tuple[int, int, int, int]:
@@ -58,9 +60,9 @@ def shown(world: World, cell: Cell, canvas: tuple[int, int]) -> tuple[int, int, 
     thing = world.object_at(cell)
     if thing is not None:
         type_ = TYPES[thing.type]
-        tag = 1 if thing.status == "tagged" else 0
-        status = 0 if thing.dark else type_.states.index(thing.status)
-        return type_.code, COLORS.index(str(thing.color)), status, tag
+        seen = type_.initial if thing.dark else thing.status
+        tag = 1 if seen == "tagged" else 0
+        return type_.code, COLORS.index(str(thing.color)), type_.states.index(seen), tag
     ground = world.terrain.get(cell)
     if ground is not None:
         return TYPES[ground].code, COLORS.index(str(TYPES[ground].color)), 0, 0

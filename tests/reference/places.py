@@ -50,7 +50,10 @@ def cells_of(node: Any, context: Context) -> list[Cell]:
         "in_front_of": lambda cell: geometry.in_front_of(world, cell, arguments[0]),
         "on": lambda cell: geometry.at(world, cell, arguments[0]),
     }
-    return [cell for cell in world.interior() if tests[name](cell)]
+    # A row, a column or a rectangle is all of it; of other regions only the floor counts.
+    whole = name in ("row", "column", "rect") or (context.setup is not None and context.setup.building)
+    ground = [cell for cell in world.interior() if whole or cell not in world.terrain]
+    return [cell for cell in ground if tests[name](cell)]
 
 
 def wall(world: World, side: str, margin: int) -> list[Cell]:

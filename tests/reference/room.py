@@ -11,6 +11,7 @@ from tests.reference.evaluate import Context, evaluate, of
 from tests.reference.places import region
 from tests.reference.script import Group, Member, Script, Sequence
 from tests.reference.source import Sources, Value
+from tests.reference.speech import noun_value
 from tests.reference.world import (
     COLORS,
     DIRECTIONS,
@@ -37,6 +38,7 @@ class Setup:
         self.drawn_cells: set[str] = set()
         self.facing_known: set[str] = set()
         self.status_known: set[str] = set()
+        self.building = False
 
     # -- the whole of it -----------------------------------------------------------------------------------
 
@@ -89,12 +91,14 @@ class Setup:
             setattr(self.world, side, pinned.get(side) or chosen)
 
     def build(self) -> None:
-        """Fixed things stand in place of floor."""
+        """Fixed things stand in place of floor, or of what was built there before."""
+        self.building = True
         for number, entry in enumerate(self.scenario.room.build):
             for type_, place in entry.items():
                 value = self.sources.expression(f"room.build[{number}].{type_}", place)
                 for cell in region(value, self.context()):
                     self.world.terrain[cell] = type_
+        self.building = False
 
     # -- entities ------------------------------------------------------------------------------------------
 
@@ -184,7 +188,7 @@ class Setup:
     def needs(self, name: str) -> list[str]:
         """The entities that somebody's place or position speaks of, through lets and facings too, as mentioned."""
         found: dict[str, None] = {}
-        for value in self.values_of(name, ("place", "at")):
+        for value in self.values_of(name, ("place", "at", "inside")):
             self.collect(value.tree, found, {name})
         return [need for need in found if need != name]
 
@@ -283,7 +287,10 @@ class Setup:
             _, source = written[entity.index % len(written)]
             value = self.sources.expression(f"{site_of(entity)}.place", source)
             found = region(value, self.context(entity, it=entity))
-            cells = [c for c in found if c not in self.world.terrain and not self.shared(c, holder)]
+            overlaps = isinstance(holder, Group) and holder.overlap
+            cells = [
+                c for c in found if overlaps or (c not in self.world.terrain and not self.shared(c, holder))
+            ]
         if cells:
             entity.cell = cells[self.draw(f"{path}.cell", number_of(entity), len(cells))]
 
@@ -380,7 +387,7 @@ class Setup:
         if source is None or thing.inside is not None:
             return
         found = evaluate(
-            self.sources.expression(f"objects.{thing.key}.inside", source), self.context(thing, it=thing)
+            self.sources.expression(f"{site_of(thing)}.inside", source), self.context(thing, it=thing)
         )
         thing.inside = found[thing.index] if isinstance(found, list) else found
 
@@ -424,8 +431,8 @@ class Setup:
             context = self.context(member)
             context.value = value
             goal = where(of(value.tree.args[0], context))
-            if member.cell is not None and goal is not None:
-                member.facing = quadrant(member.cell, goal)
+            there = member.cell is not None and goal is not None
+            member.facing = quadrant(member.cell, goal) if there else "down"
         else:
             member.facing = evaluate(value, self.context(member))
 
@@ -504,6 +511,8 @@ class Setup:
                 member.slots[name] = self.sources.text(path, source)
             elif type_ == "bool":
                 member.slots[name] = self.sources.expression(path, source)
+            elif type_ == "noun" and str(source) in map(str, self.scenario.grammar.nouns):
+                member.slots[name] = noun_value(source)
             else:
                 member.slots[name] = evaluate(self.sources.expression(path, source), self.context(member))
 

@@ -37,6 +37,17 @@ def match(pieces: list[str | None], text: str, world: World) -> dict[str, Any] |
     return None
 
 
+def noun_of(grammar: Grammar, heard: Heard) -> str | int | None:
+    """The noun of an utterance: the one that was chosen, else that of the template whose text it is."""
+    if heard.noun is not None:
+        return heard.noun
+    for template, noun in grammar.pairs():
+        fits = canonical(grammar.utterance(template, noun)) == canonical(heard.text)
+        if fits and "<noun>" in grammar.templates[template]:
+            return noun_value(grammar.nouns[noun])
+    return None
+
+
 def within_earshot(world: World, speaker: Entity, hearer: Entity) -> bool:
     """An utterance carries as far as its speaker's earshot, from where the speaker stands now."""
     # What is said in the turn in which one vanishes is heard from where that was.

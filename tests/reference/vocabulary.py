@@ -20,22 +20,29 @@ Who = tuple[str, int]
 """A member of the cast in one of its versions: `one_of` gives several."""
 
 
-class Vocabulary:
-    """Words to ids: 0 pads, 1 is unknown. Made before `observe:` is applied."""
+class Words:
+    """Words with the numbers that they were given, and how many are kept: 0 pads, 1 is unknown."""
+
+    def __init__(self, ids: dict[str, int], length: int) -> None:
+        self.ids, self.length = ids, length
+
+    def tokens(self, heard: list[str]) -> list[int]:
+        """The ids of words."""
+        return [self.ids.get(word, UNKNOWN) for word in heard]
+
+
+class Vocabulary(Words):
+    """The words of a scenario, numbered as they appear in it. Made before `observe:` is applied."""
 
     def __init__(self, scenario: Script, sources: Sources) -> None:
         self.scenario, self.sources = scenario, sources
         self.members = {name: scenario.versions(name) for name in scenario.cast}
-        self.ids: dict[str, int] = {}
+        super().__init__({}, 0)
         self.ranges: dict[tuple[Who, str], tuple[int, int]] = {}  # of registers that are being worked out
         for text in self.in_order_of_appearance():
             for word in words(text):
                 self.ids.setdefault(word, len(self.ids) + 2)
         self.length = self.longest_history()
-
-    def tokens(self, heard: list[str]) -> list[int]:
-        """The ids of words."""
-        return [self.ids.get(word, UNKNOWN) for word in heard]
 
     def in_order_of_appearance(self) -> Iterator[str]:
         """Texts of the grammar, names of the cast, then all that members can say."""

@@ -382,6 +382,44 @@ def solved(name: str, number: int) -> int:
     return successes
 
 
+class TestAlone:
+    @pytest.mark.parametrize("alone", ["asocial", "asocial+alone"])
+    @pytest.mark.parametrize("problem", PROBLEMS)
+    def test_without_a_caretaker_nobody_is_there_and_all_rooms_can_be_solved(
+        self, problem: str, alone: str
+    ) -> None:
+        room = made(school(problem, alone)).describe()
+        assert "caretaker" not in room
+        assert len(room["things"]) == (1 if "+" in alone else 2)
+        assert solved(school(problem, f"{alone}+oracle"), 40) == 40
+
+    @pytest.mark.parametrize("problem", PROBLEMS)
+    def test_without_a_distractor_there_is_one_thing_and_a_caretaker(self, problem: str) -> None:
+        assert solved(school(problem, "alone+oracle"), 40) == 40
+        for seed in range(5):
+            room = Episode(school(problem, "alone"), seed=seed).now()
+            assert (len(room["things"]), room["let"]["target"]) == (1, "things[0]")
+            assert not room["caretaker"].get("gone")
+
+    def test_cues_are_given_without_a_distractor_as_well(self) -> None:
+        episode = Episode(school("boxes", "alone+color", introduction="none"), seed=3)
+        color = episode.now()["things"][0]["color"]
+        assert episode.hears("left", "left") == [f"Caretaker: {color}", ""]
+
+    @pytest.mark.parametrize(("split", "count"), [("", 12), ("?split=train", 10), ("?split=test", 2)])
+    def test_the_suite_plays_each_problem_with_and_without_a_distractor(self, split: str, count: int) -> None:
+        envs = sd.make_vec(f"school/information_seeking_asocial{split}", num_envs=400)
+        envs.reset(seed=0)
+        found = set(envs.members())
+        assert len(found) == count
+        assert any("doors" in leaf for leaf in found) == (split != "?split=train")
+
+    @pytest.mark.parametrize("variant", ["alone", "asocial", "asocial+alone", "alone+pointing"])
+    @pytest.mark.parametrize("problem", PROBLEMS)
+    def test_nothing_looks_odd(self, problem: str, variant: str) -> None:
+        assert sd.load(school(problem, variant)).warnings == ()
+
+
 @pytest.mark.parametrize("misleading", ["false", "true"])
 @pytest.mark.parametrize("cue", CUES)
 @pytest.mark.parametrize("problem", PROBLEMS)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import pytest
@@ -12,30 +11,9 @@ from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import check, load
 from socialai_dsl.loader import read_document
 from socialai_dsl.source import Source
+from tests.socialai_dsl.checking.suite_files import suite, written
 
-FOLDER = Path(__file__).parents[2] / "data" / "suites"
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of the suites to work in."""
-    shutil.copytree(FOLDER, tmp_path / "suites")
-    monkeypatch.chdir(tmp_path / "suites")
-    return tmp_path / "suites"
-
-
-def suite(name: str) -> LoadedSuite:
-    loaded = load(name)
-    assert isinstance(loaded, LoadedSuite)
-    return loaded
-
-
-def written(text: str) -> list[str]:
-    """What is found in a suite of this text, without the file's name."""
-    Path("mine.yaml").write_text(text)
-    result = check("mine.yaml")
-    assert result.suite is None
-    return [str(finding).removeprefix("mine.yaml:") for finding in result.diagnostics]
+pytestmark = pytest.mark.usefixtures("folder")
 
 
 def test_union_says_each_text_once_in_the_order_of_the_members() -> None:
@@ -144,7 +122,7 @@ def test_names_that_are_wrong(name: str, message: str) -> None:
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_where_it_is(text: str, findings: list[str]) -> None:
-    assert written(f"suite: mine\n{text}\n") == findings
+    assert written(text) == findings
 
 
 def test_mistakes_of_members_are_shown_in_their_files() -> None:
@@ -166,9 +144,9 @@ def test_what_a_script_says_must_be_sayable_too() -> None:
         "variant: errands_oracle\nof: errands.yaml\n"
         "set: {cast.agent.frame: buy, frames.buy: {steps: [{say: Open 2}, {say: Give me bread}]}}\n"
     )
-    text = "suite: mine\nmembers: [errands+oracle]\n"
+    text = "members: [errands+oracle]\n"
     said = "{templates: [Open <noun>, Give me <noun>], nouns: [bread, sesame]}"
-    assert written(text + f"grammar: {said}\n") == [
+    assert written(text + f"grammar: {said}") == [
         '3:1: S401 `errands+oracle` needs "Open 2", which the grammar of this suite cannot say'
     ]
 

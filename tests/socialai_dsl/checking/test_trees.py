@@ -2,37 +2,14 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import pytest
 
-from socialai_dsl.checking import LoadedSuite
-from socialai_dsl.frontend import check, load
+from socialai_dsl.frontend import check
+from tests.socialai_dsl.checking.suite_files import suite, written
 
-FOLDER = Path(__file__).parents[2] / "data" / "suites"
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of the suites to work in."""
-    shutil.copytree(FOLDER, tmp_path / "suites")
-    monkeypatch.chdir(tmp_path / "suites")
-    return tmp_path / "suites"
-
-
-def suite(name: str) -> LoadedSuite:
-    loaded = load(name)
-    assert isinstance(loaded, LoadedSuite)
-    return loaded
-
-
-def written(text: str) -> list[str]:
-    """What is found in a suite of this text, without the file's name."""
-    Path("mine.yaml").write_text(f"suite: mine\n{text}\n")
-    result = check("mine.yaml")
-    assert result.suite is None
-    return [str(finding).removeprefix("mine.yaml:") for finding in result.diagnostics]
+pytestmark = pytest.mark.usefixtures("folder")
 
 
 def test_every_parameter_of_a_tree_has_a_value_in_every_leaf() -> None:

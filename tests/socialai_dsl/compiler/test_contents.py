@@ -49,12 +49,12 @@ def filled() -> Checked:
     return with_content(workshop(), APPLE, CHEST)
 
 
-def test_what_lies_in_something_is_out_of_the_room_on_its_cell(filled: Checked) -> None:
+def test_what_lies_in_something_is_out_of_the_room_and_on_no_cell(filled: Checked) -> None:
     env = start(filled)
     apple = env.describe()["apple"]
     assert (apple["at"], apple["gone"], apple["state"]) == (None, True, "whole")
-    assert worth(FieldOf(Type("int", -1, 31), entity(APPLE), "x"), checked=filled) == 2
-    assert worth(FieldOf(Type("int", -1, 31), entity(APPLE), "y"), checked=filled) == 3
+    assert worth(FieldOf(Type("int", -1, 31), entity(APPLE), "x"), checked=filled) == -1
+    assert worth(FieldOf(Type("int", -1, 31), entity(APPLE), "y"), checked=filled) == -1
     assert worth(FieldOf(HOLDERS, entity(APPLE), "inside"), checked=filled) == CHEST
 
 

@@ -62,7 +62,6 @@ def lively(horizon: int = 6) -> Program:
         at=(None,) * 5,
         npcs=2,
         objects=("door", "lava"),
-        in_wall=False,
         deadly=True,
         reset=put,
         frames=frames,

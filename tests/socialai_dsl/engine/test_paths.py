@@ -111,7 +111,6 @@ def test_shortest_paths_in_random_rooms(size: int) -> None:
             "at": at,
             "npcs": 1,
             "objects": ("door",) * 12,
-            "in_wall": False,
             "size": (size, size),
             "canvas": (size, size),
             "facing": (0, facing),

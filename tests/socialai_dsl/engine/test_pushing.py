@@ -40,7 +40,7 @@ def code_at(batch: Batch, x: int, y: int, width: int = 9) -> int:
 
 def corridor(at: tuple[tuple[int, int], ...], objects: tuple[str, ...], **more: object) -> Batch:
     """A room of 9 by 5 in which the agent looks to the right, everybody else where `at` says."""
-    room = {"size": (9, 5), "canvas": (9, 5), "in_wall": False, "flags": ROLLS, **more}
+    room = {"size": (9, 5), "canvas": (9, 5), "flags": ROLLS, **more}
     return batch_of(Assembly(at=at, objects=objects, **room).program())  # type: ignore[arg-type]
 
 

@@ -149,7 +149,7 @@ def test_pinned_cells_are_taken() -> None:
 
 
 def test_a_pinned_absence_and_a_pinned_status_are_drawn() -> None:
-    room = Assembly(at=((1, 2), (0, 2), (2, 2)), objects=("door", "door"), in_wall=False)
+    room = Assembly(at=((1, 2), (0, 2), (2, 2)), objects=("door", "door"))
     pins = {
         entity_register(2, Field.X): -1,
         entity_register(2, Field.Y): -1,

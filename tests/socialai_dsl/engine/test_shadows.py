@@ -64,7 +64,6 @@ def test_the_picture_and_what_is_seen_follow_the_shadows(seed: int) -> None:
         objects=("door",) * len(doors),
         size=(SIDE, SIDE),
         canvas=(SIDE, SIDE),
-        in_wall=False,
         flags=OCCLUSION,
         reset=[
             (Op.LOAD, entity_register(2 + i, Field.STATUS), constant(OPEN)) for i, o in enumerate(opened) if o
@@ -102,7 +101,7 @@ def test_the_picture_and_what_is_seen_follow_the_shadows(seed: int) -> None:
 
 
 # Light goes round a single thing, so there are three in a row.
-ROOM = {"at": ((1, 2), (3, 2), (2, 1), (2, 2), (2, 3)), "npcs": 1, "in_wall": False}
+ROOM = {"at": ((1, 2), (3, 2), (2, 1), (2, 2), (2, 3)), "npcs": 1}
 
 
 @pytest.mark.parametrize(("flags", "seen"), [(0, 1), (OCCLUSION, 0)])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from socialai_dsl.semantics.build import walk
-from socialai_dsl.semantics.terms import Const, Measure, PokedNow
+from socialai_dsl.semantics.terms import Const, FieldOf, Measure, PokedNow
 from socialai_dsl.semantics.terms import Test as Relation
 
 THINGS = {
@@ -130,9 +130,9 @@ def test_who_toggled(outcome_term):
     asked = {"objects": THINGS, "let": {"one": "pick(agent | guide)"}}
     term = outcome_term("lever.toggled_by(one)", **asked)
     assert [type(part) for part in walk(term) if isinstance(part, PokedNow)] == [PokedNow]
-    (turned,) = [part for part in walk(term) if isinstance(part, Relation)]
-    assert isinstance(turned.subject, Const)
-    assert (turned.name, turned.subject.value) == ("faces", 1)
+    (used,) = [part for part in walk(term) if isinstance(part, FieldOf)]
+    assert isinstance(used.entity, Const)
+    assert (used.name, used.entity.value) == ("toggled", 1)
 
 
 @pytest.mark.parametrize(

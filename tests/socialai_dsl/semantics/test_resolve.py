@@ -149,7 +149,7 @@ def test_texts_compare_by_what_they_say(meaning):
 def test_a_definition_is_expanded_where_it_is_used(outcome_term):
     define = {"close_to(x)": "agent.distance(x) <= 2"}
     term = outcome_term("close_to(exit)", define=define)
-    assert term.left == Measure(Type("int", 0, 14), "distance", (AGENT, Read(DOORS, "let.exit")))
+    assert term.left == Measure(Type("int", 0, 16), "distance", (AGENT, Read(DOORS, "let.exit")))
 
 
 def test_variables_of_a_definition_do_not_catch_its_arguments(outcome_term):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
-
 from socialai_dsl.frontend import load
 from socialai_dsl.semantics.terms import Coloring, Drawn, Facing, Placing, Read
 
@@ -77,20 +75,11 @@ def test_defaults_count_as_written_in_the_member(meaning):
 def test_a_list_of_places_gives_one_each(meaning):
     checked = meaning(objects={"doors": {"type": "door", "count": 2, "place": ["wall(top)", "row(2)"]}})
     assert [p.regions[0].name for p in places(checked)[:2]] == ["wall", "row"]
-    assert [e.in_wall for e in checked.entities if e.key == "doors"] == [True, False]
 
 
 def test_a_list_of_cells_is_a_group(meaning):
     checked = meaning(objects={"doors": {"type": "switch", "at": [[1, "H - 1"], [2, 1]]}})
-    assert [(e.index, e.in_wall) for e in checked.entities if e.key == "doors"] == [(0, True), (1, False)]
-
-
-@pytest.mark.parametrize(
-    ("size", "y", "in_wall"), [("5..8", "H - 1", True), ("5..8", 7, False), (8, 7, True), (8, 0, True)]
-)
-def test_in_a_wall_means_whatever_the_size(meaning, size, y, in_wall):
-    checked = meaning(room={"size": size}, objects={"doors": {"type": "door", "count": 1, "at": [1, y]}})
-    assert checked.entities[2].in_wall is in_wall
+    assert [e.index for e in checked.entities if e.key == "doors"] == [0, 1]
 
 
 def test_a_wall_that_is_drawn_is_an_argument(meaning):

@@ -1,0 +1,481 @@
+"""The writer of random scenarios: what exists first, then who is there, then what they do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from random import Random
+from typing import Any
+
+import yaml
+
+from tests.scenario_fuzzer.behaviour import Behaviour
+from tests.scenario_fuzzer.declared import STATUSES, Declared, Frame, Thing
+from tests.scenario_fuzzer.phrases import COLORS, Phrases, Where
+
+NOUNS: tuple[tuple[str | int, ...], ...] = (
+    (1, 2, 3, 4),
+    COLORS,
+    ("sesame", "the exit", "red", "3"),
+    ("toy", "you", "ana", "bel"),
+)
+TEMPLATES = ("Say <noun>", "Where is <noun>", "It is <noun>", "Give me <noun>", "Look <noun>")
+SAYINGS = ("Good day", "Look at me!", "Stop it.")
+"""What some NPC says in every scenario that has a frame."""
+WORDS = ("ana", "bel", "cor", "dol", "ers", "fit")
+GROUPED = ("door", "box", "switch", "ball", "marble", "generator", "apple", "lever")
+SINGLE = (*GROUPED, "remote_door", "platform", "fence", "floor", "wall", "lava")
+
+
+def write(seed: int) -> str:
+    """The text of the scenario of this seed."""
+    author = _Author(Random(seed))
+    return yaml.safe_dump(author.scenario(f"random_{seed}"), sort_keys=False, width=110, allow_unicode=True)
+
+
+class _Author:
+    """Makes one scenario; all choices are drawn from `rng`."""
+
+    def __init__(self, rng: Random) -> None:
+        self.rng = rng
+        self.declared = Declared()
+        self.phrases = Phrases(rng, self.declared)
+
+    def often(self, probability: float) -> bool:
+        """Whether something happens."""
+        return self.rng.random() < probability
+
+    def scenario(self, name: str) -> dict[str, Any]:
+        """The whole file, in an order in which what is spoken of is known."""
+        self.acts = self.actions()
+        behaviour = Behaviour(self.rng, self.declared, self.phrases, self.acts)
+        made: dict[str, Any] = {
+            "scenario": name,
+            "horizon": self.rng.randint(12, 26),
+            "earshot": self.rng.choice(("next_to", "room", "room", 2, 4)),
+            "actions": list(self.acts),
+            "grammar": self.grammar(),
+            "room": self.room(),
+        }
+        objects = self.objects()
+        frames = self.plan_cast()
+        tables, lets, state = self.tables(), self.lets(), self.state()
+        made |= {"objects": objects} if objects else {}
+        made |= {"tables": tables} if tables else {}
+        made |= {"let": lets} if lets else {}
+        made |= {"state": state} if state else {}
+        defines = self.definitions()
+        made |= {"define": defines} if defines else {}
+        self.finish_objects(objects)
+        memory = self.memory(lets)
+        made |= {"memory": memory} if memory else {}
+        played = {frame.name: self.frame(frame, behaviour) for frame in frames}
+        say_somewhere([played[frame.name] for frame in frames if not frame.of_agent], SAYINGS)
+        made |= {"frames": played} if played else {}
+        made["cast"] = self.cast()
+        if self.often(0.25):
+            names = [*objects, *self.declared.members, "agent"]
+            made["order"] = self.rng.sample(names, self.rng.randint(1, len(names)))
+        if self.often(0.15):
+            made["require"] = ["agent.distance(ann) > 1"]
+        if self.often(0.6):
+            made["rules"] = [behaviour.world_rule() for _ in range(self.rng.randint(1, 3))]
+        made["outcome"] = self.outcome()
+        if self.often(0.3):
+            made["reward"] = {"success": "linear(0.5)", "each_step": self.rng.choice((-0.001, 0.002))}
+        made["observe"] = self.observe()
+        return made
+
+    # -- what there is -----------------------------------------------------------------------------------------
+
+    def actions(self) -> tuple[str, ...]:
+        """The agent's body actions."""
+        return ("left", "right", "forward", "toggle", *(["done"] if self.often(0.7) else []))
+
+    def grammar(self) -> dict[str, Any]:
+        """What can be said; some of it NPCs say as well."""
+        self.declared.nouns = list(self.rng.choice(NOUNS))
+        self.declared.templates = self.rng.sample(TEMPLATES, self.rng.randint(1, 2))
+        said = [
+            t.replace("<noun>", str(self.rng.choice(self.declared.nouns))) for t in self.declared.templates
+        ]
+        self.declared.says = [*SAYINGS, *said]
+        return {"templates": list(self.declared.templates), "nouns": list(self.declared.nouns)}
+
+    def room(self) -> dict[str, Any]:
+        """Its size, what is built, whether things cast shadows."""
+        made: dict[str, Any] = {"size": self.rng.choice(("6..7", 7, "7..8", 8))}
+        if self.often(0.3):
+            kind = self.rng.choice(("wall", "fence", "lava"))
+            place = self.rng.choice(("rect(3, 3, 3, 4)", "row(H // 2) where here.x > 3", "column(2)"))
+            made["build"] = [{kind: place.partition(" where ")[0]}]
+        if self.often(0.2):
+            made["occlusion"] = True
+        return made
+
+    def objects(self) -> dict[str, dict[str, Any]]:
+        """Objects and groups of them, where they are and how they begin."""
+        made: dict[str, dict[str, Any]] = {}
+        for number in range(self.rng.randint(1, 4)):
+            group = self.often(0.45)
+            type_ = self.rng.choice(GROUPED if group else SINGLE)
+            thing = Thing(f"{type_}_{'abcdefgh'[number]}", type_, self.rng.randint(2, 3) if group else None)
+            self.declared.things.append(thing)
+            made[thing.name] = self.new_object(thing)
+        self.link(made)
+        return made
+
+    def new_object(self, thing: Thing) -> dict[str, Any]:
+        """One of them, without what speaks of others."""
+        made: dict[str, Any] = {"type": thing.type}
+        if thing.count is not None:
+            made["count"] = thing.count
+        in_wall = thing.type in ("door", "remote_door") or (
+            thing.type in ("switch", "lever") and self.often(0.4)
+        )
+        made["place"] = self.place(thing, in_wall)
+        if self.often(0.6):
+            several = ("distinct", "random") if thing.count else ("random",)
+            made["color"] = self.rng.choice((*several, *COLORS))
+        if thing.type in ("door", "box") and self.often(0.3):
+            made["state"] = "locked"
+        if not in_wall and self.often(0.2):
+            made["overlap"] = True
+        if thing.type == "switch" and self.often(0.2):
+            made["one_way"] = True
+        if thing.type in ("switch", "box", "door") and self.often(0.15):
+            made["dark"] = True
+        if thing.count and thing.type in ("switch", "box", "lever", "generator") and self.often(0.35):
+            made["exclusive"] = True
+        if thing.type == "lever" and self.often(0.6):
+            made["timer"] = self.rng.randint(1, 5)
+        return made
+
+    def place(self, thing: Thing, in_wall: bool) -> str:
+        """Where it is drawn."""
+        if in_wall:
+            return "each_wall(2)" if thing.count else f"wall({self.rng.choice(('top', 'left', 'right'))})"
+        return self.rng.choice(
+            (
+                "anywhere",
+                "anywhere",
+                "left_half",
+                "right_half",
+                "anywhere where here.x > 1",
+                "rect(2, 2, 4, 4)",
+                "column(2) | row(3)",
+            )
+        )
+
+    def link(self, made: dict[str, dict[str, Any]]) -> None:
+        """What unlocks, opens, holds and pushes what."""
+        known = self.declared.things
+        switches = [thing for thing in known if thing.type in ("switch", "lever", "generator")]
+        for switch in switches:
+            locked = [thing for thing in known if thing.type in ("door", "box") and fits(switch, thing)]
+            opened = [thing for thing in known if thing.type == "remote_door" and fits(switch, thing)]
+            if locked and self.often(0.5):
+                made[switch.name]["unlocks"] = self.rng.choice(locked).name
+            if opened and self.often(0.8):
+                made[switch.name]["opens"] = self.rng.choice(opened).name
+        boxes = [thing for thing in known if thing.type == "box"]
+        for thing in known:
+            if thing.type in ("apple", "ball", "marble") and boxes and self.often(0.7):
+                box = self.rng.choice(boxes)
+                self.declared.contents[thing.name] = box.name
+                made[thing.name]["inside"] = f"pick({box.name})" if box.count else box.name
+                del made[thing.name]["place"]
+        marbles = [thing for thing in known if thing.type == "marble"]
+        for thing in known:
+            if thing.type == "generator" and marbles and self.often(0.5):
+                made[thing.name]["pushed_by"] = "marble"
+
+    def finish_objects(self, made: dict[str, dict[str, Any]]) -> None:
+        """Computed statuses, which may speak of anything."""
+        for thing in self.declared.things:
+            where = Where(variables=(("it", thing),), still=True, searching=True, acts=self.acts)
+            linked = any(thing.name in (other.get("unlocks"), other.get("opens")) for other in made.values())
+            on = {"ball": "tagged", "door": "locked"}.get(thing.type)
+            if on is None or linked or not self.often(0.35):
+                continue
+            condition = self.phrases.plain_condition(where)
+            others = [other.name for other in self.declared.things if other.type in ("ball", "door")]
+            circular = (*others, *(f"it.{status}" for status in STATUSES[thing.type]))
+            if not any(name in condition for name in circular):
+                made[thing.name][on] = condition
+
+    def tables(self) -> dict[str, Any]:
+        """Words and numbers for colours."""
+        if not self.often(0.35):
+            return {}
+        self.declared.tables, self.declared.ranks = ["words", "other"], ["rank"]
+        return {
+            "words": dict(zip(COLORS, self.rng.sample(WORDS, len(WORDS)), strict=True)),
+            "other": "permuted(words)",
+            "rank": {color: self.rng.randint(0, 5) for color in COLORS},
+        }
+
+    def lets(self) -> dict[str, Any]:
+        """What is drawn once."""
+        made: dict[str, Any] = {}
+        where = Where(reset=True, still=True)
+        if self.often(0.5):
+            made["limit"] = "pick(1..4)"
+            self.declared.numbers.append("limit")
+        if self.often(0.5):
+            made["hue"] = self.rng.choice(("pick(colors)", "pick(red | 2 * blue)"))
+            self.declared.colors.append("hue")
+        for thing in self.declared.several:
+            if self.often(0.6):
+                name = f"the_{thing.name}"
+                made[name] = f"pick({thing.name})"
+                self.declared.lets[name] = thing.name
+        if self.often(0.4):
+            made["spot"] = f"pick(c in cells where {self.phrases.of_cell(where)})"
+            self.declared.cells.append("spot")
+        if self.often(0.3):
+            made["dance"] = {"sequence": self.rng.randint(1, 3), "moves": ["left", "right", "forward"]}
+            if self.often(0.6):
+                made["dance"]["utterance"] = {"chance": 0.5}
+            self.declared.sequences.append("dance")
+        return made
+
+    def state(self) -> dict[str, Any]:
+        """Registers of the world."""
+        made: dict[str, Any] = {}
+        for name in self.rng.sample(("price", "round"), self.rng.randint(0, 2)):
+            made[name] = {
+                "start": self.rng.choice((0, 1, "pick(0..2)")),
+                "range": f"0..{self.rng.randint(3, 7)}",
+            }
+            self.declared.numbers.append(name)
+            self.declared.registers.append(name)
+        return made
+
+    def definitions(self) -> dict[str, str]:
+        """Conditions with names, one of them with an argument."""
+        if not self.often(0.4):
+            return {}
+        where = Where(acts=self.acts)
+        found = {
+            "odd_one": self.phrases.condition(replace(where, still=True), 1),
+            "near_by(x)": "agent.distance(x) < 3",
+        }
+        self.declared.truths, self.declared.relations = ["odd_one"], ["near_by"]
+        return found
+
+    def memory(self, lets: dict[str, Any]) -> dict[str, Any]:
+        """What the agent did last."""
+        if not self.declared.sequences or not self.often(0.7):
+            return {}
+        self.declared.memories["attempt"] = "dance"
+        made: dict[str, Any] = {"last": lets["dance"]["sequence"], "of": "agent.acts"}
+        if self.often(0.5):
+            made["while"] = self.phrases.plain_condition(Where(still=True))
+        return {"attempt": made}
+
+    # -- who is there ------------------------------------------------------------------------------------------
+
+    def plan_cast(self) -> list[Frame]:
+        """Names of NPCs and of their frames, so that everything can speak of them."""
+        frames = []
+        for number in range(self.rng.randint(1, 3)):
+            name = ("ann", "bob", "crowd")[number]
+            if name == "crowd":
+                self.declared.groups[name] = self.rng.randint(2, 3)
+            else:
+                self.declared.members.append(name)
+            if self.often(0.85):
+                frame = self.new_frame(f"frame_{number}", name == "crowd")
+                self.declared.follows[name] = frame
+                frames.append(frame)
+            if self.often(0.35):
+                self.declared.beliefs[name] = self.sorts_of_beliefs()
+        if not frames:
+            self.declared.says = []
+        if self.often(0.15):
+            frames.append(self.new_frame("frame_9", False))
+            frames[-1].of_agent = True
+            self.declared.follows["agent"] = frames[-1]
+        return frames
+
+    def new_frame(self, name: str, of_group: bool) -> Frame:
+        """A frame without its content."""
+        in_steps = self.often(0.3)
+        states = [
+            f"{part}_{name[-1]}" for part in ("start", "middle", "end", "last")[: self.rng.randint(2, 4)]
+        ]
+        frame = Frame(name, [*states, "finished"] if in_steps else states, of_group=of_group)
+        if self.often(0.6):
+            frame.numbers.append("count_" + name[-1])
+        if self.often(0.3):
+            frame.colors.append("shade_" + name[-1])
+        for thing in self.declared.several:
+            if self.often(0.3):
+                frame.things["thing_" + name[-1]] = thing.name
+        if self.often(0.4):
+            frame.slots["greeting"] = "text"
+        for name, type_, known in (
+            ("way", "direction", frame.directions),
+            ("goal", "cell", frame.cells),
+            ("wish", "noun", frame.nouns),
+            ("ready", "bool", frame.truths),
+        ):
+            if self.often(0.15):
+                frame.slots[f"{name}_{frame.name[-1]}"] = type_
+                known.append(f"{name}_{frame.name[-1]}")
+        return frame
+
+    def sorts_of_beliefs(self) -> dict[str, str]:
+        """Names of beliefs, each with what it is."""
+        sorts = {"near": "truth", "shade": "color", "place": "cell"}
+        if self.declared.contents:
+            sorts["lies"] = "thing"
+        chosen = self.rng.sample(sorted(sorts), self.rng.randint(1, 2))
+        return {name: sorts[name] for name in chosen}
+
+    def frame(self, frame: Frame, behaviour: Behaviour) -> dict[str, Any]:
+        """What a frame holds and does."""
+        made: dict[str, Any] = {}
+        if frame.slots:
+            made["slots"] = dict(frame.slots)
+        lets: dict[str, Any] = {
+            name: {"start": self.rng.choice((0, 2, "pick(0..2)")), "range": f"0..{self.rng.randint(3, 6)}"}
+            for name in frame.numbers
+        }
+        lets |= dict.fromkeys(frame.colors, "pick(colors)")
+        lets |= {name: f"pick({group})" for name, group in frame.things.items()}
+        if lets:
+            made["let"] = lets
+        return made | (
+            behaviour.by_steps(frame) if "finished" in frame.states else behaviour.by_states(frame)
+        )
+
+    def cast(self) -> dict[str, Any]:
+        """Everybody."""
+        made: dict[str, Any] = {}
+        for name in (*self.declared.members, *self.declared.groups):
+            member: dict[str, Any] = {}
+            if name in self.declared.groups:
+                member["count"] = self.declared.groups[name]
+            member |= self.look()
+            frame = self.declared.follows.get(name)
+            if frame is not None:
+                member["frame"] = frame.name
+                if frame.slots:
+                    member["with"] = {slot: self.filling(type_) for slot, type_ in frame.slots.items()}
+            if name in self.declared.beliefs:
+                member["beliefs"] = {
+                    key: self.belief(sort) for key, sort in self.declared.beliefs[name].items()
+                }
+            made[name] = member
+        made["agent"] = {"place": "anywhere"}
+        if "agent" in self.declared.follows:
+            frame = self.declared.follows["agent"]
+            made["agent"]["frame"] = frame.name
+            if frame.slots:
+                made["agent"]["with"] = {slot: self.filling(type_) for slot, type_ in frame.slots.items()}
+        if self.often(0.3):
+            made["agent"]["facing"] = self.rng.choice(("up", "random", "left"))
+        return made
+
+    def filling(self, type_: str) -> str:
+        """What fills a slot."""
+        once, always = Where(reset=True), Where(acts=self.acts, still=True)
+        fillings: dict[str, Callable[[], str]] = {
+            "text": lambda: self.rng.choice(
+                (*self.declared.says, f"I like <{self.phrases.in_text(self.phrases.color, once)}>")
+            ),
+            "direction": lambda: self.phrases.direction(once),
+            "cell": lambda: self.rng.choice(("agent.cell", "ann.cell", *self.declared.cells)),
+            "noun": lambda: str(self.rng.choice(self.declared.nouns)),
+            "bool": lambda: self.phrases.condition(always, 1),
+        }
+        return fillings[type_]()
+
+    def look(self) -> dict[str, Any]:
+        """Where somebody is put and how he looks."""
+        made: dict[str, Any] = {}
+        if self.often(0.3):
+            made["kind"] = self.rng.choice(("guide", "child"))
+        if self.often(0.4):
+            made["place"] = self.rng.choice(
+                ("left_half", "right_half", "anywhere where not here.in_line(agent)")
+            )
+        if self.often(0.4):
+            made["facing"] = self.rng.choice(("down", "pick(left | up)", "toward(agent)"))
+        if self.often(0.3):
+            made["view"] = self.rng.choice((3, 4, 5, 9))
+        if self.often(0.4):
+            made["earshot"] = self.rng.choice(("room", "next_to", 3))
+        if self.often(0.1):
+            made["audible"] = "always"
+        return made
+
+    def belief(self, sort: str) -> dict[str, Any]:
+        """What is believed, and when it is looked at."""
+        where = Where(reset=True, still=True, searching=True)
+        what, _ = self.rng.choice(sorted(self.declared.contents.items()) or [("", "")])
+        of: dict[str, Callable[[], str]] = {
+            "truth": lambda: self.phrases.relation(where),
+            "color": lambda: (
+                f"nearest(o in {self.declared.several[0].name} to agent).color"
+                if self.declared.several
+                else "agent.color"
+            ),
+            "cell": lambda: "agent.cell",
+            "thing": lambda: f"{self.phrases.one(self.declared.group(what), where)}.inside",
+        }
+        made = {"of": of[sort]()}
+        if self.often(0.7):
+            made["when"] = self.rng.choice(("sees(agent)", "next_to(agent)", "agent.sees(self)"))
+        return made
+
+    # -- how it ends, and how it looks -------------------------------------------------------------------------
+
+    def outcome(self) -> list[dict[str, Any]]:
+        """Ends that are rare enough for an episode to last a while."""
+        where = Where(acts=self.acts)
+        entries: list[dict[str, Any]] = []
+        for number in range(self.rng.randint(1, 3)):
+            kind = self.rng.choice(("success", "success", "failure"))
+            entry: dict[str, Any] = {
+                kind: f"t > {self.rng.randint(5, 15)} and ({self.phrases.condition(where, 1)})"
+            }
+            if kind == "success" and self.often(0.5):
+                entry["reward"] = self.rng.choice((30, "100 - 10 * (t + " + self.phrases.number(where) + ")"))
+            if self.often(0.3):
+                entry["id"] = f"end_{number}"
+            entries.append(entry)
+        return entries
+
+    def observe(self) -> dict[str, Any]:
+        """What the agent perceives."""
+        made: dict[str, Any] = {"image": "before_npcs"} if self.often(0.25) else {}
+        if self.often(0.15):
+            made["npcs"] = "hidden"
+        if self.often(0.2):
+            made["names"] = "hidden"
+        if self.often(0.25):
+            made["own_voice"] = True
+        if self.often(0.3):
+            made["directions"] = "egocentric"
+        if self.often(0.25):
+            made["channels"] = ["type", "color", "status", "orientation", "pointing", "last_act"]
+        return made
+
+
+def fits(one: Thing, other: Thing) -> bool:
+    """Whether something can be linked to something: one to all, or group to group of the same size."""
+    return one.count is None or other.count is None or one.count == other.count
+
+
+def say_somewhere(frames: list[dict[str, Any]], texts: tuple[str, ...]) -> None:
+    """Let each of these texts be said by somebody, so that others can wait for it."""
+    for number, text in enumerate(texts if frames else ()):
+        frame = frames[number % len(frames)]
+        if "steps" in frame:
+            frame["steps"].append({"for": 1, "say": text})
+        else:
+            state = [*frame["states"].values()][number % len(frame["states"])]
+            state.setdefault("then", []).append({"chance": 0.25, "say": text})

@@ -1,0 +1,217 @@
+"""Random frames and rules: what members of the cast do, and what the world does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from random import Random
+from typing import Any
+
+from tests.scenario_fuzzer.declared import STATUSES, Declared, Frame, Thing
+from tests.scenario_fuzzer.phrases import Phrases, Where
+
+ALWAYS_OPEN = ("face", "follow", "flee", "wander", "choose")
+"""Activities that never end by themselves."""
+
+
+class Behaviour:
+    """Makes frames and rules of what is declared."""
+
+    def __init__(self, rng: Random, declared: Declared, phrases: Phrases, acts: tuple[str, ...]) -> None:
+        self.rng, self.declared, self.phrases, self.acts = rng, declared, phrases, acts
+
+    def often(self, probability: float) -> bool:
+        """Whether something happens."""
+        return self.rng.random() < probability
+
+    # -- frames ------------------------------------------------------------------------------------------------
+
+    def by_states(self, frame: Frame) -> dict[str, Any]:
+        """A frame with states."""
+        where = Where(frame, acts=self.acts)
+        return {
+            "states": {name: self.state(number, frame, where) for number, name in enumerate(frame.states)}
+        }
+
+    def state(self, number: int, frame: Frame, where: Where) -> dict[str, Any]:
+        """One state: what comes later can be entered at once."""
+        later = frame.states[number + 1 :]
+        made: dict[str, Any] = {}
+        if self.often(0.6):
+            first = replace(where)
+            made["first"] = [self.rule(first, frame.states, [], True) for _ in range(self.rng.randint(1, 2))]
+        if self.often(0.85):
+            made["do"] = self.activity(where)
+        if self.often(0.9) or not made:
+            made["then"] = [
+                self.rule(where, frame.states, later, False) for _ in range(self.rng.randint(1, 3))
+            ]
+        return made
+
+    def by_steps(self, frame: Frame) -> dict[str, Any]:
+        """A frame with steps, of which some have names."""
+        where = Where(frame, acts=self.acts)
+        return {"steps": [self.step(name, where) for name in frame.states if name != "finished"]}
+
+    def step(self, name: str, where: Where) -> dict[str, Any]:
+        """One entry."""
+        made: dict[str, Any] = {"state": name}
+        if self.often(0.85):
+            made["do"] = self.activity(where)
+        endless = str(made.get("do", "")).partition("(")[0] in (*ALWAYS_OPEN, "stay")
+        if endless or self.often(0.3):
+            made["for"] = self.rng.randint(0 if not endless else 1, 3)
+        if self.often(0.3):
+            made["until"] = self.phrases.condition(where)
+        return made | self.effects(where, 0.4)
+
+    def rule(self, where: Where, states: list[str], later: list[str], first: bool) -> dict[str, Any]:
+        """One rule of a frame."""
+        made: dict[str, Any] = {}
+        if self.often(0.45):
+            made["hears"], where = self.hearing(where)
+        if self.often(0.6) or not made:
+            made["when"] = self.phrases.condition(where)
+        if self.often(0.2):
+            made["after"] = self.rng.randint(1, 4)
+        if self.often(0.12):
+            made["once"] = True
+        if self.often(0.15):
+            made["chance"] = self.rng.choice((0.25, 0.5, 0.75))
+        if first and self.often(0.35):
+            made["do"] = self.activity(where)
+        made |= self.effects(where, 0.5)
+        if self.often(0.5) or not made.keys() & {"do", "set", "cause", "say"}:
+            made["goto"] = self.rng.choice(states)
+            if later and self.often(0.3):
+                made["goto_now"] = self.rng.choice(later)
+                del made["goto"]
+        return made
+
+    def hearing(self, where: Where) -> tuple[Any, Where]:
+        """What a rule hears, and what is known in it."""
+        kind = self.rng.choice(("any", "noun", "text", "text", "several"))
+        if kind == "any":
+            return "any", replace(where, heard=True, noun=True)
+        if kind == "noun":
+            template = next((t for t in self.declared.templates if "<noun>" in t), None)
+            if template is not None:
+                return template, replace(where, heard=True, noun=True)
+        if kind == "several":
+            return [self.phrases.heard_of_now(), self.phrases.heard_of_now()], replace(where, heard=True)
+        return self.phrases.heard_of_now(), replace(where, heard=True)
+
+    def effects(self, where: Where, probability: float) -> dict[str, Any]:
+        """Some of: what is set, caused and said."""
+        made: dict[str, Any] = {}
+        registers = self.registers(where)
+        if registers and self.often(probability * 0.7):
+            chosen = self.rng.sample(sorted(registers), min(len(registers), self.rng.randint(1, 2)))
+            made["set"] = {name: registers[name]() for name in chosen}
+        if self.often(probability):
+            made["cause"] = [self.effect(where) for _ in range(self.rng.randint(1, 3))]
+        if where.frame is not None and self.often(probability):
+            made["say"] = self.phrases.words(where)
+        return made
+
+    def registers(self, where: Where) -> dict[str, Callable[[], str]]:
+        """What can be set here, each with how a value for it is made."""
+        found: dict[str, Callable[[], str]] = {
+            name: lambda: self.phrases.number(where) for name in self.declared.registers
+        }
+        if where.frame is not None:
+            frame = where.frame
+            found |= {name: lambda: self.phrases.number(where) for name in frame.numbers}
+            found |= {name: lambda: self.phrases.color(where) for name in frame.colors}
+            found |= {
+                name: lambda group=group: self.phrases.one(self.declared.group(group), where)  # type: ignore[misc]
+                for name, group in frame.things.items()
+                if name not in frame.slots
+            }
+        return found
+
+    # -- activities --------------------------------------------------------------------------------------------
+
+    def activity(self, where: Where) -> str:
+        """What to do in a turn."""
+        rng, phrases = self.rng, self.phrases
+        plain = ["left", "right", "forward", "forward", "toggle", "wander", "stay"]
+        points = where.is_npcs
+        plain += ["stop_pointing"] if points else []
+        options: list[Callable[[], str]] = [
+            lambda: rng.choice(plain),
+            lambda: rng.choice(
+                ("choose(left | 2 * forward | stay)", "choose(toggle | forward)", "turn(left)")
+            ),
+            lambda: f"turn_to({phrases.direction(where)})",
+            lambda: f"face({phrases.spot(where)})",
+            lambda: f"go_to({phrases.reachable(where)})",
+            lambda: f"go_next_to({phrases.reachable(where)})",
+            lambda: (
+                f"{rng.choice(('follow', 'flee', *(['point'] if points else [])))}({phrases.entity(where)})"
+            ),
+        ]
+        usable = phrases.thing(where, "door", "switch", "lever", "box", "apple")
+        if usable is not None:
+            options += [lambda: f"use({usable[0]})"] * 3
+            if usable[1].type == "door":
+                options.append(lambda: f"enter({usable[0]})")
+        pushable = phrases.thing(where, "marble", "generator")
+        if pushable is not None:
+            options += [lambda: f"push({pushable[0]}, {phrases.direction(where)})"] * 3
+        if self.declared.sequences:
+            options.append(lambda: f"perform({rng.choice(self.declared.sequences)})")
+        return rng.choice(options)()
+
+    # -- effects -----------------------------------------------------------------------------------------------
+
+    def effect(self, where: Where) -> str:
+        """One effect on something or somebody."""
+        if self.often(0.25):
+            return self.effect_on_somebody(where)
+        thing = self.rng.choice(self.declared.things) if self.declared.things else None
+        if thing is None:
+            return self.effect_on_somebody(where)
+        if self.often(0.05):
+            return "objects.reset"
+        what = thing.name if self.often(0.25) else self.phrases.one(thing, where)
+        return f"{what}.{self.rng.choice(self.verbs(thing, where))()}"
+
+    def verbs(self, thing: Thing, where: Where) -> list[Callable[[], str]]:
+        """What can be done to a thing."""
+        verbs = ["reset", "reset", "vanish"]
+        if thing.type == "door":
+            verbs += ["open", "close", "lock", "unlock"]
+        if thing.type == "remote_door":
+            verbs += ["open", "close"]
+        if thing.type == "box":
+            verbs += ["reveal", "lock", "unlock"]
+        found: list[Callable[[], str]] = [lambda: self.rng.choice(verbs)] * 2
+        found += [lambda: f"become({self.rng.choice(STATUSES[thing.type])})"] * 3
+        found.append(lambda: f"put({self.phrases.spot(where)})")
+        if thing.name in self.declared.contents:
+            box = self.declared.group(self.declared.contents[thing.name])
+            found += [lambda: f"move_into({self.phrases.one(box, where)})"] * 4
+        return found
+
+    def effect_on_somebody(self, where: Where) -> str:
+        """An effect on the agent or an NPC."""
+        who = self.rng.choice([*self.declared.members, *(["self"] * 2 if where.is_npcs else []), "agent"])
+        if who == "agent" or self.often(0.5):
+            return f"{who}.put({self.phrases.spot(where)})"
+        return f"{who}.{self.rng.choice(('reset', 'reset', 'vanish'))}"
+
+    # -- the world ---------------------------------------------------------------------------------------------
+
+    def world_rule(self) -> dict[str, Any]:
+        """A rule of the world."""
+        where = Where(acts=self.acts)
+        made: dict[str, Any] = {"when": self.phrases.condition(where)}
+        if self.often(0.25):
+            made["once"] = True
+        if self.often(0.2):
+            made["chance"] = 0.5
+        made |= self.effects(where, 0.6)
+        if self.often(0.3) or not made.keys() & {"set", "cause"}:
+            made["reward"] = self.rng.randint(-5, 9)
+        return made

@@ -1,0 +1,101 @@
+"""What a random scenario has declared so far: expressions are made of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+STATUSES = {
+    "door": ("closed", "open", "locked"),
+    "remote_door": ("closed", "open"),
+    "switch": ("idle", "pressed"),
+    "lever": ("down", "up", "spent"),
+    "generator": ("idle", "pressed"),
+    "marble": ("still", "rolling"),
+    "box": ("shut", "opened", "locked"),
+    "apple": ("whole", "eaten"),
+    "ball": ("plain", "tagged"),
+    "fence": ("solid",),
+    "floor": ("plain",),
+    "lava": ("hot",),
+    "platform": ("empty",),
+    "wall": ("solid",),
+}
+
+
+@dataclass(frozen=True)
+class Thing:
+    """An object, or a group of so many."""
+
+    name: str
+    type: str
+    count: int | None = None
+
+
+@dataclass
+class Frame:
+    """A frame as others speak of it: what it can be asked for."""
+
+    name: str
+    states: list[str]
+    numbers: list[str] = field(default_factory=list)  # registers with a range
+    colors: list[str] = field(default_factory=list)  # registers that hold a colour
+    things: dict[str, str] = field(default_factory=dict)  # registers and slots: one of this group
+    slots: dict[str, str] = field(default_factory=dict)  # name: type
+    directions: list[str] = field(default_factory=list)  # slots that hold a direction
+    cells: list[str] = field(default_factory=list)  # slots that hold a cell
+    nouns: list[str] = field(default_factory=list)  # slots that hold a noun
+    truths: list[str] = field(default_factory=list)  # slots that hold a condition
+    of_group: bool = False  # whether it is followed by the members of a group, which have an index
+    of_agent: bool = False  # whether the agent follows it, who says what its grammar has and never points
+
+
+@dataclass
+class Declared:
+    """Names, by what they can be used for."""
+
+    things: list[Thing] = field(default_factory=list)
+    members: list[str] = field(default_factory=list)  # NPCs that are no group
+    groups: dict[str, int] = field(default_factory=dict)  # groups of NPCs
+    follows: dict[str, Frame] = field(default_factory=dict)  # NPC or group: its frame
+    beliefs: dict[str, dict[str, str]] = field(default_factory=dict)  # member: belief: sort
+    numbers: list[str] = field(default_factory=list)  # registers of the world and lets
+    registers: list[str] = field(default_factory=list)  # those of them that rules can set
+    colors: list[str] = field(default_factory=list)  # lets that hold a colour
+    lets: dict[str, str] = field(default_factory=dict)  # lets that hold one of a group
+    cells: list[str] = field(default_factory=list)  # lets that hold a cell
+    sequences: list[str] = field(default_factory=list)
+    memories: dict[str, str] = field(default_factory=dict)  # memory: a sequence of its length
+    tables: list[str] = field(default_factory=list)  # colour -> word
+    ranks: list[str] = field(default_factory=list)  # colour -> number
+    contents: dict[str, str] = field(default_factory=dict)  # what lies in things: the containers
+    templates: list[str] = field(default_factory=list)
+    nouns: list[str | int] = field(default_factory=list)
+    truths: list[str] = field(default_factory=list)  # definitions without arguments
+    relations: list[str] = field(
+        default_factory=list
+    )  # definitions with somebody or something as their argument
+    says: list[str] = field(default_factory=list)  # what NPCs say without values
+
+    def group(self, name: str) -> Thing:
+        """The objects of this name."""
+        return next(thing for thing in self.things if thing.name == name)
+
+    @property
+    def single(self) -> list[Thing]:
+        """Objects that are one."""
+        return [thing for thing in self.things if thing.count is None]
+
+    @property
+    def several(self) -> list[Thing]:
+        """Groups of objects."""
+        return [thing for thing in self.things if thing.count is not None]
+
+    @property
+    def nouns_are_numbers(self) -> bool:
+        """Whether nouns can be counted with."""
+        return all(isinstance(noun, int) for noun in self.nouns)
+
+    @property
+    def nouns_are_colors(self) -> bool:
+        """Whether any colour can be said."""
+        return "purple" in self.nouns

@@ -1,0 +1,231 @@
+"""Odd moments on which the engine and the reference interpreter once differed: both do what the pages say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from socialai_dsl.frontend import load
+from tests.agreement import Pair
+from tests.tiny import Folder
+
+Act = tuple[str | None, str | None]
+STILL: Act = (None, None)
+
+
+def play(folder: Path, text: str, acts: Sequence[Act]) -> dict[str, Any]:
+    """Play the same acts on both sides, which have to agree after each; the state at the end."""
+    pair = Pair.of(load(str(Folder(folder).write("tiny", text))), number_words=False)
+    pair.reset(seed=0)
+    for act in acts:
+        pair.step(tuple(map(int, np.asarray(pair.env.encode_action(act)))))  # type: ignore[arg-type]
+    return pair.env.describe()
+
+
+def registers(state: dict[str, Any], owner: str = "ann") -> dict[str, Any]:
+    """What somebody's frame holds."""
+    return {
+        name.partition(".")[2]: value for name, value in state["let"].items() if name.startswith(f"{owner}.")
+    }
+
+
+WHERE_GONE = """
+objects: {{coin: {{type: ball, at: [3, 3]}}}}
+state:
+  total: {{start: 0, range: -9..9}}
+  far: {{start: 0, range: 0..20}}
+  way_down: false
+  close_by: true
+rules:
+  - {{when: t == 1, cause: [coin.vanish]}}
+  - set:
+      total: coin.x + coin.y
+      far: coin.distance(agent)
+      way_down: agent.dir_to(coin) == down
+      close_by: {near}
+"""
+
+
+@pytest.mark.parametrize(
+    "near", ["agent.distance(coin) < 9", "coin.x >= 0", "agent.in_line(coin)", "agent.sees(coin)"]
+)
+def test_what_has_left_is_nowhere(tmp_path: Path, near: str) -> None:
+    found = play(tmp_path, WHERE_GONE.format(near=near), [STILL])["state"]
+    assert found == {"total": -2, "far": 14, "way_down": True, "close_by": False}
+
+
+def test_nothing_is_nearest_to_what_has_left(tmp_path: Path) -> None:
+    state = play(
+        tmp_path,
+        """
+        objects: {coin: {type: ball, at: [3, 3]}, doors: {type: door, count: 2, at: [[3, 0], [5, 0]]}}
+        state: {some: 0}
+        rules:
+          - {when: t == 1, cause: [coin.vanish]}
+          - {when: "nearest(d in doors to coin).closed", set: {some: "min(some + 1, 9)"}}
+        """,
+        [STILL] * 4,
+    )
+    assert state["state"]["some"] == 0, "the first rule runs before the second"
+
+
+def test_the_noun_of_a_silent_agent_is_not_said(tmp_path: Path) -> None:
+    text = """
+    frames:
+      ask:
+        let: {other: 0, rest: 0}
+        states:
+          s:
+            then:
+              - {when: t < 3, say: Was it <agent.noun>, set: {other: 1}}
+              - {when: agent.noun != "bye", set: {rest: "min(rest + 1, 9)"}}
+    cast: {ann: {at: [5, 5], frame: ask}}
+    """
+    silent = play(tmp_path, text, [STILL] * 2)
+    assert (registers(silent), silent["heard"]) == ({"other": 0, "rest": 2}, [])
+    spoken = play(tmp_path, text, [(None, "Say bye")])
+    assert (registers(spoken), spoken["heard"]) == ({"other": 1, "rest": 0}, ["Ann: Was it bye"])
+
+
+def test_a_box_is_toggled_by_who_opened_it_though_its_content_stands_there(tmp_path: Path) -> None:
+    state = play(
+        tmp_path,
+        """
+        objects: {box: {type: box, at: [4, 5]}, apple: {type: apple, inside: box}}
+        state: {box_by: false, apple_by: false, any_by: false}
+        frames: {open: {steps: [{do: toggle}]}}
+        cast: {ann: {at: [3, 5], facing: right, frame: open}}
+        rules:
+          - {when: t == 1, set: {box_by: box.toggled_by(ann), apple_by: apple.toggled_by(ann), any_by: box.toggled}}
+        """,
+        [STILL],
+    )
+    assert state["state"] == {"box_by": True, "apple_by": False, "any_by": True}
+    assert (state["box"].get("gone"), state["apple"]["at"]) == (True, [4, 5])
+
+
+@pytest.mark.parametrize(("npcs", "heard"), [("shown", 1), ("hidden", 0)])
+def test_a_scripted_agent_does_not_hear_who_is_hidden(tmp_path: Path, npcs: str, heard: int) -> None:
+    text = f"""
+    observe: {{npcs: {npcs}}}
+    frames:
+      talk: {{states: {{s: {{then: [{{say: Good day}}]}}}}}}
+      listen: {{let: {{heard_it: 0}}, states: {{s: {{then: [{{hears: Good day, set: {{heard_it: 1}}}}]}}}}}}
+    cast: {{agent: {{at: [1, 1], frame: listen}}, ann: {{at: [5, 5], frame: talk}}}}
+    """
+    assert registers(play(tmp_path, text, [STILL] * 3), "agent")["heard_it"] == heard
+
+
+def test_turning_lasts_until_it_is_done(tmp_path: Path) -> None:
+    text = """
+    frames: {look: {let: {since: 0}, steps: [{do: turn_to(left)}, {for: 1, set: {since: t}}]}}
+    cast: {ann: {at: [5, 5], facing: right, frame: look}}
+    """
+    state = play(tmp_path, text, [STILL] * 3)
+    assert (state["ann"]["facing"], registers(state)["since"]) == ("left", 3)
+
+
+@pytest.mark.parametrize(("at", "front"), [([3, 0], [3, 1]), ([3, 3], None)])
+def test_objects_have_a_front_in_a_wall_only(tmp_path: Path, at: list[int], front: list[int] | None) -> None:
+    text = f"""
+    objects: {{door: {{type: door, at: {at}}}}}
+    cast: {{agent: {{at: {front or [4, 3]}, facing: up}}}}
+    state: {{before_it: false}}
+    rules: [{{set: {{before_it: agent.in_front_of(door)}}}}]
+    """
+    assert play(tmp_path, text, [STILL])["state"]["before_it"] is (front is not None)
+
+
+def test_paths_of_the_agent_lead_round_what_is_deadly(tmp_path: Path) -> None:
+    state = play(
+        tmp_path,
+        """
+        room: {build: [{lava: row(3)}]}
+        objects: {door: {type: door, at: [3, 6]}, coin: {type: ball, at: [5, 1]}}
+        state: {over: false, along: false}
+        rules: [{set: {over: agent.can_reach(door), along: agent.can_reach(coin)}}]
+        """,
+        [STILL],
+    )
+    assert state["state"] == {"over": False, "along": True}
+
+
+def test_what_was_before_may_have_been_nothing(tmp_path: Path) -> None:
+    state = play(
+        tmp_path,
+        """
+        objects: {doors: {type: door, count: 2, at: [[3, 0], [5, 0]], color: [red, blue]}}
+        state: {is_red: 0, other: 0}
+        rules:
+          - {when: "prev(first(d in doors where d.open).color) == red", set: {is_red: "min(is_red + 1, 9)"}}
+          - {when: "not (prev(first(d in doors where d.open).color) == red)", set: {other: "min(other + 1, 9)"}}
+          - {when: t == 2, cause: [first(doors).open]}
+        """,
+        [STILL] * 4,
+    )
+    assert state["state"] == {"is_red": 2, "other": 0}
+
+
+def test_a_cell_that_is_drawn_of_none_is_the_first(tmp_path: Path) -> None:
+    state = play(tmp_path, "let: {spot: pick(c in cells where c.x > 20)}", [])
+    assert state["let"]["spot"] == [1, 1]
+
+
+@pytest.mark.parametrize("noun", ["1", "4"])
+def test_a_noun_in_a_range_is_the_number_that_it_is(tmp_path: Path, noun: str) -> None:
+    text = """
+    grammar: {templates: [Say <noun>], nouns: [1, 2, 3, 4]}
+    state: {within: false}
+    rules: [{when: agent.noun in 1..4, set: {within: true}}]
+    """
+    assert play(tmp_path, text, [(None, f"Say {noun}")])["state"]["within"] is True
+
+
+def test_a_gate_in_a_fence_overlaps_what_is_built(tmp_path: Path) -> None:
+    text = """
+    room: {build: [{fence: column(W // 2)}]}
+    objects: {gate: {type: door, place: column(W // 2), overlap: true}}
+    """
+    state = play(tmp_path, text, [])
+    assert state["gate"]["at"][0] == 3
+    assert 1 <= state["gate"]["at"][1] <= 5
+
+
+def test_the_speaker_is_who_said_the_value_that_was_waited_for(tmp_path: Path) -> None:
+    state = play(
+        tmp_path,
+        """
+        grammar: {templates: [Say <noun>], nouns: [1, 2]}
+        state: {price: {start: 2, range: 1..2}}
+        frames:
+          bid: {states: {s: {then: [{say: Say 2}]}}}
+          sell: {states: {s: {then: [{hears: Say <price>, say: "Sold to <speaker.name>"}]}}}
+        cast: {ann: {at: [3, 5], frame: bid}, bob: {at: [5, 5], frame: sell}}
+        """,
+        [(None, "Say 1")],
+    )
+    assert state["heard"][-1] == "Bob: Sold to Ann"
+
+
+@pytest.mark.parametrize("what", ["one", "pick(apples)", "first(apples)", "moved"])
+def test_whatever_is_moved_into_a_box_comes_out_of_it(tmp_path: Path, what: str) -> None:
+    state = play(
+        tmp_path,
+        f"""
+        objects: {{box: {{type: box, at: [3, 3]}}, apples: {{type: apple, count: 2, at: [[1, 5], [5, 1]]}}}}
+        let: {{one: first(apples)}}
+        define: {{moved: first(a in apples where a.index == 1)}}
+        state: {{lay_in_it: false}}
+        rules:
+          - {{when: t == 1, cause: ["{what}.move_into(box)"]}}
+          - {{when: t == 2, set: {{lay_in_it: "any(a in apples where a.gone)"}}, cause: [box.reveal]}}
+        """,
+        [STILL] * 3,
+    )
+    assert state["state"]["lay_in_it"] is True
+    assert state["box"].get("gone")
+    assert [3, 3] in [apple.get("at") for apple in state["apples"]]

@@ -1,0 +1,63 @@
+"""The engine and the reference interpreter agree on scenarios that nobody has written: random files of the language."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from socialai_dsl.frontend import load
+from tests.agreement import Pair
+from tests.scenario_fuzzer import write
+
+EPISODES = 2
+
+
+def compare(folder: Path, seed: int) -> int:
+    """Write, check and play the scenario of a seed on both sides; the number of steps."""
+    path = folder / f"random_{seed}.yaml"
+    path.write_text(write(seed), encoding="utf-8")
+    pair = Pair.of(load(str(path)), number_words=False)
+    rng = np.random.default_rng(seed)
+    return sum(pair.play(seed, episode, rng) for episode in range(EPISODES))
+
+
+@pytest.mark.parametrize("first", range(0, 60, 10))
+def test_random_scenarios_agree(tmp_path: Path, first: int) -> None:
+    steps = [compare(tmp_path, seed) for seed in range(first, first + 10)]
+    assert min(steps) >= EPISODES
+    assert sum(steps) > 10 * 5 * EPISODES, "the episodes were too short to mean anything"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("first", range(0, 10_000, 500))
+def test_ten_thousand_random_scenarios_agree(tmp_path: Path, first: int) -> None:
+    for seed in range(first, first + 500):
+        compare(tmp_path, seed)
+
+
+def test_a_seed_makes_one_scenario() -> None:
+    assert write(7) == write(7)
+    assert write(7) != write(8)
+
+
+SPOKEN_OF = (
+    *("hears: any", "<noun>", "speaker", "heard(", "agent.said(", "agent.noun", ".spoke"),
+    *("goto_now:", "once: true", "chance:", "after:", "until:", "perform(", "memory:", "tables:", "state:"),
+    *("prev(", "pick(", "nearest(", "count(", " in cells where ", "believes.", "beliefs:", "toggled_by("),
+    *("timer:", "exclusive: true", "unlocks:", "opens:", "inside:", "pushed_by:", "locked:", "tagged:"),
+    *(".move_into(", ".put(", ".reset", ".vanish", ".become(", ".reveal", "push(", "use(", "enter(", "flee("),
+    *("slots:", "define:", "require:", "order:", "occlusion: true", "npcs: hidden", "image: before_npcs"),
+    *("pointing", "egocentric", "own_voice: true", "reward:", "each_step:", "would_see(", "joint_attention("),
+)
+"""What authors can write, and what the random scenarios of the ordinary suite are to contain."""
+
+
+def test_random_scenarios_speak_of_most_of_the_language() -> None:
+    texts = [write(seed) for seed in range(60)]
+    missing = [word for word in SPOKEN_OF if not any(word in text for text in texts)]
+    assert not missing
+    assert all(re.match(r"scenario: random_\d+\n", text) for text in texts)
