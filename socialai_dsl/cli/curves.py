@@ -1,6 +1,7 @@
 """This module is `socialai curves`: the learning curves of several runs in one picture and one table."""
 
 import argparse
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -16,6 +17,7 @@ _SHOWN: Final = ("net", "explo", "curriculum")
 """Settings that a title names where they are not the default."""
 
 _ROWS: Final = 8
+_WORTH_SHOWING: Final = 0.005
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -81,17 +83,24 @@ def _table(condition: "Condition") -> str:
     """Success of each seed, and the mean rates of outcomes and rules, at a few moments, as Markdown."""
     import numpy as np
 
+    from socialai_dsl.cli.seeds import mean_over_seeds
+
     seeds = condition.seeds
     step = max(1, len(seeds.frames) // _ROWS)
     moments = range(step - 1, len(seeds.frames), step)
-    rates = {name: rate for name, rate in seeds.rates.items() if np.nanmax(rate, initial=0.0) >= 0.005}
+    means = {name: mean_over_seeds(rate) for name, rate in seeds.rates.items()}
+    rates = {name: rate for name, rate in means.items() if np.nanmax(rate, initial=0.0) >= _WORTH_SHOWING}
     head = ["frames", *(f"run {number + 1}" for number in range(len(seeds.success)))]
     head += [name.partition("/")[2] for name in rates]
     lines = [f"\n{condition.title}\n", f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for moment in moments:
         cells = [f"{seeds.frames[moment] / 1e6:.2f} M"]
-        cells += [f"{value:.2f}" for value in seeds.success[:, moment]]
-        cells += [f"{np.mean(rate[:, moment]):.2f}" for rate in rates.values()]
+        cells += [_shown(value) for value in seeds.success[:, moment]]
+        cells += [_shown(rate[moment]) for rate in rates.values()]
         lines.append(f"| {' | '.join(cells)} |")
     test = ", ".join(f"{rate:.3f}" for _, rate in condition.tests)
     return "\n".join([*lines, "", f"test set: {test}"])
+
+
+def _shown(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.2f}"

@@ -22,7 +22,7 @@ class Seeds:
 
     Attributes:
         frames: (B,) end of each bin, frames.
-        success: (S, B) share of successes by seed; nan where no episode ended.
+        success: (S, B) share of successes by seed; nan where no episode ended, as after the end of a run.
         rates: name -> (S, B), how often an episode ended in this outcome, or this rule fired in an episode.
             Outcomes first; names are prefixed with `outcomes/` or `rules/`.
     """
@@ -38,7 +38,7 @@ class Seeds:
 
 
 def read_seeds(metrics: Sequence[Path], bins: int = 40) -> Seeds:
-    """Read the `metrics.jsonl` of runs that differ in nothing but their seed; the shortest says how far.
+    """Read the `metrics.jsonl` of runs that differ in nothing but their seed; a shorter one is unknown at the end.
 
     Raises:
         ValueError: a file is empty.
@@ -47,8 +47,8 @@ def read_seeds(metrics: Sequence[Path], bins: int = 40) -> Seeds:
     for path, rows in zip(metrics, runs, strict=True):
         if not rows:
             raise ValueError(f"{path}: expected at least one update, got an empty file")
-    end = min(rows[-1]["frames"] for rows in runs)
-    edges = np.linspace(0, end, min(bins, min(len(rows) for rows in runs)) + 1)
+    end = max(rows[-1]["frames"] for rows in runs)
+    edges = np.linspace(0, end, min(bins, max(len(rows) for rows in runs)) + 1)
     flat = [[_flat(row) for row in rows] for rows in runs]
     names = list(dict.fromkeys(name for rows in flat for row in rows for name in row))
     return Seeds(
@@ -64,6 +64,13 @@ def read_seeds(metrics: Sequence[Path], bins: int = 40) -> Seeds:
             for name in names
         },
     )
+
+
+def mean_over_seeds(rates: Float) -> Float:
+    """Mean over the seeds that had an episode, (S, B) to (B,); nan where none had."""
+    known = ~np.isnan(rates)
+    total = np.where(known, rates, 0.0).sum(0)
+    return np.where(known.any(0), total / np.maximum(known.sum(0), 1), np.nan)
 
 
 def _flat(row: Mapping[str, Any]) -> dict[str, float | None]:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, PercentFormatter
 
 from socialai_dsl.cli.curve import BLUE, RED, draw_outcomes
-from socialai_dsl.cli.seeds import Float, Seeds
+from socialai_dsl.cli.seeds import Seeds, mean_over_seeds
 
 _RULES_SHOWN: Final = 6
 _WIDTH: Final = 4.6  # inches a condition
@@ -44,7 +44,7 @@ def draw_conditions(conditions: Sequence[Condition], path: Path) -> None:
         success, outcomes, rules = column
         success.set_title(condition.title, fontsize=10, loc="left", weight="bold")
         _draw_success(success, condition)
-        means = {name: _mean(rate) for name, rate in condition.seeds.part("outcomes").items()}
+        means = {name: mean_over_seeds(rate) for name, rate in condition.seeds.part("outcomes").items()}
         draw_outcomes(outcomes, condition.seeds.frames, means, condition.successes, _BELOW)
         _draw_rules(rules, condition.seeds)
         for axes in column:
@@ -66,13 +66,6 @@ def draw_conditions(conditions: Sequence[Condition], path: Path) -> None:
 _BELOW: Final = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.1), "ncols": 3}
 
 
-def _mean(rates: Float) -> Float:
-    """Mean over the seeds that had an episode, (S, B) to (B,); nan where none had."""
-    known = ~np.isnan(rates)
-    total = np.where(known, rates, 0.0).sum(0)
-    return np.where(known.any(0), total / np.maximum(known.sum(0), 1), np.nan)
-
-
 def _draw_success(axes: Axes, condition: Condition) -> None:
     seeds = condition.seeds
     for one in seeds.success:
@@ -80,7 +73,7 @@ def _draw_success(axes: Axes, condition: Condition) -> None:
     label = (
         f"training, mean of {len(seeds.success)} seeds" if len(seeds.success) > 1 else "training, one seed"
     )
-    axes.plot(seeds.frames, _mean(seeds.success), color=BLUE, linewidth=2, label=label)
+    axes.plot(seeds.frames, mean_over_seeds(seeds.success), color=BLUE, linewidth=2, label=label)
     if condition.tests:
         frames, rates = zip(*condition.tests, strict=True)
         axes.plot(frames, rates, "o", color=RED, markersize=5, clip_on=False, zorder=3, label="test set")
@@ -91,7 +84,7 @@ def _draw_success(axes: Axes, condition: Condition) -> None:
 
 def _draw_rules(axes: Axes, seeds: Seeds) -> None:
     """The rules that fired most, one line each."""
-    means = {name: _mean(rate) for name, rate in seeds.part("rules").items()}
+    means = {name: mean_over_seeds(rate) for name, rate in seeds.part("rules").items()}
     peaks = {name: float(np.nanmax(rate, initial=0.0)) for name, rate in means.items()}
     names = [name for name in sorted(peaks, key=lambda name: -peaks[name]) if peaks[name] > 0][:_RULES_SHOWN]
     for name in names:

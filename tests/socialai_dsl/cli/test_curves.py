@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from socialai_dsl.cli.main import main
-from socialai_dsl.cli.seeds import read_seeds
+from socialai_dsl.cli.seeds import mean_over_seeds, read_seeds
 
 
 def row(update: int, episodes: int, success: float | None, asked: float | None = None) -> str:
@@ -44,12 +44,15 @@ def test_a_bin_without_episodes_is_unknown(tmp_path: Path) -> None:
     assert seeds.success[0, 1] == 0.5
 
 
-def test_the_shortest_run_says_how_far_all_are_shown(tmp_path: Path) -> None:
+def test_a_shorter_run_is_unknown_after_its_end(tmp_path: Path) -> None:
     long = write_metrics(tmp_path / "long.jsonl", [row(n, 1, 1.0) for n in range(1, 9)])
     short = write_metrics(tmp_path / "short.jsonl", [row(n, 1, 0.0) for n in range(1, 5)])
     seeds = read_seeds([long, short])
-    assert seeds.frames[-1] == 400
-    assert seeds.success[:, -1].tolist() == [1.0, 0.0]
+    assert seeds.frames[-1] == 800
+    assert seeds.success[0].tolist() == [1.0] * 8
+    assert seeds.success[1, :4].tolist() == [0.0] * 4
+    assert np.isnan(seeds.success[1, 4:]).all()
+    assert mean_over_seeds(seeds.success).tolist() == [0.5] * 4 + [1.0] * 4
 
 
 def make_run(folder: Path, scenario: str, seed: int, rate: float, explo: str = "none") -> Path:
