@@ -26,6 +26,8 @@ def shipped() -> Iterator[str]:
             continue
         yield name
         variants = ("+oracle", *CUES, *ALONE) if name in FOLDERS else VARIANTS
+        if name.endswith(("_alone", "_asocial")):  # what has been changed so is not changed so once more
+            variants = ("+oracle",)
         yield from (name + variant for variant in variants if exists(name + variant))
         yield from (f"{name}?{choice}" for choice in choices(resolve(name).data.get("params", {})))  # type: ignore[union-attr]
 
