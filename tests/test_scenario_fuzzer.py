@@ -12,23 +12,20 @@ from socialai_dsl.frontend import load
 from tests.agreement import Pair
 from tests.scenario_fuzzer import write
 
-EPISODES = 2
 
-
-def compare(folder: Path, seed: int) -> int:
+def compare(folder: Path, seed: int, episodes: int) -> int:
     """Write, check and play the scenario of a seed on both sides; the number of steps."""
     path = folder / f"random_{seed}.yaml"
     path.write_text(write(seed), encoding="utf-8")
     pair = Pair.of(load(str(path)), number_words=False)
     rng = np.random.default_rng(seed)
-    return sum(pair.play(seed, episode, rng) for episode in range(EPISODES))
+    return sum(pair.play(seed, episode, rng) for episode in range(episodes))
 
 
-@pytest.mark.parametrize("first", range(0, 40, 10))
+@pytest.mark.parametrize("first", range(0, 60, 10))
 def test_random_scenarios_agree(tmp_path: Path, first: int) -> None:
-    steps = [compare(tmp_path, seed) for seed in range(first, first + 10)]
-    assert min(steps) >= EPISODES
-    assert sum(steps) > 10 * 5 * EPISODES, "the episodes were too short to mean anything"
+    steps = [compare(tmp_path, seed, episodes=1) for seed in range(first, first + 10)]
+    assert sum(steps) > 10 * 5, "the episodes were too short to mean anything"
 
 
 @pytest.mark.slow
@@ -36,7 +33,7 @@ def test_random_scenarios_agree(tmp_path: Path, first: int) -> None:
 @pytest.mark.parametrize("first", range(0, 10_000, 500))
 def test_ten_thousand_random_scenarios_agree(tmp_path: Path, first: int) -> None:
     for seed in range(first, first + 500):
-        compare(tmp_path, seed)
+        compare(tmp_path, seed, episodes=2)
 
 
 def test_a_seed_makes_one_scenario() -> None:
@@ -57,7 +54,7 @@ SPOKEN_OF = (
 
 
 def test_random_scenarios_speak_of_most_of_the_language() -> None:
-    texts = [write(seed) for seed in range(40)]
+    texts = [write(seed) for seed in range(60)]
     missing = [word for word in SPOKEN_OF if not any(word in text for text in texts)]
     assert not missing
     assert all(re.match(r"scenario: random_\d+\n", text) for text in texts)
