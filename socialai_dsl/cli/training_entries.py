@@ -72,6 +72,7 @@ def entries() -> list[Entry]:
     own = [
         _own("fast", "ours, fast", TrainConfig()),
         _own("paper", "ours, paper", paper),
+        _own("paper-wide", "ours, paper, as --net paper runs it", TrainConfig(net="paper")),
         _own("paper-every-frame", "ours, paper, duplicates kept", paper, every_frame=True),
         _own("paper-reference", "ours, paper-reference", paper_preset()),
     ]

@@ -22,6 +22,7 @@ _PACKAGES: Final = ("torch", "numpy", "gymnasium", "stable-baselines3", "sb3-con
 _PAIRS: Final = (
     ("paper-every-frame", "plain-loop"),
     ("paper", "plain-loop"),
+    ("paper-wide", "plain-loop"),
     ("paper-reference", "plain-loop"),
     ("paper", "clean-paper"),
     ("paper", "sb3-paper"),

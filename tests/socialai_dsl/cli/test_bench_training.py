@@ -92,7 +92,8 @@ def test_duplicates_are_counted_and_kept_if_asked() -> None:
 def test_peers_are_left_out_where_they_are_not(monkeypatch: pytest.MonkeyPatch) -> None:
     assert {"plain-loop", "clean-paper", "clean-fast", "fast-long"} < {entry.name for entry in entries()}
     monkeypatch.setitem(sys.modules, "benchmarks.training", None)
-    assert [entry.name for entry in entries()] == ["fast", "paper", "paper-every-frame", "paper-reference"]
+    names = ["fast", "paper", "paper-wide", "paper-every-frame", "paper-reference"]
+    assert [entry.name for entry in entries()] == names
 
 
 @pytest.mark.parametrize(
