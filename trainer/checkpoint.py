@@ -21,6 +21,9 @@ from trainer.config import TrainConfig
 from trainer.errors import CheckpointError
 from trainer.nets import ActorCritic, NetSpec, build_net
 
+FOLDER = "checkpoints"
+"""Where a run keeps its checkpoints, in its own folder."""
+
 KEPT = 2
 _HEADER_LIMIT = 1_000_000
 _FILE_LIMIT = 8_000_000_000

@@ -23,7 +23,6 @@ Observation = Mapping[str, NDArray[Any]]
 
 # Encodings kept before they are made anew, so that endless play does not fill the memory.
 _REMEMBERED_FRAMES = 1 << 16
-_CHECKPOINTS = "checkpoints"
 
 
 class Policy(Protocol):
@@ -112,7 +111,7 @@ class CheckpointPolicy:
             CheckpointError: see `checkpoint.read` and `checkpoint.restore_net`.
         """
         path, program = Path(path), envs.unwrapped.program
-        folder = path / _CHECKPOINTS
+        folder = path / checkpoints.FOLDER
         checkpoint = checkpoints.read(folder if folder.is_dir() else path)
         restored = checkpoints.restore_net(
             checkpoint, net_spec(envs.unwrapped), list(program.vocabulary), net

@@ -24,8 +24,6 @@ from trainer.rollout import EpisodeTally, Rollout, collect
 from trainer.session import Session
 from trainer.team import ALONE, Team
 
-CHECKPOINTS = "checkpoints"
-
 
 @dataclass(frozen=True)
 class Progress:
@@ -80,7 +78,7 @@ def train(
             is gone; the last good checkpoint is intact.
     """
     session = Session.start(config, envs, team)
-    folder = run_dir / CHECKPOINTS
+    folder = run_dir / checkpoints.FOLDER
     if resume:
         if not folder.is_dir():
             raise CheckpointError(f"{run_dir}: nothing to resume, there are no checkpoints")

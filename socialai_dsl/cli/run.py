@@ -178,7 +178,9 @@ _NOT_TRAINED: Final = {"frames": 0, "train_seconds": 0.0, "frames_per_second": N
 
 def _discard_unstarted(folder: Path) -> None:
     """Take back the folder of a run that could not even begin, so that the same command can be given again."""
-    checkpoints = folder / "checkpoints"
+    from trainer.checkpoint import FOLDER
+
+    checkpoints = folder / FOLDER
     if not any(checkpoints.glob("*.safetensors")):
         (folder / SETTINGS).unlink(missing_ok=True)
         for empty in (checkpoints, folder):
