@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -71,7 +73,7 @@ class Actor:
             raise ObservationError(
                 f"image: a cell exceeds the bounds {tuple(self.net.spec.image_high)} of its channels"
             )
-        history_rows = self._hear(history_ids, self._read(tokens))
+        history_rows = self._hear(history_ids, tokens)
         pairs = np.stack((image_rows, history_rows), 1)
         rows, fresh = self.pairs.add(image_rows << 32 | history_rows, pairs)
         if len(fresh):
@@ -97,9 +99,9 @@ class Actor:
     def _hear(self, ids: Int64, tokens: NDArray[np.int16]) -> Int64:
         """Row of every history, int64 (E,); new ones are encoded, from where the same environment was if possible."""
         before = self.histories.size
-        rows, fresh = self.histories.add(ids, tokens)
+        rows, fresh = self.histories.add(ids, tokens, self._read)
         if len(fresh):
-            words = tokens[fresh]
+            words: NDArray[Any] = self.histories.data[before:]
             lengths = history_lengths(words)
             parents = (
                 np.zeros(len(fresh), np.int64) if self._last_history is None else self._last_history[fresh]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,8 +46,13 @@ class DistinctRows:
         """The rows held, (size, ...); a view, valid until the next `add`."""
         return self._data[: self.size]
 
-    def add(self, ids: Int64, values: NDArray[np.generic]) -> tuple[Int64, Int64]:
-        """Store the rows of `values` (E, ...) whose id is new.
+    def add(
+        self,
+        ids: Int64,
+        values: NDArray[Any],
+        read: Callable[[NDArray[Any]], NDArray[Any]] = lambda rows: rows,
+    ) -> tuple[Int64, Int64]:
+        """Store the rows of `values` (E, ...) whose id is new, as `read` makes them; what is held is not read again.
 
         Returns:
             rows: int64 (E,), where each given row is held.
@@ -61,7 +68,7 @@ class DistinctRows:
             rows[missing] = fresh_rows
             self._row_of.update(zip(unique[missing].tolist(), fresh_rows.tolist(), strict=True))
             self._reserve(self.size + len(missing))
-            self._data[fresh_rows] = values[first[missing]]
+            self._data[fresh_rows] = read(values[first[missing]])
             self.size += len(missing)
         return rows[inverse], first[missing].astype(np.int64)
 
