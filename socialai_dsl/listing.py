@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from socialai_dsl.program import (
+    BODY_WORDS,
     CELL,
     CONSTANT,
     ENTITY_FIELDS,
@@ -53,6 +54,7 @@ _LITERALS: dict[Op, tuple[int, ...]] = {
     Op.END: (0, 1),
     Op.END_GRADED: (0,),
     **dict.fromkeys((Op.HEARD_FROM, Op.HEARD_NOUN), (1, 2)),
+    Op.CHOOSE: (0, 1, 2),
     Op.TURN_TO: (2,),
     Op.GO_TO: (2,),
     Op.GO_NEXT_TO: (2,),
@@ -167,7 +169,7 @@ class _Names:
         shown = (
             []
             if op == Op.SKIP
-            else [self._operand(op, i, word) for i, word in enumerate(words[: 2 if skip else 3])]
+            else [self._operand(op, i, word, words[1]) for i, word in enumerate(words[: 2 if skip else 3])]
         )
         while shown and shown[-1] == "0" and len(shown) > _least_operands(op):
             shown.pop()
@@ -175,11 +177,13 @@ class _Names:
             shown.append(f"-> {pc + 1 + words[2]}")
         return ", ".join(shown)
 
-    def _operand(self, op: Op, position: int, word: int) -> str:
+    def _operand(self, op: Op, position: int, word: int, count: int) -> str:
         if op == Op.COUNT:
             return self.program.rules[word] if position == 0 else "0"
         if op in (Op.END, Op.END_GRADED) and position == 0:
             return self.program.outcomes[word]
+        if op == Op.CHOOSE and position == 0:
+            return "|".join(BODY_WORDS[word >> 4 * k & 15] for k in range(count))
         if position in _LITERALS.get(op, ()):
             return Field(word).name.lower() if op in (Op.FIELD, Op.SET_FIELD) else str(word)
         if word >= CONSTANT // 2:

@@ -241,6 +241,10 @@ class FrameColumn(IntEnum):
     COLUMNS = 8
 
 
+MOST_CHOICES = 7
+"""So many actions fit into the operand of `Op.CHOOSE`, which is a positive int32."""
+
+
 class LineColumn(IntEnum):
     """Columns of the line table: one row for each thing that may be heard."""
 
@@ -321,6 +325,8 @@ class Op(IntEnum):
     GO_TO = 52  # e(a) takes one step of a shortest path to the cell of e(b); site c for turning round
     GO_NEXT_TO = 53  # e(a) takes one step of a shortest path to a free cell next to e(b); site c
     POINT = 54  # e(a) points in direction v(b)
+    # One of b (literal) actions, drawn at site c: action k is in the bits 4 k to 4 k + 3 of a (literal).
+    CHOOSE = 55
     # Boards: sets of cells, numbered 0 to BOARDS - 1 (literals). They carry nothing from run to run; B_FREE and PUT
     # belong to reset code.
     B_FLOOR = 60  # board a = cells of plain floor

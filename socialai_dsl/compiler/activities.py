@@ -8,7 +8,7 @@ from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.mobility import numbers_of
 from socialai_dsl.compiler.registers import entity_register, label
-from socialai_dsl.program import Body, Field, Op
+from socialai_dsl.program import MOST_CHOICES, Body, Field, Op
 from socialai_dsl.semantics.terms import Activity, CellOf, Checked, Const, Measure, ObjectType, Read, Term
 
 _BODIES = {"left": Body.LEFT, "right": Body.RIGHT, "forward": Body.FORWARD, "toggle": Body.TOGGLE}
@@ -249,8 +249,18 @@ class Activities:
     def _choose(self, activity: Activity) -> None:
         block = self.to.block
         weights = activity.weights or (1,) * len(activity.args)
-        drawn = block.temporary()
         site = self.to.sites.row(activity.site, activity.ordinal)
+        actions = [
+            option.value
+            for option, weight in zip(activity.args, weights, strict=True)
+            if isinstance(option, Const)
+            for _ in range(weight)
+        ]
+        if len(actions) == sum(weights) <= MOST_CHOICES:
+            packed = sum(action << 4 * k for k, action in enumerate(actions))
+            block.emit(Op.CHOOSE, packed, len(actions), site)
+            return
+        drawn = block.temporary()
         block.emit(Op.DRAW, drawn, constant(sum(weights)), site)
         done = Label()
         below = 0

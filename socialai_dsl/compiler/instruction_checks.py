@@ -11,6 +11,7 @@ from socialai_dsl.program import (
     CELL,
     ENTITY_FIELDS,
     FIRST_ENTITY,
+    MOST_CHOICES,
     TEMPORARIES,
     TEMPORARY,
     Body,
@@ -266,6 +267,13 @@ class _Instruction:
             return None
         return self.value(a, 0, Body.NONE)
 
+    def choose(self, a: int, b: int, c: int) -> str | None:
+        if problem := self.literal(b, 1, MOST_CHOICES) or self.literal(a, 0, (1 << 4 * MOST_CHOICES) - 1):
+            return problem
+        if any(a >> 4 * k & 15 > Body.NONE for k in range(b)):
+            return f"{a} holds what is no action"
+        return self.site(c)
+
     def point(self, a: int, b: int, _c: int) -> str | None:
         if self.is_agents:
             return "the agent cannot point"
@@ -383,6 +391,7 @@ _CHECKS: dict[Op, Callable[[_Instruction, int, int, int], str | None]] = {
     Op.PLACE: _Instruction.put_on,
     Op.POINT: _Instruction.point,
     Op.BODY: _Instruction.body,
+    Op.CHOOSE: _Instruction.choose,
     Op.TURN_TO: _Instruction.turn_to,
     **dict.fromkeys((Op.GO_TO, Op.GO_NEXT_TO), _Instruction.go),
     Op.B_FLOOR: _Instruction.fill,

@@ -155,6 +155,14 @@ def draw_cell(row: Row, x: int, y: int) -> None:
 
 
 @inline
+def draw_npc(row: Row, npc: int) -> None:
+    """Draw an NPC that is in the room and the lowest in its cell; gives what `draw_cell` gives for that cell."""
+    if not npcs_are_hidden(row):
+        cell = field(row, npc, Field.Y) * row.program[Header.CANVAS_WIDTH] + field(row, npc, Field.X)
+        row.board[cell] = npc_look(row, npc)
+
+
+@inline
 def draw_entity(row: Row, entity: int) -> None:
     """Draw the cell of an entity anew, if it has one."""
     if field(row, entity, Field.X) >= 0:

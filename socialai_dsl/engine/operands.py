@@ -38,3 +38,9 @@ def draw_at(row: Row, site: int) -> np.uint64:
 def draw_below(row: Row, site: int, n: int) -> int:
     """A uniform number below n."""
     return rng.below(draw_at(row, site), n)
+
+
+@inline
+def draw_action(row: Row, packed: int, count: int, site: int) -> int:
+    """One of the actions packed into a word, four bits each; see `Op.CHOOSE`."""
+    return np.int64((packed >> (4 * draw_below(row, site, count))) & 15)

@@ -10,7 +10,7 @@ from socialai_dsl.engine.boards import draw_entity
 from socialai_dsl.engine.conditions import holds
 from socialai_dsl.engine.entities import field, quadrant, set_field
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.operands import assign, draw_below, value
+from socialai_dsl.engine.operands import assign, draw_action, draw_below, value
 from socialai_dsl.engine.places import next_cell, place
 from socialai_dsl.engine.pointers import ROW_TYPES
 from socialai_dsl.engine.pushing import put_on
@@ -144,6 +144,8 @@ def _choose(row: Row, op: int, a: int, b: int, c: int) -> int:
     """Instructions that choose the body action of the entity on turn."""
     if op == Op.BODY:
         return value(row, a)
+    if op == Op.CHOOSE:
+        return draw_action(row, a, b, c)
     mover = value(row, a)
     target = value(row, b)
     if op == Op.POINT:

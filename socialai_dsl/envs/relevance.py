@@ -49,7 +49,8 @@ _RECORDS = (Register.HEARD, Register.LOGGED, Register.TOKENS, Register.ATTEMPT, 
 _WHOLE_UTTERANCE = (Register.TEMPLATE, Register.NOUN, Register.UTTERANCE)
 
 _READ: dict[Op, tuple[int, ...]] = {
-    **dict.fromkeys((Op.HALT, Op.SKIP, Op.IF_UNPINNED, Op.IF_CHANCE, Op.GOTO, Op.COUNT, Op.END), ()),
+    **dict.fromkeys((Op.HALT, Op.SKIP, Op.IF_UNPINNED, Op.IF_CHANCE, Op.CHOOSE, Op.GOTO, Op.COUNT), ()),
+    Op.END: (),
     **dict.fromkeys((Op.IF_EQ, Op.IF_NE, Op.IF_LT, Op.IF_LE, Op.IF_BIT), (0, 1)),
     Op.IF_HEARD: (0,),
     **dict.fromkeys(map(Op, range(Op.IF_SAME_CELL, Op.IF_UNOBSTRUCTED + 1)), (0, 1)),
@@ -69,7 +70,7 @@ _READ: dict[Op, tuple[int, ...]] = {
 _LAST_TURN = (Field.LAST, Field.TOGGLED)
 _COMPARISONS = (Op.IF_EQ, Op.IF_NE, Op.IF_LT, Op.IF_LE)
 _DRAWS = (Op.DRAW, Op.PICK_BIT, Op.PICK_CELL)
-_CHANCY = (Op.IF_CHANCE, Op.TURN_TO, Op.GO_TO, Op.GO_NEXT_TO)
+_CHANCY = (Op.IF_CHANCE, Op.CHOOSE, Op.TURN_TO, Op.GO_TO, Op.GO_NEXT_TO)
 _VALUES = (*map(Op, range(Op.LOAD, Op.ABS + 1)), Op.FIELD, Op.DISTANCE, Op.QUADRANT, Op.SET_BIT, Op.COUNT_BITS,
            Op.LOWEST_BIT, Op.SEES, Op.CELL_OF, Op.CELL_BESIDE)  # fmt: skip
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from socialai_dsl import draws
 from socialai_dsl.engine.batch import Batch
 from socialai_dsl.engine.kernel import Task
 from socialai_dsl.program import Body, Field, Flag, Op, Register
@@ -18,6 +19,7 @@ from tests.assembly import (
     batch_of,
     constant,
     entity_register,
+    temporary,
 )
 
 
@@ -451,3 +453,31 @@ def test_what_moves_by_itself_moves_in_the_look_ahead_of_the_script_too() -> Non
     assert batch.ports.actions[0].tolist() == [7, 1, 0, 1]
     assert np.array_equal(batch.state.registers, before)
     assert np.array_equal(batch.state.boards, board)
+
+
+@pytest.mark.parametrize("before", [0, 1], ids=["as the whole activity", "behind another instruction"])
+def test_an_action_is_drawn_among_those_in_a_word(before: int) -> None:
+    # Right twice, so that it has two chances of four; then forward, then nothing.
+    word = Body.RIGHT | Body.RIGHT << 4 | Body.FORWARD << 8 | Body.NONE << 12
+    activity = [(Op.LOAD, temporary(0), constant(0))] * before + [(Op.CHOOSE, word, 4, 0)]
+    room = Assembly(
+        at=((1, 1), (2, 3)), npcs=1, frames=(FrameSpec(1, (activity,)),), sites=((draws.site("b"), 3),)
+    )
+    batch = batch_of(room.program(), rows=200)
+    play(batch, body(Body.NONE))
+    chosen = batch.state.registers[:, entity_register(1, Field.LAST)]
+    expected = [
+        word >> 4 * draws.below(draws.draw(draws.episode_key(7, i, 0), draws.site("b"), 1, 3), 4) & 15
+        for i in range(200)
+    ]
+    assert chosen.tolist() == expected
+    assert {*expected} == {Body.RIGHT, Body.FORWARD, Body.NONE}
+
+
+def test_a_turn_shows_the_lowest_npc_of_its_cell() -> None:
+    turning = FrameSpec(2, ([(Op.BODY, constant(Body.LEFT))],))
+    batch = batch_of(Assembly(at=((1, 1), (2, 3), (2, 3)), npcs=2, frames=(turning,)).program())
+    before = batch.state.boards.copy()
+    play(batch, body(Body.NONE))
+    assert entity(batch, 2, Field.DIR) == [3]
+    assert np.array_equal(batch.state.boards, before), "the other one stands in front of it"
