@@ -28,7 +28,6 @@ KEPT = 2
 _HEADER_LIMIT = 1_000_000
 _FILE_LIMIT = 8_000_000_000
 _NO_DIGEST = "0" * 64
-_EMBEDDING = "dialogue.embedding.weight"
 
 
 class CheckpointMeta(BaseModel):
@@ -252,20 +251,23 @@ def _warn_of_words(old: list[str], new: list[str]) -> None:
 
 
 def _move_words(weights: dict[str, Tensor], model: ActorCritic, vocabulary: list[str]) -> None:
-    """Rearrange the rows of the word embedding from the words of the checkpoint's vocabulary to those of the model."""
+    """Rearrange the rows that belong to words from the checkpoint's vocabulary to that of the model."""
     try:
         old = model.reader_class(vocabulary).words
     except ValueError as error:
         raise CheckpointError(f"checkpoint's vocabulary does not fit its network: {error}") from error
-    source = weights.get(_EMBEDDING)
-    fresh = model.state_dict()[_EMBEDDING].clone()
-    if source is None or source.ndim != 2 or len(source) < len(old) or source.shape[1:] != fresh.shape[1:]:
-        raise CheckpointError(f"checkpoint's {_EMBEDDING} does not fit its vocabulary")
     position = {word: index for index, word in enumerate(old)}
-    for index, word in enumerate(model.reader.words):
-        if word in position:
-            fresh[index] = source[position[word]]
-    weights[_EMBEDDING] = fresh
+    for name in model.word_rows:
+        source = weights.get(name)
+        fresh = model.state_dict()[name].clone()
+        if source is None or len(source.shape) != len(fresh.shape) or source.shape[1:] != fresh.shape[1:]:
+            raise CheckpointError(f"checkpoint's {name} does not fit its network")
+        if len(source) < len(old):
+            raise CheckpointError(f"checkpoint's {name} does not fit its vocabulary")
+        for index, word in enumerate(model.reader.words):
+            if word in position:
+                fresh[index] = source[position[word]]
+        weights[name] = fresh
 
 
 def _check_weights(weights: dict[str, Tensor], expected: dict[str, Tensor]) -> None:

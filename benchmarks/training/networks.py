@@ -66,7 +66,7 @@ class PaperTrunk(nn.Module):
 
 
 class CellTrunk(nn.Module):
-    """The perception of our `fast` network written plainly: cells embedded, modulated by the dialogue, one layer."""
+    """The perception of our `fast` network written plainly: cells read in the light of the dialogue, one layer."""
 
     kind_size = 16
 
@@ -75,6 +75,7 @@ class CellTrunk(nn.Module):
         height, ahead, channels = image_shape
         self.history = History(vocabulary)
         self.channels = nn.ModuleList(nn.Embedding(256, self.kind_size) for _ in range(channels))
+        self.mentions = nn.Parameter(torch.zeros(vocabulary, channels, 256))
         self.film = nn.Linear(SIZE, 2 * self.kind_size)
         self.cells = nn.Linear(height * ahead * self.kind_size, SIZE)
         self.words = nn.Linear(SIZE, SIZE, bias=False)
@@ -84,8 +85,12 @@ class CellTrunk(nn.Module):
         text = self.history(tokens)
         cells = images.flatten(1, 2).int()
         kinds = torch.stack([layer(cells[..., i]) for i, layer in enumerate(self.channels)]).sum(0)
+        heard = text.new_zeros(len(tokens), len(self.mentions)).scatter_(1, tokens, 1)
+        heard[:, 0] = 0  # padding
+        codes = torch.einsum("nv,vck->nkc", heard, self.mentions)  # (N, 256, channels)
+        mentioned = codes.gather(1, cells.long()).sum(2)  # (N, H * W)
         scale, shift = self.film(text)[:, None].chunk(2, 2)
-        read = torch.relu(kinds * (1 + scale) + shift)
+        read = torch.relu(kinds * (1 + scale + mentioned[:, :, None]) + shift)
         return torch.relu(self.cells(read.flatten(1)) + self.words(text))
 
 

@@ -174,8 +174,10 @@ def test_the_fast_network_sees_what_ours_sees() -> None:
     net: Any = build_net("fast", SPEC, 0).double()
     plain_net = CellTrunk(SPEC.vocabulary_size, SPEC.image_shape).double()
     dialogue = list(net.dialogue.parameters())
+    with torch.no_grad():
+        net.mentions.normal_()
     rest = [*net.film.parameters(), *net.cells.parameters(), *net.words.parameters()]
-    copy(dict(plain_net.named_parameters()), [*dialogue, *net.channels, *rest])
+    copy(dict(plain_net.named_parameters()), [net.mentions, *dialogue, *net.channels, *rest])
     images, tokens = frames(6)
     got = plain_net(images, torch.from_numpy(tokens.astype(np.int64)))
     assert torch.allclose(got, ours(net, images, tokens), rtol=0, atol=1e-10)

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from tests.trainer.fake_envs import EchoEnvs
+from tests.trainer.plain import encode
 from trainer.actor import Actor
 from trainer.config import TrainConfig
 from trainer.minibatch import make_minibatch
@@ -50,14 +51,6 @@ def play(net_name: str, distinct: bool) -> tuple[Actor, Rollout, list[dict[str, 
     return actor, rollout, seen[:-1]
 
 
-def encode(net: ActorCritic, tokens: np.ndarray) -> Tensor:
-    """One history, from its first word, by PyTorch's own GRU."""
-    words = torch.from_numpy(tokens[tokens > 0].astype(np.int64))
-    if not len(words):
-        return torch.zeros(net.dialogue.size)
-    return net.dialogue.gru(net.dialogue.embedding(words))[1][0]
-
-
 def reference(net: ActorCritic, rollout: Rollout, seen: list[dict[str, np.ndarray]]) -> tuple[Tensor, Tensor]:
     """Logits (T, E, ...) and values (T, E), one frame after the other."""
     only = torch.tensor([0])
@@ -67,7 +60,9 @@ def reference(net: ActorCritic, rollout: Rollout, seen: list[dict[str, np.ndarra
             memory = rollout.memories[t // STRETCH]
         memory = memory * torch.from_numpy(~rollout.starts[t])[:, None]
         features = [
-            net.perceive(net.prepare(torch.from_numpy(image[None])), encode(net, tokens)[None], only, only)
+            net.perceive(
+                net.prepare(torch.from_numpy(image[None])), encode(net.dialogue, tokens)[None], only, only
+            )
             for image, tokens in zip(observation["image"], observation["tokens"], strict=True)
         ]
         memory = net.memory.step(torch.cat(features), memory)

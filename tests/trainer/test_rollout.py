@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from tests.trainer.fake_envs import EchoEnvs
+from tests.trainer.plain import encode
 from trainer.actor import Actor
 from trainer.errors import ObservationError, TrainingStopped
 from trainer.nets import build_net
@@ -85,10 +86,7 @@ def test_values_equal_those_of_a_plain_recurrent_loop(net: str, length: int, sma
 
 
 def plain_features(model: Any, observation: dict[str, np.ndarray], e: int) -> torch.Tensor:
-    words = observation["tokens"][e]
-    heard = torch.from_numpy(words[words > 0].astype(np.int64))
-    gru = model.dialogue.gru
-    text = gru(model.dialogue.embedding(heard))[1] if len(heard) else torch.zeros(1, model.dialogue.size)
+    text = encode(model.dialogue, observation["tokens"][e])[None]
     image, only = torch.from_numpy(observation["image"][e : e + 1].copy()), torch.zeros(1, dtype=torch.int64)
     features: torch.Tensor = model.perceive(model.prepare(image), text, only, only)[0]
     return features

@@ -112,12 +112,15 @@ class ActorCritic(nn.Module, ABC):
             rest of the batch.
         reducible: whether the network can do the bulk of its arithmetic in bfloat16.
         precision: number type of that bulk; all that is stored, and everything else, is float32.
+        word_rows: the parameters that have a row for each word, by which an agent keeps what it knows of words in
+            another vocabulary.
         reader_class: how histories are read before they are encoded. reader: such a reader of the scenario's words.
     """
 
     distinct = True
     reducible = False
     precision: Precision = "float32"
+    word_rows: tuple[str, ...] = ("dialogue.embedding.weight",)
     reader_class: type[Reader] = Reader
 
     def __init__(

@@ -105,17 +105,18 @@ class DialogueEncoder(nn.Module):
     Source: SocialAI 1.0's language encoder (embedding 128, GRU 128, output at the last word).
 
     Attributes:
+        hidden: width of the GRU, and of the words' embedding.
         size: width of the encoding, floats.
     """
 
-    def __init__(self, vocabulary_size: int, size: int = 128) -> None:
+    def __init__(self, vocabulary_size: int, hidden: int = 128) -> None:
         super().__init__()
-        self.size = size
-        self.embedding = nn.Embedding(vocabulary_size, size)
-        self.gru = nn.GRU(size, size)
+        self.hidden = self.size = hidden
+        self.embedding = nn.Embedding(vocabulary_size, hidden)
+        self.gru = nn.GRU(hidden, hidden)
 
     def word_inputs(self) -> Tensor:
-        """The GRU's input gates of every word of the vocabulary, (V, 3 * size), made once per batch of histories."""
+        """The GRU's input gates of every word of the vocabulary, (V, 3 * hidden), made once per batch of histories."""
         w_ih, b_ih = self.gru.get_parameter("weight_ih_l0"), self.gru.get_parameter("bias_ih_l0")
         return functional.linear(self.embedding.weight, w_ih, b_ih)
 
@@ -126,7 +127,7 @@ class DialogueEncoder(nn.Module):
             Encodings (K + 1, size); row 0, the empty history, is zero.
         """
         inputs = functional.embedding(tokens, self.word_inputs())
-        root = inputs.new_zeros(self.size)
+        root = inputs.new_zeros(self.hidden)
         states: Tensor = _TreeGru.apply(  # type: ignore[no-untyped-call]
             inputs, self.gru.weight_hh_l0, self.gru.bias_hh_l0, root, parents, offsets
         )
@@ -146,7 +147,7 @@ class DialogueEncoder(nn.Module):
             (K, size) encodings after the new words.
         """
         states = states.clone()
-        size, active = self.size, len(lengths)
+        size, active = self.hidden, len(lengths)
         w_t, b_hh = self.gru.get_parameter("weight_hh_l0").t(), self.gru.get_parameter("bias_hh_l0")
         for position in range(lengths[0] if lengths else 0):
             while lengths[active - 1] <= position:

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 
 from trainer.nets.base import ActorCritic, NetSpec
-from trainer.nets.dialogue import DialogueEncoder
+from trainer.nets.heard import HeardWords
 
 LARGEST_TABLE = 1 << 16
 """Up to so many kinds of cells there can be, a table finds those that there are; beyond, sorting is faster."""
@@ -51,26 +51,33 @@ def _unravel(codes: Tensor, sizes: tuple[int, ...]) -> Tensor:
 
 
 class FastNet(ActorCritic):
-    """FiLM on every cell by the dialogue, a linear layer over all cells, LSTM, heads.
+    """Every cell read in the light of the dialogue, a linear layer over all cells, LSTM, heads.
 
-    Each kind of cell is embedded from its channels. The dialogue scales and shifts the embedding (FiLM, Perez et al.
-    2018) before a rectifier, so that a word such as a colour can pick out the cells it speaks of wherever they are.
-    This is computed once for each pair of a history and a kind of cell, then looked up for the cells of an image.
+    Each kind of cell is embedded from its channels. The dialogue scales and shifts the embedding before a rectifier, in
+    two ways: feature by feature (FiLM, Perez et al. 2018), by the recurrent state; and as a whole, by the sum of what
+    each word that was heard has to do with each code of the cell. So a word such as a colour picks out the cells it
+    speaks of, wherever they are and however much was said since; with FiLM alone agents asked and did not heed
+    (docs/learning.md). All this is computed once for each pair of a history and a kind of cell, then looked up for the
+    cells of an image.
 
     Attributes:
         kind_size: width of a cell's embedding.
+        mentions: (V, channels, 256), how much a word scales the cells that have a code; 0 at first.
     """
 
     kind_size = 16
+    word_rows = (*ActorCritic.word_rows, "mentions")
+    dialogue: HeardWords
 
     def __init__(self, spec: NetSpec, width: int = 128) -> None:
-        super().__init__(spec, width, DialogueEncoder(spec.vocabulary_size))
+        super().__init__(spec, width, HeardWords(spec.vocabulary_size))
         height, ahead, channels = spec.image_shape
         # 256 values per channel, so that scenarios with other bounds share the weights' shape.
         self.channels = nn.Parameter(torch.randn(channels, 256, self.kind_size) * channels**-0.5)
-        self.film = nn.Linear(self.dialogue.size, 2 * self.kind_size)
+        self.mentions = nn.Parameter(torch.zeros(spec.vocabulary_size, channels, 256))
+        self.film = nn.Linear(self.dialogue.hidden, 2 * self.kind_size)
         self.cells = nn.Linear(height * ahead * self.kind_size, width)
-        self.words = nn.Linear(self.dialogue.size, width, bias=False)
+        self.words = nn.Linear(self.dialogue.hidden, width, bias=False)
         self._sizes = tuple(high + 1 for high in spec.image_high)
 
     def prepare(self, images: Tensor) -> Cells:
@@ -80,12 +87,15 @@ class FastNet(ActorCritic):
     def perceive(self, prepared: Cells, text: Tensor, image_index: Tensor, text_index: Tensor) -> Tensor:
         """Features (P, width) of the pairs; see `ActorCritic.perceive`."""
         used, history = torch.unique(text_index, return_inverse=True)
-        text = text.index_select(0, used)  # (S, size)
+        state, heard = self.dialogue.split(text.index_select(0, used))  # (S, hidden), (S, V)
         channel = torch.arange(self.channels.shape[0], device=text.device)
         kinds = self.channels[channel, prepared.kinds].sum(1)  # (C, kind_size)
-        scale, shift = self.film(text)[:, None].chunk(2, 2)
-        read = torch.relu(torch.addcmul(kinds + shift, kinds, scale))  # (S, C, kind_size)
+        mentioned = heard @ self.mentions[:, channel, prepared.kinds].sum(2)  # (S, C)
+        scale, shift = self.film(state)[:, None].chunk(2, 2)
+        read = torch.relu(
+            torch.addcmul(kinds + shift, kinds, scale + mentioned[:, :, None])
+        )  # (S, C, kind_size)
         rows = history[:, None] * len(kinds) + prepared.kind_of.index_select(0, image_index)  # (P, cells)
         cells = read.flatten(0, 1).index_select(0, rows.flatten()).view(len(rows), -1)
-        said = self.words(text).index_select(0, history)
+        said = self.words(state).index_select(0, history)
         return torch.relu(self.cells(cells) + said)

@@ -5,8 +5,10 @@ import pytest
 import torch
 from torch import Tensor
 
+from tests.trainer.plain import encode
 from trainer.distinct import prefix_tree
 from trainer.nets.dialogue import DialogueEncoder
+from trainer.nets.heard import HeardWords
 
 
 @pytest.fixture
@@ -31,14 +33,7 @@ def conversations(count: int, length: int) -> np.ndarray:
 
 
 def encode_one_by_one(encoder: DialogueEncoder, rows: np.ndarray) -> Tensor:
-    encodings = []
-    for row in rows:
-        words = torch.tensor(row[row > 0].astype(np.int64))
-        last = (
-            encoder.gru(encoder.embedding(words))[1][0] if len(words) else torch.zeros(encoder.size).double()
-        )
-        encodings.append(last)
-    return torch.stack(encodings)
+    return torch.stack([encode(encoder, row) for row in rows])
 
 
 def encode_tree(encoder: DialogueEncoder, rows: np.ndarray) -> Tensor:
@@ -78,3 +73,27 @@ def test_extending_agrees_with_reencoding(encoder: DialogueEncoder) -> None:
 
 def test_the_empty_history_is_zero(encoder: DialogueEncoder) -> None:
     assert (encode_tree(encoder, np.zeros((3, 8), np.int16)) == 0).all()
+
+
+def heard_by(rows: np.ndarray, words: int) -> Tensor:
+    return torch.tensor([[float(word > 0 and word in row) for word in range(words)] for row in rows]).double()
+
+
+def test_words_heard_stay_beside_the_recurrent_state() -> None:
+    torch.manual_seed(0)
+    both = HeardWords(20, 16).double()
+    rows = conversations(12, 12)
+    got = encode_tree(both, rows)
+    assert torch.allclose(got, encode_one_by_one(both, rows), rtol=0, atol=1e-12)
+    assert torch.equal(both.split(got)[1], heard_by(rows, 20))
+
+
+def test_extending_adds_the_words_heard_since() -> None:
+    both = HeardWords(20, 16).double()
+    rows = np.array([[3, 1, 2, 4], [5, 5, 6, 0], [7, 0, 0, 0]], np.int16)
+    known = np.array([[3, 0, 0, 0], [5, 0, 0, 0], [7, 0, 0, 0]], np.int16)
+    before = encode_tree(both, known).detach()
+    suffix = torch.tensor([[1, 2, 4], [5, 6, 0], [0, 0, 0]])
+    after = both.extend(before, suffix, [3, 2, 0], both.word_inputs())
+    assert torch.allclose(after, encode_tree(both, rows), rtol=0, atol=1e-12)
+    assert torch.equal(both.split(before)[1], heard_by(known, 20)), "what was known stays as it is"
