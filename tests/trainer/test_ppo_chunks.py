@@ -10,6 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from tests.trainer.fake_envs import EchoEnvs
+from tests.trainer.plain import encode
 from trainer.config import TrainConfig, paper_preset, paper_tuned_preset
 from trainer.crew import Crew
 from trainer.policies import CheckpointPolicy
@@ -181,19 +182,11 @@ def test_acting_normalises_by_the_batch_and_evaluation_by_the_running_statistics
 @torch.no_grad()
 def first_values(net: Any, image: np.ndarray, tokens: np.ndarray) -> Tensor:
     """Values of first observations, each history through PyTorch's own GRU."""
-    texts = torch.stack([plain_text(net, row) for row in net.reader.read(tokens)])
+    texts = torch.stack([encode(net.dialogue, row) for row in net.reader.read(tokens)])
     each = torch.arange(len(image))
     features = net.perceive(net.prepare(torch.from_numpy(image)), texts, each, each)
     values: Tensor = net.heads(net.memory.step(features, net.memory.initial(len(image)))[0])[1]
     return values
-
-
-def plain_text(net: Any, row: np.ndarray) -> Tensor:
-    words = torch.from_numpy(row[row > 0].astype(np.int64))
-    if not len(words):
-        return torch.zeros(net.dialogue.size, dtype=net.dialogue.embedding.weight.dtype)
-    last: Tensor = net.dialogue.gru(net.dialogue.embedding(words))[1][0]
-    return last
 
 
 def test_batch_statistics_make_the_first_ratios_differ_from_one() -> None:
@@ -254,7 +247,9 @@ def plain_update(net: Any, session: Session, rollout: Rollout, config: TrainConf
             frames = [(t + step, e) for t, e in starts]
             kept = torch.tensor([not rollout.starts[frame] for frame in frames]).double()[None, :, None]
             images = torch.from_numpy(np.stack([actor.images.data[pairs[frame][0]] for frame in frames]))
-            texts = torch.stack([plain_text(net, actor.histories.data[pairs[frame][1]]) for frame in frames])
+            texts = torch.stack(
+                [encode(net.dialogue, actor.histories.data[pairs[frame][1]]) for frame in frames]
+            )
             each = torch.arange(len(frames))
             features = net.perceive(net.prepare(images), texts, each, each)
             h, c = net.memory.cell(features, tuple(memory * kept))
