@@ -72,6 +72,10 @@ CODES: Final[dict[str, str]] = {
     "S508": "not a scenario name",
     # S6xx: the room
     "S601": "a placement without a free cell",
+    # S7xx: experiments
+    "S701": "settings for a condition that does not exist",
+    "S702": "a seed given twice",
+    "S703": "an agent that cannot be found",
 }
 """Code -> one-line title, for every finding the product can make."""
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from socialai_dsl.checking import (
     Loaded,
+    LoadedExperiment,
     LoadedScenario,
     LoadedSuite,
+    check_experiment,
     check_library,
     check_npc,
     check_scenario,
@@ -25,7 +28,17 @@ from socialai_dsl.schema import Scenario
 from socialai_dsl.semantics.terms import Checked
 from socialai_dsl.source import Source, Span
 
-__all__ = ["CheckResult", "Loaded", "LoadedScenario", "LoadedSuite", "check", "check_files", "load"]
+__all__ = [
+    "CheckResult",
+    "Loaded",
+    "LoadedExperiment",
+    "LoadedScenario",
+    "LoadedSuite",
+    "check",
+    "check_files",
+    "load",
+    "load_experiment",
+]
 
 SUFFIXES = (".yaml", ".yml")
 
@@ -42,6 +55,7 @@ class CheckResult:
         resolved: the data with its positions; None if the files could not be read.
         suite: the suite with its members, if it is one and nothing is wrong with it.
         used: the places of the codes in comments that silenced a warning.
+        experiment: the experiment with its conditions, if it is one and nothing is wrong with it.
     """
 
     name: str
@@ -52,6 +66,7 @@ class CheckResult:
     resolved: Resolved | None
     suite: LoadedSuite | None = None
     used: frozenset[Span] = frozenset()
+    experiment: LoadedExperiment | None = None
 
     @property
     def has_errors(self) -> bool:
@@ -84,6 +99,24 @@ def load(name: str | Path) -> Loaded:
     )  # fmt: skip
 
 
+def load_experiment(name: str | Path) -> LoadedExperiment:
+    """An experiment's file, with its conditions.
+
+    Raises:
+        ScenarioError: with all findings, if one of them is an error, or S108 if it is a file of another kind.
+    """
+    result = check(name)
+    if result.has_errors:
+        raise ScenarioError(result.diagnostics, result.sources)
+    if result.experiment is None:
+        assert result.resolved is not None, "internal: nothing was read, and nothing is wrong"
+        kind = result.resolved.kind
+        message = f"this is a file of the kind `{kind}`, not an experiment"
+        span = result.resolved.key_span((kind,))
+        raise ScenarioError([Diagnostic("S108", message, span)], result.sources)
+    return result.experiment
+
+
 def check(name: str | Path, texts: Mapping[Path, Source] | None = None) -> CheckResult:
     """Check a scenario or suite; findings are returned, never raised.
 
@@ -102,6 +135,14 @@ def check(name: str | Path, texts: Mapping[Path, Source] | None = None) -> Check
         return _sifted(
             CheckResult(name, None, None, tuple(said_once(bag)), dict(resolved.files), resolved, suite)
         )
+    if resolved.kind == "experiment":
+        experiment = check_experiment(resolved, bag)
+        files = dict(resolved.files)
+        if experiment is not None:
+            _check_played(experiment, bag, files)
+        found = tuple(bag)
+        right = None if bag.has_errors else experiment
+        return _sifted(CheckResult(name, None, None, found, files, resolved, experiment=right))
     checked, scenario = _checked(resolved, bag)
     found = tuple(DiagnosticBag(naming_the_patch(d, resolved) for d in said_once(bag)))
     return _sifted(CheckResult(name, checked, scenario, found, dict(resolved.files), resolved))
@@ -110,7 +151,7 @@ def check(name: str | Path, texts: Mapping[Path, Source] | None = None) -> Check
 def _sifted(result: CheckResult) -> CheckResult:
     """Without the warnings that comments ignore; a file whose warnings are all known is to have no idle ones."""
     assert result.resolved is not None, "internal: what was checked has been read"
-    meant = result.checked is not None or result.suite is not None
+    meant = (result.checked, result.suite, result.experiment) != (None, None, None)
     judged = display_name(result.resolved.path) if meant and not result.has_errors else None
     sifted = sift(result.diagnostics, result.sources, judged)
     suite = result.suite
@@ -145,3 +186,26 @@ def _checked(resolved: Resolved, bag: DiagnosticBag) -> tuple[Checked | None, Sc
         case "library":
             check_library(resolved, bag)
     return None, None  # the shape of a variant of any scenario was checked when it was read
+
+
+def _check_played(experiment: LoadedExperiment, bag: DiagnosticBag, files: dict[str, Source]) -> None:
+    """Check the scenarios that an experiment names, each once; what is wrong with a name points into the experiment."""
+    for name, written, place in experiment.named():
+        result = check(name)
+        kind = result.resolved.kind if result.resolved is not None else "scenario"
+        if not result.has_errors and result.checked is None and result.suite is None:
+            what = "an abstract scenario" if kind == "scenario" else f"a file of the kind `{kind}`"
+            message = f"`{written}` is {what}; only a scenario or a suite can be run"
+            bag.error("S108", message, experiment.resolved.value_span(place))
+            continue
+        files.update({source: text for source, text in result.sources.items() if source not in files})
+        for finding in result.diagnostics:
+            if finding.severity is not Severity.ERROR:
+                continue  # said where the scenario itself is checked
+            if finding.span.file in result.sources and Path(finding.span.file).is_file():
+                bag.add(finding)
+            else:
+                meant = finding.suggestion
+                if meant is not None and os.path.isabs(meant):
+                    meant = os.path.relpath(meant, experiment.folder)
+                bag.add(replace(finding, span=experiment.resolved.value_span(place), suggestion=meant))

@@ -126,7 +126,7 @@ def headings(path: Path) -> set[str]:
     return {re.sub(r"[^\w -]", "", line.lower()).replace(" ", "-") for line in lines}
 
 
-KINDS = ("scenario", "npc", "variant", "suite", "library")
+KINDS = ("scenario", "npc", "variant", "suite", "library", "experiment")
 
 
 def kind(text: str) -> str | None:

@@ -26,6 +26,7 @@ TEXT_SIDE = {
 
 # layer -> (layers of socialai_dsl it may import, third-party packages it may import)
 MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
+    "atomic": (set(), set()),
     "source": (set(), set()),
     "diagnostics": ({"source"}, set()),
     "draws": (set(), {"numpy", "numba"}),
@@ -54,6 +55,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         TEXT_SIDE | {"program", "program_suite", "compilation", "engine"},
         {"numpy", "gymnasium", "PIL"},
     ),
+    "experiments": (TEXT_SIDE | {"atomic", "compilation"}, {"ray", "submitit"}),
     "_gymnasium_hook": ({"envs"}, set()),
     "__main__": ({"cli"}, set()),
     "": (
@@ -126,7 +128,14 @@ def test_engine_and_compiler_do_not_know_each_other() -> None:
         assert not MAY_IMPORT["engine"][0] & (TEXT_SIDE - {"draws"})
 
 
-@pytest.mark.parametrize("statement", ["import socialai_dsl.frontend", "import socialai_dsl.cli.main"])
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "import socialai_dsl.frontend",
+        "import socialai_dsl.cli.main",
+        "import socialai_dsl.experiments.document, socialai_dsl.experiments.driver, socialai_dsl.cli.experiment",
+    ],
+)
 def test_checking_a_file_loads_nothing_heavy(statement: str) -> None:
     heavy = ("numba", "torch", "gymnasium", "matplotlib", "PIL")
     script = f"{statement}\nimport sys\nprint([name for name in {heavy!r} if name in sys.modules])"

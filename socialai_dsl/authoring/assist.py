@@ -16,7 +16,7 @@ from socialai_dsl.loader import Data, DataPath, Document
 from socialai_dsl.loader.library import yaml_files
 from socialai_dsl.schema.annotations import annotation_at, literals, model_at
 from socialai_dsl.schema.behaviour import CastGroup
-from socialai_dsl.schema.files import NpcFile, ScenarioFile, SuiteFile, VariantFile
+from socialai_dsl.schema.files import ExperimentFile, NpcFile, ScenarioFile, SuiteFile, VariantFile
 from socialai_dsl.semantics.signatures import (
     ACTIVITIES,
     EFFECTS,
@@ -32,6 +32,7 @@ _FILES: Final[dict[str, type[BaseModel]]] = {
     "npc": NpcFile,
     "suite": SuiteFile,
     "variant": VariantFile,
+    "experiment": ExperimentFile,
 }
 
 _NAMING_FILES: Final = ("extends", "of", "one_of", "members", "scenario")

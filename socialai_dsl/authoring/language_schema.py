@@ -16,7 +16,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary
-from socialai_dsl.schema.files import NpcFile, ScenarioFile, SuiteFile, VariantFile
+from socialai_dsl.schema.files import ExperimentFile, NpcFile, ScenarioFile, SuiteFile, VariantFile
 
 Schema = dict[str, Any]
 
@@ -36,6 +36,7 @@ def language_schema() -> Schema:
         "suite": (SuiteFile,),
         "variant": (VariantFile,),
         "library": (ObjectLibrary, GrammarLibrary),
+        "experiment": (ExperimentFile,),
     }
     models = [model for files in kinds.values() for model in files]
     _, made = models_json_schema([(model, "validation") for model in models])
@@ -141,7 +142,7 @@ class _Definitions:
         return formed
 
 
-_SAYS_THE_KIND: Final = ("scenario", "npc", "suite", "variant", "library")
+_SAYS_THE_KIND: Final = ("scenario", "npc", "suite", "variant", "library", "experiment")
 _ANNOTATIONS: Final = ("description", "default", "examples")
 
 

@@ -1,5 +1,6 @@
 """Resolved files to what they mean, or to what is wrong with them: one module for each kind of file."""
 
+from socialai_dsl.checking.experiments import LoadedExperiment, check_experiment
 from socialai_dsl.checking.ignored import sift
 from socialai_dsl.checking.libraries import check_library, check_npc
 from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite, Start
@@ -9,9 +10,11 @@ from socialai_dsl.checking.suites import check_suite
 
 __all__ = [
     "Loaded",
+    "LoadedExperiment",
     "LoadedScenario",
     "LoadedSuite",
     "Start",
+    "check_experiment",
     "check_library",
     "check_npc",
     "check_scenario",

@@ -34,6 +34,7 @@ _COMMANDS: Final = (
     "check",
     "curves",
     "sheets",
+    "experiment",
 )
 """Each is a module beside this one."""
 

@@ -137,7 +137,9 @@ def execute(arguments: argparse.Namespace) -> Exit:
         return Exit.GOOD
     if settings.agent == "ppo":
         training = _training_figures(folder)
-    player = Player(agent, settings.device, net=settings.net)
+    # What is trained differs by its training; what is not, by what it draws.
+    drawn = 0 if settings.agent == "ppo" else settings.seed
+    player = Player(agent, settings.device, seed=drawn, net=settings.net)
     evaluation = evaluate_agent(player, settings.scenario, settings.eval_episodes)
     for warning in evaluation.warnings:
         print(f"warning: {warning}", file=sys.stderr)

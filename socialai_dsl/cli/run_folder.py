@@ -1,13 +1,14 @@
-"""This module names a run's folder and writes its small files so that a reader never sees half of one."""
+"""This module names a run's folder and reads its small files."""
 
 import json
-import os
 import platform
 import time
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final
 
+from socialai_dsl.atomic import write_json as write_json
+from socialai_dsl.atomic import write_text as write_text
 from socialai_dsl.cli.errors import UsageError
 
 RESULT: Final = "result.json"
@@ -52,24 +53,6 @@ def create_run_folder(out: Path | None, spec: str, seed: int) -> Path:
             continue
         return folder
     raise UsageError(f"{parent}: a hundred runs were started in this second")
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file by replacing it in one go."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with open(temporary, "w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write a JSON object by replacing the file in one go."""
-    write_text(path, json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
 def read_json(path: Path) -> dict[str, Any]:

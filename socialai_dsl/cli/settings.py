@@ -11,7 +11,7 @@ class Settings:
     Attributes:
         scenario: path or name, with variants and parameters.
         agent: `ppo`, `random`, `oracle`, `human`, or the path of a checkpoint or run folder.
-        seed: of training; the test set is always the same.
+        seed: of training, or of what an agent draws that is not trained; the test set is always the same.
         frames: to train for, 0 for agents that are not trained here.
         envs: environments stepped together while training.
         net: the network or preset, as the trainer names it.

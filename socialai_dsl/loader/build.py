@@ -15,7 +15,7 @@ from socialai_dsl.loader.patches import Edit, apply_patch, check_variant
 from socialai_dsl.loader.tree import Node, merge, tree_of
 from socialai_dsl.source import Span
 
-KINDS: Final = ("scenario", "npc", "variant", "suite", "library")
+KINDS: Final = ("scenario", "npc", "variant", "suite", "library", "experiment")
 """The kinds of file; exactly one of these keys is present."""
 
 ANY: Final = "any"

@@ -22,6 +22,16 @@ from socialai_dsl.schema.behaviour import (
     ThenRule,
     WorldRule,
 )
+from socialai_dsl.schema.experiment import (
+    Condition,
+    Experiment,
+    Grid,
+    Override,
+    Profile,
+    Reference,
+    Settings,
+    Tested,
+)
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.schema.properties import OnlyThrough, Property
 from socialai_dsl.schema.scenario import Memory, Outcome, Parameter, Reward, Scenario, Sequence, SungWith
@@ -58,8 +68,19 @@ CALLED: Final[dict[type, str]] = {
     Split: "a split",
     Entry: "a member",
     Value: "a value of a tree",
+    Experiment: "an experiment",
+    Condition: "a condition",
+    Grid: "a grid",
+    Settings: "settings",
+    Override: "an override",
+    Profile: "a profile",
+    Tested: "a test",
+    Reference: "a reference",
 }
 """How messages call what a model describes."""
+
+
+_OF_EXPERIMENTS: Final = (Experiment, Condition, Grid, Settings, Override, Profile, Tested, Reference)
 
 
 def keys_of(model: type) -> list[str]:
@@ -68,9 +89,13 @@ def keys_of(model: type) -> list[str]:
     return [field.alias or name for name, field in model.model_fields.items()]
 
 
-def home_of(key: str) -> str | None:
-    """Where a key that is misplaced would belong."""
-    homes = [called for model, called in CALLED.items() if key in keys_of(model)]
+def home_of(key: str, owner: type | None) -> str | None:
+    """Where a key that is misplaced in `owner` would belong, in a file of the same kind."""
+    homes = [
+        called
+        for model, called in CALLED.items()
+        if key in keys_of(model) and (model in _OF_EXPERIMENTS) == (owner in _OF_EXPERIMENTS)
+    ]
     return " or ".join(dict.fromkeys(homes[:2])) if homes else None
 
 

@@ -8,6 +8,7 @@ from pydantic import Field, JsonValue
 
 from socialai_dsl.schema.base import Model
 from socialai_dsl.schema.behaviour import Npc
+from socialai_dsl.schema.experiment import Experiment
 from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.schema.suite import Suite
 
@@ -30,6 +31,12 @@ class NpcFile(Npc):
 
 class SuiteFile(Suite):
     """A suite, perhaps built on another."""
+
+    extends: str | None = _EXTENDS
+
+
+class ExperimentFile(Experiment):
+    """An experiment, perhaps built on another."""
 
     extends: str | None = _EXTENDS
 

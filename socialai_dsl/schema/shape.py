@@ -204,7 +204,7 @@ class _Report:
     def _unknown_word(
         self, key: str, owner: type | None, called: str, known: list[str], near: str | None, span: Span
     ) -> None:
-        elsewhere = None if near else home_of(key)
+        elsewhere = None if near else home_of(key, owner)
         listed = ", ".join(f"`{word}`" for word in known)
         if owner is State and near is None:
             hint = f"`{key}` belongs to {elsewhere}" if elsewhere else None

@@ -14,8 +14,6 @@ FOLDER = Path(__file__).parent.parent / "diagnostics"
 CASES = sorted(path.stem for path in FOLDER.glob("[0-9]*.yaml"))
 
 NOT_FROM_ONE_FILE = {
-    "S007": "a file that cannot be read has no text",
-    "S503": "about a name on the command line",
     "S507": "needs dozens of files",
     "S508": "about a name on the command line",
 }

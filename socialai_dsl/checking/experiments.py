@@ -1,0 +1,112 @@
+"""An experiment's file to its conditions, or to what is wrong with them; their scenarios are checked by `frontend`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
+from socialai_dsl.loader import DataPath, Resolved
+from socialai_dsl.loader.files import display_name
+from socialai_dsl.loader.names import looks_like_path
+from socialai_dsl.schema.experiment import AGENTS, NETS, Experiment
+from socialai_dsl.schema.shape import model_of
+from socialai_dsl.semantics.experiment import Cell, cells_of
+
+
+@dataclass(frozen=True)
+class LoadedExperiment:
+    """An experiment with its conditions.
+
+    Attributes:
+        experiment: the models. resolved: the data with its positions.
+        cells: profile -> its conditions; None is the file without a profile.
+    """
+
+    experiment: Experiment
+    resolved: Resolved
+    cells: Mapping[str | None, tuple[Cell, ...]]
+
+    def __repr__(self) -> str:
+        return f"<LoadedExperiment {self.experiment.experiment}: {len(self.cells[None])} conditions>"
+
+    @property
+    def folder(self) -> Path:
+        """Where relative paths of the file start."""
+        return self.resolved.path.parent
+
+    def named(self) -> Iterator[tuple[str, str, DataPath]]:
+        """Each scenario that is played: its name from anywhere, its name in the file, and where that stands."""
+        seen = set()
+        for cell in (cell for cells in self.cells.values() for cell in cells):
+            for written, key in ((cell.scenario, "scenario"), *((test, "tests") for test in cell.tests)):
+                if written not in seen:
+                    seen.add(written)
+                    yield from_anywhere(written, self.folder), written, self._place(cell, written, key)
+
+    def _place(self, cell: Cell, written: str, key: str) -> DataPath:
+        place = cell.places[key]
+        if key == "scenario":
+            return place
+        tests = self.resolved.part(place)
+        assert isinstance(tests, list), "internal: the shape of tests was checked"
+        return (*place, list(cell.tests).index(written)) if len(tests) == len(cell.tests) else place
+
+
+def from_anywhere(name: str, folder: Path) -> str:
+    """A scenario's name in a file in `folder`, as it is called from any working directory."""
+    base = name.partition("?")[0]
+    if not looks_like_path(base.partition("+")[0]):
+        return name
+    return os.path.abspath(folder / base) + name[len(base) :]
+
+
+def check_experiment(resolved: Resolved, bag: DiagnosticBag) -> LoadedExperiment | None:
+    """An experiment with those of its conditions that can be understood; None if there are none.
+
+    `bag` takes the findings, after which the experiment serves only to check the rest of it.
+    """
+    shaped = model_of(Experiment, resolved.data, resolved, bag, parameters=False)
+    if shaped.model is None:
+        return None
+    experiment = shaped.model
+    if experiment.profile is not None and experiment.profile not in experiment.profiles:
+        near = did_you_mean(experiment.profile, experiment.profiles)
+        message = f"there is no profile `{experiment.profile}`"
+        hint = None if near else "the file's profiles are " + (", ".join(experiment.profiles) or "none")
+        bag.error("S201", message, resolved.value_span(("profile",)), suggestion=near, hint=hint)
+    cells = {
+        profile: cells_of(experiment, profile, shaped.places, bag, whole=not shaped.lost)
+        for profile in (None, *experiment.profiles)
+    }
+    for own in cells.values():
+        _check_agents(own, resolved, bag)
+        _check_nets(own, resolved, bag)
+    return LoadedExperiment(experiment, resolved, cells)
+
+
+def _check_agents(cells: Sequence[Cell], resolved: Resolved, bag: DiagnosticBag) -> None:
+    for cell in cells:
+        if cell.agent in AGENTS or (resolved.path.parent / cell.agent).exists():
+            continue
+        near = did_you_mean(cell.agent, AGENTS)
+        hint = (
+            None
+            if near
+            else f"an agent is {', '.join(AGENTS)}, or the path of a checkpoint or of a run's folder"
+        )
+        folder = display_name(resolved.path.parent)
+        message = f"there is no checkpoint `{cell.agent}` in {folder}"
+        bag.error("S703", message, resolved.value_span(cell.places["agent"]), suggestion=near, hint=hint)
+
+
+def _check_nets(cells: Sequence[Cell], resolved: Resolved, bag: DiagnosticBag) -> None:
+    for cell in cells:
+        net = cell.options.get("net", "fast")
+        if isinstance(net, str) and net not in NETS and ":" not in net:
+            near = did_you_mean(net, NETS)
+            hint = None if near else "one of " + ", ".join(NETS) + ", or my.module:MyNet"
+            span = resolved.value_span(cell.places["net"])
+            bag.error("S103", f"`{net}` is not a word for `net`", span, suggestion=near, hint=hint)

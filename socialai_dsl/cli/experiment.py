@@ -1,0 +1,279 @@
+"""This module is `socialai experiment`: many runs from one file, on one machine or many."""
+
+import argparse
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from socialai_dsl.cli.arguments import positive
+from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.diagnostics import did_you_mean
+
+if TYPE_CHECKING:
+    from socialai_dsl.checking.experiments import LoadedExperiment
+    from socialai_dsl.experiments.folder import Run
+
+SUMMARY: Final = "plan, run and look after the runs that an experiment file declares"
+
+ENGINES: Final = ("local", "ray", "slurm")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this command's commands."""
+    commands = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    _add_plan(commands.add_parser("plan", help="list the runs, how long they will take and how far they are"))
+    _add_run(commands.add_parser("run", help="do what is left to do; repeat it to go on"))
+    status = commands.add_parser("status", help="how far the runs of an experiment are")
+    status.add_argument("--each", action="store_true", help="a line for each run, not for each condition")
+    retry = commands.add_parser("retry", help="let the next `run` try again what failed or was cancelled")
+    cancel = commands.add_parser("cancel", help="give runs up, wherever they are being worked on")
+    for command, execute in ((status, _status), (retry, _retry), (cancel, _cancel)):
+        command.add_argument("folder", type=Path, metavar="DIR", help="the experiment's folder")
+        command.add_argument("--json", action="store_true", help="print one JSON object")
+        command.set_defaults(act=execute)
+    for command in (retry, cancel):
+        command.add_argument(
+            "runs", nargs="*", metavar="RUN", help="ids of runs or names of conditions (default: all)"
+        )
+
+
+def _add_file(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE", help="an experiment's file, or its folder once it was run")
+    parser.add_argument("--profile", metavar="NAME", help="a profile of the file (default: as the file says)")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="the experiment's folder (default: runs/experiments/NAME)"
+    )
+    parser.add_argument(
+        "--workers", type=positive, metavar="N", help="runs at once (default: one for each core)"
+    )
+
+
+def _add_plan(parser: argparse.ArgumentParser) -> None:
+    _add_file(parser)
+    parser.add_argument("--each", action="store_true", help="a line for each run, not for each condition")
+    parser.add_argument(
+        "--measure", action="store_true", help="measure the speed of networks of which none is known"
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.set_defaults(act=_plan)
+
+
+def _add_run(parser: argparse.ArgumentParser) -> None:
+    _add_file(parser)
+    parser.add_argument(
+        "--engine", choices=ENGINES, default="local", help="who does the runs (default: local)"
+    )
+    parser.add_argument(
+        "--address", metavar="ADDRESS", help="of the Ray cluster (default: a cluster of this machine)"
+    )
+    parser.add_argument(
+        "--runs",
+        type=Path,
+        metavar="DIR",
+        help="keep the runs in this folder, which other experiments may share (default: runs in the experiment's)",
+    )
+    parser.add_argument(
+        "--update",
+        action="store_true",
+        help="let the folder follow a file that has changed; runs that are the same are kept",
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print one JSON object at the end, and nothing else"
+    )
+    parser.set_defaults(act=_run)
+
+
+def execute(arguments: argparse.Namespace) -> Exit:
+    """Do what was asked for."""
+    act: Callable[[argparse.Namespace], Exit] = arguments.act
+    return act(arguments)
+
+
+# -- plan and run ------------------------------------------------------------------------------------------------------
+
+
+def _plan(arguments: argparse.Namespace) -> Exit:
+    from socialai_dsl.cli.experiment_measure import measure_unknown
+    from socialai_dsl.cli.experiment_tables import plan_figures, plan_text
+    from socialai_dsl.experiments.estimate import Speeds
+    from socialai_dsl.experiments.folder import runs_of
+
+    document, folder = _document(arguments)
+    runs = runs_of(folder, document)
+    speeds = Speeds(runs)
+    if arguments.measure:
+        measure_unknown(runs, speeds, sys.stderr)
+    figures = plan_figures(document, folder, runs, speeds, arguments.workers or _workers(document))
+    print(
+        json.dumps(figures, indent=2, ensure_ascii=False)
+        if arguments.json
+        else plan_text(figures, arguments.each)
+    )
+    return Exit.GOOD
+
+
+def _run(arguments: argparse.Namespace) -> Exit:
+    from socialai_dsl.cli.experiment_run import work_on
+    from socialai_dsl.experiments.folder import runs_of
+
+    document, folder = _document(arguments)
+    if arguments.address is not None and arguments.engine != "ray":
+        raise UsageError("--address: only the engine `ray` has one")
+    _prepare(folder, document, arguments)
+    engine = _engine(arguments, document)
+    return work_on(folder, document, runs_of(folder, document), engine, arguments.json)
+
+
+def _document(arguments: argparse.Namespace) -> tuple[dict[str, Any], Path]:
+    """What is to be run, and the folder for it."""
+    from socialai_dsl.experiments.document import document_of
+    from socialai_dsl.frontend import load_experiment
+
+    given = Path(arguments.file)
+    if given.is_dir():
+        if arguments.out is not None or arguments.profile is not None:
+            raise UsageError(
+                f"{given} is a folder, which says itself what is run; --out and --profile are for files"
+            )
+        return _kept(given), given
+    loaded = load_experiment(arguments.file)
+    profile = _profile(loaded, arguments.profile)
+    document = document_of(loaded, profile)
+    name = document["name"]
+    if profile is not None and profile != loaded.experiment.profile:
+        name += f"-{profile}"
+    return document, arguments.out or Path("runs") / "experiments" / name
+
+
+def _profile(loaded: "LoadedExperiment", asked: str | None) -> str | None:
+    if asked is None:
+        return loaded.experiment.profile
+    if asked not in loaded.cells:
+        near = did_you_mean(asked, loaded.experiment.profiles)
+        listed = ", ".join(loaded.experiment.profiles) or "none"
+        hint = f"did you mean {near}?" if near else f"the file's profiles are {listed}"
+        raise UsageError(f"--profile: there is no {asked!r}; {hint}")
+    return asked
+
+
+def _prepare(folder: Path, document: dict[str, Any], arguments: argparse.Namespace) -> None:
+    """Make the experiment's folder, or see that it is one of the same experiment."""
+    from socialai_dsl.atomic import write_json
+    from socialai_dsl.experiments.document import differences
+    from socialai_dsl.experiments.folder import EXPERIMENT, RUNS
+
+    if (folder / EXPERIMENT).exists():
+        changed = differences(_kept(folder), document)
+        if changed and not arguments.update:
+            shown = changed[:10] + ([f"and {len(changed) - 10} more"] if len(changed) > 10 else [])
+            listed = "".join(f"\n  {line}" for line in shown)
+            raise UsageError(
+                f"{folder} is of another experiment or of an earlier state of this one:{listed}\n"
+                "Choose another --out; or let the folder follow with --update, which keeps the runs that are the same"
+            )
+    folder.mkdir(parents=True, exist_ok=True)
+    runs = folder / RUNS
+    if arguments.runs is not None and runs.resolve() != arguments.runs.resolve():
+        if runs.exists() or runs.is_symlink():
+            raise UsageError(f"--runs: {runs} exists already, so its runs stay there")
+        arguments.runs.mkdir(parents=True, exist_ok=True)
+        runs.symlink_to(arguments.runs.resolve(), target_is_directory=True)
+    runs.mkdir(exist_ok=True)
+    write_json(folder / EXPERIMENT, document)
+
+
+def _engine(arguments: argparse.Namespace, document: dict[str, Any]) -> Any:
+    workers = arguments.workers or _workers(document)
+    from socialai_dsl.experiments.engines.local import LocalEngine
+
+    return LocalEngine(workers)
+
+
+def _workers(document: dict[str, Any]) -> int:
+    """As many runs at once as this machine has cores for."""
+    from socialai_dsl.experiments.cores import available_cores
+
+    threads = max(int(condition["options"].get("threads", 1)) for condition in document["conditions"])
+    return max(1, len(available_cores()) // threads)
+
+
+# -- status, retry, cancel ---------------------------------------------------------------------------------------------
+
+
+def _status(arguments: argparse.Namespace) -> Exit:
+    from socialai_dsl.cli.experiment_tables import status_figures, status_text
+    from socialai_dsl.experiments.folder import runs_of
+
+    document = _kept(arguments.folder)
+    figures = status_figures(document, arguments.folder, runs_of(arguments.folder, document))
+    text = (
+        json.dumps(figures, indent=2, ensure_ascii=False)
+        if arguments.json
+        else status_text(figures, arguments.each)
+    )
+    print(text)
+    return Exit.GOOD
+
+
+def _retry(arguments: argparse.Namespace) -> Exit:
+    from socialai_dsl.experiments.wishes import retry
+
+    chosen = _chosen(arguments)
+    wanted = [run for run in chosen if run.shown_status().state in ("failed", "cancelled")]
+    return _tell(arguments, "waiting", wanted, {run.id for run in wanted if retry(run)})
+
+
+def _cancel(arguments: argparse.Namespace) -> Exit:
+    from socialai_dsl.experiments.wishes import cancel
+
+    wanted = [run for run in _chosen(arguments) if run.shown_status().state in ("waiting", "running")]
+    for run in wanted:
+        cancel(run)
+    return _tell(arguments, "cancelled", wanted, {run.id for run in wanted})
+
+
+def _tell(arguments: argparse.Namespace, state: str, wanted: "list[Run]", changed: set[str]) -> Exit:
+    """Say what became of wishes for runs."""
+    missed = [run for run in wanted if run.id not in changed]
+    if arguments.json:
+        print(json.dumps({state: sorted(changed), "busy": [run.id for run in missed]}, indent=2))
+    else:
+        print(f"{len(changed)} runs {state}" if len(changed) != 1 else f"1 run {state}")
+        for run in missed:
+            print(f"{run.label} ({run.id}): somebody works on it just now", file=sys.stderr)
+    return Exit.FINDINGS if missed else Exit.GOOD
+
+
+def _chosen(arguments: argparse.Namespace) -> "list[Run]":
+    from socialai_dsl.experiments.folder import runs_of
+
+    document = _kept(arguments.folder)
+    runs = runs_of(arguments.folder, document)
+    if not arguments.runs:
+        return runs
+    names: dict[str, set[str]] = {}
+    for entry in document["runs"]:
+        names.setdefault(entry["condition"], set()).add(entry["id"])
+        names.setdefault(entry["id"], set()).add(entry["id"])
+    for word in arguments.runs:
+        if word not in names:
+            near = did_you_mean(word, names)
+            hint = f"; did you mean {near}?" if near else ""
+            raise UsageError(f"RUN: {arguments.folder} has no run and no condition {word!r}{hint}")
+    wanted = set().union(*(names[word] for word in arguments.runs))
+    return [run for run in runs if run.id in wanted]
+
+
+def _kept(folder: Path) -> dict[str, Any]:
+    """What an experiment's folder says is run."""
+    from socialai_dsl.experiments.folder import EXPERIMENT, UnreadableError, read_experiment
+
+    try:
+        document = read_experiment(folder)
+    except UnreadableError as error:
+        raise UsageError(str(error)) from None
+    if document is None:
+        raise UsageError(f"{folder} is no experiment's folder, it has no {EXPERIMENT}")
+    return document

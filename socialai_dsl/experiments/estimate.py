@@ -1,0 +1,108 @@
+"""How long runs will take: from what runs of this experiment took, from a short measurement, or from what is usual."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from socialai_dsl.atomic import write_json
+from socialai_dsl.experiments.folder import Run, UnreadableError
+
+USUAL_SPEEDS: Final[Mapping[str, float]] = {"fast": 5000.0}
+"""Frames per second of a network on a core of a server, where nothing was measured; of others nothing is known."""
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Frames per second, and how that is known."""
+
+    frames_per_second: float
+    source: str
+
+
+class Speeds:
+    """What is known of the speed of networks, the best knowledge first."""
+
+    def __init__(self, runs: Iterable[Run]) -> None:
+        """Learn from the runs of an experiment that have got far enough to tell."""
+        self._by_scenario: dict[tuple[str, str], list[float]] = {}
+        self._by_net: dict[str, list[float]] = {}
+        self._cached = _cached()
+        for run in runs:
+            speed = _speed_of(run)
+            if speed is not None:
+                net = str(run.condition["options"]["net"])
+                self._by_scenario.setdefault((run.condition["scenario"], net), []).append(speed)
+                self._by_net.setdefault(net, []).append(speed)
+
+    def of(self, condition: Mapping[str, Any]) -> Speed | None:
+        """The speed to expect of a condition's runs; None if nothing is known."""
+        net = str(condition["options"]["net"])
+        alike = self._by_scenario.get((condition["scenario"], net))
+        if alike:
+            return Speed(_mean(alike), "runs of this scenario here")
+        if net in self._by_net:
+            return Speed(_mean(self._by_net[net]), "runs of this network here")
+        if net in self._cached:
+            return Speed(self._cached[net], "a short measurement on this machine")
+        if net in USUAL_SPEEDS:
+            return Speed(USUAL_SPEEDS[net], "what is usual for this network")
+        return None
+
+    def is_from_runs(self, condition: Mapping[str, Any]) -> bool:
+        """Whether runs here tell the speed."""
+        return str(condition["options"]["net"]) in self._by_net
+
+    def look_again(self) -> None:
+        """Take note of what was measured meanwhile."""
+        self._cached = _cached()
+
+    def remaining(self, run: Run) -> float | None:
+        """Seconds that training still takes; None if the speed is not known."""
+        if run.condition["frames"] is None or run.result() is not None:
+            return 0.0
+        speed = self.of(run.condition)
+        if speed is None:
+            return None
+        left: int = run.condition["frames"] - (run.checkpoint_frames() or 0)
+        return max(0, left) / speed.frames_per_second
+
+
+def remember(net: str, frames_per_second: float) -> None:
+    """Keep a measured speed for other experiments on this machine."""
+    path = _cache_file()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_json(path, _cached() | {net: frames_per_second})
+
+
+def _cache_file() -> Path:
+    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(base) / "socialai-dsl" / "speeds.json"
+
+
+def _cached() -> dict[str, float]:
+    try:
+        content = json.loads(_cache_file().read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    known = content.items() if isinstance(content, dict) else ()
+    return {net: float(speed) for net, speed in known if isinstance(speed, int | float) and speed > 0}
+
+
+def _speed_of(run: Run) -> float | None:
+    try:
+        result = run.result()
+    except (OSError, UnreadableError):
+        return None
+    row = result or run.last_metrics() or {}
+    speed: object = row.get("frames_per_second")
+    return float(speed) if isinstance(speed, int | float) and speed > 0 else None
+
+
+def _mean(speeds: list[float]) -> float:
+    """The harmonic mean: what a frame takes is what adds up."""
+    return len(speeds) / sum(1 / speed for speed in speeds)

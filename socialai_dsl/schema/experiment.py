@@ -1,0 +1,191 @@
+"""An experiment file as models: which agents learn or play which scenarios, how often, and what was found elsewhere."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BeforeValidator, Discriminator, Field, StringConstraints, Tag, ValidationError
+
+from socialai_dsl.schema.base import Model, Word, _as_tuple, _one_or_many
+from socialai_dsl.schema.suite import MemberName
+
+Label = Annotated[str, StringConstraints(min_length=1, max_length=80)]
+"""A name for people: of a condition, a row, a column."""
+
+Labels = Annotated[
+    tuple[Label, ...],
+    BeforeValidator(_as_tuple),
+    BeforeValidator(_one_or_many, json_schema_input_type=Label | tuple[Label, ...]),
+]
+
+NETS: Final = ("fast", "paper", "paper-reference", "paper-reference-tuned")
+"""The networks and presets that ship, as `socialai-run --net` takes them."""
+
+AGENTS: Final = ("ppo", "random", "oracle")
+"""The agents that are no checkpoint."""
+
+
+class Reference(Model):
+    """What somebody else found under this condition, for the report to set beside."""
+
+    mean: float | int = Field(description="share of successful test episodes, mean over seeds", ge=0, le=1)
+    std: float | int | None = Field(None, description="its standard deviation over seeds", ge=0, le=1)
+    note: str | None = Field(None, description="what has to be known to compare")
+    source: str | None = Field(None, description="where the figure stands")
+
+
+class Tested(Model):
+    """A scenario that the trained agents play besides their own."""
+
+    scenario: MemberName = Field(description="what is played; the condition's `variants` apply to it as well")
+    reference: Reference | None = Field(None, description="what was found elsewhere")
+
+
+def _is_mapping(value: Any) -> str:
+    return "mapping" if isinstance(value, dict | Model) else "word"
+
+
+Test = Annotated[
+    Annotated[MemberName, Tag("word")] | Annotated[Tested, Tag("mapping")], Discriminator(_is_mapping)
+]
+
+
+class Settings(Model):
+    """What can be said of runs; a key that is left out is as `socialai-run` has it."""
+
+    scenario: MemberName | None = Field(
+        None, description="a shipped name, or a path relative to this file; with variants and parameters"
+    )
+    variants: Annotated[tuple[Word, ...], BeforeValidator(_as_tuple)] | None = Field(
+        None, description="variants applied to the scenario and to what is tested besides"
+    )
+    agent: Annotated[str, StringConstraints(min_length=1, max_length=1000)] | None = Field(
+        None,
+        description="ppo (default), random, oracle, or a checkpoint or run folder, relative to this file",
+    )
+    frames: int | None = Field(None, ge=1, description="frames to train for")
+    seeds: (
+        Annotated[int, Field(ge=1, le=10_000)]
+        | Annotated[
+            tuple[Annotated[int, Field(ge=0)], ...],
+            BeforeValidator(_as_tuple),
+            Field(min_length=1, max_length=10_000),
+        ]
+        | None
+    ) = Field(None, description="how many seeds, from 0 on, or a list of seeds")
+    tests: Annotated[tuple[Test, ...], BeforeValidator(_as_tuple)] | None = Field(
+        None, description="scenarios that the agents play besides their own when they are trained"
+    )
+    reference: Reference | None = Field(None, description="what was found elsewhere on the scenario itself")
+    net: Annotated[str, StringConstraints(min_length=1, max_length=200)] | None = Field(
+        None, description="a network or preset: " + ", ".join(NETS) + ", or my.module:MyNet"
+    )
+    explo: Literal["none", "auto", "lang", "cell"] | None = Field(
+        None, description="exploration bonus; auto: the paper's choice for the scenario"
+    )
+    envs: int | None = Field(None, ge=1, description="environments stepped together")
+    curriculum: Annotated[str, StringConstraints(min_length=1, max_length=1000)] | None = Field(
+        None, description="who chooses the members of a suite while training"
+    )
+    precision: Literal["auto", "float32", "bfloat16"] | None = Field(
+        None, description="numbers the convolutions of `paper` compute with"
+    )
+    device: Literal["auto", "cpu", "cuda"] | None = Field(None, description="default here: cpu")
+    threads: int | None = Field(None, ge=1, le=64, description="CPU threads of each run; default here: 1")
+    checkpoint_every: int | None = Field(None, ge=1, description="updates between checkpoints")
+    eval_episodes: int | None = Field(None, ge=1, description="episodes of each test set")
+
+
+def one_setting(name: str, value: str | int) -> Settings | str:
+    """The settings that hold this value alone, or what is wrong with it, in words."""
+    try:
+        return Settings.model_validate({name: value})
+    except ValidationError as error:
+        said = error.errors()[0]["msg"]
+        return said[:1].lower() + said[1:]
+
+
+class Condition(Settings):
+    """One cell of the experiment: an agent and a scenario, run once for each seed."""
+
+    name: Label = Field(description="the condition's name; each has its own")
+    group: Label | None = Field(None, description="conditions that are shown together")
+    row: Label | None = Field(None, description="its row in the group's table; default its name")
+    column: Label | None = Field(None, description="its column in the group's table; default the agent")
+
+
+AxisValue = Annotated[
+    Annotated[str | int, Tag("word")] | Annotated[Settings, Tag("mapping")], Discriminator(_is_mapping)
+]
+
+Axis = Annotated[
+    Annotated[
+        tuple[str | int, ...], BeforeValidator(_as_tuple), Field(min_length=1, max_length=1000), Tag("list")
+    ]
+    | Annotated[dict[Label, AxisValue], Field(min_length=1, max_length=1000), Tag("mapping")],
+    Discriminator(lambda value: "mapping" if isinstance(value, dict) else "list"),
+]
+"""The values of one axis of a grid: those of the setting it is named after, or label -> value or several settings."""
+
+
+class Grid(Model):
+    """Every combination of the values of some axes is a condition; the first axis makes the rows of a table."""
+
+    grid: dict[Label, Axis] = Field(
+        min_length=1, max_length=8, description="axis: values; the axis `scenario`, for example"
+    )
+    group: Label | None = Field(None, description="conditions that are shown together")
+    set: Settings | None = Field(None, description="settings of all of them")
+
+
+ConditionOrGrid = Annotated[
+    Annotated[Condition, Tag("condition")] | Annotated[Grid, Tag("grid")],
+    Discriminator(
+        lambda value: (
+            "grid"
+            if isinstance(value, Grid) or (isinstance(value, dict) and "grid" in value)
+            else "condition"
+        )
+    ),
+]
+ConditionList = Annotated[tuple[ConditionOrGrid, ...], BeforeValidator(_as_tuple), Field(max_length=1000)]
+
+
+class Override(Model):
+    """Other settings for some of the conditions."""
+
+    where: dict[Label, Labels] = Field(
+        min_length=1, description="name, row, column, group or an axis: its value, or a list of values"
+    )
+    set: Settings = Field(description="their settings")
+
+
+OverrideList = Annotated[tuple[Override, ...], BeforeValidator(_as_tuple), Field(max_length=1000)]
+
+
+class Profile(Model):
+    """A size in which the experiment can be run; what it says wins over everything else in the file."""
+
+    about: str | None = Field(None, description="one sentence for people")
+    set: Settings | None = Field(None, description="settings of all conditions of the file")
+    overrides: OverrideList = Field((), description="other settings for some of them; later ones win")
+    conditions: ConditionList = Field(
+        (), description="conditions of this profile alone, which `set` is a default for"
+    )
+
+
+class Experiment(Model):
+    """What to run, as a whole."""
+
+    experiment: Word = Field(description="the name of the experiment, and of its folder")
+    about: str | None = Field(None, description="one sentence for people")
+    notes: str | None = Field(None, description="more for people")
+    set: Settings | None = Field(None, description="settings of all conditions that say nothing else")
+    conditions: Annotated[ConditionList, Field(min_length=1)] = Field(
+        description="conditions and grids of them"
+    )
+    overrides: OverrideList = Field(
+        (), description="other settings for some of the conditions; later ones win"
+    )
+    profile: Word | None = Field(None, description="the profile that is meant where none is named")
+    profiles: dict[Word, Profile] = Field(default_factory=dict, description="sizes in which it can be run")

@@ -1,0 +1,75 @@
+"""A program that looks like `socialai run` and `socialai evaluate` from outside, and learns nothing, quickly.
+
+Its weights are a chain of digests, one for each update, so they tell whether an update was left out or made twice.
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import sys
+import time
+from pathlib import Path
+
+FRAMES_OF_AN_UPDATE = 100
+
+
+def run(words: list[str]) -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("scenario", nargs="?")
+    for option in ("out", "resume"):
+        parser.add_argument(f"--{option}", type=Path)
+    for option in ("frames", "seed", "checkpoint-every", "envs"):
+        parser.add_argument(f"--{option}", type=int, default=0)
+    parser.add_argument("--agent", default="ppo")
+    given, _ = parser.parse_known_args(words)
+    folder = given.resume or given.out
+    folder.mkdir(parents=True, exist_ok=True)
+    config = folder / "config.json"
+    if given.out:
+        assert not config.exists(), "--out: the folder holds a run already"
+        settings = {
+            k: getattr(given, k) for k in ("scenario", "frames", "seed", "agent", "checkpoint_every", "envs")
+        }
+        config.write_text(json.dumps(settings))
+    settings = json.loads(config.read_text())
+    if settings["envs"] == 13:
+        print("thirteen environments bring bad luck", file=sys.stderr)
+        sys.exit(1)
+    digest = train(folder, settings) if settings["agent"] == "ppo" else settings["agent"]
+    rate = int(hashlib.sha256(digest.encode()).hexdigest()[:4], 16) / 0xFFFF
+    result = {"frames": settings["frames"], "frames_per_second": 1000.0, "digest": digest}
+    (folder / "result.json").write_text(json.dumps(result | {"eval": {"success_rate": rate}}))
+
+
+def train(folder: Path, settings: dict) -> str:
+    """Weights after all updates, from the newest checkpoint on."""
+    checkpoints = folder / "checkpoints"
+    checkpoints.mkdir(exist_ok=True)
+    found = sorted(checkpoints.glob("*.safetensors"))
+    frames, digest = (
+        (int(found[-1].stem), found[-1].read_text()) if found else (0, f"seed {settings['seed']}")
+    )
+    rows = (folder / "metrics.jsonl").read_text().splitlines() if frames else []
+    rows = [row for row in rows if json.loads(row)["frames"] <= frames]
+    (folder / "metrics.jsonl").write_text("".join(row + "\n" for row in rows))
+    while frames < settings["frames"]:
+        time.sleep(float(os.environ.get("PRETEND_SECONDS", "0")))
+        frames += FRAMES_OF_AN_UPDATE
+        digest = hashlib.sha256(digest.encode()).hexdigest()
+        with open(folder / "metrics.jsonl", "a") as file:
+            file.write(json.dumps({"frames": frames, "frames_per_second": 1000.0}) + "\n")
+        if frames // FRAMES_OF_AN_UPDATE % settings["checkpoint_every"] == 0:
+            temporary = checkpoints / "new"
+            temporary.write_text(digest)
+            temporary.rename(checkpoints / f"{frames:015d}.safetensors")
+    return digest
+
+
+def evaluate(words: list[str]) -> None:
+    scenarios = [words[i + 1] for i, word in enumerate(words) if word == "--on"]
+    print(json.dumps([{"scenario": name, "eval": {"success_rate": 0.5}} for name in scenarios]))
+
+
+if __name__ == "__main__":
+    (run if sys.argv[1] == "run" else evaluate)(sys.argv[2:])
