@@ -64,6 +64,7 @@ _LITERALS: dict[Op, tuple[int, ...]] = {
     Op.B_WALL: (0, 1, 2),
     **dict.fromkeys((Op.B_AND, Op.B_OR, Op.B_WITHOUT, Op.B_COPY), (0, 1)),
     Op.EACH_CELL: (0,),
+    Op.DRAW_ROOM: (0,),
 }
 _ENTRIES = {
     Header.RESET_PC: "reset",
@@ -204,7 +205,7 @@ class _Names:
 
 
 def _least_operands(op: Op) -> int:
-    one = (Op.COUNT, Op.BODY, Op.VANISH, Op.REWARD, Op.IF_UNPINNED, Op.B_FLOOR, Op.B_FREE)
+    one = (Op.COUNT, Op.BODY, Op.VANISH, Op.REWARD, Op.IF_UNPINNED, Op.B_FLOOR, Op.B_FREE, Op.DRAW_ROOM)
     three = (
         *range(Op.ADD, Op.ABS),
         Op.FIELD,

@@ -362,6 +362,8 @@ class Op(IntEnum):
     # Who and what was heard: of the first entry of inbox b (literal) whose class is in class set c (literal).
     HEARD_FROM = 79  # dst a = the speaker's number; -1 if there is none
     HEARD_NOUN = 80  # dst a = the noun; -1 if there is none
+    # Reset code: the board shows the room with what stands in it so far (a literal 1), or bare again (0).
+    DRAW_ROOM = 81
 
 
 class Side(IntEnum):

@@ -229,3 +229,47 @@ def test_whatever_is_moved_into_a_box_comes_out_of_it(tmp_path: Path, what: str)
     assert state["state"]["lay_in_it"] is True
     assert state["box"].get("gone")
     assert [3, 3] in [apple.get("at") for apple in state["apples"]]
+
+
+CROWDED = """
+scenario: crowded
+about: Boxes everywhere.
+horizon: 20
+earshot: room
+grammar: {{templates: [Hello <noun>], nouns: [you]}}
+room: {{size: {size}}}
+objects: {{boxes: {{type: box, count: {boxes}, place: anywhere}}}}
+let:
+  near: pick(b in boxes where agent.can_reach(b))
+  far: pick(b in boxes where not agent.can_reach(b))
+cast: {{agent: {{place: anywhere}}}}
+outcome: [success: agent.said("Hello you")]
+"""
+
+
+def crowded(folder: Path, size: str, boxes: int) -> Pair:
+    """A room full of boxes, on both sides."""
+    path = folder / "crowded.yaml"
+    path.write_text(CROWDED.format(size=size, boxes=boxes), encoding="utf-8")
+    return Pair.of(load(str(path)))
+
+
+def test_what_is_drawn_at_reset_knows_what_is_in_the_way(tmp_path: Path) -> None:
+    pair = crowded(tmp_path, "6", 11)
+    first = 0
+    for episode in range(40):
+        pair.reset(0, episode)
+        pair.step((6, 0, 0, 0))
+        chosen = pair.env.describe()["let"]
+        first += chosen["near"] == "boxes[0]" and chosen["far"] == "boxes[0]"
+    assert first == 0, "without paths all boxes could be reached, or none"
+
+
+def test_an_agent_without_a_cell_sees_what_lies_outside(tmp_path: Path) -> None:
+    pair = crowded(tmp_path, "5..6", 9)
+    absent = 0
+    for episode in range(10):
+        pair.reset(0, episode)
+        pair.step((2, 0, 0, 0))
+        absent += pair.env.describe()["agent"]["at"] is None
+    assert 0 < absent < 10

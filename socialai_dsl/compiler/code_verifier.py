@@ -21,7 +21,7 @@ from socialai_dsl.program import (
     Register,
 )
 
-_RESET_OPS = frozenset((Op.B_FREE, Op.PUT, Op.MAKE_ROOM))
+_RESET_OPS = frozenset((Op.B_FREE, Op.PUT, Op.MAKE_ROOM, Op.DRAW_ROOM))
 _ENTRIES = (
     Header.RESET_PC,
     Header.SETTLE_PC,

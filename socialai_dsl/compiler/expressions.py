@@ -75,6 +75,8 @@ class Expressions:
         of the inbox of the member whose frame this is, or -1.
         loop: the cell that the loop over cells is at, outside of loops None.
         failed: label to skip to when a pick finds nothing; None: it takes the first item.
+        is_bare: whether the board does not show what stands in the room, as while a room is set up.
+        has_drawn: whether some of the code had to have it shown.
     """
 
     def __init__(
@@ -92,6 +94,8 @@ class Expressions:
         self.facts = Facts()
         self.loop: LoopCell | None = None
         self.failed: Label | None = None
+        self.is_bare = False
+        self.has_drawn = False
 
     @cached_property
     def absent(self) -> frozenset[int]:
@@ -138,6 +142,9 @@ class Expressions:
             case terms.Test():
                 assert term.subject is not None
                 subject = self.value(term.subject)
+                if self.is_bare and term.name == "can_reach":
+                    block.emit(Op.DRAW_ROOM, 1)
+                    self.has_drawn = True
                 block.test(_TESTS[term.name], subject, self.value(term.object), otherwise)
             case terms.Sees():
                 self._sees(term, otherwise)

@@ -357,6 +357,9 @@ class _Instruction:
         self.known.has_room = True
         return None if fits else "a room without a template"
 
+    def draw_room(self, a: int, _b: int, _c: int) -> str | None:
+        return self.literal(a, 0, 1) or (None if self.known.has_room else "there is no room yet")
+
 
 _CHECKS: dict[Op, Callable[[_Instruction, int, int, int], str | None]] = {
     **dict.fromkeys((Op.IF_EQ, Op.IF_NE, Op.IF_LT, Op.IF_LE), _Instruction.compare),
@@ -408,6 +411,7 @@ _CHECKS: dict[Op, Callable[[_Instruction, int, int, int], str | None]] = {
     Op.B_COUNT: _Instruction.count_cells,
     Op.PUT: _Instruction.put,
     Op.MAKE_ROOM: _Instruction.make_room,
+    Op.DRAW_ROOM: _Instruction.draw_room,
 }
 
 _ONE_TEMPORARY = frozenset(

@@ -29,6 +29,7 @@ ALL_COLORS = (1 << len(COLORS)) - 1
 def reset(to: Expressions, computed: ComputedStatuses, homes: Homes) -> None:
     """Emit everything that happens at reset."""
     checked, registers = to.checked, to.registers
+    to.is_bare = True
     _room(to, checked.room)
     for entity in checked.entities:
         if status := entity.status if entity.role == "object" else entity.kind_code:
@@ -46,6 +47,8 @@ def reset(to: Expressions, computed: ComputedStatuses, homes: Homes) -> None:
         _not_yet(to, registers.by_path[item.path])
     computed.fix(to)
     homes.save(to)
+    if to.has_drawn:  # everything is drawn once more when the code has run, into the bare room
+        to.block.emit(Op.DRAW_ROOM, 0)
 
 
 def require(to: Expressions) -> None:

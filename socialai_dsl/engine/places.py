@@ -3,7 +3,7 @@
 import numpy as np
 
 from socialai_dsl.engine.bits import count_bits, lowest_bit, nth_bit
-from socialai_dsl.engine.boards import copy_room, room_table
+from socialai_dsl.engine.boards import copy_room, draw_all, room_table
 from socialai_dsl.engine.entities import field, front_direction, is_present, set_field, step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.operands import assign, draw_below, value
@@ -30,6 +30,10 @@ def place(row: Row, op: int, a: int, b: int, c: int) -> None:
         _write_cell(row, a, next_cell(row, b, NOTHING, ZERO))
     elif op == Op.NEAREST_CELL:
         _write_cell(row, a, _nearest_cell(row, b, value(row, c)))
+    elif op == Op.DRAW_ROOM:
+        copy_room(row)
+        if a == 1:
+            draw_all(row)
     elif op >= Op.HEARD_FROM:
         assign(row, a, first_heard(row, b, c, op - Op.HEARD_FROM + 1))
     elif op == Op.B_FLOOR or op == Op.B_RECT:

@@ -13,6 +13,8 @@ NOTHING = 255  # in the channels of gestures
 LAST_ACTS = {"forward": 0, "left": 1, "right": 2, "toggle": 3, "point": 4, "stop_pointing": 8, "none": 10}
 EMPTY, WALL = (1, 0, 0, 0), (2, 5, 0, 0)
 NPC = 11
+NOWHERE = (-1000, -1000)
+"""Where an agent looks from that had no cell to be put on: all that it sees lies off the canvas."""
 
 
 def picture(world: World, canvas: tuple[int, int]) -> np.ndarray:
@@ -20,8 +22,8 @@ def picture(world: World, canvas: tuple[int, int]) -> np.ndarray:
     (7, 7, 6)."""
     image = np.full((SIZE, SIZE, 6 if world.gestures else 4), NOTHING, dtype=np.uint8)
     agent = world.agent
-    eye = agent.cell or (0, 0)
-    bright = lit(world, eye, agent.facing, SIZE) if world.occlusion else None
+    eye = agent.cell or NOWHERE
+    bright = lit(world, eye, agent.facing, SIZE) if world.occlusion and agent.cell else None
     for i in range(SIZE):
         for j in range(SIZE):
             ahead, right = 6 - j, i - 3

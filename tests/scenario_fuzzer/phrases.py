@@ -247,9 +247,8 @@ class Phrases:
 
     def relation(self, where: Where) -> str:
         """A condition between two things, or of somebody and a place."""
-        verbs = ("at", "next_to", "in_line", "unobstructed", "in_front_of", "faces", *SEARCHING)
-        # Of what is computed at reset only `require` knows which objects are in the way.
-        verb = self.rng.choice(verbs if where.reset else (*verbs, "can_reach"))
+        verbs = ("at", "next_to", "in_line", "unobstructed", "in_front_of", "faces", "can_reach", *SEARCHING)
+        verb = self.rng.choice(verbs)
         who = self.member(where)
         others: list[str | Callable[[], str]] = [lambda: self.entity(where)] * 3
         others += [thing.name for thing in self.declared.several] + list(self.declared.groups)

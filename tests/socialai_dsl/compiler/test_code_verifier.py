@@ -185,6 +185,8 @@ REFUSED: dict[str, tuple[Header, Code]] = {
     "a pick without a site": (RULES, [FILL, (Op.PICK_CELL, temp(0), 0, 999)]),
     "free cells in a rule": (RULES, [FILL, (Op.B_FREE, 0)]),
     "a placement in a rule": (RULES, [FILL, (Op.FIRST_CELL, temp(0), 0), (Op.PUT, const(1), temp(0))]),
+    "a room shown in a rule": (RULES, [(Op.DRAW_ROOM, 1)]),
+    "a room shown in no way there is": (RESET, [(Op.DRAW_ROOM, 2)]),
     "a new room in a rule": (RULES, [(Op.MAKE_ROOM, const(7), const(7))]),
     "a loop over nothing": (RULES, [(*EACH, 1), (Op.DROP_CELL,), (Op.END_EACH,)]),
     "a loop without an end": (RULES, [FILL, (*EACH, 1), (Op.DROP_CELL,), (Op.SKIP, 0, 0, 0)]),
