@@ -296,17 +296,18 @@ class Assembly:
 
     def _room(self) -> list[int]:
         (width, height), (across, down) = self.canvas, self.size
-        cells, solid, floor = [], [0] * height, [0] * height
+        cells, solid, floor, opaque = [], [0] * height, [0] * height, [0] * height
         for y in range(height):
             for x in range(width):
                 inside = x < across and y < down
                 wall = inside and (x in (0, across - 1) or y in (0, down - 1))
+                opaque[y] |= wall << x
                 cells.append(pack_cell(WALL, 5) if wall else pack_cell(EMPTY))
                 if wall or not inside:
                     solid[y] |= 1 << x
                 else:
                     floor[y] |= 1 << x
-        return [*cells, pack_cell(WALL, 5), *solid, *floor]
+        return [*cells, pack_cell(WALL, 5), *solid, *floor, *opaque]
 
     def _frames(self, registers: int, inbox: int) -> list[int]:
         rows: list[int] = []

@@ -21,6 +21,7 @@ from socialai_dsl.program import (
     Header,
     Op,
     Program,
+    room_words,
 )
 
 _TWO_PLACES = range(Op.IF_SAME_CELL, Op.IF_UNOBSTRUCTED + 1)
@@ -351,7 +352,7 @@ class _Instruction:
         low, high = h(Header.MIN_HEIGHT), h(Header.MIN_HEIGHT) + h(Header.HEIGHTS) - 1
         if problem := self.value(a, h(Header.MIN_WIDTH), h(Header.CANVAS_WIDTH)) or self.value(b, low, high):
             return problem
-        size = h(Header.CANVAS_WIDTH) * h(Header.CANVAS_HEIGHT) + 1 + 2 * h(Header.CANVAS_HEIGHT)
+        size = room_words(h(Header.CANVAS_WIDTH), h(Header.CANVAS_HEIGHT))
         templates = (self._interval(a)[1] - h(Header.MIN_WIDTH) + 1) * h(Header.HEIGHTS)
         fits = h(Header.ROOM_AT) + templates * size <= len(self.program.words)
         self.known.has_room = True

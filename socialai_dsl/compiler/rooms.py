@@ -28,25 +28,34 @@ def _template(room: RoomPlan, width: int, height: int) -> list[int]:
     columns, rows = room.canvas
     cells = [[EMPTY] * columns for _ in range(rows)]
     solid = [(1 << columns) - 1] * rows
-    floor = [0] * rows
+    floor, opaque = [0] * rows, [0] * rows
     for x, y in product(range(width), range(height)):
         if x in (0, width - 1) or y in (0, height - 1):
             cells[y][x] = WALL
+            opaque[y] |= 1 << x
         else:
             solid[y] &= ~(1 << x)
             floor[y] |= 1 << x
     for kind, region, _span in room.build:
         for x, y in interior_cells(region, (width, height)):
-            _build(kind, x, y, cells, solid, floor)
-    return [*(cell for row in cells for cell in row), WALL, *solid, *floor]
+            _build(kind, x, y, cells, solid, floor, opaque)
+    return [*(cell for row in cells for cell in row), WALL, *solid, *floor, *opaque]
 
 
 def _build(
-    kind: ObjectType, x: int, y: int, cells: list[list[int]], solid: list[int], floor: list[int]
+    kind: ObjectType,
+    x: int,
+    y: int,
+    cells: list[list[int]],
+    solid: list[int],
+    floor: list[int],
+    opaque: list[int],
 ) -> None:
     shown = kind.shown.get(kind.initial, (kind.initial, 0))
     cells[y][x] = pack_cell(kind.code, kind.color, *shown)
     floor[y] &= ~(1 << x)
-    solid[y] &= ~(1 << x)
-    if kind.initial not in kind.walkable:
-        solid[y] |= 1 << x
+    for rows, here in (
+        (solid, kind.initial not in kind.walkable),
+        (opaque, kind.initial not in kind.transparent),
+    ):
+        rows[y] = rows[y] | 1 << x if here else rows[y] & ~(1 << x)

@@ -21,6 +21,7 @@ from socialai_dsl.program import (
     LineColumn,
     Program,
     TypeColumn,
+    room_words,
 )
 
 __all__ = ["InvalidProgramError", "verify"]
@@ -52,7 +53,7 @@ def _sizes(program: Program) -> dict[Header, int]:
         Header.CLASS_AT: h(Header.TEMPLATES) * h(Header.NOUNS),
         Header.ENTITY_AT: h(Header.ENTITIES) * EntityColumn.COLUMNS,
         Header.TYPE_AT: h(Header.TYPE_ROWS) * TypeColumn.COLUMNS,
-        Header.ROOM_AT: h(Header.HEIGHTS) * (width * height + 1 + 2 * height),
+        Header.ROOM_AT: h(Header.HEIGHTS) * room_words(width, height),
         Header.FRAME_AT: h(Header.FRAMES) * FrameColumn.COLUMNS,
         Header.STATE_AT: h(Header.STATES) * (1 + 2 * (h(Header.CLASSES) + 1)),
         Header.OUTCOME_AT: h(Header.CLASSES) * 8,

@@ -6,7 +6,6 @@ from socialai_dsl.engine.entities import column, field, is_at, is_present
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.state import Row
 from socialai_dsl.program import (
-    CODES_OF_TYPES,
     EntityColumn,
     Field,
     Flag,
@@ -14,10 +13,6 @@ from socialai_dsl.program import (
     Register,
     TypeColumn,
 )
-
-_EMPTY = CODES_OF_TYPES["empty"]
-_WALL = CODES_OF_TYPES["wall"]
-_WITHOUT_COLOR = np.int64(0xFFFF00FF)
 
 
 @inline
@@ -62,22 +57,14 @@ def room_table(row: Row) -> int:
     """Offset of the template of this room."""
     width = row.program[Header.CANVAS_WIDTH]
     height = row.program[Header.CANVAS_HEIGHT]
-    return row.program[Header.ROOM_AT] + row.registers[Register.ROOM] * (width * height + 1 + 2 * height)
+    return row.program[Header.ROOM_AT] + row.registers[Register.ROOM] * (width * height + 1 + 3 * height)
 
 
 @inline
-def is_built_opaque(row: Row, x: int, y: int) -> bool:
-    """Whether one cannot look through this cell of the bare room, by its look: what is built is a type in a status."""
-    look = row.program[room_table(row) + y * row.program[Header.CANVAS_WIDTH] + x] & _WITHOUT_COLOR
-    if look & 0xFF == _EMPTY:
-        return np.bool_(False)
-    table = row.program[Header.TYPE_AT]
-    for _ in range(row.program[Header.TYPE_ROWS]):
-        shown = row.program[table + TypeColumn.CODE] | row.program[table + TypeColumn.STATUS] << 16
-        if look == shown | row.program[table + TypeColumn.ORIENTATION] << 24:
-            return row.program[table + TypeColumn.TRANSPARENT] == 0
-        table += TypeColumn.COLUMNS
-    return look & 0xFF == _WALL
+def built_opaque_line(row: Row, y: int) -> int:
+    """The cells of a line of the bare room that one cannot look through, bit x for column x."""
+    height = row.program[Header.CANVAS_HEIGHT]
+    return row.program[room_table(row) + row.program[Header.CANVAS_WIDTH] * height + 1 + 2 * height + y]
 
 
 @inline

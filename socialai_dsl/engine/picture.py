@@ -9,8 +9,8 @@ from socialai_dsl.engine import rng
 from socialai_dsl.engine.entities import field, npc_at, step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.pointers import uint16_of
-from socialai_dsl.engine.shadows import light_next, look_around
-from socialai_dsl.engine.state import AGENT, ONE, Book, Link, Row, Trait
+from socialai_dsl.engine.shadows import lit_cells, look_around
+from socialai_dsl.engine.state import AGENT, NOTHING, Book, Link, Row, Trait
 from socialai_dsl.program import (
     CODES_OF_TYPES,
     LAST_ACTS,
@@ -92,7 +92,7 @@ def take_picture(row: Row, link: int, book: Any, number: int) -> None:
                 _turn_npcs(row, field(row, AGENT, Field.DIR))
     row.image[OWN_PLACE] = OWN_LOOK
     if row.program[Header.FLAGS] & Trait.GESTURES:
-        _take_gestures(row, link, uint16_of(book, Book.EXTRA, number))
+        _take_gestures(row, uint16_of(book, Book.EXTRA, number))
 
 
 @outline
@@ -100,42 +100,52 @@ def _hide_unlit(row: Row, x: int, y: int, direction: int) -> None:
     """Let cells that no light reaches the agent from read 0, which is unseen."""
     stay_outline()
     look_around(row)
-    lit = ONE << _HALF
-    for ahead in range(VIEW):
-        lit = light_next(row, x, y, direction, _HALF, lit)
-        for i in range(VIEW):
-            if (lit >> i) & 1 == 0:
-                row.image[i * VIEW + VIEW - 1 - ahead] = 0
-        lit >>= 32
-        x += step_x(direction)
-        y += step_y(direction)
+    lit = lit_cells(row, x, y, direction)
+    for i in range(VIEW):
+        column = np.uint32((lit >> np.uint64(8 * i)) & np.uint64(0xFF))
+        for j in range(VIEW):
+            row.image[i * VIEW + j] &= np.uint32(0) - ((column >> np.uint32(j)) & np.uint32(1))
+
+
+@inline
+def _place_in_picture(row: Row, npc: int) -> int:
+    """Where the picture shows an NPC, -1 if nowhere: it may be out of view, hidden, or behind another in its cell."""
+    direction = field(row, AGENT, Field.DIR)
+    x = field(row, npc, Field.X)
+    y = field(row, npc, Field.Y)
+    dx = x - field(row, AGENT, Field.X)
+    dy = y - field(row, AGENT, Field.Y)
+    ahead = dx * step_x(direction) + dy * step_y(direction)
+    right = dy * step_x(direction) - dx * step_y(direction)
+    if ahead < 0 or ahead >= VIEW or abs(right) > _HALF:
+        return NOTHING
+    place = (right + _HALF) * VIEW + VIEW - 1 - ahead
+    shown = row.image[place] & 0xFF == _NPC and npc_at(row, x, y) == npc
+    return place if shown else NOTHING
 
 
 @outline
 def _turn_npcs(row: Row, direction: int) -> None:
     """Show the directions of NPCs relative to the agent's: 0 the opposite, 2 the same."""
     stay_outline()
-    for i in range(CELLS):
-        look = row.image[i]
-        if look & 0xFF == _NPC:
-            row.image[i] = (look & 0xFFFFFF) | (((look >> 24) - direction + 2) & 3) << 24
+    for npc in range(1, row.program[Header.NPCS] + 1):
+        place = _place_in_picture(row, npc)
+        if place >= 0:
+            look = row.image[place]
+            row.image[place] = (look & 0xFFFFFF) | (((look >> 24) - direction + 2) & 3) << 24
 
 
 @outline
-def _take_gestures(row: Row, link: int, extra: NDArray[np.uint16]) -> None:
+def _take_gestures(row: Row, extra: NDArray[np.uint16]) -> None:
     """Write where the NPCs in the picture point and what they did last, if the program shows it."""
     stay_outline()
-    width = row.program[Header.CANVAS_WIDTH]
-    own = field(row, AGENT, Field.DIR)
-    pose = (field(row, AGENT, Field.Y) * width + field(row, AGENT, Field.X)) * 4 + own
-    view = (row.program[link + Link.VIEWS] + pose) * CELLS
     for i in range(CELLS):
         extra[i] = NO_GESTURE << 8 | NO_GESTURE
-        if row.program[Header.CHANNELS] == _WITH_GESTURES and row.image[i] & 0xFF == _NPC:
-            cell = np.int64(row.views[view + i])
-            npc = npc_at(row, cell % width, cell // width)
-            if npc > 0:
-                extra[i] = _gesture(row, npc, own)
+    if row.program[Header.CHANNELS] == _WITH_GESTURES:
+        for npc in range(1, row.program[Header.NPCS] + 1):
+            place = _place_in_picture(row, npc)
+            if place >= 0:
+                extra[place] = _gesture(row, npc, field(row, AGENT, Field.DIR))
 
 
 @inline

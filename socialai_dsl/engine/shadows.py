@@ -1,29 +1,56 @@
-"""What is hidden behind what: the usual shadow casting of grid-worlds, row by row away from the viewer."""
+"""What is hidden behind what: the usual shadow casting of grid-worlds, row by row away from the viewer.
 
-from socialai_dsl.engine.boards import is_built_opaque, type_row
+A row of a view is a word, bit 0 its leftmost cell. Light that reaches a cell one can look through goes on along the row
+and lights the three cells before it in the next row.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.engine.boards import built_opaque_line, type_row
 from socialai_dsl.engine.entities import field, is_present, step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.sets import add_cell, clear, has_cell
-from socialai_dsl.engine.state import FRONT, ONE, SEEN, ZERO, Row
-from socialai_dsl.program import Field, Header, TypeColumn
+from socialai_dsl.engine.sets import add_cell, drop_cell, get_line, set_line
+from socialai_dsl.engine.state import FRONT, ONE, ZERO, Row
+from socialai_dsl.program import VIEW, Field, Header, TypeColumn
 
-FURNISHED = SEEN
 OPAQUE = FRONT
-"""Boards of `look_around`: cells with an object, and with one that is not transparent. Paths use them too."""
+"""The board of `look_around`: cells that one cannot look through. Paths use it too."""
+
+_HALF = VIEW // 2
+_ROW = np.int64((1 << VIEW) - 1)
+
+
+def _onward() -> NDArray[np.uint8]:
+    """Where light goes on to, (16384,): by the cells of a row that it reaches << 7 | those one can look through."""
+    through = np.arange(1 << 2 * VIEW) & _ROW
+    passed = np.arange(1 << 2 * VIEW) >> VIEW & through
+    for _ in range(VIEW):
+        passed |= (passed << 1 | passed >> 1) & through
+    return ((passed | passed << 1 | passed >> 1) & _ROW).astype(np.uint8)
+
+
+_ONWARD = _onward()
+# Masks of the three rounds in which a matrix of 8 x 8 bits is transposed: blocks of 1, 2 and 4 bits change places.
+_ONES = np.uint64(0x00AA00AA00AA00AA)
+_TWOS = np.uint64(0x0000CCCC0000CCCC)
+_FOURS = np.uint64(0x00000000F0F0F0F0)
+_BYTES = np.uint64(0x00FF00FF00FF00FF)
+_PAIRS = np.uint64(0x0000FFFF0000FFFF)
 
 
 @inline
 def look_around(row: Row) -> None:
-    """Note where objects are, and where one cannot look through them; `light_next` reads it."""
-    clear(row, FURNISHED)
-    clear(row, OPAQUE)
-    for entity in range(row.program[Header.NPCS] + 1, row.program[Header.ENTITIES]):
+    """Note where one cannot look through; `light_next` and `lit_cells` read it."""
+    for y in range(row.program[Header.CANVAS_HEIGHT]):
+        set_line(row, OPAQUE, y, built_opaque_line(row, y))
+    first = row.program[Header.NPCS] + 1
+    for entity in range(first, row.program[Header.ENTITIES]):  # what is furnished is not as it was built
         if is_present(row, entity):
-            x = field(row, entity, Field.X)
-            y = field(row, entity, Field.Y)
-            add_cell(row, FURNISHED, x, y)
-            if row.program[type_row(row, entity) + TypeColumn.TRANSPARENT] == 0:
-                add_cell(row, OPAQUE, x, y)
+            drop_cell(row, OPAQUE, field(row, entity, Field.X), field(row, entity, Field.Y))
+    for entity in range(first, row.program[Header.ENTITIES]):
+        if is_present(row, entity) and row.program[type_row(row, entity) + TypeColumn.TRANSPARENT] == 0:
+            add_cell(row, OPAQUE, field(row, entity, Field.X), field(row, entity, Field.Y))
 
 
 @outline
@@ -47,16 +74,19 @@ def light_next(row: Row, x: int, y: int, direction: int, half: int, lit: int) ->
     through = ZERO
     for i in range(2 * half + 1):
         through |= _is_transparent(row, x + (i - half) * right_x, y + (i - half) * right_y) << i
-    ahead = ZERO
-    for i in range(2 * half):
-        if (lit & through) >> i & 1 == 1:
-            lit |= ONE << (i + 1)
-            ahead |= (ONE << i) | (ONE << (i + 1))
-    for i in range(2 * half, 0, -1):
-        if (lit & through) >> i & 1 == 1:
-            lit |= ONE << (i - 1)
-            ahead |= (ONE << i) | (ONE << (i - 1))
-    return lit | ahead << 32
+    passed = lit & through
+    before = ZERO
+    while passed != before:
+        before = passed
+        passed |= ((passed << 1) | (passed >> 1)) & through
+    ahead = _beside(passed) & ((ONE << (2 * half + 1)) - 1)
+    return lit | ahead | ahead << 32
+
+
+@inline
+def _beside(cells: int) -> int:
+    """These cells of a row and their neighbours."""
+    return cells | cells << 1 | cells >> 1
 
 
 @inline
@@ -64,9 +94,7 @@ def _is_transparent(row: Row, x: int, y: int) -> int:
     """1 if one can look through this cell, else 0; nobody can off the canvas."""
     if x < 0 or x >= row.program[Header.CANVAS_WIDTH] or y < 0 or y >= row.program[Header.CANVAS_HEIGHT]:
         return ZERO
-    if has_cell(row, FURNISHED, x, y):
-        return ZERO if has_cell(row, OPAQUE, x, y) else ONE
-    return ZERO if is_built_opaque(row, x, y) else ONE
+    return 1 - ((get_line(row, OPAQUE, y) >> x) & 1)
 
 
 @outline
@@ -84,3 +112,53 @@ def is_lit(row: Row, x: int, y: int, direction: int, half: int, ahead: int, righ
         y += step_y(direction)
     lit = light_next(row, x, y, direction, half, lit)
     return (lit >> (right + half)) & 1 == 1
+
+
+@inline
+def lit_cells(row: Row, x: int, y: int, direction: int) -> np.uint64:
+    """The cells of the agent's picture that light reaches it from: bit 8 i + j for image[i, j].
+
+    The same as `light_next` row by row, with the whole view in one word. `look_around` must have been called.
+    """
+    # Rows and columns of the room from the upper left corner of the view on, where off the canvas is opaque.
+    top = y - _HALF * (1 - step_y(direction)) if direction & 1 == 1 else y - _HALF
+    left = x - _HALF if direction & 1 == 1 else x - _HALF * (1 - step_x(direction))
+    beyond = np.int64(-1) << row.program[Header.CANVAS_WIDTH]
+    opaque = np.uint64(0)
+    for r in range(VIEW):
+        line = np.int64(-1)
+        if 0 <= top + r < row.program[Header.CANVAS_HEIGHT]:
+            line = (((get_line(row, OPAQUE, top + r) | beyond) << VIEW) | _ROW) >> (left + VIEW)
+        opaque |= np.uint64(line & _ROW) << np.uint64(8 * r)
+    if direction & 1 == 0:
+        opaque = _transposed(opaque)
+    backward = direction >= 2  # rows of the view are counted away from the agent
+    reached = ONE << _HALF
+    lit = np.uint64(0)
+    for ahead in range(VIEW):
+        byte = np.uint64(8 * (VIEW - 1 - ahead) if backward else 8 * ahead)
+        through = ~np.int64(opaque >> byte) & _ROW
+        onward = np.int64(_ONWARD[reached << VIEW | through])
+        lit |= np.uint64(reached | onward) << np.uint64(8 * (VIEW - 1 - ahead))
+        reached = onward
+    lit = _transposed(lit)
+    return _swapped(lit) if direction == 1 or direction == 2 else lit
+
+
+@inline
+def _transposed(bits: np.uint64) -> np.uint64:
+    """A matrix of 8 x 8 bits, a byte for each row, with rows and columns exchanged."""
+    change = (bits ^ (bits >> np.uint64(7))) & _ONES
+    bits = bits ^ change ^ (change << np.uint64(7))
+    change = (bits ^ (bits >> np.uint64(14))) & _TWOS
+    bits = bits ^ change ^ (change << np.uint64(14))
+    change = (bits ^ (bits >> np.uint64(28))) & _FOURS
+    return bits ^ change ^ (change << np.uint64(28))
+
+
+@inline
+def _swapped(bits: np.uint64) -> np.uint64:
+    """The seven lower bytes in the opposite order."""
+    bits = ((bits >> np.uint64(8)) & _BYTES) | ((bits & _BYTES) << np.uint64(8))
+    bits = ((bits >> np.uint64(16)) & _PAIRS) | ((bits & _PAIRS) << np.uint64(16))
+    return ((bits >> np.uint64(32)) | (bits << np.uint64(32))) >> np.uint64(8)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from socialai_dsl.engine.boards import is_built_opaque, type_row
+from socialai_dsl.engine.boards import built_opaque_line, type_row
 from socialai_dsl.engine.entities import column, is_at, step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.shadows import is_lit
@@ -61,4 +61,4 @@ def _is_opaque(row: Row, x: int, y: int) -> bool:
             if row.program[type_row(row, entity) + TypeColumn.TRANSPARENT] == 0:
                 return np.bool_(True)
             furnished = True
-    return not furnished and is_built_opaque(row, x, y)
+    return not furnished and (built_opaque_line(row, y) >> x) & 1 == 1

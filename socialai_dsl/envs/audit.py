@@ -16,6 +16,7 @@ from socialai_dsl.program import (
     Header,
     Program,
     Register,
+    room_words,
 )
 
 Bounds = NDArray[np.int16]
@@ -89,7 +90,7 @@ def _common(program: Program) -> list[Range]:
 def _rooms_that_fit(program: Program) -> int:
     """How many room templates the program has space for behind the first."""
     h = program.header
-    size = h(Header.CANVAS_WIDTH) * h(Header.CANVAS_HEIGHT) + 1 + 2 * h(Header.CANVAS_HEIGHT)
+    size = room_words(h(Header.CANVAS_WIDTH), h(Header.CANVAS_HEIGHT))
     return min((h(Header.SIZE) - h(Header.ROOM_AT)) // size, np.iinfo(np.int16).max)
 
 

@@ -9,7 +9,17 @@ import numpy as np
 from gymnasium import spaces
 
 from socialai_dsl.engine.batch import Part
-from socialai_dsl.program import BODY_WORDS, NO_GESTURE, VIEW, Body, EntityColumn, Header, Program, TypeColumn
+from socialai_dsl.program import (
+    BODY_WORDS,
+    NO_GESTURE,
+    VIEW,
+    Body,
+    EntityColumn,
+    Header,
+    Program,
+    TypeColumn,
+    room_words,
+)
 from socialai_dsl.program_suite import Playable, ProgramSuite, mixture, prefixed
 
 
@@ -128,7 +138,7 @@ def _highest_codes(program: Program) -> tuple[int, int, int, int]:
     )
     rooms = words[h(Header.ROOM_AT) : h(Header.FRAME_AT)].view(np.uint32) if h(Header.FRAME_AT) else words[:0]
     width, height = h(Header.CANVAS_WIDTH), h(Header.CANVAS_HEIGHT)
-    cells = rooms.reshape(-1, width * height + 1 + 2 * height)[:, : width * height + 1]
+    cells = rooms.reshape(-1, room_words(width, height))[:, : width * height + 1]
     kinds = max((int(kind) for kind in _kinds(program)), default=0)
     return (
         max(int(types[:, TypeColumn.CODE].max()), int((cells & 255).max())),
