@@ -33,6 +33,7 @@ _COMMANDS: Final = (
     "oracles",
     "check",
     "curves",
+    "report",
     "sheets",
     "experiment",
 )

@@ -286,7 +286,7 @@ def _resumed(arguments: argparse.Namespace) -> Settings:
 
 
 def _draw_curve(settings: Settings, program: "Playable", folder: Path, result: dict[str, Any]) -> None:
-    from socialai_dsl.cli.curve import draw_learning_curve, read_curve
+    from socialai_dsl.reporting.curve import draw_learning_curve, read_curve
 
     test = (result["frames"], result["eval"]["success_rate"], *result["eval"]["success_interval"])
     successes = frozenset(outcome.name for outcome in program.outcome_table if outcome.success)
