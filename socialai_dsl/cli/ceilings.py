@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.cli.errors import UsageError
 from socialai_dsl.cli.run_folder import read_json, write_json
@@ -32,7 +32,7 @@ def known_ceilings(experiment: "Experiment") -> "dict[str, Ceilings]":
             episodes = sum(one.episodes for one in rates)
             level = Level(value, _error(value, episodes), f"{entry.name}, {episodes:,} episodes")
             told.setdefault(entry.scenario, {})[entry.agent] = level
-    return {scenario: Ceilings(**levels) for scenario, levels in told.items()}
+    return {s: Ceilings(oracle=one.get("oracle"), random=one.get("random")) for s, one in told.items()}
 
 
 def measured_ceilings(scenario: str) -> "Ceilings":

@@ -28,6 +28,9 @@ THRESHOLDS: Final = (0.25, 0.5, 0.75, 0.9)
 RISING: Final = 0.05
 """A curve still rises if the last fifth of its training lies so far above the fifth before."""
 
+SOLVED: Final = 0.95
+"""With such a success on the test episodes it does not matter whether a curve still rises."""
+
 _TABLES: Final = ("table2", None)
 """Groups that are tables of rows and columns; any other is a case study, whose conditions are compared in pairs."""
 
@@ -247,10 +250,10 @@ def _summarise(condition: Condition) -> Summary:
     }
     curves = [updates for run in condition.runs if (updates := run.updates()) is not None]
     seeds = align(curves) if curves else None
-    return Summary(condition, success, tests, seeds, tuple(_too_short(condition, seeds)))
+    return Summary(condition, success, tests, seeds, tuple(_too_short(condition, success, seeds)))
 
 
-def _too_short(condition: Condition, seeds: Seeds | None) -> list[str]:
+def _too_short(condition: Condition, success: Spread, seeds: Seeds | None) -> list[str]:
     reasons = []
     missing = len(condition.runs) - len(condition.done)
     if missing:
@@ -259,7 +262,9 @@ def _too_short(condition: Condition, seeds: Seeds | None) -> list[str]:
     if asked is not None and any(run.frames < asked for run in condition.done):
         least = min(run.frames for run in condition.done)
         reasons.append(f"a seed stopped at {least:,} of {asked:,} frames")
-    if seeds is not None and (rise := still_rising(seeds)) is not None and rise > RISING:
+    rise = still_rising(seeds) if seeds is not None else None
+    solved = success.n > 0 and success.mean >= SOLVED
+    if rise is not None and rise > RISING and not solved:
         reasons.append(f"success still rises, by {rise:.2f} in the last fifth of training")
     return reasons
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,9 +16,14 @@ from socialai_dsl.reporting.curve import draw_outcomes
 from socialai_dsl.reporting.seeds import Float, mean_over_seeds
 from socialai_dsl.reporting.style import INK, MUTED, colour, frames, marker, new_figure, rates, shown
 
-_PANEL: Final = (3.7, 2.75)  # inches
+_PANEL: Final = (4.4, 2.9)  # inches
 _ACROSS: Final = 2
-_LEVELS: Final = (("oracle", "own script", "-"), ("random", "random", ":"), ("alone", "without NPCs", "--"))
+_Style = Literal["-", ":", "--"]
+_LEVELS: Final[tuple[tuple[str, str, _Style], ...]] = (
+    ("oracle", "own script", "-"),
+    ("random", "random", ":"),
+    ("alone", "without NPCs", "--"),
+)
 
 
 def colours_of(section: Section) -> dict[str, int]:
@@ -32,7 +37,7 @@ def success_figure(section: Section, ceilings: Mapping[str, Ceilings]) -> Figure
     rows = section.rows if section.is_table else {s.name: [s] for s in section.summaries}
     colours = colours_of(section)
     lanes = sum(len(members) for members in rows.values()) + 0.9 * (len(rows) - 1)
-    figure = new_figure(7.4, 0.9 + 0.27 * lanes + 0.25)
+    figure = new_figure(8.8, 0.9 + 0.27 * lanes + 0.25)
     axes = figure.subplots()
     place, ticks = 0.0, []
     for members in rows.values():
@@ -122,7 +127,7 @@ def curves_figure(section: Section, ceilings: Mapping[str, Ceilings]) -> Figure 
     colours = colours_of(section)
     across = min(_ACROSS, len(rows))
     down = -(-len(rows) // across)
-    width = _PANEL[0] * across if len(rows) > 1 else 6.4
+    width = _PANEL[0] * across if len(rows) > 1 else 8.0
     figure = new_figure(width, _PANEL[1] * down * (1.25 if len(rows) == 1 else 1) + 0.5)
     panels = figure.subplots(down, across, squeeze=False).ravel()
     for axes in panels[len(rows) :]:
@@ -193,7 +198,9 @@ def _curve(axes: Axes, summary: Summary, index: int) -> None:
     axes.fill_between(
         seeds.frames, mean - std, mean + std, color=colour(index), alpha=0.15, linewidth=0, zorder=1.5
     )
-    axes.plot(seeds.frames, mean, color=colour(index), linewidth=2, zorder=3)
+    axes.plot(seeds.frames, mean, "--", color=colour(index), linewidth=1.2, zorder=3)
+    everyone = np.where(np.isnan(seeds.success).any(0), np.nan, mean)
+    axes.plot(seeds.frames, everyone, color=colour(index), linewidth=2, zorder=3)
 
 
 def std_over_seeds(rates: Float) -> Float:
@@ -251,7 +258,7 @@ _BELOW: Final = {"loc": "upper left", "bbox_to_anchor": (-0.05, -0.14), "ncols":
 
 def iqm_figure(aggregates: Sequence[Aggregate], columns: Sequence[str]) -> Figure:
     """Interquartile mean of each column with its interval."""
-    figure = new_figure(6.4, 0.75 + 0.36 * len(aggregates))
+    figure = new_figure(8.0, 0.75 + 0.36 * len(aggregates))
     axes = figure.subplots()
     for place, aggregate in enumerate(aggregates):
         index = columns.index(aggregate.column)
