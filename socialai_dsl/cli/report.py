@@ -128,9 +128,9 @@ def _write(analysis: "Analysis", out: Path) -> None:
     document = compose(analysis, version("socialai-dsl"))
     figures = out / FIGURES
     figures.mkdir(exist_ok=True)
-    for name, (svg, png) in document.images.items():
-        (figures / f"{name}.svg").write_bytes(svg)
-        (figures / f"{name}.png").write_bytes(png)
+    for name, image in document.images.items():
+        (figures / f"{name}.svg").write_bytes(image.svg)
+        (figures / f"{name}.png").write_bytes(image.png)
     for name, rows in tables(analysis).items():
         write_text(out / f"{name}.csv", as_csv(rows))
         if rows and (content := as_parquet(rows)) is not None:

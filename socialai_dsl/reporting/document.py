@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Union
 
@@ -91,6 +91,15 @@ class Figure:
 
 
 @dataclass(frozen=True)
+class Image:
+    """A drawing's files: as SVG and PNG, and as SVG for screens as narrow as a telephone's."""
+
+    svg: bytes
+    png: bytes
+    narrow: bytes
+
+
+@dataclass(frozen=True)
 class Folded:
     """Blocks that open at a click."""
 
@@ -106,10 +115,10 @@ class Document:
     """A report.
 
     Attributes:
-        title, subtitle: at its head. blocks: the rest. images: name of a figure -> its SVG and PNG.
+        title, subtitle: at its head. blocks: the rest. images: of its figures, by name.
     """
 
     title: str
     subtitle: str
     blocks: Sequence[Block]
-    images: dict[str, tuple[bytes, bytes]]
+    images: Mapping[str, Image]

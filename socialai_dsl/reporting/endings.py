@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from socialai_dsl.reporting import plots
-from socialai_dsl.reporting.analysis import Analysis, Summary
+from socialai_dsl.reporting.analysis import Analysis, Section, Summary
 from socialai_dsl.reporting.document import Block, Cell, Folded, Heading, Meter, Table, Text
 from socialai_dsl.reporting.images import Images
 from socialai_dsl.reporting.records import Ending
@@ -18,29 +18,32 @@ _RULES_SHOWN: Final = 12
 
 def ending_blocks(analysis: Analysis, images: Images) -> Iterator[Block]:
     """A part for each row: how training episodes ended, then the test episodes by line, and which rules fired."""
-    blocks: list[Block] = []
-    for number, section in enumerate(analysis.sections, start=1):
-        for place, (row, members) in enumerate(section.rows.items(), start=1):
-            inner: list[Block] = []
-            labels = [section.label(summary) for summary in members]
-            inner += images.figure(
-                f"part{number}-endings{place}",
-                plots.endings_figure(members, labels, row),
-                f"How training episodes of {row} ended over frames.",
-                "Training episodes by how they ended, mean over seeds: successes green, failures red, time-outs grey.",
-            )
-            for summary in members:
-                inner += _ending_tables(summary)
-            if inner:
-                blocks.append(Folded(f"{row}", inner))
-    if blocks:
+    parts = [
+        Folded(row if section.is_table else f"Case study: {row}", blocks)
+        for number, section in enumerate(analysis.sections, start=1)
+        for place, (row, members) in enumerate(section.rows.items(), start=1)
+        if (blocks := _row(f"part{number}-endings{place}", row, section, members, images))
+    ]
+    if parts:
         yield Heading(2, "How episodes ended, and which rules fired", "endings")
         yield Text(
             "Shares of the test episodes by the line of the scenario's file that ended them, and how often each rule "
             "fired in an episode; both as mean ± standard deviation over the seeds that are done.",
             "note",
         )
-        yield from blocks
+        yield from parts
+
+
+def _row(name: str, row: str, section: Section, members: Sequence[Summary], images: Images) -> list[Block]:
+    labels = [section.label(summary) for summary in members]
+    drawing = images.figure(
+        name,
+        lambda narrow: plots.endings_figure(members, labels, narrow),
+        f"How training episodes of {row} ended over frames.",
+        "Training episodes by how they ended, mean over seeds: successes blue, failures orange, time-outs "
+        "grey.",
+    )
+    return [*drawing, *(block for summary in members for block in _ending_tables(summary))]
 
 
 def _ending_tables(summary: Summary) -> Iterator[Block]:

@@ -20,7 +20,7 @@ def render_page(document: Document) -> str:
     environment.filters["kind"] = lambda block: type(block).__name__
     environment.filters["slug"] = slug
     template = environment.from_string(_text("page.html.jinja"))
-    images = {name: _address(svg) for name, (svg, _) in document.images.items()}
+    images = {name: (_address(one.svg), _address(one.narrow)) for name, one in document.images.items()}
     # The style sheet is ours.
     return template.render(document=document, images=images, style=Markup(_text("page.css"))) + "\n"
 

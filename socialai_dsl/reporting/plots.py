@@ -17,6 +17,7 @@ from socialai_dsl.reporting.seeds import Float, mean_over_seeds
 from socialai_dsl.reporting.style import INK, MUTED, colour, frames, marker, new_figure, rates, shown
 
 _PANEL: Final = (4.4, 2.9)  # inches
+_NARROW: Final = 4.4
 _ACROSS: Final = 2
 _Style = Literal["-", ":", "--"]
 _LEVELS: Final[tuple[tuple[str, str, _Style], ...]] = (
@@ -32,12 +33,12 @@ def colours_of(section: Section) -> dict[str, int]:
     return {label: index for index, label in enumerate(labels)}
 
 
-def success_figure(section: Section, ceilings: Mapping[str, Ceilings]) -> Figure:
+def success_figure(section: Section, ceilings: Mapping[str, Ceilings], narrow: bool = False) -> Figure:
     """Test success of every condition: a dot for each seed, mean and standard deviation, published figures beside."""
     rows = section.rows if section.is_table else {s.name: [s] for s in section.summaries}
     colours = colours_of(section)
     lanes = sum(len(members) for members in rows.values()) + 0.9 * (len(rows) - 1)
-    figure = new_figure(8.8, 0.9 + 0.27 * lanes + 0.25)
+    figure = new_figure(_NARROW if narrow else 8.8, 0.9 + 0.27 * lanes + (0.6 if narrow else 0.25))
     axes = figure.subplots()
     place, ticks = 0.0, []
     for members in rows.values():
@@ -65,7 +66,7 @@ def success_figure(section: Section, ceilings: Mapping[str, Ceilings]) -> Figure
         _reference_handle(),
         *_level_handles([s.condition.entry.scenario for s in section.summaries], ceilings),
     ]
-    figure.legend(handles=handles, loc="outside upper left", ncols=4, fontsize=8.5)
+    figure.legend(handles=handles, loc="outside upper left", ncols=2 if narrow else 4, fontsize=8.5)
     return figure
 
 
@@ -115,7 +116,7 @@ def _level_handles(scenarios: Sequence[str], ceilings: Mapping[str, Ceilings]) -
     ]
 
 
-def curves_figure(section: Section, ceilings: Mapping[str, Ceilings]) -> Figure | None:
+def curves_figure(section: Section, ceilings: Mapping[str, Ceilings], narrow: bool = False) -> Figure | None:
     """Learning curves, a panel for each row: every seed thin, the mean thick, its standard deviation shaded.
 
     None where nothing was trained.
@@ -125,10 +126,10 @@ def curves_figure(section: Section, ceilings: Mapping[str, Ceilings]) -> Figure 
     if not rows:
         return None
     colours = colours_of(section)
-    across = min(_ACROSS, len(rows))
+    across = 1 if narrow else min(_ACROSS, len(rows))
     down = -(-len(rows) // across)
-    width = _PANEL[0] * across if len(rows) > 1 else 8.0
-    figure = new_figure(width, _PANEL[1] * down * (1.25 if len(rows) == 1 else 1) + 0.5)
+    width = _NARROW if narrow else _PANEL[0] * across if len(rows) > 1 else 8.0
+    figure = new_figure(width, _PANEL[1] * down * (1.25 if len(rows) == 1 else 1) + (0.9 if narrow else 0.5))
     panels = figure.subplots(down, across, squeeze=False).ravel()
     for axes in panels[len(rows) :]:
         axes.set_axis_off()
@@ -147,7 +148,12 @@ def curves_figure(section: Section, ceilings: Mapping[str, Ceilings]) -> Figure 
     if any(s.reference is not None for members in rows.values() for s in members):
         handles.append(_reference_handle())
     handles += _level_handles([members[0].condition.entry.scenario for members in rows.values()], ceilings)
-    figure.legend(handles=handles, loc="outside upper left", ncols=3 if across == 1 else 4, fontsize=8.5)
+    figure.legend(
+        handles=handles,
+        loc="outside upper left",
+        ncols=2 if narrow else 3 if across == 1 else 4,
+        fontsize=8.5,
+    )
     return figure
 
 
@@ -232,16 +238,16 @@ def _ends(axes: Axes, summary: Summary, index: int, end: float) -> None:
         )
 
 
-def endings_figure(members: Sequence[Summary], labels: Sequence[str], title: str) -> Figure | None:
+def endings_figure(members: Sequence[Summary], labels: Sequence[str], narrow: bool = False) -> Figure | None:
     """How training episodes ended over frames, mean over seeds, a panel for each condition; None without curves."""
     drawn = [(s, label) for s, label in zip(members, labels, strict=True) if s.seeds is not None]
     if not drawn:
         return None
-    figure = new_figure(max(3.2, 2.5 * len(drawn)), 2.9)
-    figure.suptitle(shown(title), x=0.01, ha="left", fontsize=10, weight="bold")
-    for axes, (summary, label) in zip(
-        figure.subplots(1, len(drawn), squeeze=False, sharey=True)[0], drawn, strict=True
-    ):
+    down, across = (len(drawn), 1) if narrow else (1, len(drawn))
+    size = (_NARROW, 2.9 * down) if narrow else (max(3.2, 2.9 * across), 2.9)
+    figure = new_figure(*size)
+    panels = figure.subplots(down, across, squeeze=False, sharey=True).ravel()
+    for axes, (summary, label) in zip(panels, drawn, strict=True):
         assert summary.seeds is not None, "internal: only conditions with curves are drawn"
         means = {shown(n, 30): mean_over_seeds(rate) for n, rate in summary.seeds.part("outcomes").items()}
         successes = frozenset(shown(name, 30) for name in summary.successes)
@@ -256,9 +262,9 @@ def endings_figure(members: Sequence[Summary], labels: Sequence[str], title: str
 _BELOW: Final = {"loc": "upper left", "bbox_to_anchor": (-0.05, -0.14), "ncols": 1}
 
 
-def iqm_figure(aggregates: Sequence[Aggregate], columns: Sequence[str]) -> Figure:
+def iqm_figure(aggregates: Sequence[Aggregate], columns: Sequence[str], narrow: bool = False) -> Figure:
     """Interquartile mean of each column with its interval."""
-    figure = new_figure(8.0, 0.75 + 0.36 * len(aggregates))
+    figure = new_figure(_NARROW if narrow else 8.0, 0.75 + 0.36 * len(aggregates))
     axes = figure.subplots()
     for place, aggregate in enumerate(aggregates):
         index = columns.index(aggregate.column)
@@ -288,5 +294,5 @@ def iqm_figure(aggregates: Sequence[Aggregate], columns: Sequence[str]) -> Figur
             Patch(color=MUTED, alpha=0.5, label="all rows of the column"),
             Line2D([], [], color=MUTED, marker="o", markersize=3, label="rows that all columns have"),
         ]
-        figure.legend(handles=handles, loc="outside upper left", ncols=2)
+        figure.legend(handles=handles, loc="outside upper left", ncols=1 if narrow else 2)
     return figure

@@ -25,9 +25,10 @@ def section_blocks(
     title = _TITLES[section.group] if section.is_table else f"Case study: {section.group}"
     yield Heading(2, title, prefix)
     yield _results(section)
+    yield from _sources(section)
     yield from images.figure(
         f"{prefix}-success",
-        plots.success_figure(section, ceilings),
+        lambda narrow: plots.success_figure(section, ceilings, narrow),
         f"Success on the test episodes of each condition of {title}, seeds and mean, with published figures.",
         "Success on the test episodes: a small mark for each seed, a large one for their mean, a bar of one standard "
         "deviation to either side. Diamonds: published figures. Grey lines: who does not learn (see below).",
@@ -36,7 +37,7 @@ def section_blocks(
     yield from _aggregates(section, prefix, images)
     yield from images.figure(
         f"{prefix}-curves",
-        plots.curves_figure(section, ceilings),
+        lambda narrow: plots.curves_figure(section, ceilings, narrow),
         f"Learning curves of {title}: success of training episodes over frames.",
         "Success of the training episodes, whose actions are sampled, in bins of frames: thin for each seed, thick for "
         "the mean over seeds, dashed where a seed has ended, shaded one standard deviation to either side. At the "
@@ -54,9 +55,9 @@ def _results(section: Section) -> Table:
             by_column = {column_of(summary): summary for summary in members}
             cells = [_result(by_column[c]) if c in by_column else Cell("N/A", tone="muted") for c in columns]
             rows.append([Cell(row, tone="strong"), *cells])
-        return Table(["", *columns], rows, _RESULTS + _sources(section), grid=True)
+        return Table(["", *columns], rows, _RESULTS, grid=True)
     rows = [[Cell(s.name, (s.condition.entry.scenario,), "strong"), _result(s)] for s in section.summaries]
-    return Table(["condition", "success"], rows, _RESULTS + _sources(section), grid=True)
+    return Table(["condition", "success"], rows, _RESULTS, grid=True)
 
 
 _RESULTS: Final = (
@@ -89,24 +90,26 @@ def _published(success: Spread, reference: Reference) -> list[str]:
     return [*lines, f"difference {signed(success.mean - reference.mean, '+.3f')}"] if success.n else lines
 
 
-def _sources(section: Section) -> str:
-    """Where published figures come from, and what is to be known about them: once for all that share it."""
-    about: dict[str, list[str]] = {}
-    for summary in section.summaries:
-        for test, reference in [("", summary.reference), *summary.condition.entry.test_references.items()]:
-            if reference is not None and (
-                text := "; ".join(filter(None, (reference.source, reference.note)))
-            ):
-                about.setdefault(text, []).append(f"{summary.name} on {test}" if test else summary.name)
-    if not about:
-        return ""
-    if len(about) == 1:
-        return f" Published figures: {next(iter(about))}."
-    return (
-        " Published figures: "
-        + ". ".join(f"{text}: {', '.join(names)}" for text, names in about.items())
-        + "."
-    )
+def _sources(section: Section) -> Iterator[Block]:
+    """Every published figure, with where it comes from and what is to be known about it."""
+    rows = [
+        [
+            Cell(f"{summary.name} on {test}" if test else summary.name),
+            Cell(f"{reference.mean:.3f}"),
+            number_cell(reference.std, ".3f"),
+            Cell(reference.source),
+            Cell(reference.note),
+        ]
+        for summary in section.summaries
+        for test, reference in [("", summary.reference), *summary.condition.entry.test_references.items()]
+        if reference is not None
+    ]
+    if rows:
+        table = Table(["condition", ">mean", ">standard deviation", "source", "note"], rows, _AS_PUBLISHED)
+        yield Folded("Published figures", [table])
+
+
+_AS_PUBLISHED: Final = "Success rates as published; a dash where no standard deviation was given."
 
 
 def _comparisons(section: Section) -> Iterator[Block]:
@@ -186,7 +189,7 @@ def _aggregates(section: Section, prefix: str, images: Images) -> Iterator[Block
     )
     yield from images.figure(
         f"{prefix}-iqm",
-        plots.iqm_figure(section.aggregates, section.columns),
+        lambda narrow: plots.iqm_figure(section.aggregates, section.columns, narrow),
         "Interquartile mean of each column with its bootstrap interval.",
         "Interquartile mean (line) with its 95 % interval (bar).",
     )
