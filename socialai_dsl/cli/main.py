@@ -34,6 +34,7 @@ _COMMANDS: Final = (
     "check",
     "curves",
     "report",
+    "export",
     "sheets",
     "experiment",
 )
