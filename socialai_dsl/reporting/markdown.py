@@ -9,7 +9,7 @@ from typing import Final
 
 from socialai_dsl.reporting.document import Block, Cell, Document, Figure, Folded, Heading, Items, Table, Text
 
-_SPECIAL: Final = re.compile(r"([\\`*_\[\]|#~$])")
+_SPECIAL: Final = re.compile(r"([\\`*_\[\]|~$])")
 
 
 def render_markdown(document: Document, figures: str) -> str:
@@ -42,7 +42,7 @@ def _block(block: Block, figures: str) -> Iterator[str]:
             yield ""
             yield _escaped(caption)
         case Folded(title=title, blocks=blocks):
-            yield f"<details><summary>{html.escape(_line(title))}</summary>"
+            yield f"<details><summary>{_in_html(title)}</summary>"
             for inner in blocks:
                 yield ""
                 yield from _block(inner, figures)
@@ -73,6 +73,11 @@ def _cell(cell: Cell) -> str:
 def _escaped(text: str) -> str:
     """Text that Markdown shows as it is, on one line."""
     return _SPECIAL.sub(r"\\\1", html.escape(_line(text), quote=False))
+
+
+def _in_html(text: str) -> str:
+    """The same within a line of HTML, where readers of Markdown may look for Markdown or not."""
+    return _SPECIAL.sub(lambda found: f"&#{ord(found.group(1))};", html.escape(_line(text), quote=False))
 
 
 def _line(text: str) -> str:

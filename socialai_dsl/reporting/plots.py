@@ -62,10 +62,9 @@ def success_figure(section: Section, ceilings: Mapping[str, Ceilings], narrow: b
         Line2D([], [], color=colour(i), marker=marker(i), linestyle="none", label=shown(name))
         for name, i in named.items()
     ]
-    handles += [
-        _reference_handle(),
-        *_level_handles([s.condition.entry.scenario for s in section.summaries], ceilings),
-    ]
+    if any(summary.reference is not None for summary in section.summaries):
+        handles.append(_reference_handle())
+    handles += _level_handles([s.condition.entry.scenario for s in section.summaries], ceilings)
     figure.legend(handles=handles, loc="outside upper left", ncols=2 if narrow else 4, fontsize=8.5)
     return figure
 
