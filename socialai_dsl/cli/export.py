@@ -85,7 +85,7 @@ def _new_folder(out: Path) -> Path:
 def _write(run: Path, out: Path, settings: Settings, loaded: "Loaded", checkpoint: "Checkpoint") -> None:
     from trainer import checkpoint as checkpoints
 
-    moved = _Moved.of(loaded, settings.scenario)
+    moved = Moved.of(loaded, settings.scenario)
     moved.copy(out)
     curriculum = _without_place(settings.curriculum)
     config = checkpoint.meta.config.model_copy(update={"curriculum": curriculum})
@@ -116,7 +116,7 @@ def _without_place(text: str) -> str:
 
 
 @dataclass(frozen=True)
-class _Moved:
+class Moved:
     """The scenario's own files, which go along; those that ship stay where they are.
 
     Attributes:
@@ -130,7 +130,7 @@ class _Moved:
     names: Mapping[str, str]
 
     @classmethod
-    def of(cls, loaded: "Loaded", spec: str) -> "_Moved":
+    def of(cls, loaded: "Loaded", spec: str) -> "Moved":
         """The files of a scenario that was named `spec`.
 
         Raises:

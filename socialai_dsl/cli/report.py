@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 SUMMARY: Final = "write a page, figures and tables about the runs of an experiment, finished or not"
 FIGURES: Final = "figures"
-_FOLDER: Final = "report"
+FOLDER: Final = "report"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,9 +45,9 @@ def execute(arguments: argparse.Namespace) -> Exit:
     from socialai_dsl.reporting.analysis import analyse
 
     experiment, place = _experiment(arguments.folders)
-    out = arguments.out or place / _FOLDER
+    out = arguments.out or place / FOLDER
     out.mkdir(parents=True, exist_ok=True)
-    ceilings, notes = _ceilings(experiment, out, arguments.no_ceilings)
+    ceilings, notes = ceilings_of(experiment, out, arguments.no_ceilings)
     analysis = analyse(experiment, ceilings, notes)
     _write(analysis, out)
     print(f"written to {out / 'index.html'}")
@@ -75,7 +75,7 @@ def _experiment(folders: list[Path]) -> "tuple[Experiment, Path]":
         raise UsageError(str(error)) from error
 
 
-def _ceilings(
+def ceilings_of(
     experiment: "Experiment", out: Path, only_known: bool
 ) -> "tuple[dict[str, Ceilings], list[str]]":
     """Who does not learn, by scenario: conditions tell, an earlier report told, or it is measured now and kept."""
