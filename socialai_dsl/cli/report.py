@@ -38,10 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Read, compute, draw, write."""
-    from socialai_dsl.cli.agents import require_trainer
-
     _require_libraries()
-    require_trainer()
     from socialai_dsl.reporting.analysis import analyse
 
     experiment, place = _experiment(arguments.folders)
@@ -79,6 +76,7 @@ def ceilings_of(
     experiment: "Experiment", out: Path, only_known: bool
 ) -> "tuple[dict[str, Ceilings], list[str]]":
     """Who does not learn, by scenario: conditions tell, an earlier report told, or it is measured now and kept."""
+    from socialai_dsl.cli.agents import require_trainer
     from socialai_dsl.cli.ceilings import (
         FILE,
         is_current,
@@ -91,6 +89,8 @@ def ceilings_of(
     from socialai_dsl.diagnostics import ScenarioError
     from socialai_dsl.reporting.analysis import Ceilings
 
+    if not only_known:
+        require_trainer()
     kept, notes = read_ceilings(out / FILE), []
     for scenario in scenarios_of(experiment):
         if only_known:
