@@ -62,7 +62,8 @@ def _require_libraries() -> None:
 
 def _experiment(folders: list[Path]) -> "tuple[Experiment, Path]":
     """What the folders hold, and where its report belongs."""
-    from socialai_dsl.reporting.collect import EXPERIMENT, read_experiment, read_runs
+    from socialai_dsl.experiments.folder import EXPERIMENT
+    from socialai_dsl.reporting.collect import read_experiment, read_runs
 
     try:
         if len(folders) == 1 and (folders[0] / EXPERIMENT).exists():

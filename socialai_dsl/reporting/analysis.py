@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
 from typing import Final
@@ -32,7 +33,10 @@ SOLVED: Final = 0.95
 """With such a success on the test episodes it does not matter whether a curve still rises."""
 
 _TABLES: Final = ("table2", None)
-"""Groups that are tables of rows and columns; any other is a case study, whose conditions are compared in pairs."""
+"""Groups that are tables; any other is a case study, whose rows are compared as well as its columns."""
+
+TOGETHER: Final = 4
+"""So many conditions of a case study are drawn in one panel; more get a panel for each column."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +142,6 @@ def _own(outcome: str) -> str:
 class Comparison:
     """Two conditions side by side, with p after correction for all comparisons of their section."""
 
-    row: str
     first: str
     second: str
     test: Test
@@ -167,7 +170,8 @@ class Section:
 
     Attributes:
         group: as the experiment calls it. summaries: in order.
-        comparisons: each with each, within a row of a table. common_rows: see `Aggregate`.
+        comparisons: of the columns of each row; in a case study also of the rows of each column.
+        common_rows: see `Aggregate`.
     """
 
     group: str | None
@@ -183,11 +187,19 @@ class Section:
 
     @property
     def rows(self) -> dict[str, list[Summary]]:
-        """The conditions by row; all of a case study are one."""
-        grouped: dict[str, list[Summary]] = {}
-        for summary in self.summaries:
-            grouped.setdefault(row_of(summary) if self.is_table else self.group or "", []).append(summary)
-        return grouped
+        """The conditions by row."""
+        return self._by(row_of)
+
+    @property
+    def panels(self) -> dict[str, list[Summary]]:
+        """The conditions that a figure shows together: those of a row; of a case study all, or those of a column."""
+        if self.is_table or len(self.rows) == 1:
+            return self.rows
+        return (
+            {self.group or "": list(self.summaries)}
+            if len(self.summaries) <= TOGETHER
+            else self._by(column_of)
+        )
 
     @property
     def columns(self) -> list[str]:
@@ -195,8 +207,21 @@ class Section:
         return list(dict.fromkeys(column_of(summary) for summary in self.summaries))
 
     def label(self, summary: Summary) -> str:
-        """What tells a condition from the others of its row."""
-        return column_of(summary) if self.is_table else summary.name
+        """What tells a condition from the others of its panel."""
+        if self.is_table or len(self.rows) == 1:
+            return column_of(summary)
+        return summary.name if len(self.summaries) <= TOGETHER else row_of(summary)
+
+    def pairs(self) -> list[tuple[Summary, Summary]]:
+        """The conditions that are compared: those that share a row, and in a case study those that share a column."""
+        groups = [*self.rows.values(), *([] if self.is_table else self._by(column_of).values())]
+        return [pair for members in groups for pair in combinations(members, 2)]
+
+    def _by(self, key: Callable[[Summary], str]) -> dict[str, list[Summary]]:
+        grouped: dict[str, list[Summary]] = {}
+        for summary in self.summaries:
+            grouped.setdefault(key(summary), []).append(summary)
+        return grouped
 
 
 @dataclass(frozen=True)
@@ -244,9 +269,7 @@ def _summarise(condition: Condition) -> Summary:
     success = Spread(tuple(run.figures.success_rate for run in condition.done if run.figures is not None))
     tests = {
         test: Spread(tuple(run.tests[test].success_rate for run in condition.runs if test in run.tests))
-        for test in dict.fromkeys(
-            [*condition.entry.tests, *(name for run in condition.runs for name in run.tests)]
-        )
+        for test in condition.entry.tests
     }
     curves = [updates for run in condition.runs if (updates := run.updates()) is not None]
     seeds = align(curves) if curves else None
@@ -282,19 +305,32 @@ def still_rising(seeds: Seeds) -> float | None:
 
 
 def _section(group: str | None, summaries: Sequence[Summary]) -> Section:
-    bare = Section(group, tuple(summaries), ())
-    found = []
-    for row, members in bare.rows.items():
-        for first, second in combinations(members, 2):
-            if first.success.n and second.success.n:
-                test = compare(first.success.values, second.success.values)
-                found.append((row, bare.label(first), bare.label(second), test))
+    bare = Section(group, tuple(_in_places_of_their_own(summaries)), ())
+    found = [
+        (first.name, second.name, compare(first.success.values, second.success.values))
+        for first, second in bare.pairs()
+        if first.success.n and second.success.n
+    ]
     adjusted = bonferroni([test.p for *_, test in found])
     comparisons = tuple(Comparison(*one, p) for one, p in zip(found, adjusted, strict=True))
     if not bare.is_table:
         return Section(group, bare.summaries, comparisons)
     aggregates, common = _aggregates(bare)
     return Section(group, bare.summaries, comparisons, aggregates, common)
+
+
+def _in_places_of_their_own(summaries: Sequence[Summary]) -> list[Summary]:
+    """Conditions that would share a place in the table get rows of their own, by their names."""
+    taken = Counter((row_of(summary), column_of(summary)) for summary in summaries)
+    return [
+        summary if taken[row_of(summary), column_of(summary)] == 1 else _in_row(summary, summary.name)
+        for summary in summaries
+    ]
+
+
+def _in_row(summary: Summary, row: str) -> Summary:
+    entry = summary.condition.entry.model_copy(update={"row": row})
+    return replace(summary, condition=replace(summary.condition, entry=entry))
 
 
 def _aggregates(section: Section) -> tuple[tuple[Aggregate, ...], int]:

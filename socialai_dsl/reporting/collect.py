@@ -15,6 +15,8 @@ from typing import Any, Final, TypeVar
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
+from socialai_dsl.experiments import claims
+from socialai_dsl.experiments.folder import EXPERIMENT, METRICS, RESULT, RUNS, STATUS, TESTS
 from socialai_dsl.reporting.records import (
     ConditionEntry,
     ExperimentRecord,
@@ -26,10 +28,6 @@ from socialai_dsl.reporting.records import (
     UpdateRecord,
 )
 from socialai_dsl.reporting.seeds import read_updates
-
-EXPERIMENT: Final = "experiment.json"
-RUNS: Final = "runs"
-METRICS: Final = "metrics.jsonl"
 
 _SEED_KEYS: Final = frozenset({"seed"})
 _SHOWN: Final = ("net", "explo", "curriculum")
@@ -44,7 +42,9 @@ class Run:
 
     Attributes:
         id, seed: which. folder: where it lies.
-        state: `done`, `running`, `waiting`, `failed`, `cancelled`, or `missing` where there is no folder.
+        state: `done`, `running`, `waiting`, `failed`, `cancelled`; `stopped` if it says that it
+            runs and nobody works on it;
+            `missing` where there is no folder.
         message: what its status says. attempts: how often it was begun, as far as known.
         result: of a finished run. tests: scenario -> figures of its further tests.
         frames: made so far. digest: of its configuration without the seed; empty if it has none.
@@ -109,8 +109,8 @@ class Experiment:
 
     @property
     def runs(self) -> list[Run]:
-        """All runs."""
-        return [run for condition in self.conditions for run in condition.runs]
+        """All runs, each once, also where several conditions have it."""
+        return list({run.id: run for condition in self.conditions for run in condition.runs}.values())
 
 
 def read_experiment(folder: Path) -> Experiment:
@@ -187,19 +187,19 @@ def _read_run(folder: Path, name: str, seed: int) -> Run:
     if not folder.is_dir():
         return Run(name, seed, folder, "missing")
     problems: list[str] = []
-    status = _read(folder / "status.json", StatusRecord, problems)
-    result = _read(folder / "result.json", ResultRecord, problems)
+    status = _read(folder / STATUS, StatusRecord, problems)
+    result = _read(folder / RESULT, ResultRecord, problems)
     settings = _settings(folder, problems)
     frames = result.frames if result is not None else _frames_so_far(folder / METRICS, problems)
     return Run(
         name,
         seed,
         folder,
-        state=_state(status, result, frames),
+        state=_state(folder, status, result, frames),
         message=(status.message or "") if status is not None else "",
         attempts=len(status.attempts) if status is not None else 0,
         result=result,
-        tests=_tests(folder / "tests.json", problems),
+        tests=_tests(folder / TESTS, problems),
         frames=frames,
         digest=_digest(settings) if settings is not None else "",
         starts=_starts(folder / "starts.jsonl"),
@@ -207,12 +207,22 @@ def _read_run(folder: Path, name: str, seed: int) -> Run:
     )
 
 
-def _state(status: StatusRecord | None, result: ResultRecord | None, frames: int) -> str:
+def _state(folder: Path, status: StatusRecord | None, result: ResultRecord | None, frames: int) -> str:
+    """What the status says, unless whoever wrote it is gone; without a status, what the files tell."""
     if status is not None:
-        return status.state
+        return "stopped" if status.state == "running" and _is_left(folder) else status.state
     if result is not None:
         return "done"
     return "running" if frames else "waiting"
+
+
+def _is_left(folder: Path) -> bool:
+    """Whether a run was claimed by somebody who is gone."""
+    try:
+        newest = claims.newest_claim(folder)
+        return newest is not None and not claims.is_held(newest)
+    except OSError:  # a folder that can only be read
+        return False
 
 
 def _read(path: Path, model: type[Model], problems: list[str]) -> Model | None:

@@ -19,9 +19,9 @@ _RULES_SHOWN: Final = 12
 def ending_blocks(analysis: Analysis, images: Images) -> Iterator[Block]:
     """A part for each row: how training episodes ended, then the test episodes by line, and which rules fired."""
     parts = [
-        Folded(row if section.is_table else f"Case study: {row}", blocks)
+        Folded(row if section.is_table else f"Case study {section.group}: {row}", blocks)
         for number, section in enumerate(analysis.sections, start=1)
-        for place, (row, members) in enumerate(section.rows.items(), start=1)
+        for place, (row, members) in enumerate(section.panels.items(), start=1)
         if (blocks := _row(f"part{number}-endings{place}", row, section, members, images))
     ]
     if parts:

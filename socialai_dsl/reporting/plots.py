@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from socialai_dsl.reporting.analysis import Aggregate, Ceilings, Section, Summary
+from socialai_dsl.reporting.analysis import Aggregate, Ceilings, Section, Summary, column_of
 from socialai_dsl.reporting.curve import draw_outcomes
 from socialai_dsl.reporting.seeds import Float, mean_over_seeds
 from socialai_dsl.reporting.style import INK, MUTED, colour, frames, marker, new_figure, rates, shown
@@ -35,8 +35,8 @@ def colours_of(section: Section) -> dict[str, int]:
 
 def success_figure(section: Section, ceilings: Mapping[str, Ceilings], narrow: bool = False) -> Figure:
     """Test success of every condition: a dot for each seed, mean and standard deviation, published figures beside."""
-    rows = section.rows if section.is_table else {s.name: [s] for s in section.summaries}
-    colours = colours_of(section)
+    rows = section.rows
+    colours = {column: index for index, column in enumerate(section.columns)}
     lanes = sum(len(members) for members in rows.values()) + 0.9 * (len(rows) - 1)
     figure = new_figure(_NARROW if narrow else 8.8, 0.9 + 0.27 * lanes + (0.6 if narrow else 0.25))
     axes = figure.subplots()
@@ -44,7 +44,7 @@ def success_figure(section: Section, ceilings: Mapping[str, Ceilings], narrow: b
     for members in rows.values():
         top = place
         for summary in members:
-            _dots(axes, summary, place, colours[section.label(summary)])
+            _dots(axes, summary, place, colours[column_of(summary)])
             place += 1
         ticks.append((top + place - 1) / 2)
         _level_marks(axes, ceilings.get(members[0].condition.entry.scenario), top - 0.45, place - 0.55)
@@ -57,10 +57,9 @@ def success_figure(section: Section, ceilings: Mapping[str, Ceilings], narrow: b
     axes.spines["left"].set_visible(False)
     rates(axes, "x")
     axes.set_xlabel("success on the test episodes")
-    named = colours if section.is_table else {}
     handles: list[Any] = [
         Line2D([], [], color=colour(i), marker=marker(i), linestyle="none", label=shown(name))
-        for name, i in named.items()
+        for name, i in colours.items()
     ]
     if any(summary.reference is not None for summary in section.summaries):
         handles.append(_reference_handle())
@@ -116,11 +115,11 @@ def _level_handles(scenarios: Sequence[str], ceilings: Mapping[str, Ceilings]) -
 
 
 def curves_figure(section: Section, ceilings: Mapping[str, Ceilings], narrow: bool = False) -> Figure | None:
-    """Learning curves, a panel for each row: every seed thin, the mean thick, its standard deviation shaded.
+    """Learning curves, a panel for conditions that belong together: seeds thin, the mean thick, its spread shaded.
 
     None where nothing was trained.
     """
-    rows = {row: [s for s in members if s.seeds is not None] for row, members in section.rows.items()}
+    rows = {row: [s for s in members if s.seeds is not None] for row, members in section.panels.items()}
     rows = {row: members for row, members in rows.items() if members}
     if not rows:
         return None

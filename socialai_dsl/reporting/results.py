@@ -48,16 +48,13 @@ def section_blocks(
 
 
 def _results(section: Section) -> Table:
-    if section.is_table:
-        columns = section.columns
-        rows = []
-        for row, members in section.rows.items():
-            by_column = {column_of(summary): summary for summary in members}
-            cells = [_result(by_column[c]) if c in by_column else Cell("N/A", tone="muted") for c in columns]
-            rows.append([Cell(row, tone="strong"), *cells])
-        return Table(["", *columns], rows, _RESULTS, grid=True)
-    rows = [[Cell(s.name, (s.condition.entry.scenario,), "strong"), _result(s)] for s in section.summaries]
-    return Table(["condition", "success"], rows, _RESULTS, grid=True)
+    columns = section.columns
+    rows = []
+    for row, members in section.rows.items():
+        by_column = {column_of(summary): summary for summary in members}
+        cells = [_result(by_column[c]) if c in by_column else Cell("N/A", tone="muted") for c in columns]
+        rows.append([Cell(row, tone="strong"), *cells])
+    return Table(["", *columns], rows, _RESULTS, grid=True)
 
 
 _RESULTS: Final = (
@@ -117,23 +114,9 @@ def _comparisons(section: Section) -> Iterator[Block]:
         return
     tests = sum(c.test.p is not None for c in section.comparisons)
     yield Heading(3, "Comparisons", f"compare-{section.group or 'conditions'}")
-    rows = [[Cell(c.row, tone="strong"), *_comparison(c)] for c in section.comparisons]
-    columns = [
-        "row",
-        "first",
-        "second",
-        ">difference",
-        ">t",
-        ">df",
-        ">p",
-        ">p corrected",
-        ">Hedges' g",
-        "verdict",
-    ]
-    skipped = 0 if section.is_table else 1  # all pairs of a case study are of one row
     yield Table(
-        columns[skipped:],
-        [row[skipped:] for row in rows],
+        ["first", "second", ">difference", ">t", ">df", ">p", ">p corrected", ">Hedges' g", "verdict"],
+        [_comparison(one) for one in section.comparisons],
         "Difference of the mean success, first minus second. t, df, p: Welch's two-sided t-test, which takes unequal "
         f"variances. p corrected: Bonferroni, p times the {count_of(tests, 'test')} of this table. Hedges' g: the "
         "difference in pooled standard deviations, corrected for few seeds. A dash: fewer than two seeds, or no "

@@ -24,7 +24,6 @@ def tables(analysis: Analysis) -> dict[str, Rows]:
         "comparisons": [
             {
                 "group": section.group,
-                "row": one.row,
                 "first": one.first,
                 "second": one.second,
                 "difference": one.test.difference,

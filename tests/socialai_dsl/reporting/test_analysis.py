@@ -26,19 +26,41 @@ def test_columns_of_a_row_are_compared_and_corrected_together(tmp_path: Path) ->
         condition("C / y", []),
     )
     (table,) = analysis.sections
-    assert [(c.row, c.first, c.second) for c in table.comparisons] == [("A", "x", "y"), ("B", "x", "y")]
+    assert [(c.first, c.second) for c in table.comparisons] == [("A / x", "A / y"), ("B / x", "B / y")]
     for comparison in table.comparisons:
         assert comparison.test.p is not None
         assert comparison.adjusted == pytest.approx(min(1.0, 2 * comparison.test.p))
 
 
-def test_conditions_of_a_case_study_are_compared_in_pairs(tmp_path: Path) -> None:
-    table = condition("A / x", [0.1, 0.2])
-    study = [condition(f"S{k} / PPO", [0.1 * k, 0.1 * k + 0.1], group="tags") for k in range(3)]
-    tables, case = analysed(tmp_path, *study[:1], table, *study[1:]).sections
+def test_rows_of_a_case_study_are_compared_as_well(tmp_path: Path) -> None:
+    cells = [condition(f"{row} / {column}", [0.1, 0.2], group="tags") for row in "AB" for column in "xy"]
+    tables, case = analysed(tmp_path, *cells[:2], condition("T / x", [0.1, 0.2]), *cells[2:]).sections
     assert (tables.is_table, case.is_table) == (True, False), "tables come first"
-    assert len(case.comparisons) == 3
-    assert list(case.rows) == ["tags"]
+    pairs = {(c.first, c.second) for c in case.comparisons}
+    assert pairs == {("A / x", "A / y"), ("B / x", "B / y"), ("A / x", "B / x"), ("A / y", "B / y")}
+
+
+def test_panels_of_a_case_study_stay_readable(tmp_path: Path) -> None:
+    few = [condition(f"{row} / {column}", [0.1], group="few") for row in "AB" for column in "xy"]
+    many = [condition(f"{row} / {column}", [0.1], group="many") for row in "CD" for column in "xyz"]
+    single = [condition(f"E / {column}", [0.1], group="single") for column in "xyz"]
+    drawn = {
+        section.group: {
+            panel: [section.label(s) for s in members] for panel, members in section.panels.items()
+        }
+        for section in analysed(tmp_path, *few, *many, *single).sections
+    }
+    assert drawn == {
+        "few": {"few": ["A / x", "A / y", "B / x", "B / y"]},
+        "many": {"x": ["C", "D"], "y": ["C", "D"], "z": ["C", "D"]},
+        "single": {"E": ["x", "y", "z"]},
+    }
+
+
+def test_no_condition_hides_another_in_the_same_place(tmp_path: Path) -> None:
+    twice = [condition(name, [0.1], row="A", column="x") for name in ("one", "two")]
+    (table,) = analysed(tmp_path, *twice, condition("A / y", [0.1])).sections
+    assert list(table.rows) == ["one", "two", "A"]
 
 
 def test_interquartile_means_of_all_rows_and_of_those_in_common(tmp_path: Path) -> None:

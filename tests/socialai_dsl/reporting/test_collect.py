@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from socialai_dsl.experiments import claims
 from socialai_dsl.reporting.collect import Run, read_experiment, read_runs
 from tests.socialai_dsl.reporting.synthetic import condition, write_experiment, write_run, write_tests
 
@@ -48,6 +49,26 @@ def test_runs_in_every_state(folder: Path) -> None:
     assert [run.result for run in found] == [None] * 4
     assert (found[2].message, found[2].attempts) == ("no space", 2)
     assert found[3].frames == 1000, "the line that was never finished does not count"
+
+
+def test_a_run_whose_worker_is_gone_has_stopped(folder: Path) -> None:
+    run = folder / "runs" / "c0-s0"
+    (run / "status.json").write_text(json.dumps({"state": "running", "attempts": [1]}))
+    assert runs(folder)[0].state == "running"
+    claim = claims.claim(run)
+    assert claim is not None
+    assert runs(folder)[0].state == "running"
+    claim.release()
+    assert runs(folder)[0].state == "stopped"
+
+
+def test_a_run_of_two_conditions_is_one_run(folder: Path) -> None:
+    path = folder / "experiment.json"
+    record = json.loads(path.read_text())
+    record["conditions"].append(record["conditions"][0] | {"name": "again"})
+    record["runs"].append({"id": "c0-s0", "condition": "again", "seed": 0})
+    path.write_text(json.dumps(record))
+    assert len(runs(folder)) == 4
 
 
 @pytest.mark.parametrize("name", ["result.json", "status.json", "tests.json", "config.json", "metrics.jsonl"])
