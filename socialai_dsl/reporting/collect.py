@@ -140,7 +140,7 @@ def read_experiment(folder: Path) -> Experiment:
         )
         for entry in record.conditions
     )
-    return Experiment(record.name, record.profile, record.about, record.source_sha256, conditions)
+    return Experiment(record.name, record.profile or "", record.about or "", record.source_sha256, conditions)
 
 
 def read_runs(folders: Sequence[Path]) -> Experiment:

@@ -183,4 +183,6 @@ def _interval_example(analysis: Analysis) -> str:
 
 def state_of(run: Run) -> str:
     """The state of a run in words."""
-    return "without a result" if run.state == "done" and run.result is None else run.state
+    if run.state == "done" and run.result is None:
+        return "without a result"
+    return "not begun" if run.state == "missing" else run.state

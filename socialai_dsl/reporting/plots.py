@@ -18,6 +18,7 @@ from socialai_dsl.reporting.style import INK, MUTED, colour, frames, marker, new
 
 _PANEL: Final = (4.4, 2.9)  # inches
 _NARROW: Final = 4.4
+_BETWEEN: Final = 0.08  # of an axis, so that two names do not overlap
 _ACROSS: Final = 2
 _Style = Literal["-", ":", "--"]
 _LEVELS: Final[tuple[tuple[str, str, _Style], ...]] = (
@@ -140,9 +141,7 @@ def curves_figure(section: Section, ceilings: Mapping[str, Ceilings], narrow: bo
         for name, i in colours.items()
     ]
     if tests:
-        handles.append(
-            Line2D([], [], color=INK, linestyle="-.", linewidth=1.2, label="further test (its name beside)")
-        )
+        handles.append(Line2D([], [], color=INK, linestyle="-.", linewidth=1.2, label="on a further test"))
     if any(s.reference is not None for members in rows.values() for s in members):
         handles.append(_reference_handle())
     handles += _level_handles([members[0].condition.entry.scenario for members in rows.values()], ceilings)
@@ -187,9 +186,8 @@ def _panel(
 
 
 def _name_line(axes: Axes, name: str, height: float, end: float, ink: str) -> None:
-    """Write over a line whose it is, once for lines of one name."""
-    told = {text.get_text() for text in axes.texts}
-    if shown(name, 30) not in told:
+    """Write over a line whose it is, unless a line beside it has its name there."""
+    if all(abs(text.get_position()[1] - height) > _BETWEEN for text in axes.texts):
         axes.text(end * 0.02, height + 0.015, shown(name, 30), fontsize=7.5, color=ink, va="bottom")
 
 
@@ -286,6 +284,7 @@ def iqm_figure(aggregates: Sequence[Aggregate], columns: Sequence[str], narrow: 
     axes.grid(axis="y", visible=False)
     axes.grid(axis="x", visible=True)
     axes.spines["left"].set_visible(False)
+    rates(axes, "x")
     axes.set_xlabel("interquartile mean of success")
     if any(a.common is not None and a.common != a.estimate for a in aggregates):
         handles: list[Any] = [

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+_Words = Annotated[str, BeforeValidator(lambda value: "" if value is None else value)]
+"""A text that may be left out, or null, which is the same."""
 
 
 class _Record(BaseModel):
@@ -23,8 +26,8 @@ class Reference(_Record):
 
     mean: float = Field(ge=0, le=1)
     std: float | None = Field(None, ge=0)
-    note: str = ""
-    source: str = ""
+    note: _Words = ""
+    source: _Words = ""
 
 
 class ConditionEntry(_Record):
@@ -63,8 +66,8 @@ class ExperimentRecord(_Record):
 
     format: Literal[1]
     name: str
-    profile: str = ""
-    about: str = ""
+    profile: _Words = ""
+    about: _Words = ""
     source_sha256: str = ""
     conditions: list[ConditionEntry]
     runs: list[RunEntry]

@@ -145,7 +145,7 @@ def _p(value: float | None) -> Cell:
 
 
 def _aggregates(section: Section, prefix: str, images: Images) -> Iterator[Block]:
-    if not section.aggregates:
+    if all(aggregate.rows < 2 for aggregate in section.aggregates):
         return
     yield Heading(3, "Over all rows", f"{prefix}-iqm")
     yield Table(

@@ -27,7 +27,7 @@ def write_experiment(folder: Path, conditions: Sequence[Mapping[str, Any]], abou
             runs.append({"id": run, "condition": entry["name"], "seed": seed})
             write_run(folder / "runs" / run, entry["scenario"], seed, rate)
         entries.append(entry)
-    record = {"format": 1, "name": "synthetic", "profile": "test", "about": about, "source_sha256": "a" * 64,
+    record = {"format": 1, "name": "synthetic", "profile": None, "about": about, "source_sha256": "a" * 64,
               "conditions": entries, "runs": runs}  # fmt: skip
     (folder / "experiment.json").write_text(json.dumps(record), encoding="utf-8")
     return folder

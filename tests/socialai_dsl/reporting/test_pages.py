@@ -42,11 +42,12 @@ class Tags(HTMLParser):
 
 
 def small(folder: Path) -> Analysis:
-    """A table of two columns."""
+    """A table of two columns, of which one lacks a row."""
     conditions = [
         condition("Help / PPO", [0.4, 0.5, 0.6], reference=PUBLISHED, tests=["help_as_helper"],
                   test_references={"help_as_helper": {"mean": 0.12}}),
         condition("Help / Unsocial", [0.2, 0.2, 0.3]),
+        condition("Dance / PPO", [0.7]),
     ]  # fmt: skip
     write_experiment(folder, conditions)
     for seed, rate in enumerate((0.1, 0.2, 0.3)):
@@ -81,14 +82,14 @@ def markdown(document: Document) -> str:
 
 
 def test_the_page_begins_with_what_there_is(text: str) -> None:
-    assert "6 of 6 runs done, in 2 conditions; 6,000 frames trained in 9 min of run time." in text
+    assert "7 of 7 runs done, in 3 conditions; 7,000 frames trained in 10 min of run time." in text
     assert "Of 1 condition with a published figure, 1 have it within one published standard deviation" in text
 
 
 @pytest.mark.parametrize("said", [
     "0.500 ± 0.100", "published 0.45 ± 0.05", "difference +0.050", "on help_as_helper: 0.200 ± 0.100", "published 0.12",
     "3 of 3 seeds", "paper, Table 2", "scenarios/help.yaml:56", "jill.look", "Hedges' g", "Bonferroni", "Agarwal",
-    "cpu, AVX2 instructions, 1 thread (6 runs)", "bbbbbbbbbbbb", "torch", "2.13.0", "socialai-dsl 1.2.3", "64 rooms",
+    "cpu, AVX2 instructions, 1 thread (7 runs)", "bbbbbbbbbbbb", "torch", "2.13.0", "socialai-dsl 1.2.3", "64 rooms",
 ])  # fmt: skip
 def test_page_and_markdown_say_the_same(text: str, markdown: str, said: str) -> None:
     assert said in text
@@ -109,7 +110,7 @@ def test_the_page_needs_nothing_else(page: str) -> None:
 
 def test_every_figure_has_its_alternative_text(page: str, document: Document) -> None:
     images = [attributes for tag, attributes in Tags(page).tags if tag == "img"]
-    assert len(images) == len(document.images) == 4
+    assert len(images) == len(document.images) == 5
     assert all(attributes["alt"] for attributes in images)
     for image in document.images.values():
         assert image.png.startswith(b"\x89PNG")
@@ -163,7 +164,7 @@ def test_hostile_names_stay_text(tmp_path: Path) -> None:
 def test_tables_for_other_programs(analysis: Analysis) -> None:
     read = {name: list(csv.DictReader(io.StringIO(as_csv(rows)))) for name, rows in tables(analysis).items()}
     assert {name: len(rows) for name, rows in read.items()} == {
-        "runs": 6, "conditions": 2, "comparisons": 1, "outcomes": 18,
+        "runs": 7, "conditions": 3, "comparisons": 1, "outcomes": 21,
     }  # fmt: skip
     first = read["conditions"][0]
     assert float(first["success_mean"]) == pytest.approx(0.5)
