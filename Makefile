@@ -53,5 +53,5 @@ clean: ## remove caches and builds; .venv and runs/ stay
 # Locked versions bind the installation and, through the variable, the build tool as well.
 $(STAMP): requirements.lock pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[train,dev]'
+	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[train,report,dev]'
 	touch $@

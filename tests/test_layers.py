@@ -56,6 +56,10 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"numpy", "gymnasium", "PIL"},
     ),
     "experiments": (TEXT_SIDE | {"atomic", "compilation"}, {"ray", "submitit"}),
+    "reporting": (
+        {"experiments"},
+        {"numpy", "scipy", "matplotlib", "pydantic", "jinja2", "markupsafe", "pyarrow"},
+    ),
     "_gymnasium_hook": ({"envs"}, set()),
     "__main__": ({"cli"}, set()),
     "": (

@@ -112,6 +112,18 @@ def write(directory: Path, checkpoint: Checkpoint) -> Path:
     """
     directory.mkdir(parents=True, exist_ok=True)
     path = path_of(directory, checkpoint.meta)
+    write_file(path, checkpoint)
+    for old in [*sorted(directory.glob("*.safetensors"))[:-KEPT], *directory.glob("*.tmp")]:
+        old.unlink(missing_ok=True)
+    return path
+
+
+def write_file(path: Path, checkpoint: Checkpoint) -> None:
+    """Write a checkpoint to a file of any name, which appears only when all of it is on the disk.
+
+    Raises:
+        OSError: it cannot be written.
+    """
     temporary = path.with_suffix(".tmp")
     try:
         with temporary.open("wb") as file:
@@ -123,10 +135,13 @@ def write(directory: Path, checkpoint: Checkpoint) -> Path:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
         raise
-    _sync_directory(directory)
-    for old in [*sorted(directory.glob("*.safetensors"))[:-KEPT], *directory.glob("*.tmp")]:
-        old.unlink(missing_ok=True)
-    return path
+    _sync_directory(path.parent)
+
+
+def weights_only(checkpoint: Checkpoint) -> Checkpoint:
+    """What playing needs of a checkpoint: the network, without what only training remembers."""
+    net = {name: value for name, value in checkpoint.tensors.items() if name.startswith("net.")}
+    return Checkpoint(checkpoint.meta, net)
 
 
 def _sync_directory(directory: Path) -> None:

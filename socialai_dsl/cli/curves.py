@@ -9,7 +9,7 @@ from socialai_dsl.cli.errors import Exit, UsageError
 from socialai_dsl.cli.run_folder import RESULT, SETTINGS, read_json, scenario_folder_name
 
 if TYPE_CHECKING:
-    from socialai_dsl.cli.seeds_figure import Condition
+    from socialai_dsl.reporting.seeds_figure import Condition
 
 SUMMARY: Final = "draw the learning curves of several runs, seeds of one condition together"
 
@@ -37,7 +37,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     from socialai_dsl.cli.agents import require_trainer
 
     require_trainer()
-    from socialai_dsl.cli.seeds_figure import draw_conditions
+    from socialai_dsl.reporting.seeds_figure import draw_conditions
 
     groups: dict[str, list[Path]] = {}
     for run in arguments.runs:
@@ -64,8 +64,8 @@ def _title(settings: dict[str, Any]) -> str:
 
 def _condition(title: str, runs: list[Path]) -> "Condition":
     import socialai_dsl
-    from socialai_dsl.cli.seeds import read_seeds
-    from socialai_dsl.cli.seeds_figure import Condition
+    from socialai_dsl.reporting.seeds import read_seeds
+    from socialai_dsl.reporting.seeds_figure import Condition
 
     scenario = str(_read(runs[0], SETTINGS)["scenario"])
     program = socialai_dsl.compile(socialai_dsl.load(scenario))
@@ -83,7 +83,7 @@ def _table(condition: "Condition") -> str:
     """Success of each seed, and the mean rates of outcomes and rules, at a few moments, as Markdown."""
     import numpy as np
 
-    from socialai_dsl.cli.seeds import mean_over_seeds
+    from socialai_dsl.reporting.seeds import mean_over_seeds
 
     seeds = condition.seeds
     step = max(1, len(seeds.frames) // _ROWS)

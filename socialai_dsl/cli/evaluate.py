@@ -132,4 +132,11 @@ def _own_scenario(agent: str) -> str:
     scenario = read_json(run / SETTINGS).get("scenario")
     if not isinstance(scenario, str):
         raise UsageError(f"{run / SETTINGS}: scenario: expected a text, got {scenario!r}")
-    return scenario
+    return str(run / scenario) if _comes_along(run, scenario) else scenario
+
+
+def _comes_along(run: Path, scenario: str) -> bool:
+    """Whether the scenario's file lies in the folder itself, as in an exported one."""
+    from socialai_dsl.cli.export import SCENARIO
+
+    return scenario.startswith(f"{SCENARIO}/") and (run / SCENARIO).is_dir()

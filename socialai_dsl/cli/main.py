@@ -33,6 +33,8 @@ _COMMANDS: Final = (
     "oracles",
     "check",
     "curves",
+    "report",
+    "export",
     "sheets",
     "experiment",
 )

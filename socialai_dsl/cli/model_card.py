@@ -47,7 +47,7 @@ def model_card(
         "## Evaluation",
         _evaluation(result["eval"]),
         "## How to load it",
-        "From the folder in which it was trained, with `pip install 'socialai-dsl[train]'`:",
+        f"{_place(folder)}, with `pip install 'socialai-dsl[train]'`:",
         f"```python\n{_snippet(settings, folder)}```",
         "## Training",
         _table(("", ""), _facts(settings, result, weights.relative_to(folder))),
@@ -122,6 +122,10 @@ def _facts(settings: Settings, result: Mapping[str, Any], weights: Path) -> list
         ("time", f"{result['train_seconds']:.0f} s on `{settings.device}`"),
         ("versions", versions),
     ]
+
+
+def _place(folder: Path) -> str:
+    return "From this folder" if folder == Path() else "From the folder in which it was trained"
 
 
 def _snippet(settings: Settings, folder: Path) -> str:

@@ -14,13 +14,12 @@ from socialai_dsl.cli.run_folder import (
     RESULT,
     SETTINGS,
     create_run_folder,
-    read_json,
     scenario_folder_name,
     versions,
     write_json,
     write_text,
 )
-from socialai_dsl.cli.settings import Settings
+from socialai_dsl.cli.settings import Settings, read_settings
 
 if TYPE_CHECKING:
     from socialai_dsl.checking import Loaded
@@ -260,24 +259,15 @@ def _started(arguments: argparse.Namespace) -> Settings:
 
 def _resumed(arguments: argparse.Namespace) -> Settings:
     """The settings of a run that was stopped; `--frames` may be raised, and W&B be told from now on."""
-    from pydantic import TypeAdapter, ValidationError
-
     folder: Path = arguments.resume
     if arguments.scenario is not None or arguments.out is not None:
         raise UsageError(
             "--resume: the run's folder says which scenario it is; give neither SCENARIO nor --out"
         )
-    if not (folder / SETTINGS).is_file():
-        raise UsageError(f"--resume: {folder} is not a run's folder, it has no {SETTINGS}")
-    content = read_json(folder / SETTINGS)
-    content.pop("trainer", None)
     try:
-        # As JSON, because strict validation of a dataclass takes no dict from Python.
-        settings = TypeAdapter(Settings).validate_json(json.dumps(content), strict=True)
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise UsageError(f"{folder / SETTINGS}: {place}: {first['msg']}") from None
+        settings = read_settings(folder)
+    except UsageError as error:
+        raise UsageError(f"--resume: {error}") from None
     if settings.agent != "ppo":
         raise UsageError(f"--resume: the agent {settings.agent!r} of {folder} is not trained")
     return replace(
@@ -286,7 +276,7 @@ def _resumed(arguments: argparse.Namespace) -> Settings:
 
 
 def _draw_curve(settings: Settings, program: "Playable", folder: Path, result: dict[str, Any]) -> None:
-    from socialai_dsl.cli.curve import draw_learning_curve, read_curve
+    from socialai_dsl.reporting.curve import draw_learning_curve, read_curve
 
     test = (result["frames"], result["eval"]["success_rate"], *result["eval"]["success_interval"])
     successes = frozenset(outcome.name for outcome in program.outcome_table if outcome.success)

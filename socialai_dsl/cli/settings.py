@@ -1,7 +1,12 @@
 """This module is what a run was asked for, as its folder remembers it."""
 
+import json
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
+
+from socialai_dsl.cli.errors import UsageError
+from socialai_dsl.cli.run_folder import SETTINGS, read_json
 
 
 @dataclass(frozen=True)
@@ -42,3 +47,24 @@ class Settings:
     threads: int = 0
     checkpoint_every: int = 50
     wandb: str | None = None
+
+
+def read_settings(folder: Path) -> Settings:
+    """What the run of a folder was asked for.
+
+    Raises:
+        UsageError: it is not a run's folder, or its settings are damaged.
+    """
+    from pydantic import TypeAdapter, ValidationError
+
+    if not (folder / SETTINGS).is_file():
+        raise UsageError(f"{folder} is not a run's folder, it has no {SETTINGS}")
+    content = read_json(folder / SETTINGS)
+    content.pop("trainer", None)
+    try:
+        # As JSON, because strict validation of a dataclass takes no dict from Python.
+        return TypeAdapter(Settings).validate_json(json.dumps(content), strict=True)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise UsageError(f"{folder / SETTINGS}: {place}: {first['msg']}") from None

@@ -42,17 +42,21 @@ def depth(loaded: LoadedScenario, effort: Effort, scripted: LoadedScenario | Non
     unsolved = None
     if scripted is not None:
         unsolved = tuple((~solved_by_script(compile_loaded(scripted), effort)).nonzero()[0].tolist())
-    alone = None
-    if any(entity.role == "npc" for entity in loaded.checked.entities):
-        hidden = replace(loaded, checked=replace(loaded.checked, npcs_hidden=True))
-        alone = success_alone(compile_loaded(hidden), effort.rooms, effort.seed, effort.states)
     return Depth(
         tuple(sorted(finding.steps for finding in findings if finding.steps is not None)),
         _rooms(findings, Verdict.UNSOLVABLE),
         _rooms(findings, Verdict.UNDECIDED),
         unsolved,
-        alone,
+        without_npcs(loaded, effort),
     )
+
+
+def without_npcs(loaded: LoadedScenario, effort: Effort) -> Alone | None:
+    """What a policy gets that neither sees nor hears an NPC; None if there is none."""
+    if all(entity.role != "npc" for entity in loaded.checked.entities):
+        return None
+    hidden = replace(loaded, checked=replace(loaded.checked, npcs_hidden=True))
+    return success_alone(compile_loaded(hidden), effort.rooms, effort.seed, effort.states)
 
 
 def _rooms(findings: Sequence[Finding], verdict: Verdict) -> tuple[int, ...]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from socialai_dsl.cli.main import main
-from socialai_dsl.cli.seeds import mean_over_seeds, read_seeds
+from socialai_dsl.reporting.seeds import mean_over_seeds, read_seeds
 
 
 def row(update: int, episodes: int, success: float | None, asked: float | None = None) -> str:

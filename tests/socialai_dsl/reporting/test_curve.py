@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from socialai_dsl.cli.curve import Curve, draw_learning_curve, smooth
+from socialai_dsl.reporting.curve import Curve, draw_learning_curve, smooth
 
 NAN = float("nan")
 WINS = frozenset({"success@3"})

@@ -11,8 +11,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, PercentFormatter
 
-from socialai_dsl.cli.curve import BLUE, RED, draw_outcomes
-from socialai_dsl.cli.seeds import Seeds, mean_over_seeds
+from socialai_dsl.reporting.curve import BLUE, RED, draw_outcomes
+from socialai_dsl.reporting.seeds import Seeds, mean_over_seeds
 
 _RULES_SHOWN: Final = 6
 _WIDTH: Final = 4.6  # inches a condition

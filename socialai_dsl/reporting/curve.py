@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 BLUE: Final = "#2f62b8"
 RED: Final = "#c23b33"
 _GREYS: Final = ("#8d939d", "#b3b7be", "#d3d6da", "#e6e7ea")
-_SUCCESSES: Final = ("#3a8f56", "#6bb583", "#a0d2b0")
-_FAILURES: Final = ("#c8543f", "#dd8a62", "#ebb48f", "#f4d3b8")
+# Blue and orange, which colour-blind people tell apart.
+_SUCCESSES: Final = ("#0072b2", "#569fcd", "#a3cce6")
+_FAILURES: Final = ("#d55e00", "#e88c47", "#f2b586", "#f8dac3")
 
 
 @dataclass(frozen=True)

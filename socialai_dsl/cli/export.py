@@ -1,0 +1,176 @@
+"""This module is `socialai export`: a trained agent as a folder that can be given to others."""
+
+import argparse
+import json
+import shutil
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.run_folder import (
+    RESULT,
+    SETTINGS,
+    read_json,
+    scenario_folder_name,
+    write_json,
+    write_text,
+)
+from socialai_dsl.cli.settings import Settings, read_settings
+
+if TYPE_CHECKING:
+    from socialai_dsl.checking import Loaded
+    from trainer.checkpoint import Checkpoint
+
+SUMMARY: Final = "make a folder of a trained agent that can be given to others"
+WEIGHTS: Final = "model.safetensors"
+CARD: Final = "README.md"
+VOCABULARY: Final = "vocabulary.json"
+SCENARIO: Final = "scenario"
+_FILM: Final = "episode.gif"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this command."""
+    parser.add_argument("run", type=Path, metavar="RUN_DIR", help="folder of a finished run")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="folder to make (default: exports/<scenario>-<network>-s<seed>)",
+    )
+
+
+def execute(arguments: argparse.Namespace) -> Exit:
+    """Write the folder."""
+    import socialai_dsl
+    from socialai_dsl.cli.agents import require_trainer
+    from trainer import checkpoint as checkpoints
+    from trainer.errors import CheckpointError
+
+    require_trainer()
+    run: Path = arguments.run
+    settings = read_settings(run)
+    if settings.agent != "ppo":
+        raise UsageError(f"{run}: the agent {settings.agent!r} is not trained, there is nothing to export")
+    if not (run / RESULT).is_file():
+        raise UsageError(f"{run}: expected a finished run, it has no {RESULT}")
+    loaded = socialai_dsl.load(settings.scenario)
+    try:
+        checkpoint = checkpoints.weights_only(checkpoints.read(run / checkpoints.FOLDER))
+    except CheckpointError as error:
+        raise UsageError(str(error)) from error
+    if socialai_dsl.compile(loaded).sha256 != checkpoint.meta.program_sha256:
+        print("warning: the scenario has changed since the agent was trained on it", file=sys.stderr)
+    out = _new_folder(arguments.out or Path("exports") / _name(settings))
+    _write(run, out, settings, loaded, checkpoint)
+    print(f"written to {out}; try it: socialai evaluate {out}")
+    return Exit.GOOD
+
+
+def _name(settings: Settings) -> str:
+    net = settings.net.replace(":", ".")
+    return f"{scenario_folder_name(settings.scenario)}-{net}-s{settings.seed}"
+
+
+def _new_folder(out: Path) -> Path:
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise UsageError(f"--out: {out} is there already; choose another folder")
+    out.mkdir(parents=True, exist_ok=True)
+    return out
+
+
+def _write(run: Path, out: Path, settings: Settings, loaded: "Loaded", checkpoint: "Checkpoint") -> None:
+    from trainer import checkpoint as checkpoints
+
+    moved = Moved.of(loaded, settings.scenario)
+    moved.copy(out)
+    curriculum = _without_place(settings.curriculum)
+    config = checkpoint.meta.config.model_copy(update={"curriculum": curriculum})
+    told = replace(settings, scenario=moved.scenario, curriculum=curriculum, wandb=None)
+    meta = checkpoint.meta.model_copy(update={"config": config})
+    checkpoints.write_file(out / WEIGHTS, checkpoints.Checkpoint(meta, checkpoint.tensors))
+    words = {name: getattr(meta, name) for name in ("vocabulary", "actions", "templates", "nouns")}
+    write_json(out / VOCABULARY, words)
+    result = moved.told(read_json(run / RESULT) | {"scenario": moved.scenario})
+    if (run / _FILM).is_file():
+        shutil.copyfile(run / _FILM, out / _FILM)
+    write_text(out / CARD, _card(told, config.model_dump(), result, loaded))
+    write_json(out / SETTINGS, json.loads(json.dumps(vars(told))) | {"trainer": config.model_dump()})
+    write_json(out / RESULT, result)  # last, so that its presence means a complete folder
+
+
+def _card(settings: Settings, hyper: Mapping[str, Any], result: Mapping[str, Any], loaded: "Loaded") -> str:
+    from socialai_dsl.cli.model_card import model_card
+
+    data = loaded.resolved.data
+    about = str(data.get("about", "")) if isinstance(data, dict) else ""
+    return model_card(settings, hyper, result, about, Path(), Path(WEIGHTS))
+
+
+def _without_place(text: str) -> str:
+    """A file's name without its folders; anything else as it is."""
+    return Path(text).name if text.endswith((".yaml", ".yml")) else text
+
+
+@dataclass(frozen=True)
+class Moved:
+    """The scenario's own files, which go along; those that ship stay where they are.
+
+    Attributes:
+        scenario: as it is named from the new folder.
+        texts: file in the new folder -> its text.
+        names: how the old folder's files were called -> how they are called now.
+    """
+
+    scenario: str
+    texts: Mapping[str, str]
+    names: Mapping[str, str]
+
+    @classmethod
+    def of(cls, loaded: "Loaded", spec: str) -> "Moved":
+        """The files of a scenario that was named `spec`.
+
+        Raises:
+            UsageError: one lies outside the scenario's folder and what ships.
+        """
+        from socialai_dsl.diagnostics import DiagnosticBag
+        from socialai_dsl.loader import shipped_folder
+        from socialai_dsl.loader.names import name_source, parse_name
+
+        source = name_source(spec)
+        start = source.span(0, 1)
+        base = parse_name(spec, start, DiagnosticBag(), Path.cwd()).base.text
+        rest = spec[len(base) :]
+        path, shipped = loaded.resolved.path, shipped_folder().resolve()
+        if path.is_relative_to(shipped):
+            return cls(path.relative_to(shipped).with_suffix("").as_posix() + rest, {}, {})
+        texts, names = {}, {}
+        for name, file in loaded.resolved.files.items():
+            there = Path(name).resolve()
+            if not there.is_file() or there.is_relative_to(shipped):
+                continue
+            if not there.is_relative_to(path.parent):
+                raise UsageError(f"{name}: lies outside the folder of {path.name}, so it cannot go along")
+            new = f"{SCENARIO}/{there.relative_to(path.parent).as_posix()}"
+            texts[new] = file.text
+            names[name] = names[str(there)] = new
+        return cls(f"{SCENARIO}/{path.name}{rest}", texts, names)
+
+    def copy(self, out: Path) -> None:
+        """Write the files."""
+        for name, text in self.texts.items():
+            (out / name).parent.mkdir(parents=True, exist_ok=True)
+            write_text(out / name, text)
+
+    def told(self, value: Any) -> Any:
+        """A JSON value in which files are called as in the new folder, and no place of this machine is left."""
+        if isinstance(value, dict):
+            return {key: self.told(part) for key, part in value.items()}
+        if isinstance(value, list):
+            return [self.told(part) for part in value]
+        if isinstance(value, str):
+            return self.names.get(value, Path(value).name if Path(value).is_absolute() else value)
+        return value

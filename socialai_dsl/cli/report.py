@@ -1,0 +1,140 @@
+"""This module is `socialai report`: a page about an experiment, or about some runs, with its figures and tables."""
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.run_folder import write_text
+
+if TYPE_CHECKING:
+    from socialai_dsl.reporting.analysis import Analysis, Ceilings
+    from socialai_dsl.reporting.collect import Experiment
+
+SUMMARY: Final = "write a page, figures and tables about the runs of an experiment, finished or not"
+FIGURES: Final = "figures"
+FOLDER: Final = "report"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this command."""
+    parser.add_argument(
+        "folders", nargs="+", type=Path, metavar="DIR", help="folder of an experiment, or folders of runs"
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="where to write (default: `report` in the experiment's folder, or here for runs)",
+    )
+    parser.add_argument(
+        "--no-ceilings",
+        action="store_true",
+        help="measure nothing; show what conditions and earlier reports tell of script, chance and guesses",
+    )
+
+
+def execute(arguments: argparse.Namespace) -> Exit:
+    """Read, compute, draw, write."""
+    _require_libraries()
+    from socialai_dsl.reporting.analysis import analyse
+
+    experiment, place = _experiment(arguments.folders)
+    out = arguments.out or place / FOLDER
+    out.mkdir(parents=True, exist_ok=True)
+    ceilings, notes = ceilings_of(experiment, out, arguments.no_ceilings)
+    analysis = analyse(experiment, ceilings, notes)
+    _write(analysis, out)
+    print(f"written to {out / 'index.html'}")
+    return Exit.GOOD
+
+
+def _require_libraries() -> None:
+    try:
+        import jinja2  # noqa: F401
+        import matplotlib  # noqa: F401
+        import scipy  # noqa: F401
+    except ImportError as error:
+        raise UsageError(f"reports need {error.name}: pip install 'socialai-dsl[report]'") from None
+
+
+def _experiment(folders: list[Path]) -> "tuple[Experiment, Path]":
+    """What the folders hold, and where its report belongs."""
+    from socialai_dsl.experiments.folder import EXPERIMENT
+    from socialai_dsl.reporting.collect import read_experiment, read_runs
+
+    try:
+        if len(folders) == 1 and (folders[0] / EXPERIMENT).exists():
+            return read_experiment(folders[0]), folders[0]
+        return read_runs(folders), Path()
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+
+
+def ceilings_of(
+    experiment: "Experiment", out: Path, only_known: bool
+) -> "tuple[dict[str, Ceilings], list[str]]":
+    """Who does not learn, by scenario: conditions tell, an earlier report told, or it is measured now and kept."""
+    from socialai_dsl.cli.agents import require_trainer
+    from socialai_dsl.cli.ceilings import (
+        FILE,
+        is_current,
+        known_ceilings,
+        measured_ceilings,
+        read_ceilings,
+        scenarios_of,
+        write_ceilings,
+    )
+    from socialai_dsl.diagnostics import ScenarioError
+    from socialai_dsl.reporting.analysis import Ceilings
+
+    if not only_known:
+        require_trainer()
+    kept, notes = read_ceilings(out / FILE), []
+    for scenario in scenarios_of(experiment):
+        if only_known:
+            continue
+        try:
+            if scenario not in kept or not is_current(scenario, kept[scenario]):
+                print(
+                    f"{scenario}: playing the script, at random, and without NPCs",
+                    file=sys.stderr,
+                    flush=True,
+                )
+                kept[scenario] = measured_ceilings(scenario)
+                write_ceilings(out / FILE, kept)
+        except ScenarioError as error:
+            kept.pop(scenario, None)
+            notes.append(f"{scenario}: nothing to set beside it: {error.diagnostics[0].message}")
+    told = known_ceilings(experiment)
+    merged = {}
+    for scenario in scenarios_of(experiment):
+        measured, own = kept.get(scenario, Ceilings()), told.get(scenario, Ceilings())
+        merged[scenario] = replace(
+            measured, oracle=own.oracle or measured.oracle, random=own.random or measured.random
+        )
+    return merged, notes
+
+
+def _write(analysis: "Analysis", out: Path) -> None:
+    from importlib.metadata import version
+
+    from socialai_dsl.reporting.markdown import render_markdown
+    from socialai_dsl.reporting.page import render_page
+    from socialai_dsl.reporting.sections import compose
+    from socialai_dsl.reporting.tables import as_csv, as_parquet, tables
+
+    document = compose(analysis, version("socialai-dsl"))
+    figures = out / FIGURES
+    figures.mkdir(exist_ok=True)
+    for name, image in document.images.items():
+        (figures / f"{name}.svg").write_bytes(image.svg)
+        (figures / f"{name}.png").write_bytes(image.png)
+    for name, rows in tables(analysis).items():
+        write_text(out / f"{name}.csv", as_csv(rows))
+        if rows and (content := as_parquet(rows)) is not None:
+            (out / f"{name}.parquet").write_bytes(content)
+    write_text(out / "report.md", render_markdown(document, FIGURES))
+    write_text(out / "index.html", render_page(document))  # last, so that its presence means a whole report

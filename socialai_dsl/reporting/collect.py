@@ -1,0 +1,310 @@
+"""This module reads the folder of an experiment: conditions and runs, whatever state they are in.
+
+A report has to be made of what is there. So nothing in a run's folder is an error: what is missing or cannot be read
+is a problem of that run, which the report names.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from pydantic import BaseModel, TypeAdapter, ValidationError
+
+from socialai_dsl.experiments import claims
+from socialai_dsl.experiments.folder import EXPERIMENT, METRICS, RESULT, RUNS, STATUS, TESTS
+from socialai_dsl.reporting.records import (
+    ConditionEntry,
+    ExperimentRecord,
+    Figures,
+    ResultRecord,
+    RunEntry,
+    StartRecord,
+    StatusRecord,
+    UpdateRecord,
+)
+from socialai_dsl.reporting.seeds import read_updates
+
+_SEED_KEYS: Final = frozenset({"seed"})
+_SHOWN: Final = ("net", "explo", "curriculum")
+_USUAL: Final = (None, "none", "fast")
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run, as far as it came.
+
+    Attributes:
+        id, seed: which. folder: where it lies.
+        state: `done`, `running`, `waiting`, `failed`, `cancelled`; `stopped` if it says that it
+            runs and nobody works on it;
+            `missing` where there is no folder.
+        message: what its status says. attempts: how often it was begun, as far as known.
+        result: of a finished run. tests: scenario -> figures of its further tests.
+        frames: made so far. digest: of its configuration without the seed; empty if it has none.
+        starts: in what surroundings it ran.
+        problems: what could not be read, in words.
+    """
+
+    id: str
+    seed: int
+    folder: Path
+    state: str
+    message: str = ""
+    attempts: int = 0
+    result: ResultRecord | None = None
+    tests: Mapping[str, Figures] = field(default_factory=dict)
+    frames: int = 0
+    digest: str = ""
+    starts: tuple[StartRecord, ...] = ()
+    problems: tuple[str, ...] = ()
+
+    @property
+    def figures(self) -> Figures | None:
+        """Of its test episodes, if it is done."""
+        return self.result.eval if self.result is not None else None
+
+    def updates(self) -> list[UpdateRecord] | None:
+        """Its learning curve; None where there is none that can be read."""
+        try:
+            return read_updates(self.folder / METRICS)
+        except (OSError, ValueError):
+            return None
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Runs that differ in nothing but their seed."""
+
+    entry: ConditionEntry
+    runs: tuple[Run, ...]
+
+    @property
+    def done(self) -> tuple[Run, ...]:
+        """The runs that have a result."""
+        return tuple(run for run in self.runs if run.result is not None)
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What a report is about.
+
+    Attributes:
+        name, profile, about: as the experiment says; name and about of a list of runs say that it is one.
+        source_sha256: digest of the experiment's file, empty if there is none.
+        conditions: in the order of the file.
+    """
+
+    name: str
+    profile: str
+    about: str
+    source_sha256: str
+    conditions: tuple[Condition, ...]
+
+    @property
+    def runs(self) -> list[Run]:
+        """All runs, each once, also where several conditions have it."""
+        return list({run.id: run for condition in self.conditions for run in condition.runs}.values())
+
+
+def read_experiment(folder: Path) -> Experiment:
+    """Read an experiment's folder.
+
+    Raises:
+        OSError: `experiment.json` cannot be read.
+        ValueError: it is damaged, or of another format.
+    """
+    path = folder / EXPERIMENT
+    try:
+        record = ExperimentRecord.model_validate_json(path.read_bytes())
+    except ValidationError as error:
+        raise ValueError(f"{path}: {_first(error)}") from None
+    entries: dict[str, list[RunEntry]] = {entry.name: [] for entry in record.conditions}
+    for run in record.runs:
+        if run.condition not in entries:
+            raise ValueError(
+                f"{path}: run {run.id!r} is of the condition {run.condition!r}, which is not listed"
+            )
+        if run.id == ".." or Path(run.id).name != run.id:
+            raise ValueError(f"{path}: run {run.id!r}: expected the name of a folder in {RUNS}")
+        entries[run.condition].append(run)
+    conditions = tuple(
+        Condition(
+            entry, tuple(_read_run(folder / RUNS / run.id, run.id, run.seed) for run in entries[entry.name])
+        )
+        for entry in record.conditions
+    )
+    return Experiment(record.name, record.profile or "", record.about or "", record.source_sha256, conditions)
+
+
+def read_runs(folders: Sequence[Path]) -> Experiment:
+    """Take runs that belong to no experiment: what differs in nothing but the seed is one condition.
+
+    Raises:
+        ValueError: a folder is not that of a run.
+    """
+    grouped: dict[tuple[str, str], list[tuple[dict[str, Any], Run]]] = {}
+    for folder in folders:
+        settings = _settings(folder, [])
+        if settings is None or not isinstance(settings.get("scenario"), str):
+            raise ValueError(f"{folder}: expected the folder of a run, with its config.json")
+        seed = settings.get("seed")
+        run = _read_run(folder, folder.name, seed if isinstance(seed, int) else 0)
+        grouped.setdefault((str(settings["scenario"]), _column(settings)), []).append((settings, run))
+    conditions = []
+    for (scenario, column), members in grouped.items():
+        settings = members[0][0]
+        frames = settings.get("frames")
+        entry = ConditionEntry(
+            name=f"{scenario} / {column}",
+            row=scenario,
+            column=column,
+            scenario=scenario,
+            agent=str(settings.get("agent", "ppo")),
+            frames=frames if isinstance(frames, int) and frames > 0 else None,
+            tests=sorted({test for _, run in members for test in run.tests}),
+        )
+        conditions.append(
+            Condition(entry, tuple(sorted((run for _, run in members), key=lambda r: (r.seed, r.id))))
+        )
+    names = f"{len(folders)} runs" if len(folders) != 1 else "one run"
+    return Experiment(names, "", "Runs that were given one by one.", "", tuple(conditions))
+
+
+def _column(settings: Mapping[str, Any]) -> str:
+    """Who played, and what of it is not the default."""
+    named = [f"{key} {settings[key]}" for key in _SHOWN if settings.get(key) not in _USUAL]
+    return ", ".join([str(settings.get("agent", "ppo")), *named])
+
+
+def _read_run(folder: Path, name: str, seed: int) -> Run:
+    if not folder.is_dir():
+        return Run(name, seed, folder, "missing")
+    problems: list[str] = []
+    status = _read(folder / STATUS, StatusRecord, problems)
+    result = _read(folder / RESULT, ResultRecord, problems)
+    settings = _settings(folder, problems)
+    frames = result.frames if result is not None else _frames_so_far(folder / METRICS, problems)
+    return Run(
+        name,
+        seed,
+        folder,
+        state=_state(folder, status, result, frames),
+        message=(status.message or "") if status is not None else "",
+        attempts=len(status.attempts) if status is not None else 0,
+        result=result,
+        tests=_tests(folder / TESTS, problems),
+        frames=frames,
+        digest=_digest(settings) if settings is not None else "",
+        starts=_starts(folder / "starts.jsonl"),
+        problems=tuple(problems),
+    )
+
+
+def _state(folder: Path, status: StatusRecord | None, result: ResultRecord | None, frames: int) -> str:
+    """What the status says, unless whoever wrote it is gone; without a status, what the files tell."""
+    if status is not None:
+        return "stopped" if status.state == "running" and _is_left(folder) else status.state
+    if result is not None:
+        return "done"
+    return "running" if frames else "waiting"
+
+
+def _is_left(folder: Path) -> bool:
+    """Whether a run was claimed by somebody who is gone."""
+    try:
+        newest = claims.newest_claim(folder)
+        return newest is not None and not claims.is_held(newest)
+    except OSError:  # a folder that can only be read
+        return False
+
+
+def _read(path: Path, model: type[Model], problems: list[str]) -> Model | None:
+    """A file as a model; None if there is none, or, with a problem, none that can be read."""
+    try:
+        return model.model_validate_json(path.read_bytes())
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        problems.append(f"{path.name} cannot be read ({error.strerror})")
+    except ValidationError as error:
+        problems.append(f"{path.name} is damaged ({_first(error)})")
+    return None
+
+
+_TESTS: Final = TypeAdapter(dict[str, Figures])
+
+
+def _tests(path: Path, problems: list[str]) -> dict[str, Figures]:
+    try:
+        return _TESTS.validate_json(path.read_bytes())
+    except FileNotFoundError:
+        return {}
+    except OSError as error:
+        problems.append(f"{path.name} cannot be read ({error.strerror})")
+    except ValidationError as error:
+        problems.append(f"{path.name} is damaged ({_first(error)})")
+    return {}
+
+
+def _settings(folder: Path, problems: list[str]) -> dict[str, Any] | None:
+    try:
+        content = json.loads((folder / "config.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        content = None
+    if not isinstance(content, dict):
+        problems.append("config.json is missing or damaged")
+        return None
+    return content
+
+
+def _frames_so_far(metrics: Path, problems: list[str]) -> int:
+    """Frames of a run without a result."""
+    try:
+        return read_updates(metrics)[-1].frames
+    except FileNotFoundError:
+        return 0
+    except OSError as error:
+        problems.append(f"{metrics.name} cannot be read ({error.strerror})")
+    except ValueError as error:
+        problems.append(str(error).replace(f"{metrics}", metrics.name))
+    return 0
+
+
+def _starts(path: Path) -> tuple[StartRecord, ...]:
+    """The lines that are whole; a killed process may have left others."""
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return ()
+    starts = []
+    for line in lines:
+        try:
+            starts.append(StartRecord.model_validate_json(line))
+        except ValidationError:
+            continue
+    return tuple(starts)
+
+
+def _digest(settings: Mapping[str, Any]) -> str:
+    """SHA-256 of a configuration without its seed."""
+    content = json.dumps(_without_seed(settings), sort_keys=True, ensure_ascii=False, separators=(",", ":"))
+    return hashlib.sha256(content.encode()).hexdigest()
+
+
+def _without_seed(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _without_seed(part) for key, part in value.items() if key not in _SEED_KEYS}
+    return value
+
+
+def _first(error: ValidationError) -> str:
+    first = error.errors()[0]
+    place = ".".join(str(part) for part in first["loc"])
+    return f"{place}: {first['msg']}" if place else first["msg"]

@@ -1,0 +1,193 @@
+"""The statistics of a report: means and spread over seeds, Welch's test, effect sizes, interquartile means.
+
+Sources: B. L. Welch (1947) for the test; L. V. Hedges (1981) for the unbiased effect size; R. Agarwal et al. (2021),
+"Deep reinforcement learning at the edge of the statistical precipice", for interquartile means over tasks and seeds
+with intervals of a stratified bootstrap.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+from scipy.special import gammaln
+
+Float = NDArray[np.float64]
+
+RESAMPLES: Final = 10_000
+LEVEL: Final = 0.95
+ALPHA: Final = 0.05
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Values of several seeds.
+
+    Attributes:
+        values: one for each seed.
+    """
+
+    values: tuple[float, ...]
+
+    @property
+    def n(self) -> int:
+        """How many seeds."""
+        return len(self.values)
+
+    @property
+    def mean(self) -> float:
+        """Their mean; nan without any."""
+        return float(np.mean(self.values)) if self.values else math.nan
+
+    @property
+    def std(self) -> float | None:
+        """Their sample standard deviation (n - 1); None with fewer than two."""
+        return float(np.std(self.values, ddof=1)) if self.n > 1 else None
+
+
+@dataclass(frozen=True)
+class Test:
+    """A comparison of two groups of seeds.
+
+    Attributes:
+        difference: of the means, first minus second.
+        t, degrees, p: Welch's statistic, its degrees of freedom, the two-sided p. None where the test says nothing:
+            a group of fewer than two, or no spread in either.
+        g: Hedges' g; None where the pooled standard deviation is 0 or unknown.
+    """
+
+    difference: float
+    t: float | None
+    degrees: float | None
+    p: float | None
+    g: float | None
+
+
+def compare(first: Sequence[float], second: Sequence[float]) -> Test:
+    """Welch's t-test and Hedges' g of two groups.
+
+    Raises:
+        ValueError: a group is empty.
+    """
+    if not len(first) or not len(second):
+        raise ValueError(f"got groups of {len(first)} and {len(second)}, expected at least one value in each")
+    difference = float(np.mean(first) - np.mean(second))
+    enough = min(len(first), len(second)) > 1
+    if not enough or (_constant(first) and _constant(second)):
+        return Test(difference, None, None, None, None)
+    with warnings.catch_warnings():
+        # One group may be all alike, as where every seed solves everything; the other's variance then decides.
+        warnings.filterwarnings("ignore", message="Precision loss occurred")
+        result = stats.ttest_ind(first, second, equal_var=False)
+    return Test(
+        difference, float(result.statistic), float(result.df), float(result.pvalue), hedges_g(first, second)
+    )
+
+
+def _constant(values: Sequence[float]) -> bool:
+    return len(set(values)) == 1
+
+
+def hedges_g(first: Sequence[float], second: Sequence[float]) -> float | None:
+    """Difference of the means in pooled standard deviations, times the factor that makes it unbiased (Hedges 1981).
+
+    The factor is J(m) = Γ(m/2) / (√(m/2) Γ((m-1)/2)), with m = n1 + n2 - 2 degrees of freedom. None where the pooled
+    standard deviation is 0 or a group has fewer than two values.
+    """
+    degrees = len(first) + len(second) - 2
+    if min(len(first), len(second)) < 2:
+        return None
+    squares = (len(first) - 1) * np.var(first, ddof=1) + (len(second) - 1) * np.var(second, ddof=1)
+    pooled = math.sqrt(squares / degrees)
+    if pooled == 0.0:
+        return None
+    factor = math.exp(gammaln(degrees / 2) - gammaln((degrees - 1) / 2)) / math.sqrt(degrees / 2)
+    return float((np.mean(first) - np.mean(second)) / pooled * factor)
+
+
+def bonferroni(ps: Sequence[float | None]) -> list[float | None]:
+    """Each p times the number of tests that gave one, at most 1; so none of them is found by chance too often."""
+    tests = sum(p is not None for p in ps)
+    return [None if p is None else min(1.0, p * tests) for p in ps]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A figure with its interval, `LEVEL` of it."""
+
+    value: float
+    low: float
+    high: float
+
+
+def interquartile_mean(scores: Sequence[Sequence[float]]) -> float:
+    """Mean of the middle half of all scores together; the lowest and the highest quarter are left out.
+
+    Args:
+        scores: for each task those of its seeds.
+
+    Raises:
+        ValueError: there are none.
+    """
+    together = np.concatenate([np.asarray(task, np.float64) for task in scores]) if scores else np.empty(0)
+    if not len(together):
+        raise ValueError("scores: got none, expected at least one")
+    return float(stats.trim_mean(together, 0.25))
+
+
+def bootstrapped_iqm(
+    scores: Sequence[Sequence[float]], resamples: int = RESAMPLES, seed: int = 0
+) -> Estimate:
+    """The interquartile mean with its percentile interval of a stratified bootstrap.
+
+    Each resample draws, within each task, as many seeds as the task has, with replacement (Agarwal et al. 2021).
+
+    Args:
+        scores: for each task those of its seeds, at least one each.
+        resamples: how many.
+        seed: of the drawing.
+    """
+    generator = np.random.default_rng(seed)
+    tasks = [np.asarray(task, np.float64) for task in scores]
+    drawn = np.concatenate(
+        [task[generator.integers(0, len(task), (resamples, len(task)))] for task in tasks], axis=1
+    )
+    tail = (1 - LEVEL) / 2
+    low, high = np.quantile(stats.trim_mean(drawn, 0.25, axis=1), [tail, 1 - tail])
+    return Estimate(interquartile_mean(scores), float(low), float(high))
+
+
+def mean_interval(values: Sequence[float]) -> tuple[float, float] | None:
+    """Student's interval, `LEVEL` of it, of the mean of what more seeds would give; None with fewer than two."""
+    if len(values) < 2:
+        return None
+    half = stats.t.ppf((1 + LEVEL) / 2, len(values) - 1) * np.std(values, ddof=1) / math.sqrt(len(values))
+    return float(np.mean(values) - half), float(np.mean(values) + half)
+
+
+def frames_to(frames: Float, success: Float, threshold: float) -> float | None:
+    """The end of the first bin in which a run's success reached a threshold; None if it never did.
+
+    Args:
+        frames: (B,) ends of the bins.
+        success: (B,), nan where no episode ended.
+        threshold: 0 to 1.
+    """
+    reached = np.flatnonzero(np.nan_to_num(success, nan=-1.0) >= threshold)
+    return float(frames[reached[0]]) if len(reached) else None
+
+
+def area_under(success: Float) -> float | None:
+    """Mean success over the frames of a run: the area under its curve, divided by its frames.
+
+    Args:
+        success: (B,) in bins of equal width; nan where no episode ended, which are left out.
+    """
+    known = success[~np.isnan(success)]
+    return float(known.mean()) if len(known) else None

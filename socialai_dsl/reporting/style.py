@@ -1,0 +1,109 @@
+"""The look of all figures of a report: colours that colour-blind people can tell apart, sizes, number formats."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Final
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter, PercentFormatter
+
+# Okabe and Ito (2008), without yellow, which is too light for a line, and with black last.
+COLOURS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MARKERS: Final = ("o", "s", "^", "D", "v", "P", "X")
+INK: Final = "#1f2430"
+MUTED: Final = "#6b7280"
+RULE: Final = "#e3e6eb"
+
+_SETTINGS: Final[dict[Any, Any]] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.edgecolor": "#9aa1ad",
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 10.0,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.grid": True,
+    "axes.grid.axis": "y",
+    "axes.axisbelow": True,
+    "grid.color": RULE,
+    "grid.linewidth": 0.8,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "text.color": INK,
+    "text.parse_math": False,  # names come from files; a dollar sign in one is a dollar sign
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "svg.hashsalt": "socialai-dsl",
+}
+
+
+def colour(index: int) -> str:
+    """The colour of the column or condition with this index."""
+    return COLOURS[index % len(COLOURS)]
+
+
+def marker(index: int) -> str:
+    """Its marker, for who sees no colours."""
+    return MARKERS[index % len(MARKERS)]
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw and save in the report's style."""
+    with matplotlib.rc_context(_SETTINGS):
+        yield
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """A figure of this size, in inches."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def rates(axes: Axes, along: str = "y") -> None:
+    """An axis from 0 to 100 %, with room for a marker at either end."""
+    axis = axes.yaxis if along == "y" else axes.xaxis
+    (axes.set_ylim if along == "y" else axes.set_xlim)(-0.02, 1.02)
+    axis.set_major_formatter(PercentFormatter(1.0))
+    axis.set_ticks([0, 0.25, 0.5, 0.75, 1])
+
+
+def frames(axes: Axes, end: float) -> None:
+    """A horizontal axis of frames."""
+    axes.set_xlim(0, max(end, 1) * 1.02)
+    axes.xaxis.set_major_formatter(EngFormatter(sep=""))
+
+
+def saved(figure: Figure, form: str) -> bytes:
+    """The figure as `svg` or `png`, the same bytes for the same figure."""
+    stream = io.BytesIO()
+    with warnings.catch_warnings():
+        # Names come from files; a letter that the font lacks is drawn as a box.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+        _save(figure, form, stream)
+    return stream.getvalue()
+
+
+def _save(figure: Figure, form: str, stream: io.BytesIO) -> None:
+    metadata = {"Date": None, "Creator": None} if form == "svg" else {"Software": None}
+    figure.savefig(stream, format=form, dpi=150, metadata=metadata)
+
+
+def shown(name: str, width: int = 48) -> str:
+    """A name as a figure shows it: on one line, cut to a width, and not hidden by a leading underscore."""
+    line = " ".join(name.split())
+    line = line if len(line) <= width else line[: width - 1] + "…"
+    return f"\u200a{line}" if line.startswith("_") else line

@@ -1,0 +1,132 @@
+"""From runs to what a report says, on experiments with known figures."""
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from socialai_dsl.reporting.analysis import Analysis, analyse
+from socialai_dsl.reporting.collect import read_experiment
+from tests.socialai_dsl.reporting.synthetic import condition, write_experiment, write_run, write_tests
+
+
+def analysed(folder: Path, *conditions: dict[str, Any]) -> Analysis:
+    return analyse(read_experiment(write_experiment(folder, conditions)), {})
+
+
+def test_columns_of_a_row_are_compared_and_corrected_together(tmp_path: Path) -> None:
+    analysis = analysed(
+        tmp_path,
+        condition("A / x", [0.1, 0.2, 0.3]),
+        condition("A / y", [0.4, 0.6, 0.8]),
+        condition("B / x", [0.1, 0.2, 0.3]),
+        condition("B / y", [0.3, 0.4, 0.5]),
+        condition("C / x", [0.5]),
+        condition("C / y", []),
+    )
+    (table,) = analysis.sections
+    assert [(c.first, c.second) for c in table.comparisons] == [("A / x", "A / y"), ("B / x", "B / y")]
+    for comparison in table.comparisons:
+        assert comparison.test.p is not None
+        assert comparison.adjusted == pytest.approx(min(1.0, 2 * comparison.test.p))
+
+
+def test_rows_of_a_case_study_are_compared_as_well(tmp_path: Path) -> None:
+    cells = [condition(f"{row} / {column}", [0.1, 0.2], group="tags") for row in "AB" for column in "xy"]
+    tables, case = analysed(tmp_path, *cells[:2], condition("T / x", [0.1, 0.2]), *cells[2:]).sections
+    assert (tables.is_table, case.is_table) == (True, False), "tables come first"
+    pairs = {(c.first, c.second) for c in case.comparisons}
+    assert pairs == {("A / x", "A / y"), ("B / x", "B / y"), ("A / x", "B / x"), ("A / y", "B / y")}
+
+
+def test_panels_of_a_case_study_stay_readable(tmp_path: Path) -> None:
+    few = [condition(f"{row} / {column}", [0.1], group="few") for row in "AB" for column in "xy"]
+    many = [condition(f"{row} / {column}", [0.1], group="many") for row in "CD" for column in "xyz"]
+    single = [condition(f"E / {column}", [0.1], group="single") for column in "xyz"]
+    drawn = {
+        section.group: {
+            panel: [section.label(s) for s in members] for panel, members in section.panels.items()
+        }
+        for section in analysed(tmp_path, *few, *many, *single).sections
+    }
+    assert drawn == {
+        "few": {"few": ["A / x", "A / y", "B / x", "B / y"]},
+        "many": {"x": ["C", "D"], "y": ["C", "D"], "z": ["C", "D"]},
+        "single": {"E": ["x", "y", "z"]},
+    }
+
+
+def test_no_condition_hides_another_in_the_same_place(tmp_path: Path) -> None:
+    twice = [condition(name, [0.1], row="A", column="x") for name in ("one", "two")]
+    (table,) = analysed(tmp_path, *twice, condition("A / y", [0.1])).sections
+    assert list(table.rows) == ["one", "two", "A"]
+
+
+def test_interquartile_means_of_all_rows_and_of_those_in_common(tmp_path: Path) -> None:
+    (table,) = analysed(
+        tmp_path,
+        condition("A / x", [0.2, 0.2]),
+        condition("B / x", [0.8, 0.8]),
+        condition("A / y", [0.4, 0.4]),
+    ).sections
+    assert table.common_rows == 1
+    x, y = table.aggregates
+    assert x.common is not None
+    assert (x.rows, x.scores, x.estimate.value, x.common.value) == (
+        2,
+        4,
+        pytest.approx(0.5),
+        pytest.approx(0.2),
+    )
+    assert (y.rows, y.estimate.value) == (1, pytest.approx(0.4))
+
+
+def test_further_tests_are_spread_over_the_seeds_that_have_them(tmp_path: Path) -> None:
+    folder = write_experiment(tmp_path, [condition("Help / PPO", [0.9, 0.9, 0.9], tests=["other"])])
+    for seed, rate in ((0, 0.1), (2, 0.3)):
+        write_tests(folder / "runs" / f"c0-s{seed}", {"other": rate})
+    (summary,) = analyse(read_experiment(folder), {}).summaries
+    assert summary.tests["other"].values == (0.1, 0.3)
+
+
+def test_too_short(tmp_path: Path) -> None:
+    folder = write_experiment(
+        tmp_path, [condition("A / x", [0.4, 0.4, 0.4]), condition("A / y", [0.4]), condition("A / z", [0.4])]
+    )
+    shutil.rmtree(folder / "runs" / "c0-s1")
+    stopped = folder / "runs" / "c1-s0"
+    shutil.rmtree(stopped)
+    write_run(stopped, "help", 0, 0.4, frames=500)
+    missing, early, enough = analyse(read_experiment(folder), {}).summaries
+    assert missing.short == ("1 of 3 seeds without a result",)
+    assert early.short == ("a seed stopped at 500 of 1,000 frames",)
+    assert enough.short == ()
+
+
+def test_a_curve_that_still_rises_is_too_short_unless_it_is_solved(tmp_path: Path) -> None:
+    folder = write_experiment(tmp_path, [condition("A / x", [0.6]), condition("A / y", [0.97])])
+    for run in ("c0-s0", "c1-s0"):
+        path = folder / "runs" / run / "metrics.jsonl"
+        lines = path.read_text().splitlines(keepends=True)[:5]  # the part that rises
+        path.write_text("".join(lines))
+    rising, solved = analyse(read_experiment(folder), {}).summaries
+    # Bins end at 0.12, 0.24, ... 0.6: the last fifth is 0.6, the one before 0.48.
+    assert rising.short == ("success still rises, by 0.12 in the last fifth of training",)
+    assert solved.short == ()
+
+
+def test_sample_efficiency(tmp_path: Path) -> None:
+    (summary,) = analysed(tmp_path, condition("A / x", [0.6, 0.2])).summaries
+    assert summary.efficiency is not None
+    # Success rises by 0.12 each 100 frames up to 0.6, or by 0.04 up to 0.2.
+    assert summary.efficiency.reached == ((300, None), (500, None), (None, None), (None, None))
+    # (0.12 + 0.24 + 0.36 + 0.48 + 6 * 0.6) / 10, and a third of it.
+    assert summary.efficiency.areas == pytest.approx((0.48, 0.16))
+
+
+def test_successes_are_told_by_results_and_else_by_name(tmp_path: Path) -> None:
+    folder = write_experiment(tmp_path, [condition("A / x", [0.6]), condition("A / y", [0.6])])
+    (folder / "runs" / "c1-s0" / "result.json").unlink()
+    for summary in analyse(read_experiment(folder), {}).summaries:
+        assert summary.successes == {"success@56"}

@@ -1,0 +1,125 @@
+"""Reading experiments: whatever state their runs are in, a report can be made of what is there."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from socialai_dsl.experiments import claims
+from socialai_dsl.reporting.collect import Run, read_experiment, read_runs
+from tests.socialai_dsl.reporting.synthetic import condition, write_experiment, write_run, write_tests
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """One condition of four seeds."""
+    return write_experiment(tmp_path, [condition("Help / PPO", [0.2, 0.4, 0.6, 0.8])])
+
+
+def runs(folder: Path) -> list[Run]:
+    return read_experiment(folder).runs
+
+
+def test_a_finished_run_is_read_whole(folder: Path) -> None:
+    write_tests(folder / "runs" / "c0-s1", {"help_as_helper": 0.1})
+    first, second, *_ = runs(folder)
+    assert (first.state, first.frames, first.attempts, first.problems) == ("done", 1000, 1, ())
+    assert first.figures is not None
+    assert first.figures.success_rate == 0.2
+    assert second.tests["help_as_helper"].success_rate == 0.1
+    assert first.digest == second.digest, "a configuration's digest does not depend on the seed"
+    assert len(first.updates() or []) == 10
+
+
+def test_runs_in_every_state(folder: Path) -> None:
+    missing, unfinished, failed, torn = (folder / "runs" / f"c0-s{seed}" for seed in range(4))
+    shutil.rmtree(missing)
+    for run in (unfinished, torn):
+        (run / "result.json").unlink()
+        (run / "status.json").unlink()
+    (failed / "result.json").unlink()
+    (failed / "status.json").write_text(
+        json.dumps({"state": "failed", "attempts": [1, 2], "message": "no space"})
+    )
+    with (torn / "metrics.jsonl").open("a") as file:
+        file.write('{"update": 11, "fra')
+    found = runs(folder)
+    assert [run.state for run in found] == ["missing", "running", "failed", "running"]
+    assert [run.result for run in found] == [None] * 4
+    assert (found[2].message, found[2].attempts) == ("no space", 2)
+    assert found[3].frames == 1000, "the line that was never finished does not count"
+
+
+def test_a_run_whose_worker_is_gone_has_stopped(folder: Path) -> None:
+    run = folder / "runs" / "c0-s0"
+    (run / "status.json").write_text(json.dumps({"state": "running", "attempts": [1]}))
+    assert runs(folder)[0].state == "running"
+    claim = claims.claim(run)
+    assert claim is not None
+    assert runs(folder)[0].state == "running"
+    claim.release()
+    assert runs(folder)[0].state == "stopped"
+
+
+def test_a_run_of_two_conditions_is_one_run(folder: Path) -> None:
+    path = folder / "experiment.json"
+    record = json.loads(path.read_text())
+    record["conditions"].append(record["conditions"][0] | {"name": "again"})
+    record["runs"].append({"id": "c0-s0", "condition": "again", "seed": 0})
+    path.write_text(json.dumps(record))
+    assert len(runs(folder)) == 4
+
+
+@pytest.mark.parametrize("name", ["result.json", "status.json", "tests.json", "config.json", "metrics.jsonl"])
+@pytest.mark.parametrize("content", ["{", '{"a": [', "[1, 2]\n", '{"eval": {"success_rate": 7}}\n', "\x00\n"])
+def test_damaged_files_are_problems_of_their_run(folder: Path, name: str, content: str) -> None:
+    run = folder / "runs" / "c0-s2"
+    if name == "metrics.jsonl":
+        (run / "result.json").unlink()
+    (run / name).write_text(content)
+    damaged = runs(folder)[2]
+    if (name, content) != ("config.json", '{"eval": {"success_rate": 7}}\n'):  # a mapping is a configuration
+        assert any(problem.startswith(name) for problem in damaged.problems), damaged.problems
+    assert [run.problems for run in runs(folder) if run.seed != 2] == [()] * 3
+
+
+def test_a_folder_in_place_of_a_file_is_a_problem_too(folder: Path) -> None:
+    run = folder / "runs" / "c0-s0"
+    (run / "result.json").unlink()
+    (run / "result.json").mkdir()
+    assert "result.json cannot be read" in runs(folder)[0].problems[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"format": 2}, "format: Input should be 1"),
+        (
+            {"runs": [{"id": "x", "condition": "nobody", "seed": 0}]},
+            "condition 'nobody', which is not listed",
+        ),
+        ({"runs": [{"id": "../x", "condition": "Help / PPO", "seed": 0}]}, "expected the name of a folder"),
+        ({"runs": [{"id": "..", "condition": "Help / PPO", "seed": 0}]}, "expected the name of a folder"),
+    ],
+)
+def test_a_damaged_experiment_is_a_mistake(folder: Path, change: dict[str, object], message: str) -> None:
+    path = folder / "experiment.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    with pytest.raises(ValueError, match=r"experiment\.json") as caught:
+        read_experiment(folder)
+    assert message in str(caught.value)
+
+
+def test_runs_without_an_experiment_are_grouped_by_what_they_are(tmp_path: Path) -> None:
+    folders = [
+        write_run(tmp_path / "a", "help", 1, 0.5),
+        write_run(tmp_path / "b", "help", 0, 0.7),
+        write_run(tmp_path / "c", "talkitout+unsocial", 0, 0.2),
+    ]
+    helped, unsocial = read_runs(folders).conditions
+    assert [run.seed for run in helped.runs] == [0, 1]
+    assert (helped.entry.row, helped.entry.column) == ("help", "ppo")
+    assert unsocial.entry.name == "talkitout+unsocial / ppo"
+    with pytest.raises(ValueError, match=r"expected the folder of a run, with its config\.json"):
+        read_runs([tmp_path])

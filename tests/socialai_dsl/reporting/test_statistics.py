@@ -1,0 +1,109 @@
+"""The statistics of a report against figures computed by hand."""
+
+import math
+
+import numpy as np
+import pytest
+
+from socialai_dsl.reporting.statistics import (
+    Spread,
+    area_under,
+    bonferroni,
+    bootstrapped_iqm,
+    compare,
+    frames_to,
+    interquartile_mean,
+    mean_interval,
+)
+
+
+def test_mean_and_sample_standard_deviation() -> None:
+    spread = Spread((0.2, 0.4, 0.9))
+    assert spread.mean == pytest.approx(0.5)
+    # Deviations -0.3, -0.1, 0.4: squares 0.09 + 0.01 + 0.16 = 0.26, over n - 1 = 2.
+    assert spread.std == pytest.approx(math.sqrt(0.13))
+    assert Spread((0.2,)).std is None
+    assert math.isnan(Spread(()).mean)
+
+
+def test_welch_with_unequal_variances() -> None:
+    # Means 0.2 and 0.6, variances 0.01 and 0.04: t = -0.4 / sqrt(0.01/3 + 0.04/3) = -0.4 / sqrt(1/60).
+    # df = (0.01/3 + 0.04/3)^2 / ((0.01/3)^2/2 + (0.04/3)^2/2) = 25 / ((1 + 16)/2) = 50/17.
+    test = compare([0.1, 0.2, 0.3], [0.4, 0.6, 0.8])
+    assert test.difference == pytest.approx(-0.4)
+    assert test.t == pytest.approx(-0.4 * math.sqrt(60))
+    assert test.degrees == pytest.approx(50 / 17)
+
+
+def test_p_and_effect_size() -> None:
+    # Means 2 and 4, variances 1: t^2 = 4 / (2/3) = 6, df = 4. Student's distribution with four degrees of freedom is
+    # F(t) = 1/2 + 3/8 u (1 - u^2/12) with u = t / sqrt(1 + t^2/4); here u = sqrt(6/2.5) = sqrt(2.4).
+    test = compare([1, 2, 3], [3, 4, 5])
+    upper = 0.5 - 3 / 8 * math.sqrt(2.4) * (1 - 2.4 / 12)
+    assert test.p == pytest.approx(2 * upper)
+    assert test.p == pytest.approx(0.0705, abs=5e-5)
+    # The pooled standard deviation is 1; J(4) = gamma(2) / (sqrt(2) gamma(3/2)) = 1 / (sqrt(2) sqrt(pi)/2).
+    assert test.g == pytest.approx(-2 * math.sqrt(2 / math.pi))
+
+
+@pytest.mark.parametrize(("first", "second"), [([0.5], [0.1, 0.2]), ([1.0, 1.0], [0.0, 0.0])])
+def test_a_test_that_says_nothing_says_so(first: list[float], second: list[float]) -> None:
+    test = compare(first, second)
+    assert (test.t, test.degrees, test.p, test.g) == (None, None, None, None)
+    assert test.difference == pytest.approx(np.mean(first) - np.mean(second))
+
+
+def test_spread_in_one_group_is_enough_for_a_test() -> None:
+    # Variances 0 and 0.02: t = 0.5 / sqrt(0.02/2) = 5, df = 1, for which F(t) = 1/2 + atan(t)/pi.
+    test = compare([1.0, 1.0], [0.4, 0.6])
+    assert test.t == pytest.approx(5)
+    assert test.p == pytest.approx(1 - 2 * math.atan(5) / math.pi)
+
+
+def test_comparing_nothing_is_a_mistake() -> None:
+    with pytest.raises(ValueError, match="groups of 0 and 1"):
+        compare([], [1.0])
+
+
+def test_bonferroni_counts_the_tests_that_were_made() -> None:
+    assert bonferroni([0.01, None, 0.7]) == [0.02, None, 1.0]
+
+
+def test_the_interquartile_mean_leaves_out_a_quarter_at_either_end() -> None:
+    # Together 0, .2, .4, .5, .5, .6, .8, 1: two go at either end, (.4 + .5 + .5 + .6) / 4.
+    assert interquartile_mean([[0.0, 0.2], [0.4, 0.6], [0.8, 1.0], [0.5, 0.5]]) == pytest.approx(0.5)
+    with pytest.raises(ValueError, match="got none"):
+        interquartile_mean([])
+
+
+def test_the_bootstrap_draws_within_tasks_only() -> None:
+    # Drawn from all together, 0.2 and 0.8 would come in other numbers; within each task nothing can change.
+    estimate = bootstrapped_iqm([[0.2, 0.2], [0.8, 0.8]])
+    assert (estimate.value, estimate.low, estimate.high) == pytest.approx((0.5, 0.5, 0.5))
+    # Two seeds 0 and 1 give 0, 1/2, 1 with probabilities 1/4, 1/2, 1/4: both tails are longer than 2.5 %.
+    estimate = bootstrapped_iqm([[0.0, 1.0]])
+    assert (estimate.value, estimate.low, estimate.high) == pytest.approx((0.5, 0.0, 1.0))
+
+
+def test_the_bootstrap_can_be_repeated() -> None:
+    scores = np.random.default_rng(0).random((3, 16)).tolist()
+    assert bootstrapped_iqm(scores) == bootstrapped_iqm(scores)
+    assert bootstrapped_iqm(scores, seed=1) != bootstrapped_iqm(scores, seed=2)
+
+
+def test_the_interval_of_a_mean() -> None:
+    # Mean 0.5, standard error 0.1; with one degree of freedom the quantile is tan(0.475 pi) = 12.706.
+    interval = mean_interval([0.4, 0.6])
+    assert interval == pytest.approx(
+        (0.5 - 0.1 * math.tan(0.475 * math.pi), 0.5 + 0.1 * math.tan(0.475 * math.pi))
+    )
+    assert mean_interval([0.4]) is None
+
+
+def test_sample_efficiency_passes_over_unknown_bins() -> None:
+    frames, success = np.array([100.0, 200.0, 300.0]), np.array([np.nan, 0.4, 0.8])
+    assert frames_to(frames, success, 0.4) == 200
+    assert frames_to(frames, success, 0.0) == 200
+    assert frames_to(frames, success, 0.81) is None
+    assert area_under(success) == pytest.approx(0.6)
+    assert area_under(np.array([np.nan])) is None
