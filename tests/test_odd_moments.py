@@ -273,3 +273,17 @@ def test_an_agent_without_a_cell_sees_what_lies_outside(tmp_path: Path) -> None:
         pair.step((2, 0, 0, 0))
         absent += pair.env.describe()["agent"]["at"] is None
     assert 0 < absent < 10
+
+
+def test_a_push_is_for_what_is_in_the_way(tmp_path: Path) -> None:
+    state = play(
+        tmp_path,
+        """
+        objects:
+          marble: {type: marble, at: [2, 1], overlap: true}
+          plate: {type: floor, at: [2, 1], overlap: true}
+        cast: {agent: {at: [1, 1], facing: right}}
+        """,
+        [("forward", None)],
+    )
+    assert (state["marble"]["at"], state["marble"]["state"]) == ([3, 1], "rolling")

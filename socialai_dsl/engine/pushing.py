@@ -1,13 +1,12 @@
 """Things that are moved: put on a cell, pushed by who walks into them, rolling until something is in their way."""
 
-from socialai_dsl.engine.boards import draw_cell, is_deadly, is_solid, type_row
+from socialai_dsl.engine.boards import draw_cell, is_deadly, is_in_the_way, is_solid, type_row
 from socialai_dsl.engine.entities import (
     column,
     field,
     is_at,
     is_present,
     npc_at,
-    object_at,
     set_field,
     step_x,
     step_y,
@@ -55,11 +54,20 @@ def is_free(row: Row, x: int, y: int) -> bool:
     )
 
 
+@inline
+def _object_in_the_way(row: Row, x: int, y: int) -> int:
+    """The last object that keeps others from entering this cell; 0 if there is none."""
+    for entity in range(row.program[Header.ENTITIES] - 1, row.program[Header.NPCS], -1):
+        if is_at(row, entity, x, y) and is_in_the_way(row, entity):
+            return entity
+    return 0
+
+
 @outline
 def push(row: Row, x: int, y: int, direction: int, rolling: int) -> None:
     """A body (`rolling` 0) or something rolling (1) wants to enter a cell where something is in its way."""
     stay_outline()
-    entity = object_at(row, x, y)
+    entity = _object_in_the_way(row, x, y)
     if entity == 0 or field(row, entity, Field.POKED) != 0:
         return
     status = row.program[type_row(row, entity) + TypeColumn.PUSHED]

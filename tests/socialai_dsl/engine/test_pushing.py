@@ -165,12 +165,12 @@ def test_a_marble_that_is_gone_does_not_roll() -> None:
     assert entity(batch, 1, Field.X, Field.STATUS) == [3, ROLLING]
 
 
-def test_the_last_object_lies_on_top_and_any_one_is_in_the_way() -> None:
+def test_the_last_object_lies_on_top_and_what_is_in_the_way_is_pushed() -> None:
     batch = corridor(((2, 2), (3, 2), (3, 2)), ("generator", "platform"))
     assert code_at(batch, 3, 2) == PLATFORM
     step(batch, FORWARD)
     assert entity(batch, 0, Field.X) == [2], "the generator is in the way"
-    assert entity(batch, 1, Field.STATUS) == [IDLE], "but covered"
+    assert entity(batch, 1, Field.STATUS) == [PRESSED], "though it is covered"
     batch = corridor(((2, 2), (3, 2), (3, 2)), ("platform", "generator"))
     assert code_at(batch, 3, 2) == GENERATOR
     step(batch, FORWARD)
