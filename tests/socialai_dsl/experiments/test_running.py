@@ -92,7 +92,7 @@ def test_a_killed_driver_leaves_nobody_behind_and_the_command_goes_on(place, und
     assert all(reasons(other)[-1] == "done" and reasons(other).count("done") == 1 for other in others)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM])
 def test_stopped_by_a_person_or_the_system(place, undisturbed, number):
     driver = place.start("--workers", "2", seconds=0.1)
     run = place.until(place.at_work)
