@@ -157,12 +157,12 @@ def test_nothing_is_lost_and_nothing_done_twice(cluster: Cluster, tmp_path: Path
     until(lambda: lost.shown_status().state == "waiting", 60)
     cluster.add()
 
+    until(lambda: [run for run in runs_in(cluster.out) if run.status().state == "done"], 180)
     orphaned = until(lambda: cluster.under_way(killed.id, lost.id), 180)
     driver.kill()
     driver.wait()
     until(lambda: orphaned.shown_status().state == "waiting", 60)
     ends = {run.id: run.status().attempts for run in runs_in(cluster.out) if run.status().state == "done"}
-    assert ends, "some runs had come to their end"
 
     again = cluster.start()
     said, _ = again.communicate(timeout=1800)
