@@ -123,8 +123,11 @@ def _plan(arguments: argparse.Namespace) -> Exit:
 
 
 def _run(arguments: argparse.Namespace) -> Exit:
-    from socialai_dsl.cli.experiment_run import work_on
+    from socialai_dsl.cli.agents import require_trainer
     from socialai_dsl.experiments.folder import runs_of
+
+    require_trainer()
+    from socialai_dsl.cli.experiment_run import work_on
 
     document, folder = _document(arguments)
     if arguments.address is not None and arguments.engine != "ray":

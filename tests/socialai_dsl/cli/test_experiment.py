@@ -1,5 +1,6 @@
 """`socialai experiment`: what it plans, says and refuses; what becomes of runs is tested beside the runs."""
 
+import argparse
 import io
 import json
 from pathlib import Path
@@ -7,11 +8,16 @@ from typing import Any
 
 import pytest
 
+from socialai_dsl.cli import evaluate as evaluate_command
+from socialai_dsl.cli import run as run_command
 from socialai_dsl.cli.experiment_progress import RunsProgress
 from socialai_dsl.cli.experiment_tables import clock
 from socialai_dsl.cli.main import main
 from socialai_dsl.experiments import estimate
-from socialai_dsl.experiments.folder import Run, Status
+from socialai_dsl.experiments.document import document_of
+from socialai_dsl.experiments.folder import Run, Status, runs_of
+from socialai_dsl.experiments.work import _Work
+from socialai_dsl.frontend import load_experiment
 
 Capture = pytest.CaptureFixture[str]
 
@@ -47,19 +53,19 @@ def test_a_plan(file: Path, capsys: Capture) -> None:
         "tiny, profile usual, in runs/experiments/tiny\n"
         "\n"
         "condition      seeds  frames  frames/s  time left  state\n"
-        "dance / fast   0, 1   100     5,000     0 s        2 waiting\n"
+        "dance / fast   0, 1   100     5,000     30 s       2 waiting\n"
         "dance / paper  0, 1   100     -         -          2 waiting\n"
-        "chance         0      0       -         0 s        waiting\n"
+        "chance         0      0       -         15 s       waiting\n"
         "\n"
-        "5 runs, 2 at once: 0 s, and 2 of unknown speed (see --measure) left; testing is not counted\n"
-        "speeds are those of what is usual for this network\n"
+        "5 runs, 2 at once: 22 s, and 2 of unknown speed (see --measure) left\n"
+        "speeds are those of what is usual for this network; 15 s a run are counted for starting and testing\n"
     )
 
 
 def test_a_plan_for_programs(file: Path, capsys: Capture) -> None:
     plan = planned(file, capsys, "--profile", "long", "--workers", "3")
     assert (plan["name"], plan["profile"], plan["folder"]) == ("tiny", "long", "runs/experiments/tiny-long")
-    assert plan["seconds"] == 2 * 36_000_000 / 5000 / 3
+    assert plan["seconds"] == (2 * 36_000_000 / 5000 + 3 * 15) / 3
     assert plan["unknown"] == 2
     assert plan["states"] == {"waiting": 5}
     assert plan["runs"][0] | {"id": ""} == {
@@ -74,7 +80,7 @@ def test_a_plan_for_programs(file: Path, capsys: Capture) -> None:
         "message": None,
         "frames_per_second": 5000.0,
         "speed_from": "what is usual for this network",
-        "seconds": 7200.0,
+        "seconds": 7215.0,
     }
     assert not (file.parent / "runs").exists(), "a plan changes nothing"
 
@@ -170,6 +176,34 @@ def test_progress(tmp_path: Path, stream: io.StringIO, monkeypatch: pytest.Monke
     assert "[1/3] one, seed 0: failed: no memory" in said
 
 
+def test_the_words_of_a_run_are_those_of_the_command(file: Path) -> None:
+    """Whatever a condition can say, `socialai run` and `socialai evaluate` understand."""
+    options = (
+        "net: fast, explo: cell, envs: 64, curriculum: expert, precision: bfloat16, device: cpu, threads: 2, "
+        "checkpoint_every: 7, eval_episodes: 30"
+    )
+    file.write_text(
+        f"experiment: words\nset: {{scenario: social_env, seeds: [5], frames: 1000, {options}, tests: [help, dance]}}\n"
+        "conditions: [{name: learns}, {name: chance, agent: random}]\n"
+    )
+    document = document_of(load_experiment(file), None)
+    parser = argparse.ArgumentParser()
+    commands = parser.add_subparsers()
+    run_command.add_arguments(commands.add_parser("run"))
+    evaluate_command.add_arguments(commands.add_parser("evaluate"))
+    learns, chance = (_Work(run, lambda: False) for run in runs_of(file.parent, document))
+    given = parser.parse_args(learns._run_command())
+    for name, value in document["conditions"][0]["options"].items():
+        assert getattr(given, name) == value
+    assert (given.scenario, given.agent, given.seed, given.frames) == ("social_env", "ppo", 5, 1000)
+    assert parser.parse_args(chance._run_command()).seed == 5
+    own = str(file.parent / "runs" / document["runs"][0]["id"])
+    for work, agent, seed in ((learns, own, 0), (chance, "random", 5)):
+        asked = parser.parse_args(work._test_command(["help", "dance"]))
+        assert (asked.run, asked.on, asked.episodes, asked.seed) == (agent, ["help", "dance"], 30, seed)
+
+
+@pytest.mark.slow
 def test_a_real_run(file: Path, capsys: Capture) -> None:
     """The words of the command line are those that `socialai run` and `socialai evaluate` know."""
     file.write_text(

@@ -56,13 +56,18 @@ def test_a_run_under_way_tells_as_well_and_needs_less(tmp_path):
     (asked.path / "metrics.jsonl").write_text('{"frames": 600, "frames_per_second": 200.0}\n')
     (asked.path / "checkpoints").mkdir()
     (asked.path / "checkpoints" / "000000000000600.safetensors").touch()
-    assert Speeds([asked]).remaining(asked) == pytest.approx(2)
+    assert Speeds([asked]).remaining(asked) == pytest.approx(2 + 15)
 
 
-def test_what_is_done_or_not_trained_takes_no_time(tmp_path):
+def test_what_a_run_takes_besides_training(tmp_path):
+    """To start and to test: as the runs did that are done."""
     done, chance = run(tmp_path, "dance", speed=10), run(tmp_path, "help", frames=None)
+    assert Speeds([done]).remaining(chance) == 15
+    (done.path / "result.json").write_text('{"train_seconds": 60.0}')
+    attempts = [{"started": 100, "ended": 150}, {"started": 200, "ended": 220.5}]
+    (done.path / "status.json").write_text(json.dumps({"state": "done", "attempts": attempts}))
     speeds = Speeds([done])
-    assert (speeds.remaining(done), speeds.remaining(chance)) == (0, 0)
+    assert (speeds.remaining(done), speeds.remaining(chance)) == (0, 10.5)
 
 
 def test_a_spoilt_cache_is_no_cache(tmp_path):
