@@ -209,14 +209,19 @@ def test_a_real_run(file: Path, capsys: Capture) -> None:
     file.write_text(
         "experiment: real\nset: {scenario: help, eval_episodes: 3}\nconditions:\n"
         "  - {name: learns, frames: 256, envs: 4, explo: auto, checkpoint_every: 1, tests: [help_as_helper]}\n"
+        "  - {name: chance, agent: random, seeds: [1]}\n"
     )
     assert main(["experiment", "run", str(file), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert told["states"] == {"done": 1}
+    assert told["states"] == {"done": 2}
     folder = Path(told["folder"]) / "runs" / told["runs"][0]["id"]
     result, tests = (json.loads((folder / name).read_text()) for name in ("result.json", "tests.json"))
     assert (result["frames"], result["eval"]["episodes"]) == (256, 3)
     assert tests["help_as_helper"]["episodes"] == 3
     assert tests["help_as_helper"].keys() == result["eval"].keys()
     config = json.loads((folder / "config.json").read_text())
+    chance = json.loads((folder.parent / told["runs"][1]["id"] / "result.json").read_text())
+    assert chance["eval"]["actions"] == "sampled actions, seed 1", (
+        "the seed of who is not trained is of what it draws"
+    )
     assert (config["explo"], config["threads"], config["device"]) == ("cell", 1, "cpu")
