@@ -83,9 +83,8 @@ def load(name: str | Path) -> Loaded:
     result = check(name)
     if result.has_errors:
         raise ScenarioError(result.diagnostics, result.sources)
-    if result.suite is not None:
-        return result.suite
-    if result.checked is None or result.scenario is None or result.resolved is None:
+    loaded = _loaded(result)
+    if loaded is None:
         assert result.resolved is not None, "internal: nothing was read, and nothing is wrong"
         kind = result.resolved.kind
         what = "an abstract scenario, which others build on"
@@ -94,6 +93,15 @@ def load(name: str | Path) -> Loaded:
         span = result.resolved.key_span((kind,))
         message = f"this is {what}; only a scenario can be run"
         raise ScenarioError([Diagnostic("S108", message, span)], result.sources)
+    return loaded
+
+
+def _loaded(result: CheckResult) -> Loaded | None:
+    """What was checked and has no errors, if it can be run."""
+    if result.suite is not None:
+        return result.suite
+    if result.checked is None or result.scenario is None or result.resolved is None:
+        return None
     return LoadedScenario(
         result.checked.name, result.checked, result.scenario, result.resolved, result.diagnostics
     )  # fmt: skip
@@ -138,10 +146,11 @@ def check(name: str | Path, texts: Mapping[Path, Source] | None = None) -> Check
     if resolved.kind == "experiment":
         experiment = check_experiment(resolved, bag)
         files = dict(resolved.files)
+        right = None
         if experiment is not None:
-            _check_played(experiment, bag, files)
+            played = _check_played(experiment, bag, files)
+            right = None if bag.has_errors else replace(experiment, played=played)
         found = tuple(bag)
-        right = None if bag.has_errors else experiment
         return _sifted(CheckResult(name, None, None, found, files, resolved, experiment=right))
     checked, scenario = _checked(resolved, bag)
     found = tuple(DiagnosticBag(naming_the_patch(d, resolved) for d in said_once(bag)))
@@ -188,15 +197,26 @@ def _checked(resolved: Resolved, bag: DiagnosticBag) -> tuple[Checked | None, Sc
     return None, None  # the shape of a variant of any scenario was checked when it was read
 
 
-def _check_played(experiment: LoadedExperiment, bag: DiagnosticBag, files: dict[str, Source]) -> None:
-    """Check the scenarios that an experiment names, each once; what is wrong with a name points into the experiment."""
+def _check_played(
+    experiment: LoadedExperiment, bag: DiagnosticBag, files: dict[str, Source]
+) -> dict[str, Loaded]:
+    """Check the scenarios that an experiment names, each once, and return those that are right.
+
+    What is wrong with a name points into the experiment; what is wrong with a file, into that.
+    """
+    played: dict[str, Loaded] = {}
     for name, written, place in experiment.named():
         result = check(name)
-        kind = result.resolved.kind if result.resolved is not None else "scenario"
-        if not result.has_errors and result.checked is None and result.suite is None:
+        span = experiment.resolved.value_span(place)
+        if not result.has_errors:
+            loaded = _loaded(result)
+            if loaded is not None:
+                played[written] = loaded
+                continue
+            assert result.resolved is not None, "internal: nothing was read, and nothing is wrong"
+            kind = result.resolved.kind
             what = "an abstract scenario" if kind == "scenario" else f"a file of the kind `{kind}`"
-            message = f"`{written}` is {what}; only a scenario or a suite can be run"
-            bag.error("S108", message, experiment.resolved.value_span(place))
+            bag.error("S108", f"`{written}` is {what}; only a scenario or a suite can be run", span)
             continue
         files.update({source: text for source, text in result.sources.items() if source not in files})
         for finding in result.diagnostics:
@@ -204,8 +224,9 @@ def _check_played(experiment: LoadedExperiment, bag: DiagnosticBag, files: dict[
                 continue  # said where the scenario itself is checked
             if finding.span.file in result.sources and Path(finding.span.file).is_file():
                 bag.add(finding)
-            else:
-                meant = finding.suggestion
-                if meant is not None and os.path.isabs(meant):
-                    meant = os.path.relpath(meant, experiment.folder)
-                bag.add(replace(finding, span=experiment.resolved.value_span(place), suggestion=meant))
+                continue
+            meant = finding.suggestion
+            if meant is not None and os.path.isabs(meant):
+                meant = os.path.relpath(meant, experiment.folder)
+            bag.add(replace(finding, span=span, suggestion=meant))
+    return played

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.loader import DataPath, Resolved
@@ -15,6 +16,9 @@ from socialai_dsl.schema.experiment import AGENTS, NETS, Experiment
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.semantics.experiment import Cell, cells_of
 
+if TYPE_CHECKING:
+    from socialai_dsl.checking.loaded import Loaded
+
 
 @dataclass(frozen=True)
 class LoadedExperiment:
@@ -23,11 +27,13 @@ class LoadedExperiment:
     Attributes:
         experiment: the models. resolved: the data with its positions.
         cells: profile -> its conditions; None is the file without a profile.
+        played: the scenarios, by their names in the file; `frontend` puts them in when it has checked them.
     """
 
     experiment: Experiment
     resolved: Resolved
     cells: Mapping[str | None, tuple[Cell, ...]]
+    played: Mapping[str, Loaded] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"<LoadedExperiment {self.experiment.experiment}: {len(self.cells[None])} conditions>"

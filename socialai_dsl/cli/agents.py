@@ -3,6 +3,7 @@
 import contextlib
 from collections.abc import Iterator
 from dataclasses import asdict
+from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Final, Literal
 
@@ -24,10 +25,8 @@ def require_trainer() -> None:
     Raises:
         UsageError: it is.
     """
-    try:
-        import torch  # noqa: F401
-    except ImportError:
-        raise UsageError("training and evaluating need PyTorch: pip install 'socialai-dsl[train]'") from None
+    if find_spec("torch") is None:
+        raise UsageError("training and evaluating need PyTorch: pip install 'socialai-dsl[train]'")
 
 
 def resolve_device(device: str) -> str:

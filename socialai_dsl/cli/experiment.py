@@ -13,6 +13,7 @@ from socialai_dsl.diagnostics import did_you_mean
 
 if TYPE_CHECKING:
     from socialai_dsl.checking.experiments import LoadedExperiment
+    from socialai_dsl.experiments.engines import Engine
     from socialai_dsl.experiments.folder import Run
 
 SUMMARY: Final = "plan, run and look after the runs that an experiment file declares"
@@ -69,6 +70,13 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
         "--address", metavar="ADDRESS", help="of the Ray cluster (default: a cluster of this machine)"
     )
     parser.add_argument(
+        "--slurm",
+        type=_parameter,
+        action="append",
+        metavar="NAME=VALUE",
+        help="a parameter of the Slurm jobs, such as timeout_min=600 or slurm_partition=cpu; repeatable",
+    )
+    parser.add_argument(
         "--runs",
         type=Path,
         metavar="DIR",
@@ -115,14 +123,19 @@ def _plan(arguments: argparse.Namespace) -> Exit:
 
 
 def _run(arguments: argparse.Namespace) -> Exit:
-    from socialai_dsl.cli.experiment_run import work_on
+    from socialai_dsl.cli.agents import require_trainer
     from socialai_dsl.experiments.folder import runs_of
+
+    require_trainer()
+    from socialai_dsl.cli.experiment_run import work_on
 
     document, folder = _document(arguments)
     if arguments.address is not None and arguments.engine != "ray":
         raise UsageError("--address: only the engine `ray` has one")
+    if arguments.slurm and arguments.engine != "slurm":
+        raise UsageError("--slurm: only the engine `slurm` has jobs")
     _prepare(folder, document, arguments)
-    engine = _engine(arguments, document)
+    engine = _engine(arguments, document, folder)
     return work_on(folder, document, runs_of(folder, document), engine, arguments.json)
 
 
@@ -184,19 +197,45 @@ def _prepare(folder: Path, document: dict[str, Any], arguments: argparse.Namespa
     write_json(folder / EXPERIMENT, document)
 
 
-def _engine(arguments: argparse.Namespace, document: dict[str, Any]) -> Any:
-    workers = arguments.workers or _workers(document)
+def _engine(arguments: argparse.Namespace, document: dict[str, Any], folder: Path) -> "Engine":
+    from socialai_dsl.experiments.engines import MissingEngineError
     from socialai_dsl.experiments.engines.local import LocalEngine
+    from socialai_dsl.experiments.engines.ray import RayEngine
+    from socialai_dsl.experiments.engines.slurm import SlurmEngine
 
+    threads = _threads(document)
+    workers = arguments.workers or _workers(document)
+    try:
+        match arguments.engine:
+            case "ray":
+                return RayEngine(arguments.address, threads, workers)
+            case "slurm":
+                # A cluster has more cores than this machine: all jobs at once, unless somebody says how many.
+                at_once = arguments.workers or len(document["runs"])
+                return SlurmEngine(folder, threads, at_once, dict(arguments.slurm or ()))
+    except (MissingEngineError, ValueError) as error:
+        raise UsageError(str(error)) from None
     return LocalEngine(workers)
+
+
+def _parameter(text: str) -> tuple[str, str | int]:
+    """`timeout_min=600` as a pair."""
+    name, equals, value = text.partition("=")
+    if not equals or not name.isidentifier():
+        raise argparse.ArgumentTypeError(f"expected NAME=VALUE, got {text!r}")
+    return name, int(value) if value.isdigit() else value
+
+
+def _threads(document: dict[str, Any]) -> int:
+    """The cores that a run needs, whichever it is."""
+    return max(int(condition["options"].get("threads", 1)) for condition in document["conditions"])
 
 
 def _workers(document: dict[str, Any]) -> int:
     """As many runs at once as this machine has cores for."""
     from socialai_dsl.experiments.cores import available_cores
 
-    threads = max(int(condition["options"].get("threads", 1)) for condition in document["conditions"])
-    return max(1, len(available_cores()) // threads)
+    return max(1, len(available_cores()) // _threads(document))
 
 
 # -- status, retry, cancel ---------------------------------------------------------------------------------------------

@@ -39,6 +39,7 @@ def plan_figures(
         **_head(document, folder),
         "workers": workers,
         "seconds": round(sum(known_seconds) / workers, 1),
+        "seconds_besides": round(speeds.seconds_besides, 1),
         "unknown": len(rows) - len(known_seconds),
         "states": dict(Counter(row["state"] for row in rows)),
         "runs": rows,
@@ -116,11 +117,9 @@ def plan_text(figures: Mapping[str, Any], each: bool) -> str:
     time = clock(figures["seconds"]) + (
         f", and {unknown} of unknown speed (see --measure)" if unknown else ""
     )
-    lines.append(
-        f"{len(figures['runs'])} runs, {figures['workers']} at once: {time} left; testing is not counted"
-    )
-    if sources:
-        lines.append("speeds are those of " + "; ".join(sources))
+    lines.append(f"{len(figures['runs'])} runs, {figures['workers']} at once: {time} left")
+    besides = f"{clock(figures['seconds_besides'])} a run are counted for starting and testing"
+    lines.append(f"speeds are those of {'; '.join(sources)}; {besides}" if sources else besides)
     return "\n".join(lines)
 
 

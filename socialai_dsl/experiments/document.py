@@ -5,13 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.checking.experiments import LoadedExperiment, from_anywhere
 from socialai_dsl.compilation import compile_loaded
-from socialai_dsl.frontend import load
 from socialai_dsl.schema.experiment import AGENTS, Reference
 from socialai_dsl.semantics.experiment import Cell
 
@@ -50,6 +48,12 @@ def document_of(loaded: LoadedExperiment, profile: str | None) -> dict[str, Any]
         OSError: a checkpoint cannot be read.
     """
     cells = loaded.cells[profile]
+    programs = {
+        name: compile_loaded(loaded.played[name]).sha256 for name in {cell.scenario for cell in cells}
+    }
+    weights = {
+        cell.agent: _weights_digest(loaded.folder / cell.agent) for cell in cells if cell.agent not in AGENTS
+    }
     return {
         "format": FORMAT,
         "name": loaded.experiment.experiment,
@@ -58,7 +62,11 @@ def document_of(loaded: LoadedExperiment, profile: str | None) -> dict[str, Any]
         "source_sha256": _source_digest(loaded),
         "conditions": [_condition(cell, loaded.folder) for cell in cells],
         "runs": [
-            {"id": run_id(cell, seed, loaded.folder), "condition": cell.name, "seed": seed}
+            {
+                "id": run_id(cell, seed, programs[cell.scenario], weights.get(cell.agent, cell.agent)),
+                "condition": cell.name,
+                "seed": seed,
+            }
             # A first seed of everything before the second of anything: half-way there is something to look at.
             for number in range(max((len(cell.seeds) for cell in cells), default=0))
             for cell in cells
@@ -67,19 +75,20 @@ def document_of(loaded: LoadedExperiment, profile: str | None) -> dict[str, Any]
     }
 
 
-def run_id(cell: Cell, seed: int, folder: Path) -> str:
+def run_id(cell: Cell, seed: int, program: str, agent: str) -> str:
     """The name of a run's folder: a hash of all that decides what the run computes.
 
     Args:
         cell: its condition.
         seed: its own.
-        folder: where relative paths of the experiment's file start.
+        program: digest of the compiled scenario.
+        agent: its name, or the digest of its weights.
     """
     options = {key: value for key, value in options_of(cell).items() if key not in _WITHOUT_EFFECT}
     identity = {
         "scenario": cell.scenario,
-        "program": _program_digest(from_anywhere(cell.scenario, folder)),
-        "agent": cell.agent if cell.agent in AGENTS else _weights_digest(folder / cell.agent),
+        "program": program,
+        "agent": agent,
         "frames": cell.frames if cell.trains else 0,
         "options": options,
         "seed": seed,
@@ -177,12 +186,6 @@ def _source_digest(loaded: LoadedExperiment) -> str:
     return hashlib.sha256("\0".join(texts).encode()).hexdigest()
 
 
-@cache
-def _program_digest(scenario: str) -> str:
-    return compile_loaded(load(scenario)).sha256
-
-
-@cache
 def _weights_digest(path: Path) -> str:
     """Of a checkpoint's file: the newest of a run's folder or of a folder of checkpoints."""
     file = path

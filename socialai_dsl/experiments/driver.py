@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Final
 
 from socialai_dsl.experiments.engines import Engine, Handle
-from socialai_dsl.experiments.folder import Run
-from socialai_dsl.experiments.work import Outcome
+from socialai_dsl.experiments.folder import Run, UnreadableError, said_of
+from socialai_dsl.experiments.work import Outcome, finished
 
 SECONDS_BETWEEN_LOOKS: Final = 0.2
-SECONDS_BEFORE_ASKING_AGAIN: Final = 3.0
-_ATTEMPTS_OF_THE_ENGINE: Final = 3
+SECONDS_BEFORE_ASKING_AGAIN: Final = 2.0
+_ATTEMPTS_OF_THE_ENGINE: Final = 5
 """How often an engine may fail at a run, through no fault of the run's, before that is called a failure."""
 
 
@@ -28,33 +28,53 @@ def drive(
         engine: who works on them; stopped when the iterator is closed.
         ended: told of each run that has come to its end.
     """
-    work = {run.id: engine.submit(folder, run.id) for run in runs}
-    again: dict[str, float] = {}
-    failures: dict[str, int] = {}
     known = {run.id: run for run in runs}
+    work: dict[str, Handle] = {}
+    failures: dict[str, int] = {}
+    # Runs that are to be given to the engine, and when.
+    waiting = dict.fromkeys(known, 0.0)
     try:
-        while work or again:
+        while work or waiting:
             for identity in [identity for identity, handle in work.items() if handle.done()]:
                 outcome, message = _outcome(work.pop(identity), failures, identity)
                 if outcome is Outcome.HELD:
-                    again[identity] = time.monotonic() + SECONDS_BEFORE_ASKING_AGAIN
+                    waiting[identity] = time.monotonic() + SECONDS_BEFORE_ASKING_AGAIN
                 else:
                     ended(known[identity], outcome, message)
-            for identity in [i for i, moment in again.items() if moment <= time.monotonic()]:
-                del again[identity]
-                work[identity] = engine.submit(folder, identity)
+            free = []
+            for identity in [identity for identity, moment in waiting.items() if moment <= time.monotonic()]:
+                waiting[identity] = time.monotonic() + SECONDS_BEFORE_ASKING_AGAIN
+                known_end, is_held = _known(known[identity])
+                if known_end is not None:
+                    ended(known[identity], *known_end)
+                elif not is_held:
+                    free.append(identity)
+                if known_end is not None or not is_held:
+                    del waiting[identity]
+            if free:
+                work |= zip(free, engine.submit(folder, free), strict=True)
             yield
             time.sleep(SECONDS_BETWEEN_LOOKS)
     finally:
         engine.stop()
 
 
+def _known(run: Run) -> tuple[tuple[Outcome, str] | None, bool]:
+    """What came of a run, if that is known, and whether somebody works on it; then no engine is asked."""
+    try:
+        return finished(run), run.is_claimed()
+    except (OSError, UnreadableError) as error:
+        return (Outcome.FAILED, said_of(error)), False
+
+
 def _outcome(handle: Handle, failures: dict[str, int], identity: str) -> tuple[Outcome, str]:
     """What came of a run; what an engine failed at is tried again some times, since the run is as it was."""
     try:
-        return handle.result()
+        outcome, message = handle.result()
+        return Outcome(outcome), message
     except Exception as error:
         failures[identity] = failures.get(identity, 0) + 1
         if failures[identity] < _ATTEMPTS_OF_THE_ENGINE:
             return Outcome.HELD, ""
-        return Outcome.FAILED, f"{type(error).__name__}: {error}"
+        said = str(error).strip().splitlines() or [""]
+        return Outcome.FAILED, f"{type(error).__name__}: {said[-1]}"

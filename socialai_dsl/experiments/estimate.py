@@ -16,6 +16,10 @@ USUAL_SPEEDS: Final[Mapping[str, float]] = {"fast": 5000.0}
 """Frames per second of a network on a core of a server, where nothing was measured; of others nothing is known."""
 
 
+USUAL_SECONDS_BESIDES: Final = 15.0
+"""What a run takes besides training, to start and to play its test sets, where no run here tells."""
+
+
 @dataclass(frozen=True)
 class Speed:
     """Frames per second, and how that is known."""
@@ -25,19 +29,26 @@ class Speed:
 
 
 class Speeds:
-    """What is known of the speed of networks, the best knowledge first."""
+    """What is known of the speed of networks, the best knowledge first.
+
+    Attributes:
+        seconds_besides: what a run takes besides training.
+    """
 
     def __init__(self, runs: Iterable[Run]) -> None:
         """Learn from the runs of an experiment that have got far enough to tell."""
         self._by_scenario: dict[tuple[str, str], list[float]] = {}
         self._by_net: dict[str, list[float]] = {}
         self._cached = _cached()
+        besides: list[float] = []
         for run in runs:
+            besides += _seconds_besides(run)
             speed = _speed_of(run)
             if speed is not None:
                 net = str(run.condition["options"]["net"])
                 self._by_scenario.setdefault((run.condition["scenario"], net), []).append(speed)
                 self._by_net.setdefault(net, []).append(speed)
+        self.seconds_besides = sum(besides) / len(besides) if besides else USUAL_SECONDS_BESIDES
 
     def of(self, condition: Mapping[str, Any]) -> Speed | None:
         """The speed to expect of a condition's runs; None if nothing is known."""
@@ -62,14 +73,16 @@ class Speeds:
         self._cached = _cached()
 
     def remaining(self, run: Run) -> float | None:
-        """Seconds that training still takes; None if the speed is not known."""
-        if run.condition["frames"] is None or run.result() is not None:
-            return 0.0
+        """Seconds that a run still takes; None if the speed is not known."""
+        if run.result() is not None:
+            return self.seconds_besides if run.missing_tests() else 0.0
+        if run.condition["frames"] is None:
+            return self.seconds_besides
         speed = self.of(run.condition)
         if speed is None:
             return None
         left: int = run.condition["frames"] - (run.checkpoint_frames() or 0)
-        return max(0, left) / speed.frames_per_second
+        return max(0, left) / speed.frames_per_second + self.seconds_besides
 
 
 def remember(net: str, frames_per_second: float) -> None:
@@ -101,6 +114,18 @@ def _speed_of(run: Run) -> float | None:
     row = result or run.last_metrics() or {}
     speed: object = row.get("frames_per_second")
     return float(speed) if isinstance(speed, int | float) and speed > 0 else None
+
+
+def _seconds_besides(run: Run) -> list[float]:
+    """The time that a run's processes took without training, if the run is done."""
+    try:
+        result, status = run.result(), run.status()
+    except (OSError, UnreadableError):
+        return []
+    if status.state != "done" or result is None or "train_seconds" not in result:
+        return []
+    whole = sum(attempt["ended"] - attempt["started"] for attempt in status.attempts)
+    return [max(0.0, whole - result["train_seconds"])]
 
 
 def _mean(speeds: list[float]) -> float:

@@ -55,6 +55,7 @@ class Status:
             {
                 "host": socket.gethostname(),
                 "pid": pid,
+                "born": claims.born(pid),
                 "started": time.time(),
                 "ended": None,
                 "reason": None,

@@ -12,10 +12,10 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import IO, Final
+from typing import IO, Any, Final
 
 from socialai_dsl.atomic import write_json
 from socialai_dsl.experiments import claims
@@ -95,6 +95,26 @@ def perform(
         return Outcome.FAILED, said_of(error)
 
 
+def perform_unasked(folder: str, run_id: str) -> tuple[str, str]:
+    """`perform` for a process that a scheduler starts, and stops by a signal; plain words in and out."""
+    outcome, message = perform(Path(folder), run_id, stop=lambda: False)
+    return outcome.value, message
+
+
+def finished(run: Run) -> tuple[Outcome, str] | None:
+    """What came of a run that has come to its end, and a message; None if there is something left to do.
+
+    Raises:
+        OSError, UnreadableError: its folder does not tell.
+    """
+    status = run.status()
+    if status.state == "done" and not run.missing_tests():
+        return Outcome.DONE, ""
+    if status.state in ("failed", "cancelled"):
+        return Outcome(status.state), status.message or ""
+    return None
+
+
 class _Work:
     """Work on one run."""
 
@@ -106,7 +126,7 @@ class _Work:
 
     def perform(self, stale_after: float) -> tuple[Outcome, str]:
         """Claim it, work, let go of it."""
-        known = self._finished()
+        known = finished(self._run)
         if known is not None:
             return known
         before = claims.newest_claim(self._run.path)
@@ -115,36 +135,43 @@ class _Work:
             return Outcome.HELD, ""
         try:
             # It may have come to its end, or been given up, just before it was ours.
-            return self._finished() or self._work(claim, before)
+            return finished(self._run) or self._work(claim, before)
         finally:
             with contextlib.suppress(OSError):  # a claim whose process is gone counts as released as well
                 claim.release()
 
-    def _finished(self) -> tuple[Outcome, str] | None:
-        status = self._run.status()
-        if status.state == "done" and not self._run.missing_tests():
-            return Outcome.DONE, ""
-        if status.state in ("failed", "cancelled"):
-            return Outcome(status.state), status.message or ""
-        return None
-
     def _work(self, claim: Claim, before: Path | None) -> tuple[Outcome, str]:
         self._status = self._run.status()
-        if before is not None and "released" not in (claims.owner_of(before) or {}):
-            self._status.end("its process was gone", self._status.heartbeat)
-            time.sleep(_SECONDS_FOR_OLD_CHILDREN)
+        self._status.end("its process was gone", self._status.heartbeat)
+        if before is not None:
+            self._let_go(claims.owner_of(before) or {})
         try:
             self._train(claim)
             self._test(claim)
         except _OvertakenError:
             return Outcome.HELD, ""
-        except _StoppedError:
+        except (_StoppedError, KeyboardInterrupt):  # the latter is how a scheduler says it in its worker
             return self._leave("waiting", "stopped", Outcome.STOPPED)
+        except SystemExit:  # Slurm takes the machine away
+            self._leave("waiting", "stopped", Outcome.STOPPED)
+            raise
         except _CancelledError:
             return self._leave("cancelled", "cancelled", Outcome.CANCELLED)
         except _FailedError as error:
             return self._leave("failed", str(error), Outcome.FAILED)
         return self._leave("done", "done", Outcome.DONE)
+
+    def _let_go(self, owner: Mapping[str, Any]) -> None:
+        """Wait until what an owner that is gone had started has noticed."""
+        if "released" in owner:
+            return
+        end = time.monotonic() + _SECONDS_FOR_OLD_CHILDREN
+        child = self._status.attempts[-1] if self._status.attempts else None
+        here = owner.get("scope") == claims.scope()
+        while time.monotonic() < end:
+            if here and (child is None or claims.born(child["pid"]) != child.get("born")):
+                return
+            time.sleep(_SECONDS_BETWEEN_LOOKS)
 
     def _leave(self, state: str, reason: str, outcome: Outcome) -> tuple[Outcome, str]:
         self._status.end(reason)

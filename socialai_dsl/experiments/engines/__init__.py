@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol
-
-from socialai_dsl.experiments.work import Outcome
+from typing import Any, Protocol
 
 
 class Handle(Protocol):
@@ -14,15 +13,19 @@ class Handle(Protocol):
     def done(self) -> bool:
         """Whether it has come to an end here, in whatever way."""
 
-    def result(self) -> tuple[Outcome, str]:
-        """What came of it; or the exception that kept the engine from working on it."""
+    def result(self) -> Any:
+        """What `work.perform` returned; or the exception that kept the engine from working on it."""
 
 
 class Engine(Protocol):
     """Somewhere to work on runs. The runs' folders hold the truth; an engine remembers nothing."""
 
-    def submit(self, folder: Path, run_id: str) -> Handle:
-        """Have `work.perform` called for a run, as soon as there is room."""
+    def submit(self, folder: Path, run_ids: Sequence[str]) -> Sequence[Handle]:
+        """Have `work.perform` called for each of these runs, as soon as there is room."""
 
     def stop(self) -> None:
         """Leave all runs as they stand, and return when nobody works on them any more."""
+
+
+class MissingEngineError(Exception):
+    """What the engine needs is not installed, or not there; the message says what to do."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
@@ -18,9 +19,9 @@ class LocalEngine:
         # The threads only watch processes.
         self._pool = ThreadPoolExecutor(workers, thread_name_prefix="run")
 
-    def submit(self, folder: Path, run_id: str) -> Future[tuple[Outcome, str]]:
+    def submit(self, folder: Path, run_ids: Sequence[str]) -> list[Future[tuple[Outcome, str]]]:
         """See `Engine.submit`."""
-        return self._pool.submit(perform, folder, run_id, self._stopped.is_set)
+        return [self._pool.submit(perform, folder, run_id, self._stopped.is_set) for run_id in run_ids]
 
     def stop(self) -> None:
         """See `Engine.stop`."""

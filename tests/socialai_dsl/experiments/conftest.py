@@ -11,9 +11,12 @@ from typing import Any
 
 import pytest
 
+from socialai_dsl.atomic import write_json
 from socialai_dsl.cli.main import main
 from socialai_dsl.experiments import work
-from socialai_dsl.experiments.folder import Run, read_experiment, runs_of
+from socialai_dsl.experiments.document import document_of
+from socialai_dsl.experiments.folder import EXPERIMENT, RUNS, Run, read_experiment, runs_of
+from socialai_dsl.frontend import load_experiment
 
 HERE = Path(__file__).parent
 
@@ -30,8 +33,9 @@ conditions:
 class Place:
     """A folder with an experiment's file, and the commands given there."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, document: dict[str, Any]) -> None:
         self.path = path
+        self.document = document
         self.file = path / "small.yaml"
         self.out = path / "out"
         self.file.write_text(SMALL, encoding="utf-8")
@@ -49,17 +53,8 @@ class Place:
             "import sys; from socialai_dsl.experiments import work; work.PROGRAM = 'pretend'; "
             "from socialai_dsl.cli.main import main; sys.exit(main(sys.argv[1:]))"
         )
-        command = [
-            sys.executable,
-            "-c",
-            script,
-            "experiment",
-            "run",
-            str(self.file),
-            "--out",
-            str(self.out),
-            *words,
-        ]
+        self.prepare()
+        command = [sys.executable, "-c", script, "experiment", "run", str(self.out), *words]
         self.drivers.append(
             subprocess.Popen(
                 command,
@@ -69,6 +64,12 @@ class Place:
             )
         )
         return self.drivers[-1]
+
+    def prepare(self) -> None:
+        """The experiment's folder as a first `run` makes it, so that a command need not compile the scenario."""
+        if not self.out.exists():
+            (self.out / RUNS).mkdir(parents=True)
+            write_json(self.out / EXPERIMENT, self.document)
 
     def runs(self) -> dict[str, Run]:
         """Label -> run."""
@@ -97,14 +98,21 @@ class Place:
         return None
 
 
+@pytest.fixture(scope="session")
+def document(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    file = tmp_path_factory.mktemp("document") / "small.yaml"
+    file.write_text(SMALL, encoding="utf-8")
+    return document_of(load_experiment(file), None)
+
+
 @pytest.fixture
-def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Place]:
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, document: dict[str, Any]) -> Iterator[Place]:
     monkeypatch.setattr(work, "PROGRAM", "pretend")
     before = os.environ.get("PYTHONPATH")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, (str(HERE), str(HERE.parents[2]), before))))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.chdir(tmp_path)
-    made = Place(tmp_path)
+    made = Place(tmp_path, document)
     yield made
     for driver in made.drivers:
         if driver.poll() is None:

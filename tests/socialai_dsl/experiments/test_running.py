@@ -1,8 +1,10 @@
 """Runs come to their end whatever happens to who works on them: none is lost, none is done twice."""
 
+import errno
 import json
 import os
 import signal
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -92,7 +94,7 @@ def test_a_killed_driver_leaves_nobody_behind_and_the_command_goes_on(place, und
     assert all(reasons(other)[-1] == "done" and reasons(other).count("done") == 1 for other in others)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM])
 def test_stopped_by_a_person_or_the_system(place, undisturbed, number):
     driver = place.start("--workers", "2", seconds=0.1)
     run = place.until(place.at_work)
@@ -140,6 +142,25 @@ def test_an_unreadable_folder_stops_no_other(place, capsys):
     said = capsys.readouterr().out
     assert f"{runs['none, seed 0'].path / 'status.json'}: not JSON" in said
     assert "1 done, 2 failed" in said
+
+
+def test_a_full_disk_stops_no_other(place):
+    """The disk of one run, which is large enough to begin."""
+    place.prepare()
+    run = place.runs()["none, seed 0"]
+    run.path.mkdir()
+    try:
+        mount = ["mount", "-t", "tmpfs", "-o", "size=36k", "tmpfs", str(run.path)]
+        subprocess.run(mount, check=True, capture_output=True, timeout=20)
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("only root can make a disk")
+    try:
+        assert place.run() == 1
+        assert run.status().state == "failed"
+        assert os.strerror(errno.ENOSPC) in run.status().message
+    finally:
+        subprocess.run(["umount", "--lazy", str(run.path)], check=True, capture_output=True, timeout=20)
+    assert [other.status().state for other in place.runs().values() if other.id != run.id] == ["done", "done"]
 
 
 def test_cancelled_and_tried_again(place, undisturbed, capsys):

@@ -1,0 +1,227 @@
+"""`socialai experiment`: what it plans, says and refuses; what becomes of runs is tested beside the runs."""
+
+import argparse
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from socialai_dsl.cli import evaluate as evaluate_command
+from socialai_dsl.cli import run as run_command
+from socialai_dsl.cli.experiment_progress import RunsProgress
+from socialai_dsl.cli.experiment_tables import clock
+from socialai_dsl.cli.main import main
+from socialai_dsl.experiments import estimate
+from socialai_dsl.experiments.document import document_of
+from socialai_dsl.experiments.folder import Run, Status, runs_of
+from socialai_dsl.experiments.work import _Work
+from socialai_dsl.frontend import load_experiment
+
+Capture = pytest.CaptureFixture[str]
+
+TINY = """\
+experiment: tiny
+set: {frames: 100, envs: 4, seeds: 2}
+conditions:
+  - grid: {scenario: [dance], net: [fast, paper]}
+  - {name: chance, scenario: dance, agent: random, seeds: 1}
+profile: usual
+profiles:
+  usual: {}
+  long: {set: {frames: 36000000}}
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(estimate, "_cache_file", lambda: tmp_path / "speeds.json")
+    (tmp_path / "tiny.yaml").write_text(TINY)
+    return tmp_path / "tiny.yaml"
+
+
+def planned(file: Path, capsys: Capture, *words: str) -> Any:
+    assert main(["experiment", "plan", str(file), "--json", *words]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_a_plan(file: Path, capsys: Capture) -> None:
+    assert main(["experiment", "plan", str(file), "--workers", "2"]) == 0
+    assert capsys.readouterr().out == (
+        "tiny, profile usual, in runs/experiments/tiny\n"
+        "\n"
+        "condition      seeds  frames  frames/s  time left  state\n"
+        "dance / fast   0, 1   100     5,000     30 s       2 waiting\n"
+        "dance / paper  0, 1   100     -         -          2 waiting\n"
+        "chance         0      0       -         15 s       waiting\n"
+        "\n"
+        "5 runs, 2 at once: 22 s, and 2 of unknown speed (see --measure) left\n"
+        "speeds are those of what is usual for this network; 15 s a run are counted for starting and testing\n"
+    )
+
+
+def test_a_plan_for_programs(file: Path, capsys: Capture) -> None:
+    plan = planned(file, capsys, "--profile", "long", "--workers", "3")
+    assert (plan["name"], plan["profile"], plan["folder"]) == ("tiny", "long", "runs/experiments/tiny-long")
+    assert plan["seconds"] == (2 * 36_000_000 / 5000 + 3 * 15) / 3
+    assert plan["unknown"] == 2
+    assert plan["states"] == {"waiting": 5}
+    assert plan["runs"][0] | {"id": ""} == {
+        "id": "",
+        "conditions": ["dance / fast"],
+        "seed": 0,
+        "frames": 36_000_000,
+        "frames_done": 0,
+        "state": "waiting",
+        "attempts": 0,
+        "success_rate": None,
+        "message": None,
+        "frames_per_second": 5000.0,
+        "speed_from": "what is usual for this network",
+        "seconds": 7215.0,
+    }
+    assert not (file.parent / "runs").exists(), "a plan changes nothing"
+
+
+def test_a_plan_of_each_run(file: Path, capsys: Capture) -> None:
+    assert main(["experiment", "plan", str(file), "--each"]) == 0
+    assert capsys.readouterr().out.count("waiting") == 5
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["plan", "tiny.yaml", "--profile", "lang"], "--profile: there is no 'lang'; did you mean long?"),
+        (["run", "tiny.yaml", "--address", "here:1"], "--address: only the engine `ray` has one"),
+        (["run", "tiny.yaml", "--slurm", "a=1"], "--slurm: only the engine `slurm` has jobs"),
+        (["status", "nowhere"], "nowhere is no experiment's folder, it has no experiment.json"),
+        (["plan", "."], ". is no experiment's folder, it has no experiment.json"),
+        (["plan", ".", "--profile", "usual"], ". is a folder, which says itself what is run"),
+    ],
+)
+def test_wrong_usage(file: Path, capsys: Capture, words: list[str], said: str) -> None:
+    assert main(["experiment", *words]) == 2
+    assert said in capsys.readouterr().err
+    assert not (file.parent / "runs" / "experiments" / "tiny" / "runs").exists() or words[0] == "run"
+
+
+def test_a_file_with_mistakes(file: Path, capsys: Capture) -> None:
+    file.write_text(TINY.replace("envs: 4", "env: 4"))
+    assert main(["experiment", "run", str(file)]) == 1
+    assert (
+        "tiny.yaml:2:20: S101 unknown key `env` in settings; did you mean `envs`?" in capsys.readouterr().err
+    )
+
+
+def test_a_file_of_another_kind(file: Path, capsys: Capture) -> None:
+    file.write_text("scenario: mine\nextends: dance.yaml\n")
+    assert main(["experiment", "plan", str(file)]) == 1
+    assert "S108 this is a file of the kind `scenario`, not an experiment" in capsys.readouterr().err
+
+
+def test_validate_knows_experiments(file: Path, capsys: Capture) -> None:
+    assert main(["validate", str(file)]) == 0
+    file.write_text(TINY.replace("dance", "danse"))
+    assert main(["validate", str(file)]) == 1
+    assert "S504 there is no scenario `danse`; did you mean `dance`?" in capsys.readouterr().out
+
+
+def test_a_run_of_an_unknown_name(file: Path, capsys: Capture) -> None:
+    folder = file.parent / "out"
+    folder.mkdir()
+    document = {"format": 1, "name": "tiny", "profile": None}
+    conditions = [{"name": "one", "tests": [], "frames": None, "options": {}}]
+    document |= {"conditions": conditions, "runs": [{"id": "abc", "condition": "one", "seed": 0}]}
+    (folder / "experiment.json").write_text(json.dumps(document))
+    assert main(["experiment", "cancel", str(folder), "onne"]) == 2
+    assert "has no run and no condition 'onne'; did you mean one?" in capsys.readouterr().err
+    assert main(["experiment", "cancel", str(folder), "abc", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"cancelled": ["abc"], "busy": []}
+    assert main(["experiment", "status", str(folder)]) == 0
+    assert "one        0      0%           -        cancelled" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"), [(5, "5 s"), (200, "3 min"), (7200, "2.0 h"), (864_000, "10.0 days")]
+)
+def test_times_people_plan_with(seconds: float, said: str) -> None:
+    assert clock(seconds) == said
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize("stream", [io.StringIO(), Terminal()])
+def test_progress(tmp_path: Path, stream: io.StringIO, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("socialai_dsl.cli.experiment_progress._SECONDS_BETWEEN_LINES", -1)
+    condition = {"name": "one", "frames": 100, "options": {}}
+    runs = [Run(tmp_path / str(seed), str(seed), condition, seed, ()) for seed in range(3)]
+    for run in runs:
+        run.path.mkdir()
+    status = Status()
+    status.begin(1, 0)
+    runs[1].write_status(status)
+    (runs[1].path / "metrics.jsonl").write_text('{"frames": 50, "frames_per_second": 10.0}\n')
+    monkeypatch.setattr(Run, "is_claimed", lambda run: run.seed == 1)
+    with RunsProgress(runs, stream) as shown:
+        shown.look()
+        shown.ended(runs[0], "failed", "no memory")
+    said = stream.getvalue()
+    assert "one, seed 1" in said
+    assert "50%" in said
+    assert "[1/3] one, seed 0: failed: no memory" in said
+
+
+def test_the_words_of_a_run_are_those_of_the_command(file: Path) -> None:
+    """Whatever a condition can say, `socialai run` and `socialai evaluate` understand."""
+    options = (
+        "net: fast, explo: cell, envs: 64, curriculum: expert, precision: bfloat16, device: cpu, threads: 2, "
+        "checkpoint_every: 7, eval_episodes: 30"
+    )
+    file.write_text(
+        f"experiment: words\nset: {{scenario: social_env, seeds: [5], frames: 1000, {options}, tests: [help, dance]}}\n"
+        "conditions: [{name: learns}, {name: chance, agent: random}]\n"
+    )
+    document = document_of(load_experiment(file), None)
+    parser = argparse.ArgumentParser()
+    commands = parser.add_subparsers()
+    run_command.add_arguments(commands.add_parser("run"))
+    evaluate_command.add_arguments(commands.add_parser("evaluate"))
+    learns, chance = (_Work(run, lambda: False) for run in runs_of(file.parent, document))
+    given = parser.parse_args(learns._run_command())
+    for name, value in document["conditions"][0]["options"].items():
+        assert getattr(given, name) == value
+    assert (given.scenario, given.agent, given.seed, given.frames) == ("social_env", "ppo", 5, 1000)
+    assert parser.parse_args(chance._run_command()).seed == 5
+    own = str(file.parent / "runs" / document["runs"][0]["id"])
+    for work, agent, seed in ((learns, own, 0), (chance, "random", 5)):
+        asked = parser.parse_args(work._test_command(["help", "dance"]))
+        assert (asked.run, asked.on, asked.episodes, asked.seed) == (agent, ["help", "dance"], 30, seed)
+
+
+@pytest.mark.slow
+def test_a_real_run(file: Path, capsys: Capture) -> None:
+    """The words of the command line are those that `socialai run` and `socialai evaluate` know."""
+    file.write_text(
+        "experiment: real\nset: {scenario: help, eval_episodes: 3}\nconditions:\n"
+        "  - {name: learns, frames: 256, envs: 4, explo: auto, checkpoint_every: 1, tests: [help_as_helper]}\n"
+        "  - {name: chance, agent: random, seeds: [1]}\n"
+    )
+    assert main(["experiment", "run", str(file), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["states"] == {"done": 2}
+    folder = Path(told["folder"]) / "runs" / told["runs"][0]["id"]
+    result, tests = (json.loads((folder / name).read_text()) for name in ("result.json", "tests.json"))
+    assert (result["frames"], result["eval"]["episodes"]) == (256, 3)
+    assert tests["help_as_helper"]["episodes"] == 3
+    assert tests["help_as_helper"].keys() == result["eval"].keys()
+    config = json.loads((folder / "config.json").read_text())
+    chance = json.loads((folder.parent / told["runs"][1]["id"] / "result.json").read_text())
+    assert chance["eval"]["actions"] == "sampled actions, seed 1", (
+        "the seed of who is not trained is of what it draws"
+    )
+    assert (config["explo"], config["threads"], config["device"]) == ("cell", 1, "cpu")

@@ -1,0 +1,203 @@
+"""Which run is which: the same if and only if it computes the same."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from socialai_dsl.checking import LoadedExperiment
+from socialai_dsl.experiments.document import differences, document_of
+from socialai_dsl.frontend import load_experiment
+from socialai_dsl.schema.experiment import NETS
+
+ROOT = Path(__file__).parents[3]
+
+
+def document(folder: Path, condition: str, settings: str = "frames: 100", name: str = "e") -> dict[str, Any]:
+    file = folder / f"{name}.yaml"
+    file.write_text(
+        f"experiment: {name}\nset: {{{settings}}}\nconditions: [{{name: one, scenario: dance{condition}}}]\n",
+        encoding="utf-8",
+    )
+    return document_of(load_experiment(file), None)
+
+
+def ids(*arguments: Any, **named: Any) -> list[str]:
+    return [run["id"] for run in document(*arguments, **named)["runs"]]
+
+
+@pytest.mark.parametrize(
+    "condition",
+    [
+        ", net: fast",
+        ", explo: none",
+        ", threads: 1, device: cpu",
+        ", tests: [help]",
+        ", checkpoint_every: 7",
+        ", row: a",
+    ],
+)
+def test_what_makes_no_difference(tmp_path, condition):
+    assert ids(tmp_path, condition) == ids(tmp_path, "", name="another")
+
+
+@pytest.mark.parametrize(
+    "condition",
+    [
+        "+unsocial",
+        "?length=2",
+        ", net: paper",
+        ", explo: cell",
+        ", frames: 200",
+        ", seeds: [1]",
+        ", envs: 8",
+        ", threads: 2",
+        ", agent: random",
+        ", eval_episodes: 7",
+        ", curriculum: progress",
+    ],
+)
+def test_what_makes_a_difference(tmp_path, condition):
+    assert ids(tmp_path, condition) != ids(tmp_path, "", name="another")
+
+
+def test_seeds_are_runs_of_their_own(tmp_path):
+    found = ids(tmp_path, ", seeds: 3")
+    assert len(set(found)) == 3
+    assert found[0] == ids(tmp_path, "")[0]
+
+
+def test_the_scenario_s_content_counts_and_not_its_place(tmp_path):
+    found = []
+    for folder, horizon in (("a", 20), ("b", 20), ("c", 30)):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "mine.yaml").write_text(
+            f"scenario: mine\nextends: dance.yaml\nhorizon: {horizon}\n"
+        )
+        file = tmp_path / folder / "e.yaml"
+        file.write_text("experiment: e\nconditions: [{name: one, scenario: mine.yaml, frames: 100}]\n")
+        made = document_of(load_experiment(file), None)
+        found.append(made["runs"][0]["id"])
+        assert made["conditions"][0]["scenario"] == str(tmp_path / folder / "mine.yaml")
+    assert found[0] == found[1] != found[2]
+
+
+def test_the_weights_of_a_checkpoint_count(tmp_path):
+    weights = tmp_path / "run" / "checkpoints" / "000000000000100.safetensors"
+    weights.parent.mkdir(parents=True)
+    found = []
+    for content in (b"one", b"two"):
+        weights.write_bytes(content)
+        found.append(ids(tmp_path, ", agent: run"))
+    assert found[0] != found[1]
+
+
+def test_what_a_condition_says(tmp_path):
+    text = (
+        ", explo: auto, tests: [{scenario: help, reference: {mean: 0.3}}], reference: {mean: 0.5, std: 0.1}"
+    )
+    (condition,) = document(tmp_path, text)["conditions"]
+    assert condition == {
+        "name": "one",
+        "row": "one",
+        "column": "ppo",
+        "group": None,
+        "scenario": "dance",
+        "agent": "ppo",
+        "frames": 100,
+        "options": {
+            "net": "fast",
+            "explo": "auto",
+            "curriculum": "none",
+            "precision": "auto",
+            "device": "cpu",
+            "threads": 1,
+            "checkpoint_every": 50,
+            "eval_episodes": 500,
+        },
+        "tests": ["help"],
+        "reference": {"mean": 0.5, "std": 0.1, "note": None, "source": None},
+        "test_references": {"help": {"mean": 0.3, "std": None, "note": None, "source": None}},
+    }
+    (chance,) = document(tmp_path, ", agent: random")["conditions"]
+    assert (chance["frames"], chance["options"]) == (None, {"device": "cpu", "eval_episodes": 500})
+
+
+def test_first_seeds_come_first(tmp_path):
+    file = tmp_path / "e.yaml"
+    file.write_text(
+        "experiment: e\nset: {frames: 9, seeds: 2}\nconditions: [{grid: {scenario: [dance, help]}}]\n"
+    )
+    runs = document_of(load_experiment(file), None)["runs"]
+    assert [(run["condition"], run["seed"]) for run in runs] == [
+        ("dance", 0),
+        ("help", 0),
+        ("dance", 1),
+        ("help", 1),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("condition", "settings", "said"),
+    [
+        ("", "frames: 100", []),
+        (", frames: 200", "frames: 100", ["`one`, frames: 100 there, 200 here"]),
+        (", net: paper", "frames: 100", ["`one`, net: 'fast' there, 'paper' here"]),
+        ("", "frames: 100, seeds: 2", ["`one`, seeds: 0 there, 0, 1 here"]),
+    ],
+)
+def test_differences_are_named(tmp_path, condition, settings, said):
+    kept = document(tmp_path, "")
+    assert differences(kept, document(tmp_path, condition, settings)) == said
+
+
+def test_a_changed_scenario_is_a_difference(tmp_path):
+    kept = document(tmp_path, "")
+    changed = kept | {"runs": [{**kept["runs"][0], "id": "0"}]}
+    assert differences(changed, kept) == ["`one`: its scenario or its checkpoint has changed since"]
+
+
+# -- the experiments that ship -----------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def shipped() -> dict[str, LoadedExperiment]:
+    return {
+        name: load_experiment(ROOT / "experiments" / f"{name}.yaml") for name in ("paper", "case_studies")
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "profile", "runs"),
+    [("paper", "full", 336), ("paper", "small", 64), ("paper", "smoke", 42), ("case_studies", "full", 304)],
+)
+def test_the_shipped_experiments(shipped, name, profile, runs):
+    loaded = shipped[name]
+    assert sum(len(cell.seeds) for cell in loaded.cells[profile]) == runs
+    assert loaded.experiment.profile == "full"
+    frames = Counter(cell.frames for cell in loaded.cells["full"])
+    assert frames == {30_000_000: frames.total() - 3, 5_000_000: 3}
+
+
+def test_conditions_that_both_files_have_are_the_same_runs(shipped):
+    paper, studies = (
+        {
+            condition["name"]: [run["id"] for run in made["runs"] if run["condition"] == condition["name"]]
+            for condition in made["conditions"]
+        }
+        for made in (document_of(loaded, "small") for loaded in shipped.values())
+    )
+    shared = paper.keys() & studies.keys()
+    assert len(shared) == 11
+    assert all(paper[name] == studies[name] for name in shared)
+    assert len({identity for runs in paper.values() for identity in runs}) == 64
+
+
+def test_the_networks_are_those_of_the_trainer():
+    from trainer import nets
+    from trainer.config import PRESETS
+
+    assert set(NETS) == set(nets._SHIPPED) | set(PRESETS)

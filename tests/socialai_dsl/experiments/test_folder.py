@@ -1,0 +1,120 @@
+"""What a run's folder says, also when its disk is full or somebody has spoilt it."""
+
+import errno
+import json
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+from socialai_dsl.experiments import claims, folder
+from socialai_dsl.experiments.folder import Run, Status, UnreadableError, read_experiment, runs_of
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Run:
+    path = tmp_path / "abc"
+    path.mkdir()
+    return Run(path, "abc", {"name": "one", "frames": 100, "options": {"net": "fast"}}, 3, ("help",))
+
+
+def test_nothing_there_yet(tmp_path: Path) -> None:
+    run = Run(tmp_path / "none", "none", {"name": "one"}, 0, ())
+    assert run.status() == Status()
+    assert run.checkpoint_frames() is None
+    assert run.last_metrics() is None
+    assert run.result() is None
+    assert run.missing_tests() == []
+    assert not run.is_claimed()
+
+
+def test_a_status_is_read_as_it_was_written(run: Run) -> None:
+    status = Status("failed", message="a “word”")
+    status.begin(17, 640)
+    status.end("killed")
+    status.state = "failed"
+    run.write_status(status)
+    assert run.status() == status
+    assert (run.path / "status.json").stat().st_size % 4096 == 0
+
+
+def test_a_full_disk_still_takes_a_status(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Written over its own blocks, of which it needs no new ones."""
+    run.write_status(Status("running"))
+
+    def fail(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(folder, "write_text", fail)
+    run.write_status(Status("failed", message="the disk is full"))
+    assert run.status().message == "the disk is full"
+    (run.path / "status.json").unlink()
+    with pytest.raises(OSError, match="space"):
+        run.write_status(Status("failed"))
+
+
+def test_a_run_whose_owner_is_gone_waits(run: Run) -> None:
+    status = Status()
+    status.begin(1, 0)
+    run.write_status(status)
+    mine = claims.claim(run.path)
+    assert mine is not None
+    assert run.shown_status().state == "running"
+    os.utime(mine.path, (time.time() - 500,) * 2)
+    shown = run.shown_status()
+    assert shown.state == "waiting"
+    assert shown.attempts[-1]["reason"] == "its process is gone"
+    assert shown.attempts[-1]["ended"] == run.status().heartbeat
+
+
+@pytest.mark.parametrize(
+    "content", ["{", "[]", '{"state": "odd"}', "\ud800".encode("utf-8", "surrogatepass")]
+)
+def test_a_spoilt_status(run: Run, content: str | bytes) -> None:
+    (run.path / "status.json").write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(UnreadableError, match=r"status\.json"):
+        run.status()
+    assert run.shown_status().state == "failed"
+
+
+def test_the_last_whole_line_of_the_metrics(run: Run) -> None:
+    rows = [json.dumps({"frames": frames, "padding": "x" * 5000}) for frames in range(40)]
+    (run.path / "metrics.jsonl").write_text("\n".join(rows) + '\n{"frames": 40, "pa')
+    row = run.last_metrics()
+    assert row is not None
+    assert row["frames"] == 39
+
+
+def test_the_newest_checkpoint(run: Run) -> None:
+    checkpoints = run.path / "checkpoints"
+    checkpoints.mkdir()
+    for name in (
+        "000000000000640.safetensors",
+        "000000000001280.safetensors",
+        "000000000009999.tmp",
+        "notes.txt",
+    ):
+        (checkpoints / name).touch()
+    assert run.checkpoint_frames() == 1280
+
+
+def test_a_run_of_two_conditions_is_one(tmp_path: Path) -> None:
+    conditions = [
+        {"name": name, "tests": tests} for name, tests in (("a", ["help"]), ("b", ["dance", "help"]))
+    ]
+    document = {
+        "conditions": conditions,
+        "runs": [{"id": "x", "condition": name, "seed": 1} for name in "ab"],
+    }
+    (run,) = runs_of(tmp_path, document)
+    assert run.label == "a, seed 1"
+    assert run.tests == ("help", "dance")
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"format": 2}'])
+def test_another_kind_of_folder(tmp_path: Path, content: str) -> None:
+    assert read_experiment(tmp_path) is None
+    (tmp_path / "experiment.json").write_text(content)
+    with pytest.raises(UnreadableError, match=r"experiment\.json"):
+        read_experiment(tmp_path)

@@ -1,0 +1,188 @@
+"""Experiments on a Ray cluster of two nodes that lose workers, a node and their driver."""
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from socialai_dsl.cli.main import main
+from socialai_dsl.experiments import claims
+from socialai_dsl.experiments.folder import Run, read_experiment, runs_of
+
+ROOT = Path(__file__).parents[3]
+
+EXPERIMENT = """\
+experiment: faults
+set: {frames: 7680, envs: 8, checkpoint_every: 1, eval_episodes: 10, seeds: 5}
+conditions:
+  - grid: {scenario: [help, dance], explo: [none, auto]}
+overrides:
+  - {where: {scenario: help}, set: {tests: [help_as_helper]}}
+"""
+"""Twenty runs of thirty updates each, with a checkpoint after each."""
+
+
+def runs_in(folder: Path) -> list[Run]:
+    document = read_experiment(folder)
+    return [] if document is None else runs_of(folder, document)
+
+
+def table(folder: Path) -> dict[str, Any]:
+    """What the experiment found: success on each test set, and the digest of the weights of each run."""
+    found = {}
+    for run in runs_in(folder):
+        result = run.result()
+        assert result is not None, run.label
+        weights = sorted((run.path / "checkpoints").glob("*.safetensors"))[-1]
+        digest = hashlib.sha256(tensors_of(weights)).hexdigest()
+        tested = {name: figures["success_rate"] for name, figures in run.tested().items()}
+        found[run.label] = (result["eval"]["success_rate"], tested, weights.name, digest)
+    return found
+
+
+def tensors_of(file: Path) -> bytes:
+    """The numbers of a checkpoint, without what says how they came about."""
+    content = file.read_bytes()
+    return content[8 + int.from_bytes(content[:8], "little") :]
+
+
+def until(holds: Any, seconds: float) -> Any:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        found = holds()
+        if found:
+            return found
+        time.sleep(0.1)
+    raise AssertionError("it did not happen")
+
+
+class Cluster:
+    """Two nodes of a core each, and the command that has them work."""
+
+    def __init__(self, place: Path) -> None:
+        from ray.cluster_utils import Cluster as Nodes
+
+        self.file = place / "faults.yaml"
+        self.file.write_text(EXPERIMENT, encoding="utf-8")
+        self.out = place / "out"
+        settings = {"num_cpus": 1, "object_store_memory": 80_000_000, "include_dashboard": False}
+        self.nodes = Nodes(initialize_head=True, head_node_args=settings)
+        self.second = self.nodes.add_node(num_cpus=1, object_store_memory=80_000_000)
+        self.nodes.wait_for_nodes()
+        self.drivers: list[subprocess.Popen[bytes]] = []
+
+    def start(self) -> subprocess.Popen[bytes]:
+        command = [
+            sys.executable,
+            "-m",
+            "socialai_dsl",
+            "experiment",
+            "run",
+            str(self.file),
+            "--out",
+            str(self.out),
+        ]
+        command += ["--engine", "ray", "--address", self.nodes.address]
+        self.drivers.append(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT))
+        return self.drivers[-1]
+
+    def remove(self) -> None:
+        """Lose the second node, without a word."""
+        self.nodes.remove_node(self.second, allow_graceful=False)
+
+    def add(self) -> None:
+        self.second = self.nodes.add_node(num_cpus=1, object_store_memory=80_000_000)
+
+    def under_way(self, *besides: str, second: bool = False) -> Run | None:
+        """A run in training that has got past a checkpoint, perhaps one of a worker of the second node."""
+        raylet = self.second.all_processes["raylet"][0].process.pid
+        for run in runs_in(self.out):
+            begun = run.status().state == "running" and 0 < (run.checkpoint_frames() or 0) < 5000
+            if run.id not in besides and begun and (not second or parent_of(owner(run)) == raylet):
+                return run
+        return None
+
+    def close(self) -> None:
+        for driver in self.drivers:
+            if driver.poll() is None:
+                driver.kill()
+            driver.communicate()
+        self.nodes.shutdown()
+
+
+def owner(run: Run) -> int:
+    """The process that works on a run."""
+    newest = claims.newest_claim(run.path)
+    content = claims.owner_of(newest) if newest is not None else None
+    return content["pid"] if content is not None else 0
+
+
+def parent_of(pid: int) -> int | None:
+    try:
+        return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+    except OSError:
+        return None
+
+
+@pytest.fixture
+def cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Cluster]:
+    pytest.importorskip("ray", reason="install the extra ray")
+    monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH")))))
+    monkeypatch.chdir(tmp_path)
+    made = Cluster(tmp_path)
+    yield made
+    made.close()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@pytest.mark.filterwarnings("ignore")  # Ray's own
+def test_nothing_is_lost_and_nothing_done_twice(cluster: Cluster, tmp_path: Path) -> None:
+    driver = cluster.start()
+
+    killed = until(cluster.under_way, 180)
+    os.kill(owner(killed), signal.SIGKILL)  # Ray's worker, and with it the process that trains
+
+    lost = until(lambda: cluster.under_way(killed.id, second=True), 180)
+    cluster.remove()
+    until(lambda: lost.shown_status().state == "waiting", 60)
+    cluster.add()
+
+    until(lambda: [run for run in runs_in(cluster.out) if run.status().state == "done"], 180)
+    orphaned = until(lambda: cluster.under_way(killed.id, lost.id), 180)
+    driver.kill()
+    driver.wait()
+    until(lambda: orphaned.shown_status().state == "waiting", 60)
+    ends = {run.id: run.status().attempts for run in runs_in(cluster.out) if run.status().state == "done"}
+
+    again = cluster.start()
+    said, _ = again.communicate(timeout=1800)
+    assert again.returncode == 0, said
+    runs = runs_in(cluster.out)
+    assert len(runs) == 20
+    for run in runs:
+        status = run.status()
+        assert status.state == "done", run.label
+        assert [attempt["reason"] for attempt in status.attempts].count("done") == 1
+        assert all(attempt["ended"] is not None for attempt in status.attempts)
+        frames = [
+            json.loads(line)["frames"] for line in (run.path / "metrics.jsonl").read_text().splitlines()
+        ]
+        assert frames == list(range(256, 7681, 256)), "each update is there once"
+        assert run.id not in ends or status.attempts == ends[run.id], "what was done is left alone"
+    for run in (killed, lost, orphaned):
+        assert any(attempt["from_frames"] > 0 for attempt in run.status().attempts), run.label
+        assert len(run.status().attempts) >= 2
+
+    undisturbed = tmp_path / "undisturbed"
+    assert main(["experiment", "run", str(cluster.file), "--out", str(undisturbed)]) == 0
+    assert table(cluster.out) == table(undisturbed)
