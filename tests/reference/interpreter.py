@@ -244,6 +244,8 @@ class Reference:
             bodies.act(self.world, npc, turn.activity.primitive(self.world, npc))
             self.settling.all()
             runner.end(turn)
+        else:
+            npc.inbox.clear()  # its turn has ended, so what it heard is forgotten
         if turn.say is not None:
             speech.speak(self.world, npc, turn.say, turn.noun)
 
