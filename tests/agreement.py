@@ -176,7 +176,8 @@ def _state_of_env(env: ScenarioEnv) -> dict[str, Any]:
             common["let"][name] = value
         elif owner in common["cast"] and not register.startswith(("fired.", *BOOKKEEPING)):
             common["cast"][owner].setdefault("registers", {})[register] = value
-    return dict(_flatten(common))
+    # A cell that is none has a word in a layout; the reference has no value then.
+    return {path: None if value == "nowhere" else value for path, value in _flatten(common)}
 
 
 def _object(described: dict[str, Any]) -> dict[str, Any]:
