@@ -16,7 +16,7 @@ from socialai_dsl.diagnostics import ScenarioError, printable, render_text
 from socialai_dsl.engine.errors import RoomError
 
 _NEW_OBJECTS_BETWEEN_COLLECTIONS: Final = 50_000
-"""Importing makes hundreds of thousands of objects that stay; looking through them every 700 is an eighth of the start."""
+"""Importing makes many objects that stay; to look through them every 700 takes a tenth of a short command."""
 
 _COMMANDS: Final = (
     "run",

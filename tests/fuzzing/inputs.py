@@ -36,6 +36,13 @@ EXPRESSIONS = (
 )
 
 
+_NAMING = ("extends", "of", "members")
+
+
+_VALUE = re.compile(rb"(?<=: )[^\n,{}\[\]]+(?=[,}\]\n])")
+"""The value of a key, up to the end of its entry."""
+
+
 def seeds(target: str) -> list[bytes]:
     """What a target starts from: texts as people write them, right ones and wrong ones."""
     if target == "expression":
@@ -70,7 +77,7 @@ def _changed(seed: bytes, other: bytes, rng: random.Random) -> bytes:
     at = rng.randrange(len(seed) + 1)
     if rng.random() < 0.6 and (ends := [found.end() for found in re.finditer(rb"[ :,{\[\n]", seed)]):
         at = rng.choice(ends)  # where a word begins
-    match rng.randrange(8):
+    match rng.randrange(10):
         case 0 | 1:
             return seed[:at] + rng.choice(WORDS).encode("utf-8") + seed[at:]
         case 2:
@@ -89,6 +96,18 @@ def _changed(seed: bytes, other: bytes, rng: random.Random) -> bytes:
         case 6 if entries := list(re.finditer(rb"[\w-]+: [^,{}\[\]\n]*, ", seed)):
             entry = rng.choice(entries)
             return seed[: entry.end()] + entry.group() + seed[entry.end() :]
+        case 7 if values := list(_VALUE.finditer(seed)):
+            value, depth = rng.choice(values), rng.choice((5, 30, 31, 32, 33, 2000))
+            opened, closed = rng.choice(((b"[", b"]"), (b"{a: ", b"}")))
+            written = rng.choice((rng.choice(WORDS).encode(), opened * depth + closed * depth))
+            return seed[: value.start()] + written + seed[value.end() :]
+        case 8:
+            key, file = (
+                rng.choice(_NAMING),
+                rng.choice([word for word in WORDS if "yaml" in word or "." in word]),
+            )
+            first = seed.find(b"\n") + 1
+            return seed[:first] + f"{key}: {file}\n".encode() + seed[first:]
         case _:
             word = rng.choice(WORDS).encode("utf-8")
             end = at + len(re.match(rb"[\w./<>+-]*", seed[at:])[0])  # type: ignore[index]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import subprocess
 import sys
@@ -54,8 +55,11 @@ def fuzz(target: str, seconds: int, plant: str | None = None, seed: int = 1) -> 
             *options,
             str(corpus),
         ]
+        environment = {**os.environ, "PYTHONUTF8": "1"}  # what was found may be written in any letters
         start = time.monotonic()
-        done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+        done = subprocess.run(
+            command, capture_output=True, text=True, errors="replace", check=False, env=environment
+        )
         took = time.monotonic() - start
     said = done.stdout + done.stderr
     executions = [int(n) for n in re.findall(r"number_of_executed_units: (\d+)", said)]
