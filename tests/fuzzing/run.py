@@ -92,7 +92,7 @@ def main() -> int:
     broken = False
     for target, plant in jobs:
         outcome = fuzz(target, arguments.seconds, plant, arguments.seed)
-        broken |= (outcome.finding is not None) is (plant is None)
+        broken |= outcome.finding is not None and plant is None
         name = f"{target}: {plant}" if plant else target
         speed = outcome.executions / outcome.seconds
         print(
