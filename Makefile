@@ -10,7 +10,9 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 ARGS ?=
 
-.PHONY: help run test test-long test-faults lint format bench docs fidelity update-goldens clean
+SECONDS_EACH ?= 60
+
+.PHONY: help run test test-long test-faults fuzz nightly lint format bench docs fidelity update-goldens clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -27,6 +29,16 @@ test-long: $(STAMP) ## run the tests that take minutes
 test-faults: $(STAMP) ## lose workers, nodes and the command of an experiment; installs Ray and submitit
 	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[ray,slurm]'
 	$(BIN)/python -m pytest -m "slow or not slow" tests/socialai_dsl/experiments $(ARGS)
+
+fuzz: $(STAMP) ## throw made-up files at the loader, each target for SECONDS_EACH=60 seconds
+	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[fuzz]'
+	$(BIN)/python -m tests.fuzzing.run --seconds $(SECONDS_EACH) $(ARGS)
+
+nightly: $(STAMP) ## everything that takes long: the long tests, half an hour of fuzzing, planted mistakes
+	$(MAKE) test-long
+	$(MAKE) test-faults
+	$(MAKE) fuzz SECONDS_EACH=600
+	$(MAKE) fuzz SECONDS_EACH=120 ARGS=--planted
 
 lint: $(STAMP) ## check formatting, style and types
 	$(BIN)/ruff format --check .

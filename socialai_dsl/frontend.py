@@ -18,6 +18,7 @@ from socialai_dsl.checking import (
     check_scenario,
     check_suite,
     naming_the_patch,
+    of_other_values,
     said_once,
     sift,
 )
@@ -125,12 +126,15 @@ def load_experiment(name: str | Path) -> LoadedExperiment:
     return result.experiment
 
 
-def check(name: str | Path, texts: Mapping[Path, Source] | None = None) -> CheckResult:
+def check(
+    name: str | Path, texts: Mapping[Path, Source] | None = None, every_value: bool = False
+) -> CheckResult:
     """Check a scenario or suite; findings are returned, never raised.
 
     Args:
         name: a path or the name of a shipped scenario, with variants and parameters.
         texts: resolved path -> text, for files that are not on the disk as they are meant: those of an editor.
+        every_value: whether a scenario that is right is also checked with the other values of its parameters.
     """
     name = str(name)
     try:
@@ -153,6 +157,8 @@ def check(name: str | Path, texts: Mapping[Path, Source] | None = None) -> Check
         found = tuple(bag)
         return _sifted(CheckResult(name, None, None, found, files, resolved, experiment=right))
     checked, scenario = _checked(resolved, bag)
+    if every_value and checked is not None:
+        bag.extend(of_other_values(resolved))
     found = tuple(DiagnosticBag(naming_the_patch(d, resolved) for d in said_once(bag)))
     return _sifted(CheckResult(name, checked, scenario, found, dict(resolved.files), resolved))
 

@@ -111,6 +111,11 @@ def prefixed(member: str, name: str) -> str:
     return f"{member}: {name}"
 
 
+def outcome_name(info: Mapping[str, Any]) -> str:
+    """How an episode ended, as `Playable.outcomes` calls it, from the info of its last step."""
+    return prefixed(info["member"], info["outcome"]) if "member" in info else str(info["outcome"])
+
+
 def mixture(playables: Sequence[Playable]) -> ProgramSuite:
     """Programs and suites as one suite: templates and nouns are shared by text, each member keeps its own pairs."""
     templates = _union(playable.templates for playable in playables)

@@ -5,11 +5,14 @@ from __future__ import annotations
 import re
 import shlex
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from socialai_dsl.cli.check import check_scenario, scenarios_of
 from socialai_dsl.diagnostics import CODES, render_text
+from socialai_dsl.envs.properties import Effort
 from socialai_dsl.frontend import CheckResult, check
 
 FOLDER = Path(__file__).parents[1] / "docs" / "diagnostics"
@@ -27,9 +30,23 @@ def checked(page: str, part: str, folder: Path) -> CheckResult:
             named = NAMED.match(text)
             (folder / (named[1] if named else name)).write_text(text, encoding="utf-8")
         elif language == "console":
-            program, command, name = shlex.split(text.removeprefix("$ "))
+            program, command, *options, name = shlex.split(text.removeprefix("$ "))
             assert (program, command) == ("socialai", "validate"), page
+            assert options in ([], ["--deep"]), page
+            if options:
+                return tried_out(name)
     return check(name)
+
+
+def tried_out(name: str) -> CheckResult:
+    """What is found in a file, and what trying it out in a few rooms shows."""
+    result = check(name)
+    found = [
+        finding
+        for scenario, called in scenarios_of(name)
+        for finding in check_scenario(scenario, called, Effort(4, 0, 2000), deep=True).findings()
+    ]
+    return replace(result, diagnostics=(*result.diagnostics, *found))
 
 
 def parts(code: str) -> tuple[str, str, str]:

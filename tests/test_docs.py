@@ -286,3 +286,21 @@ def test_architecture_names_files_that_exist() -> None:
 
 def test_architecture_stays_short() -> None:
     assert len((ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8").splitlines()) < 150
+
+
+def test_every_key_in_the_reference_has_a_meaning() -> None:
+    """No cell of a column `meaning` is empty, in any table of the page."""
+    columns: list[str] = []
+    meanings = 0
+    for number, line in enumerate((ROOT / "docs" / "reference.md").read_text("utf-8").splitlines(), 1):
+        if not line.startswith("|"):
+            columns = []
+            continue
+        cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
+        if not columns:
+            columns = cells
+        elif "meaning" in columns and set(cells[0]) != {"-"}:
+            assert len(cells) == len(columns), f"docs/reference.md:{number}: {line}"
+            assert cells[columns.index("meaning")], f"docs/reference.md:{number}: no meaning: {line}"
+            meanings += 1
+    assert meanings > 100

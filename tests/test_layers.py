@@ -141,7 +141,7 @@ def test_engine_and_compiler_do_not_know_each_other() -> None:
     ],
 )
 def test_checking_a_file_loads_nothing_heavy(statement: str) -> None:
-    heavy = ("numba", "torch", "gymnasium", "matplotlib", "PIL")
+    heavy = ("numba", "torch", "gymnasium", "matplotlib", "PIL", "textual", "rich")
     script = f"{statement}\nimport sys\nprint([name for name in {heavy!r} if name in sys.modules])"
     result = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT, timeout=60

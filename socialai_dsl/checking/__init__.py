@@ -1,5 +1,6 @@
 """Resolved files to what they mean, or to what is wrong with them: one module for each kind of file."""
 
+from socialai_dsl.checking.choices import of_other_values
 from socialai_dsl.checking.experiments import LoadedExperiment, check_experiment
 from socialai_dsl.checking.ignored import sift
 from socialai_dsl.checking.libraries import check_library, check_npc
@@ -20,6 +21,7 @@ __all__ = [
     "check_scenario",
     "check_suite",
     "naming_the_patch",
+    "of_other_values",
     "said_once",
     "sift",
 ]

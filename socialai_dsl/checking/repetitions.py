@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Final
@@ -12,18 +13,29 @@ _OF_ONE_NAME: Final = frozenset({"S201", "S206", "S301", "S401"})
 """What is wrong with a name or an utterance, wherever it is used."""
 
 
+_WORD: Final = re.compile(r"`[^`]+`")
+
+
 def said_once(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
     """The findings, with what is unknown in many places shown at the first: mostly its declaration has the slip."""
     everything = list(found)
-    alike: dict[tuple[str, str], list[Diagnostic]] = {}
+    alike: dict[tuple[str, ...], list[Diagnostic]] = {}
     for d in everything:
-        alike.setdefault((d.code, d.text), []).append(d)
+        alike.setdefault(_cause(d), []).append(d)
     for d in everything:
-        first, *others = alike[d.code, d.text]
+        first, *others = alike[_cause(d)]
         if d.code not in _OF_ONE_NAME or not others:
             yield d
         elif d is first:
             yield replace(d, hint="; ".join(filter(None, (d.hint, _repeated(d, others)))))
+
+
+def _cause(found: Diagnostic) -> tuple[str, ...]:
+    """What findings of one mistake have in common: an unknown name is one, whatever it was to stand for."""
+    word = _WORD.search(found.message)
+    if found.code == "S201" and found.suggestion is not None and word is not None:
+        return found.code, word[0], found.suggestion
+    return found.code, found.text
 
 
 def _repeated(first: Diagnostic, others: Sequence[Diagnostic]) -> str:

@@ -15,8 +15,8 @@ SUMMARY: Final = (
     "verify the properties that scenarios claim in `check`, or that everything in them can happen"
 )
 
-_ROOMS: Final = 200
-_STATES: Final = 50_000
+ROOMS: Final = 200
+STATES: Final = 50_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,15 +28,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a path or a name; of a suite every member is checked",
     )
     parser.add_argument(
-        "--rooms", type=int, default=_ROOMS, metavar="N", help=f"rooms to try (default: {_ROOMS})"
+        "--rooms", type=int, default=ROOMS, metavar="N", help=f"rooms to try (default: {ROOMS})"
     )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the rooms (default: 0)")
     parser.add_argument(
         "--states",
         type=int,
-        default=_STATES,
+        default=STATES,
         metavar="N",
-        help=f"how many states of a room are searched before it is undecided (default: {_STATES})",
+        help=f"how many states of a room are searched before it is undecided (default: {STATES})",
     )
     parser.add_argument(
         "--deep",
@@ -62,7 +62,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     effort = Effort(arguments.rooms, arguments.seed, arguments.states)
     reports = []
     for name in arguments.scenarios:
-        for scenario, called in _scenarios(name):
+        for scenario, called in scenarios_of(name):
             reports.append(check_scenario(scenario, called, effort, arguments.deep))
             if arguments.format == "text":
                 print("\n".join(reports[-1].lines()), flush=True)
@@ -92,10 +92,11 @@ def check_scenario(
     tried = tuple((plan, check_property(loaded, plan, effort, scripted)) for plan in plans)
     happening = coverage(loaded, effort, scripted) if deep or not plans else None
     success = depth(loaded, effort, scripted) if deep else None
-    return ScenarioReport(called, effort.rooms, effort.seed, tried, happening, success)
+    place = loaded.resolved.key_span(("outcome",))
+    return ScenarioReport(called, effort.rooms, effort.seed, tried, happening, success, place)
 
 
-def _scenarios(name: str) -> "list[tuple[LoadedScenario, str]]":
+def scenarios_of(name: str) -> "list[tuple[LoadedScenario, str]]":
     """The scenario of a name, or the members of a suite, each with its own."""
     from socialai_dsl.checking import LoadedSuite
     from socialai_dsl.frontend import load

@@ -5,6 +5,8 @@ from dataclasses import asdict, dataclass
 from statistics import median_high
 from typing import TYPE_CHECKING, Any, Final
 
+from socialai_dsl.diagnostics import Diagnostic, Severity
+
 if TYPE_CHECKING:
     from socialai_dsl.envs.alone import Alone
     from socialai_dsl.envs.coverage import Coverage
@@ -21,7 +23,7 @@ class ScenarioReport:
     Attributes:
         scenario: its name. rooms, seed: what was tried: rooms 0 to rooms - 1 of the seed.
         tried: its properties with what was found. coverage: what of it never happens, if that was tried.
-        depth: what success takes, if that was tried.
+        depth: what success takes, if that was tried. outcomes: where the outcomes are written.
     """
 
     scenario: str
@@ -30,13 +32,35 @@ class ScenarioReport:
     tried: "tuple[tuple[PropertyPlan, Report], ...]"
     coverage: "Coverage | None"
     depth: "Depth | None" = None
+    outcomes: "Span | None" = None
+
+    def findings(self) -> Iterator[Diagnostic]:
+        """What fails as errors, what is undecided or never happens as warnings, each at its place."""
+        for plan, report in self.tried:
+            hint = _listed(report.against) if report.against else None
+            if report.verdict.value == "fails":
+                message = f"`{plan.text}` does not hold: {report.said}"
+                yield Diagnostic("S801", message, plan.span, hint=hint)
+            elif report.verdict.value == "undecided":
+                message = f"`{plan.text}` is undecided: {report.said}"
+                yield Diagnostic("W802", message, plan.span, Severity.WARNING, hint)
+        for part in () if self.coverage is None else self.coverage.missing:
+            message = f"the {part.kind} `{part.name}` happens in none of {self.rooms} rooms"
+            yield Diagnostic("W802", message, part.span, Severity.WARNING)
+        if self._is_hopeless and self.outcomes is not None:
+            message = f"no success can be reached in any of {self.rooms} rooms"
+            yield Diagnostic("S801", message, self.outcomes)
+
+    @property
+    def _is_hopeless(self) -> bool:
+        """Whether no room can be solved."""
+        return self.depth is not None and not (self.depth.steps or self.depth.undecided)
 
     def fails(self, strict: bool) -> bool:
         """Whether a property fails or no room can be solved; with `strict` also what is undecided or never happens."""
         verdicts = {report.verdict.value for _, report in self.tried}
         missing = self.coverage is not None and bool(self.coverage.missing)
-        hopeless = self.depth is not None and not (self.depth.steps or self.depth.undecided)
-        return "fails" in verdicts or hopeless or (strict and ("undecided" in verdicts or missing))
+        return "fails" in verdicts or self._is_hopeless or (strict and ("undecided" in verdicts or missing))
 
     def lines(self) -> Iterator[str]:
         """The report for people."""

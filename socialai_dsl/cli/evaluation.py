@@ -240,25 +240,20 @@ def _let_a_person_play(
     """Let a person play test episodes until they quit."""
     import numpy as np
 
-    import socialai_dsl
-    from socialai_dsl.cli.play import HELP, Played, Quit, play_episode
+    from socialai_dsl.cli.play import play
     from trainer.evaluate import EvalResult
 
-    env = socialai_dsl.make(scenario, render_mode="ansi")
-    played: list[Played] = []
-    print(HELP)
-    try:
-        for number in range(episodes):
-            played.append(play_episode(env, program, {"options": {"test_episode": number}}))
-    except Quit:
-        if not played:
-            raise UsageError("no episode was played to its end") from None
-    finally:
-        env.close()
+    def episode(number: int) -> tuple[str, dict[str, Any]] | None:
+        title = f"{scenario}, test episode {number}"
+        return (title, {"options": {"test_episode": number}}) if number < episodes else None
+
+    played = play(scenario, episode, practice=False)
+    if not played:
+        raise UsageError("no episode was played to its end")
     names = tuple(program.outcomes)
     result = EvalResult(
-        np.array([p.success for p in played]),
-        np.array([names.index(p.outcome) for p in played]),
+        np.array([p.ended.success for p in played]),
+        np.array([names.index(p.ended.outcome) for p in played]),
         np.array([len(p.actions) for p in played]),
         np.array([p.reward for p in played]),
         names,

@@ -1,18 +1,22 @@
 """This module reads the command line, runs one command and turns whatever happens into an exit code."""
 
 import argparse
+import gc
 import os
 import sys
 import traceback
 import warnings
 from collections.abc import Sequence
 from importlib import import_module
-from typing import Final
+from typing import Final, NoReturn
 
 from socialai_dsl.cli.errors import Exit, RunFailed, UsageError, is_usage
 from socialai_dsl.cli.terminal import shows_color
-from socialai_dsl.diagnostics import ScenarioError, render_text
+from socialai_dsl.diagnostics import ScenarioError, printable, render_text
 from socialai_dsl.engine.errors import RoomError
+
+_NEW_OBJECTS_BETWEEN_COLLECTIONS: Final = 50_000
+"""Importing makes many objects that stay; to look through them every 700 takes a tenth of a short command."""
 
 _COMMANDS: Final = (
     "run",
@@ -43,7 +47,7 @@ _COMMANDS: Final = (
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `socialai COMMAND ...` and return its exit code."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="socialai", description="Check, train on and measure social scenarios written in YAML."
     )
     parser.add_argument("--version", action=_Version)
@@ -65,7 +69,7 @@ def run_main(argv: Sequence[str] | None = None) -> int:
     """Run `socialai-run ...`, the same as `socialai run ...`, and return its exit code."""
     from socialai_dsl.cli import run
 
-    parser = argparse.ArgumentParser(prog="socialai-run", description=run.SUMMARY.capitalize() + ".")
+    parser = _Parser(prog="socialai-run", description=run.SUMMARY.capitalize() + ".")
     parser.add_argument("--version", action=_Version)
     run.add_arguments(parser)
     parser.set_defaults(execute=run.execute)
@@ -79,10 +83,11 @@ def _add_debug(parser: argparse.ArgumentParser) -> None:
 
 def _guarded(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
     """Parse and execute; every error is answered with one message and its exit code."""
+    gc.set_threshold(_NEW_OBJECTS_BETWEEN_COLLECTIONS)
     debug = False
     usual = warnings.formatwarning
     # Users want to know what to look out for, not which line of ours says so.
-    warnings.formatwarning = lambda message, *_, **__: f"{parser.prog}: warning: {message}\n"
+    warnings.formatwarning = lambda message, *_, **__: f"{parser.prog}: warning: {printable(str(message))}\n"
     try:
         try:
             arguments = parser.parse_args(argv)
@@ -95,7 +100,7 @@ def _guarded(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> int
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return Exit.BROKEN_PIPE
     except KeyboardInterrupt as interruption:
-        print(f"{parser.prog}: {str(interruption) or 'interrupted'}", file=sys.stderr)
+        print(f"{parser.prog}: {printable(str(interruption)) or 'interrupted'}", file=sys.stderr)
         return Exit.INTERRUPTED
     except Exception as error:
         if debug:
@@ -110,18 +115,25 @@ def _explain(program: str, error: Exception) -> Exit:
         print(render_text(error.diagnostics, error.sources, color=shows_color(sys.stderr)), file=sys.stderr)
         return Exit.USAGE if is_usage(error.diagnostics) else Exit.FINDINGS
     if isinstance(error, UsageError | RunFailed | RoomError):
-        print(f"{program}: {error}", file=sys.stderr)
+        print(f"{program}: {printable(str(error))}", file=sys.stderr)
         return Exit.USAGE if isinstance(error, UsageError) else Exit.FINDINGS
     if isinstance(error, OSError):
         place = f": {error.filename}" if error.filename is not None else ""
-        print(f"{program}: {error.strerror or error}{place}", file=sys.stderr)
+        print(printable(f"{program}: {error.strerror or error}{place}"), file=sys.stderr)
         return Exit.USAGE
     print(
-        f"{program}: internal error, {type(error).__name__}: {error}\n"
+        f"{program}: internal error, {type(error).__name__}: {printable(str(error))}\n"
         "This is a bug. Please report it with the command and the scenario; --debug shows the traceback.",
         file=sys.stderr,
     )
     return Exit.INTERNAL
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong with the command in text that no terminal acts on, whatever was typed."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(printable(message))
 
 
 class _Version(argparse.Action):

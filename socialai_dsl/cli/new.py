@@ -63,6 +63,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
             file.write(text)
     _write_schema(Path(_SCHEMA))
     print(f"wrote {', '.join(map(str, files))}; check with: socialai validate {name}.yaml")
+    print(f"play with: socialai play {name}.yaml")
     return Exit.GOOD
 
 

@@ -1,46 +1,19 @@
 """This module is `socialai play`: a person plays a scenario in the terminal, moving and speaking."""
 
 import argparse
+import os
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
+from socialai_dsl.cli.arguments import natural
 from socialai_dsl.cli.errors import Exit, UsageError
 from socialai_dsl.diagnostics import printable
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from socialai_dsl.program_suite import Playable
+    from socialai_dsl.cli.play_app import Episodes
+    from socialai_dsl.cli.play_game import Played
 
 SUMMARY: Final = "play a scenario yourself, from the keyboard"
-
-HELP: Final = """\
-Type a movement, an utterance, or both: `forward`, `f`, `Where is the exit`, `left How are you`.
-An empty line stands still. `?` lists what can be done and said, `quit` ends the game."""
-
-
-class Quit(Exception):  # noqa: N818 - not an error
-    """The player has had enough."""
-
-
-@dataclass
-class Played:
-    """An episode as it was played.
-
-    Attributes:
-        actions: int64 (4,) each.
-        reward: sum of the rewards.
-        success: whether it ended well.
-        outcome: how it ended.
-    """
-
-    actions: "list[NDArray[np.int64]]" = field(default_factory=list)
-    reward: float = 0.0
-    success: bool = False
-    outcome: str = ""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,103 +21,71 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "scenario", metavar="SCENARIO", help="a path or a name, with +variants and ?parameters"
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="default: 0")
+    parser.add_argument(
+        "--seed",
+        type=natural,
+        default=0,
+        metavar="N",
+        help="of the first episode (default: 0); the next ones have the next seeds",
+    )
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Play episode after episode until the player quits."""
-    import socialai_dsl
 
-    if arguments.seed < 0:
-        raise UsageError(f"--seed: got {arguments.seed}, expected at least 0")
-    program = socialai_dsl.compile(socialai_dsl.load(arguments.scenario))
-    env = socialai_dsl.make(arguments.scenario, render_mode="ansi")
-    print(HELP)
-    reset: dict[str, Any] = {"seed": arguments.seed}
-    try:
-        while True:
-            play_episode(env, program, reset)
-            reset = {}
-    except Quit:
-        return Exit.GOOD
-    finally:
-        env.close()
+    def episode(number: int) -> tuple[str, dict[str, Any]]:
+        seed = arguments.seed + number
+        return f"{arguments.scenario}, seed {seed}", {"seed": seed}
+
+    for played in play(arguments.scenario, episode):
+        print(printable(str(played)))
+    return Exit.GOOD
 
 
-def play_episode(
-    env: Any, program: "Playable", reset: dict[str, Any], ask: Callable[[str], str] = input
-) -> Played:
-    """Let the player play one episode.
+def play(scenario: str, episodes: "Episodes", practice: bool = True) -> "list[Played]":
+    """Let somebody at the terminal play; the episodes that were played to their end.
 
     Args:
-        env: a single environment with render mode `ansi`.
-        program: the scenario's.
-        reset: arguments of `env.reset`.
-        ask: shows a prompt and returns the player's line; raises EOFError at the end of the input.
+        scenario: a path or a name.
+        episodes: which ones.
+        practice: whether steps may be taken back and the like.
 
     Raises:
-        Quit: the player wants no more.
+        ScenarioError: the scenario has mistakes.
+        UsageError: there is no terminal.
     """
-    played, ended = Played(), False
-    _, info = env.reset(**reset)
-    while not ended:
-        print(f"\n{env.render()}", file=sys.stdout)
-        action = _ask_action(env, program, ask)
-        _, reward, terminated, truncated, info = env.step(action)
-        ended = bool(terminated or truncated)
-        played.actions.append(action)
-        played.reward += float(reward)
-        if info["utterance"] != "NA":
-            for line in info["utterance"].splitlines():
-                print(f"  {printable(line)}")
-    played.success, played.outcome = bool(info["success"]), outcome_name(info)
-    verdict = "success" if played.success else "no success"
-    print(f"\n{verdict} ({played.outcome}) after {len(played.actions)} steps, reward {played.reward:.3f}")
-    return played
+    _require_terminal()
+    from socialai_dsl.cli.play_app import PlayApp
+    from socialai_dsl.cli.play_game import Game
+
+    game = Game(scenario)
+    try:
+        first = episodes(0)
+        assert first is not None, "internal: there is at least one episode to play"
+        game.begin(*first)
+        app = PlayApp(game, episodes, practice)
+        done = app.run() or []
+        if app.failure is not None:
+            raise app.failure
+        return done
+    finally:
+        game.close()
 
 
-def outcome_name(info: dict[str, Any]) -> str:
-    """How an episode ended, as it is called among all ways to end (`Playable.outcomes`)."""
-    from socialai_dsl.program_suite import prefixed
+def _require_terminal() -> None:
+    """Say so where nobody could see or type anything.
 
-    return prefixed(info["member"], info["outcome"]) if "member" in info else str(info["outcome"])
-
-
-def _ask_action(env: Any, program: "Playable", ask: Callable[[str], str]) -> "NDArray[np.int64]":
-    while True:
-        try:
-            line = ask("> ").strip()
-        except EOFError:
-            raise Quit from None
-        if line.lower() in ("quit", "q"):
-            raise Quit
-        if line in ("?", "help"):
-            print(_choices(program))
-            continue
-        primitive, utterance = split_line(line, program.actions)
-        try:
-            action: NDArray[np.int64] = env.unwrapped.encode_action((primitive, utterance))
-        except ValueError as error:
-            print(f"  {printable(str(error))}")
-            continue
-        return action
-
-
-def split_line(line: str, actions: Sequence[str]) -> tuple[str | None, str | None]:
-    """Split what was typed into movement and utterance; a movement may be shortened while it is clear."""
-    first, _, rest = line.partition(" ")
-    meant = [action for action in actions if first and action.startswith(first.lower())]
-    if first.lower() in actions:
-        meant = [first.lower()]
-    # A capital begins an utterance unless the whole word is a movement.
-    if len(meant) == 1 and (first.islower() or first.lower() in actions):
-        return meant[0], rest.strip() or None
-    return None, line or None
-
-
-def _choices(program: "Playable") -> str:
-    return (
-        f"  movements:  {', '.join(program.actions)}\n"
-        f"  utterances: {', '.join(program.templates)}\n"
-        f"  <noun>:     {', '.join(program.nouns)}"
-    )
+    Raises:
+        UsageError: standard input, output or error output is no terminal, or one that shows lines only.
+    """
+    streams = {"input": sys.stdin, "output": sys.stdout, "error output": sys.stderr}
+    for name, stream in streams.items():
+        if not stream.isatty():
+            raise UsageError(
+                f"playing needs a terminal, and standard {name} is none; "
+                "`socialai trace SCENARIO --do forward --do ...` plays given steps without one"
+            )
+    if os.environ.get("TERM", "dumb") in ("dumb", "unknown"):
+        raise UsageError(
+            f"playing needs a terminal that can move its cursor; TERM is {os.environ.get('TERM')!r}"
+        )

@@ -60,7 +60,12 @@ def report_text(checked: Sequence[Checked], color: bool) -> str:
     counts = [_count(errors, "error") + (" shown, more left out" if hidden else "")]
     counts.append(_count(len(diagnostics) - errors, "warning"))
     summary = f"{_count(len(checked), 'file')} checked: {', '.join(counts)}"
-    return "\n".join([render_text([d], sources, color) for d in diagnostics] + [summary])
+    more = (
+        [f"`socialai codes {diagnostics[0].code}` says more about {diagnostics[0].code}"]
+        if diagnostics
+        else []
+    )
+    return "\n".join([*(render_text([d], sources, color) for d in diagnostics), summary, *more])
 
 
 def report_json(checked: Sequence[Checked], color: bool) -> str:

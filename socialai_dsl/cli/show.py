@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.errors import Exit
+from socialai_dsl.diagnostics import printable
 
 if TYPE_CHECKING:
     from socialai_dsl.loader import Resolved
@@ -35,7 +36,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     resolved = _resolved(arguments.scenario)
     if arguments.origin:
         for line in _origins(resolved):
-            print(line)
+            print(printable(line))
     else:
         import yaml
 

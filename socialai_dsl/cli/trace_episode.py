@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.errors import UsageError
-from socialai_dsl.cli.play import outcome_name, split_line
+from socialai_dsl.cli.typed import split_line
 from socialai_dsl.diagnostics import printable
 
 if TYPE_CHECKING:
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from socialai_dsl.program import Program
+    from socialai_dsl.program_suite import Playable
 
 _NOT_STATE: Final = ("t", "heard", "pending", "last")
 """What `describe` says beside what the room is like."""
@@ -159,6 +160,8 @@ class Traced:
 
     def steps(self, trace: Trace) -> Iterator[TraceStep]:
         """Play on to the end, or as far as there is something typed."""
+        from socialai_dsl.program_suite import outcome_name
+
         env, before = self._env.unwrapped, trace.state
         while trace.outcome is None:
             action = self._act(self._observation)
@@ -192,10 +195,7 @@ class Traced:
 
     def _cast(self, info: dict[str, Any]) -> tuple[str, ...]:
         """The agent and the NPCs of what is played."""
-        program = self._env.unwrapped.program
-        if "member" in info:
-            program = program.programs[program.members.index(info["member"])]
-        return cast_of(program)
+        return cast_of(played(self._env.unwrapped.program, info))
 
     def _names(self) -> tuple[str, ...]:
         """The same of everything that may be played."""
@@ -240,6 +240,15 @@ class Traced:
         for warning in told:
             print(f"socialai: {printable(warning)}", file=sys.stderr)
         return policy
+
+
+def played(program: "Playable", info: dict[str, Any]) -> "Program":
+    """The program of an episode: of a suite the member's that `info` names."""
+    from socialai_dsl.program_suite import ProgramSuite
+
+    if not isinstance(program, ProgramSuite):
+        return program
+    return program.programs[program.members.index(info["member"])]
 
 
 def cast_of(program: "Program") -> tuple[str, ...]:

@@ -33,7 +33,11 @@ class Text:
         self._cast = trace.cast
         member = f": {trace.member}" if trace.member is not None else ""
         title = printable(f"{trace.scenario}, {trace.origin}, agent {trace.agent}{member}")
-        return [self._paint(title, _BOLD), "", *_beside(trace.picture, self._present(trace.state)), ""]
+        return [
+            *(self._paint(title, _BOLD), ""),
+            *_beside(trace.picture, present(self._cast, trace.state)),
+            "",
+        ]
 
     def step(self, step: TraceStep) -> list[str]:
         """One step."""
@@ -47,7 +51,7 @@ class Text:
         ]
         if step.reward:
             facts.append(f"reward  {step.reward:.3f}")
-        facts += ["", *self._present(step.state)]
+        facts += ["", *present(self._cast, step.state)]
         title = f"-- step {step.t} "
         lines = [self._paint(title + "-" * (_WIDTH - len(title)), _BOLD), *_beside(step.picture, facts), ""]
         return [*lines, *self._fired(step), *self._others(step), *self._idle(step), ""]
@@ -59,19 +63,6 @@ class Text:
         verdict = "success" if trace.success else "no success"
         outcome = printable(trace.outcome)
         return [f"{verdict} ({outcome}) after {trace.length} steps, reward {trace.reward:.3f}"]
-
-    def _present(self, state: dict[str, Any]) -> list[str]:
-        """Where everybody is, where they look, and in which state their frames are."""
-        width = max(map(len, self._cast), default=0)
-        lines = []
-        for name in self._cast:
-            found = _found(state, name)
-            if found is None:
-                continue
-            place = "gone" if found.get("at") is None else f"{found['at'][0]},{found['at'][1]}"
-            frame = f"  {found['state']}" if "state" in found else ""
-            lines.append(f"{name:<{width}}  {place:<5} {found.get('facing', ''):<5}{frame}".rstrip())
-        return lines
 
     def _fired(self, step: TraceStep) -> Iterator[str]:
         for rule in step.fired:
@@ -115,6 +106,20 @@ class Text:
 
     def _paint(self, text: str, style: str) -> str:
         return f"{style}{text}{_RESET}" if self._color and style else text
+
+
+def present(cast: Sequence[str], state: dict[str, Any]) -> list[str]:
+    """Where everybody of the cast is, where they look, and in which state their frames are."""
+    width = max(map(len, cast), default=0)
+    lines = []
+    for name in cast:
+        found = _found(state, name)
+        if found is None:
+            continue
+        place = "gone" if found.get("at") is None else f"{found['at'][0]},{found['at'][1]}"
+        frame = f"  {found['state']}" if "state" in found else ""
+        lines.append(f"{name:<{width}}  {place:<5} {found.get('facing', ''):<5}{frame}".rstrip())
+    return lines
 
 
 def _found(state: dict[str, Any], name: str) -> dict[str, Any] | None:

@@ -35,6 +35,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--strict", action="store_true", help="warnings count as failures too")
     parser.add_argument(
+        "--deep",
+        action="store_true",
+        help="also try every scenario that has no errors out, as `socialai check --deep` does; takes minutes",
+    )
+    parser.add_argument(
         "--max-errors", type=int, metavar="N", help="report at most N errors; the exit code stays the same"
     )
     parser.add_argument(
@@ -51,6 +56,13 @@ def execute(arguments: argparse.Namespace) -> Exit:
         raise UsageError(f"--max-errors: expected a positive number, got {arguments.max_errors}")
     results = [_checked(name, arguments.stdin_filename) for name in _expand(arguments.paths)]
     checked = _without_used(results)
+    if arguments.deep:
+        right = [result for (_, result), c in zip(results, checked, strict=True) if not c.errors]
+        tried = {result.name: _tried(result, arguments.format == "text") for result in right}
+        checked = [
+            replace(c, diagnostics=c.diagnostics + tried.get(result.name, ()))
+            for c, (_, result) in zip(checked, results, strict=True)
+        ]
     shown = checked if arguments.max_errors is None else limited(checked, arguments.max_errors)
     report = REPORTERS[arguments.format](shown, shows_color(sys.stdout))
     if report:
@@ -78,13 +90,13 @@ def _checked(name: str, stdin_filename: str) -> tuple[Checked, "CheckResult"]:
         except ScenarioError as error:  # no text at all, which is a finding in it as in a file
             nothing = frontend.CheckResult(stdin_filename, None, None, error.diagnostics, error.sources, None)
             return Checked(stdin_filename, error.diagnostics, error.sources), nothing
-        result = frontend.check(Path(stdin_filename).absolute(), texts)
+        result = frontend.check(Path(stdin_filename).absolute(), texts, every_value=True)
         name = stdin_filename
     else:
         if name.endswith((".yaml", ".yml")):
             with open(name, "rb") as file:  # raises OSError where it cannot be read: usage, not a finding
                 file.read(1)
-        result = frontend.check(name)
+        result = frontend.check(name, every_value=True)
         if result.has_errors and is_usage(result.diagnostics):
             raise ScenarioError(result.diagnostics, result.sources)
     found = (*result.diagnostics, *_misfits(result))
@@ -104,6 +116,22 @@ def _without_used(results: Iterable[tuple[Checked, "CheckResult"]]) -> list[Chec
         )
         for checked, _ in results
     ]
+
+
+def _tried(result: "CheckResult", told: bool) -> tuple[Diagnostic, ...]:
+    """What trying the scenario of a file out shows, or the members of a suite; told to people as it goes."""
+    if result.checked is None and result.suite is None:
+        return ()
+    from socialai_dsl.cli.check import ROOMS, STATES, check_scenario, scenarios_of
+    from socialai_dsl.envs.properties import Effort
+
+    found: list[Diagnostic] = []
+    for scenario, called in scenarios_of(result.name):
+        report = check_scenario(scenario, called, Effort(ROOMS, 0, STATES), deep=True)
+        found += report.findings()
+        if told:
+            print("\n".join(report.lines()), flush=True)
+    return tuple(found)
 
 
 def _misfits(result: "CheckResult") -> Iterator[Diagnostic]:

@@ -36,6 +36,14 @@ def frame(table: Table, row: int, mode: str, tile: int = 32) -> Any:
     return draw_grid(codes[:height, :width], agent, seen, tile, _under_npcs(table, row))
 
 
+def coloured_text(table: Table, row: int) -> str:
+    """The room as text with escape codes for colours, what the agent has in view on a lighter ground."""
+    codes, agent = table.cells(row)
+    width, height = table.room(row)
+    seen = _seen(table, row, agent)[:height, :width]
+    return draw_ansi(codes[:height, :width], agent, colour=True, seen=seen)
+
+
 def cast_of(table: Table, row: int, tile: int = 32) -> list[Face]:
     """The NPCs that the agent can see in a row: what the scenario calls them, with a name that was drawn.
 

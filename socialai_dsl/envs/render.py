@@ -11,6 +11,7 @@ from socialai_dsl.envs.tiles import SEEN_LINE, Code, draw_tile
 
 _ARROWS: Final = ">v<^"
 _ANSI_COLOURS: Final = (31, 32, 34, 35, 33, 37)
+_SEEN_GROUND: Final = ";48;5;237"
 _RESET: Final = "\x1b[0m"
 _COLOUR_LETTERS: Final = "rgbpye"
 _COLOURLESS: Final = frozenset({tiles.UNSEEN, tiles.LAVA})
@@ -95,27 +96,33 @@ def _outline(picture: NDArray[np.uint8], seen: NDArray[np.bool_], tile: int) -> 
             cells[row, down, column, across] = SEEN_LINE
 
 
-def draw_ansi(codes: NDArray[np.uint8], agent: tuple[int, int, int], colour: bool = False) -> str:
+def draw_ansi(
+    codes: NDArray[np.uint8],
+    agent: tuple[int, int, int],
+    colour: bool = False,
+    seen: NDArray[np.bool_] | None = None,
+) -> str:
     """The room as text, two characters a cell.
 
     The agent and the NPCs show an arrow in their direction of gaze: the agent's stands alone, an NPC's
     follows the letter of its kind (`A` for kind 0). Objects have the first letter of their colour (`e` for
     grey) before their own: `gD` is a green closed door, `gL` a locked one, `g/` an open one. With `colour`,
-    escape codes show the colours as well, those of NPCs too.
+    escape codes show the colours as well, those of NPCs too, and cells of `seen`, bool (H, W), lie on a lighter ground.
     """
-    _check(codes, None)
+    _check(codes, seen)
     x, y, direction = agent
     lines = []
     for row in range(codes.shape[0]):
         cells = []
         for column in range(codes.shape[1]):
             code = _code(codes, row, column)
+            ground = _SEEN_GROUND if seen is not None and seen[row, column] else ""
             if (column, row) == (x, y):
-                cells.append(_paint(f" {_ARROWS[direction % 4]}", "1;31", colour))
+                cells.append(_paint(f" {_ARROWS[direction % 4]}", f"1;31{ground}", colour))
             elif code[0] == tiles.EMPTY:
-                cells.append(" .")
+                cells.append(_paint(" .", f"2{ground}", colour and bool(ground)))
             else:
-                cells.append(_paint(_letters(code), str(_ANSI_COLOURS[code[1] % 6]), colour))
+                cells.append(_paint(_letters(code), f"{_ANSI_COLOURS[code[1] % 6]}{ground}", colour))
         lines.append("".join(cells))
     return "\n".join(lines)
 

@@ -14,7 +14,7 @@ from socialai_dsl.engine.state import Key
 from socialai_dsl.engine.step import TRUNCATED
 from socialai_dsl.envs.actions import encode_action
 from socialai_dsl.envs.panel import Face
-from socialai_dsl.envs.picture import cast_of, frame
+from socialai_dsl.envs.picture import cast_of, coloured_text, frame
 from socialai_dsl.envs.recording import Recording
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Register
@@ -212,6 +212,10 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         heard = "\n".join(self._table.heard(0))
         print(f"{text}\n{heard}\n")
         return None
+
+    def coloured_text(self) -> str:
+        """The room as text with escape codes for colours; what the agent has in view has a lighter ground."""
+        return coloured_text(self._table, 0)
 
     def cast(self) -> list[Face]:
         """The NPCs of this episode that the agent can see, each with a label and a picture of its face."""

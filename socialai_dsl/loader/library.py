@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -96,8 +95,7 @@ class Library:
                 "S504", "this is not the name of files", asked, hint="`*` may stand in the last part"
             )
         place = self.resolved(folder / head, asked)
-        wanted = re.compile("[^/]*".join(re.escape(piece) for piece in re.split(r"\*+", pattern)))
-        names = [name for name in yaml_files(place) if wanted.fullmatch(name)]
+        names = [name for name in yaml_files(place) if _fits(name, pattern)]
         if not names:
             raise self.error("S504", f"no file matches `{text}`", asked)
         if len(names) > MAX_FILES:
@@ -129,6 +127,22 @@ class Library:
         self.sources[source.name] = source
         self._documents[path] = read_document(source, path=path)
         return self._documents[path]
+
+
+def _fits(name: str, pattern: str) -> bool:
+    """Whether a name is the pattern with something in the place of each `*`, in time proportional to both.
+
+    Each piece between two stars is taken where it first stands: a later place would leave less for the rest.
+    """
+    first, *middle, last = pattern.split("*") if "*" in pattern else (pattern, "")
+    if not (name.startswith(first) and name.endswith(last)) or len(name) < len(first) + len(last):
+        return False
+    at, end = len(first), len(name) - len(last)
+    for piece in middle:
+        at = name.find(piece, at, end) + len(piece)
+        if at < len(piece):
+            return False
+    return "*" in pattern or name == pattern
 
 
 def yaml_files(folder: Path) -> list[str]:

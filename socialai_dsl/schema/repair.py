@@ -7,8 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from socialai_dsl.diagnostics import DiagnosticBag
+from socialai_dsl.schema.behaviour import FirstRule, ThenRule, WorldRule
 from socialai_dsl.schema.positions import DataPath, Positions
 from socialai_dsl.source import Span
+
+_KEYS = {key for model in (FirstRule, ThenRule, WorldRule) for key in model.model_fields}
+"""Keys of rules, which are mostly written inside { }."""
 
 
 @dataclass
@@ -108,6 +112,9 @@ def _join_cut_values(
         head = part[key]
         part[key] = ", ".join([head, *pieces])
         hint = f'write `{key}: "{part[key]}"`, or put every key on a line of its own'
+        word, space, rest = pieces[0].partition(" ")
+        if space and word in _KEYS:
+            hint = f"a colon is missing: write `{word}: {rest}`"
         message = (
             f"unknown key `{pieces[0]}`: inside {{ }} a comma ends the value, so `{key}` is only `{head}`"
         )

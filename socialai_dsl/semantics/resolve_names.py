@@ -371,6 +371,10 @@ def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
                 return resolver.registers.read(register)
             if played is not None and played.model.slots.get(node.name) == "bool":
                 return member_truth(resolver, played, node.name, scope)
+        # Of somebody unknown nobody can say what they have.
+        known = node.name in VALUES or node.name in _statuses(resolver)
+        if not known and means_nothing(resolver, node.subject.id, scope):
+            raise _unknown(resolver, node.subject, None, scope)
     return resolve_attributes.without_arguments(resolver, node.name, node.subject, node, scope)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from socialai_dsl.grammar import ast
+from socialai_dsl.grammar.unparse import unparse
 from socialai_dsl.semantics.signatures import Signature
 from socialai_dsl.semantics.terms import SIDE, TURN, Type
 
@@ -82,38 +83,5 @@ def spoken(type_: Type, value: int) -> str:
 
 
 def quoted(node: ast.Expr) -> str:
-    """An expression as an author would write it."""
-    match node:
-        case ast.Number(value=number):
-            return str(number)
-        case ast.Truth(value=truth):
-            return "true" if truth else "false"
-        case ast.Text(parts=parts):
-            return '"' + "".join(p if isinstance(p, str) else f"<{quoted(p)}>" for p in parts) + '"'
-        case ast.Name(id=word):
-            return word
-        case ast.Parameter(id=word):
-            return f"${word}"
-        case ast.Attribute(subject=subject, name=word):
-            return f"{quoted(subject)}.{word}"
-        case ast.Call(name=word, args=arguments, subject=owner):
-            head = f"{quoted(owner)}.{word}" if owner is not None else word
-            return f"{head}({', '.join(map(quoted, arguments))})"
-        case ast.Quantifier(name=word, var=var, group=group):
-            return f"{word}({var} in {quoted(group)} ...)"
-        case ast.Not(operand=operand):
-            return f"not {quoted(operand)}"
-        case ast.Logic(op=op, operands=operands):
-            return f" {op} ".join(map(quoted, operands))
-        case ast.Compare(op=op, left=left, right=right) | ast.Arithmetic(op=op, left=left, right=right):
-            return f"{quoted(left)} {op} {quoted(right)}"
-        case ast.Member(left=left, right=right, negated=negated):
-            return f"{quoted(left)} {'not in' if negated else 'in'} {quoted(right)}"
-        case ast.Alternatives(options=options):
-            return " | ".join(map(quoted, options))
-        case ast.Interval(low=low, high=high):
-            return f"{quoted(low)}..{quoted(high)}"
-        case ast.Negative(operand=operand):
-            return f"-{quoted(operand)}"
-        case ast.Placed(region=region):
-            return f"{quoted(region)} where ..."
+    """An expression as an author would write it, with `...` for conditions of quantifiers and places."""
+    return unparse(node, shortened=True)

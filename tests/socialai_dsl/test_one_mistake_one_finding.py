@@ -53,6 +53,14 @@ def states_misspelt(text: str) -> Iterator[Site]:
         yield found.start(1), found.end(1), slip(found[1])
 
 
+def members_misspelt(text: str) -> Iterator[Site]:
+    """Two letters of a name change places where the cast declares it; it may be used in many ways."""
+    cast = re.search(r"^cast:\n((?:  .*\n|\n)*)", text, re.MULTILINE)
+    for found in re.finditer(r"^  ([a-z_]{4,}):", cast[1], re.MULTILINE) if cast else ():
+        if found[1] != "agent":
+            yield cast.start(1) + found.start(1), cast.start(1) + found.end(1), slip(found[1])
+
+
 def types_misspelt(text: str) -> Iterator[Site]:
     """Two letters of an object's type change places."""
     for found in re.finditer(r"\btype: ([a-z]{4,})", text):
@@ -142,6 +150,21 @@ def check_mistakes(folder: Path, kind: Callable[[str], Iterator[Site]], most: in
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
 def test_one_mistake_gives_one_error(scenarios: Path, kind: Callable[[str], Iterator[Site]]) -> None:
     assert check_mistakes(scenarios, kind, most=1) >= 4
+
+
+def test_a_member_misspelt_in_the_cast_gives_one_error(scenarios: Path) -> None:
+    """It may stand anywhere where the name is used, and says how the cast spells it."""
+    made = 0
+    for name in SCENARIOS:
+        path = scenarios / name
+        text = path.read_text(encoding="utf-8")
+        for start, end, wrong in sites(members_misspelt, text):
+            path.write_text(text[:start] + wrong + text[end:], encoding="utf-8")
+            (found,) = check(name).diagnostics
+            assert (found.code, found.suggestion) == ("S201", wrong), (name, wrong, found)
+            made += 1
+        path.write_text(text, encoding="utf-8")
+    assert made >= 10
 
 
 @pytest.mark.slow

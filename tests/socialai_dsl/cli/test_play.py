@@ -1,28 +1,342 @@
-"""Playing from the keyboard: what is typed becomes an action."""
+"""Playing from the keyboard, on a screen of 80x24: in this process, and through a real terminal of another."""
 
+import asyncio
+import os
+import re
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyte
 import pytest
+from pexpect import EOF, TIMEOUT, spawn
+from textual.pilot import Pilot
+from textual.widgets import Input, Static
 
-from socialai_dsl.cli.play import split_line
+import socialai_dsl
+from socialai_dsl.cli.main import main, run_main
+from socialai_dsl.cli.play_app import PlayApp
+from socialai_dsl.cli.play_game import Game
+from socialai_dsl.cli.play_words import ahead
+from socialai_dsl.engine.errors import RoomError
 
-ACTIONS = ("left", "right", "forward", "pickup", "drop", "toggle", "done")
+SEED = 0
+ROWS, COLUMNS = 24, 80
+ARROWS = {"left": "\x1b[D", "right": "\x1b[C", "forward": "\x1b[A"}
+
+
+def script(scenario: str, seed: int) -> list[tuple[str, str | None]]:
+    """What the scenario's oracle does: body action and utterance of each step."""
+    env = socialai_dsl.make(f"{scenario}+oracle").unwrapped
+    program = socialai_dsl.compile(socialai_dsl.load(scenario))
+    env.reset(seed=seed)
+    steps, ended = [], False
+    while not ended:
+        action = env.scripted_action()
+        _, _, terminated, truncated, info = env.step(action)
+        ended = terminated or truncated
+        body, speaks, template, noun = action.tolist()
+        said = program.templates[template].replace("<noun>", program.nouns[noun]) if speaks else None
+        steps.append(([*program.actions, "none"][body], said))
+    assert info["success"], "the test needs an episode that the oracle solves"
+    return steps
+
+
+# -- a real terminal ------------------------------------------------------------------------------------------------
+
+
+class Terminal:
+    """A command in a pseudo-terminal, with what its screen shows."""
+
+    def __init__(self, *words: str) -> None:
+        environment = {**os.environ, "TERM": "xterm-256color", "LANG": "C.UTF-8"}
+        environment.pop("NO_COLOR", None)
+        self._screen = pyte.Screen(COLUMNS, ROWS)
+        self._stream = pyte.Stream(self._screen)
+        self.child = spawn(
+            sys.executable,
+            ["-m", "socialai_dsl", *words],
+            dimensions=(ROWS, COLUMNS),
+            env=environment,
+            encoding="utf-8",
+            timeout=60,
+        )
+        self.written = ""
+        self._latest = time.monotonic() + 120
+
+    def press(self, keys: str) -> None:
+        self.child.send(keys)
+
+    def shows(self, *patterns: str) -> str:
+        """Wait until the screen shows all of them; what it shows then."""
+        while not all(re.search(pattern, self.text) for pattern in patterns):
+            if not self._read() or time.monotonic() > self._latest:
+                pytest.fail(f"the screen never showed {patterns}:\n{self.text}")
+        return self.text
+
+    @property
+    def text(self) -> str:
+        return "\n".join(self._screen.display)
+
+    def ends(self) -> int:
+        """Wait for the end of the command; its exit code."""
+        while self._read():
+            pass
+        self.child.close()
+        assert self.child.exitstatus is not None, f"ended by signal {self.child.signalstatus}"
+        return int(self.child.exitstatus)
+
+    def _read(self) -> bool:
+        try:
+            chunk = self.child.read_nonblocking(65536, timeout=0.25)
+        except TIMEOUT:
+            return True
+        except EOF:
+            return False
+        self.written += chunk
+        # The stand-in for a terminal does not know these questions, which xterm ignores or answers.
+        self._stream.feed(
+            re.sub(r"\x1b\[[?>=<][0-9;]*[$]?[pu]|\x1b\[>[0-9;]*[a-zA-Z]|\x1b_.*?\x1b\\", "", chunk)
+        )
+        return True
+
+
+@pytest.fixture
+def terminal() -> Iterator[Callable[..., Terminal]]:
+    opened: list[Terminal] = []
+
+    def start(*words: str) -> Terminal:
+        opened.append(Terminal(*words))
+        return opened[-1]
+
+    yield start
+    for one in opened:
+        one.child.close(force=True)
+
+
+def test_talkitout_is_played_to_success_in_a_terminal(terminal: Callable[..., Terminal]) -> None:
+    steps = script("talkitout", SEED)
+    screen = terminal("play", "talkitout", "--seed", str(SEED))
+    first = screen.shows("step 0 ", "q quit")
+    assert "Leave by the right one" in first
+
+    # A step too many, and back; the states of frames shown, and hidden.
+    screen.press(ARROWS["left"])
+    screen.shows("step 1 ")
+    screen.press("u")
+    screen.shows("step 0 ", "one step back")
+    screen.press("s")
+    screen.shows(r"wizard +\d,\d +down +stranger")
+    screen.press("s")
+    screen.shows("in view")
+
+    for t, (movement, said) in enumerate(steps, start=1):
+        if said is not None:
+            screen.press("/" + " ".join([movement, said] if movement != "none" else [said]) + "\r")
+        else:
+            screen.press(ARROWS.get(movement, "."))
+        screen.shows(f"step {t} ")
+    screen.shows("success:", f"after {len(steps)} steps", r"\d+ You: Open sesame")
+
+    # The last step is undone and done again, with a slip that Tab puts right.
+    screen.press("u")
+    screen.shows(f"step {len(steps) - 1} ")
+    screen.press("/Open sesme\r")
+    screen.shows("'Open sesme' cannot be said; did you mean 'Open sesame'")
+    screen.press("\t\r")
+    screen.shows("success:")
+
+    screen.press("q")
+    assert screen.ends() == 0
+    left = screen.written.rfind("\x1b[?1049l")
+    assert left > 0, "the other screen of the terminal is left"
+    assert "\x1b[?25h" in screen.written, "the cursor is shown again"
+    assert "\x1b[?1000l" in screen.written, "the mouse is let go"
+    assert f"talkitout, seed {SEED}: success (" in screen.written[left:]
+    assert "Traceback" not in screen.written
+
+
+def test_without_a_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    assert main(["play", "talkitout"]) == 2
+    assert "playing needs a terminal, and standard input is none" in capsys.readouterr().err
+    assert run_main(["talkitout", "--agent", "human", "--out", os.devnull]) == 2
+    for stream in ("stdin", "stdout", "stderr"):
+        monkeypatch.setattr(getattr(sys, stream), "isatty", lambda: True, raising=False)
+    monkeypatch.setenv("TERM", "dumb")
+    assert main(["play", "talkitout"]) == 2
+    assert "TERM is 'dumb'" in capsys.readouterr().err
+
+
+# -- the screen, in this process ------------------------------------------------------------------------------------
+
+
+def episode(number: int) -> tuple[str, dict[str, Any]]:
+    return f"seed {number}", {"seed": number}
+
+
+def played(
+    scenario: str,
+    player: Callable[[PlayApp, Pilot[Any]], Any],
+    practice: bool = True,
+    episodes: Any = episode,
+) -> PlayApp:
+    """Let a function play on a screen of 80x24."""
+    game = Game(scenario)
+    game.begin(*episodes(0))
+    app = PlayApp(game, episodes, practice)
+
+    async def run() -> None:
+        async with app.run_test(size=(COLUMNS, ROWS)) as pilot:
+            await player(app, pilot)
+
+    asyncio.run(run())
+    game.close()
+    return app
+
+
+def shown(app: PlayApp, place: str) -> str:
+    return str(app.query_one(place, Static).render())
+
+
+async def typed(pilot: Pilot[Any], text: str) -> None:
+    await pilot.press(*("space" if c == " " else c for c in text), "enter")
+
+
+def test_keys_lists_and_lines() -> None:
+    async def play(app: PlayApp, pilot: Pilot[Any]) -> None:
+        await pilot.press("up", "full_stop", "a", "space")
+        assert "step 4 " in shown(app, "#title")
+        await pilot.press("c", "down", "down", "enter", "enter")  # the third template with the first noun
+        assert "step 5 " in shown(app, "#title")
+        assert app._game.now.lines[-1].text == "Which is sesame"
+        await pilot.press("c", "right", "down", "escape", "escape")
+        assert len(app.screen_stack) == 1
+        assert "step 5 " in shown(app, "#title")
+        await pilot.press("slash")
+        await typed(pilot, "left Which is the wall")
+        assert (app._game.steps, app._game.now.lines[-1].text) == (6, "Which is the wall")
+        await pilot.press("enter")
+        await typed(pilot, "Sing")
+        assert "'Sing' cannot be said" in shown(app, "#message")
+        assert app.query_one(Input).value == "Sing"
+        await pilot.press("left", "up")
+        assert app._game.steps == 6, "arrows move the cursor of the line"
+        await pilot.press("escape", "question_mark")
+        assert len(app.screen_stack) == 2
+        await pilot.press("z", "up")
+        assert app._game.steps == 7
+
+    played("talkitout", play)
+
+
+def test_steps_are_taken_back_with_their_chance_and_played_again() -> None:
+    async def play(app: PlayApp, pilot: Pilot[Any]) -> None:
+        def now() -> tuple[Any, ...]:
+            return app._game.room(), app._game.now.lines, tuple(app._game.backstage())
+
+        keys = ["up", "left", "space", "up", "right", "up", "space", "space", "up", "left"]
+        seen = [now()]
+        for key in keys:
+            await pilot.press(key)
+            seen.append(now())
+        assert len(set(seen)) > 5, "the peer dances"
+        for before in reversed(seen[:-1]):
+            await pilot.press("u")
+            assert now() == before
+        await pilot.press("u")
+        assert "no step to take back" in shown(app, "#message")
+        for key, after in zip(keys, seen[1:], strict=True):
+            await pilot.press(key)
+            assert now() == after
+        await pilot.press("r")
+        assert now() == seen[0]
+        await pilot.press("n")
+        assert "seed 1 " in shown(app, "#title")
+
+    played("dance", play)
+
+
+def test_the_end_is_told_and_nothing_is_played_after_it() -> None:
+    async def play(app: PlayApp, pilot: Pilot[Any]) -> None:
+        await pilot.press("x")
+        assert "no success: failure: agent.action in toggle | done\nafter 1 steps" in shown(app, "#message")
+        await pilot.press("up")
+        assert app._game.steps == 1
+        await pilot.press("u", "t", "n", "q")
+
+    app = played("talkitout", play)
+    (only,) = app.return_value or []
+    assert (only.title, len(only.actions), only.ended.success) == ("seed 0", 1, False)
+
+
+def test_an_evaluation_gives_nothing_away() -> None:
+    def two(number: int) -> tuple[str, dict[str, Any]] | None:
+        return (f"test episode {number}", {"options": {"test_episode": number}}) if number < 2 else None
+
+    async def play(app: PlayApp, pilot: Pilot[Any]) -> None:
+        for key, told in (("u", "taken back"), ("r", "played once"), ("s", "not shown"), ("n", "has ended")):
+            await pilot.press(key)
+            assert told in shown(app, "#message")
+        await pilot.press("x", "n", "x", "n")
+
+    app = played("talkitout", play, practice=False, episodes=two)
+    assert [one.title for one in app.return_value or []] == ["test episode 0", "test episode 1"]
+
+
+def test_members_of_a_suite_say_what_they_are_about() -> None:
+    async def play(app: PlayApp, pilot: Pilot[Any]) -> None:
+        told = {shown(app, "#facts")}
+        for _ in range(6):
+            await pilot.press("n")
+            told.add(shown(app, "#facts"))
+        assert len(told) > 2
+
+    played("social_env", play)
+
+
+def test_a_room_that_cannot_be_and_what_is_our_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def play(app: PlayApp, pilot: Pilot[Any]) -> None:
+        with monkeypatch.context() as patched:
+            patched.setattr(app._game._env, "reset", lambda **_: (_ for _ in ()).throw(RoomError("no room")))
+            await pilot.press("n")
+            assert "no room" in shown(app, "#message")
+            assert "seed 0 " in shown(app, "#title")
+        monkeypatch.setattr(app._game, "act", lambda *_: 1 / 0)
+        app.simulate_key("up")  # a pilot would wait for a screen that is left
+
+    app = played("talkitout", play)
+    assert isinstance(app.failure, ZeroDivisionError)
 
 
 @pytest.mark.parametrize(
-    ("line", "expected"),
+    ("code", "words"),
     [
-        ("", (None, None)),
-        ("left", ("left", None)),
-        ("f", ("forward", None)),
-        ("Forward", ("forward", None)),
-        ("forward How are you", ("forward", "How are you")),
-        ("Open sesame", (None, "Open sesame")),
-        ("t  Open sesame", ("toggle", "Open sesame")),
-        ("d", (None, "d")),
-        ("do", ("done", None)),
-        ("Le mot", (None, "Le mot")),
+        ((1, 0, 0), "nothing"),
+        ((4, 1, 2), "green door, locked"),
+        ((2, 5, 0), "wall"),
+        ((11, 3, 0), "somebody, purple"),
+        ((19, 0, 1), "red remote door, closed"),
+        ((200, 0, 0), "something"),
     ],
 )
-def test_a_line_is_a_movement_an_utterance_or_both(
-    line: str, expected: tuple[str | None, str | None]
-) -> None:
-    assert split_line(line, ACTIONS) == expected
+def test_what_is_ahead(code: tuple[int, int, int], words: str) -> None:
+    view = np.zeros((7, 7, 4), np.uint8)
+    view[3, 5, :3] = code
+    assert ahead(view) == words
+
+
+def test_names_reach_the_screen_as_text(tmp_path: Path) -> None:
+    """A scenario's name and texts are no markup, whatever brackets they have."""
+    file = tmp_path / "[red]x.yaml"
+    file.write_text((Path(__file__).parents[3] / "scenarios" / "talkitout.yaml").read_text())
+
+    async def play(app: PlayApp, pilot: Pilot[Any]) -> None:
+        assert "[red]x" in shown(app, "#title")
+
+    def titled(number: int) -> tuple[str, dict[str, Any]]:
+        return f"{file}, seed {number}", {"seed": number}
+
+    played(str(file), play, episodes=titled)

@@ -1,14 +1,15 @@
 """Suites on the command line: checked, shown, played, trained on and evaluated like scenarios."""
 
+import asyncio
 import json
 import re
 import shutil
-from io import StringIO
 from pathlib import Path
 
 import pytest
 
 from socialai_dsl.cli.main import main, run_main
+from socialai_dsl.cli.play_app import PlayApp
 
 Capture = pytest.CaptureFixture[str]
 DATA = Path(__file__).parents[2] / "data" / "suites"
@@ -57,7 +58,16 @@ def test_the_scripts_of_a_suite(capsys: Capture) -> None:
 
 
 def test_a_person_plays_members(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sys.stdin", StringIO("done\n" * 12 + "quit\n"))
+    async def keys(app: PlayApp) -> None:
+        async with app.run_test() as pilot:
+            await pilot.press(*["x", "n"] * 12, "q")
+
+    def run(app: PlayApp) -> object:
+        asyncio.run(keys(app))
+        return app.return_value
+
+    monkeypatch.setattr("socialai_dsl.cli.play._require_terminal", lambda: None)
+    monkeypatch.setattr(PlayApp, "run", run)
     assert run_main(["pair.yaml?split=test", "--agent", "human", "--eval-episodes", "8", "--out", "run"]) == 0
     result = json.loads(Path("run/result.json").read_text())
     assert sum(result["eval"]["outcomes"].values()) == pytest.approx(1)

@@ -44,7 +44,7 @@ def test_a_folder_is_searched_and_json_is_pure(capsys: Capture) -> None:
 
 def test_files_given_twice_are_checked_once(capsys: Capture) -> None:
     assert main(["validate", "sound.yaml", "sound.yaml", "."]) == 1
-    assert capsys.readouterr().out.splitlines()[-1] == "3 files checked: 1 error, 0 warnings"
+    assert capsys.readouterr().out.splitlines()[-2] == "3 files checked: 1 error, 0 warnings"
 
 
 @pytest.mark.parametrize("name", ["nowhere.yaml", "no_such_scenario", "sound.yaml+nothing"])
@@ -111,9 +111,76 @@ def test_a_file_whose_errors_are_left_out_still_fails(many_mistakes: None, capsy
 
 def test_fewer_errors_than_asked_for(capsys: Capture) -> None:
     assert main(["validate", "broken.yaml", "--max-errors", "1"]) == 1
-    assert capsys.readouterr().out.splitlines()[-1] == "1 file checked: 1 error, 0 warnings"
+    assert capsys.readouterr().out.splitlines()[-2] == "1 file checked: 1 error, 0 warnings"
     assert main(["validate", "broken.yaml", "--max-errors", "0"]) == 2
     assert "expected a positive number" in capsys.readouterr().err
+
+
+# -- parameters ----------------------------------------------------------------------------------------------------
+
+CHOOSING = """\
+scenario: choosing
+horizon: 9
+params:
+  n: {default: 2, values: [1, 2, 40]}
+  asks: {default: true, values: [true, false]}
+  where: {default: top, values: {top: wall(top), left: wal(left), drawn: wall(pick(top | left))}}
+grammar: {templates: [Say <noun>], nouns: [hello]}
+room: {size: 6}
+objects:
+  boxes: {type: box, count: $n}
+  door: {type: door, place: $where}
+cast: {agent: {place: anywhere}}
+outcome: [{success: agent.did(done) and $asks}]
+"""
+
+
+def test_every_value_of_a_parameter_is_checked_alone(capsys: Capture) -> None:
+    Path("choosing.yaml").write_text(CHOOSING)
+    assert main(["validate", "choosing.yaml", "--format", "json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert [(d["line"], d["code"], d["hint"]) for d in found] == [
+        (10, "S106", "with `choosing?n=40`"),
+        (11, "S205", "with `choosing?where=left`"),
+    ]
+    assert main(["validate", "choosing.yaml?n=1&where=drawn"]) == 0
+    Path("choosing.yaml").write_text(CHOOSING.replace("horizon", "horizn"))
+    assert main(["validate", "choosing.yaml", "--format", "json"]) == 1
+    assert [d["code"] for d in json.loads(capsys.readouterr().out.partition("\n")[2] or "[]")] in (
+        [],
+        ["S101"],
+    )
+
+
+# -- tried out as well ---------------------------------------------------------------------------------------------
+
+CLAIMING = """\
+scenario: claiming
+horizon: 12
+grammar: {templates: [Say <noun>], nouns: [hello]}
+room: {size: 4}
+objects: {door: {type: door, place: wall(top)}}
+cast: {agent: {place: anywhere}}
+outcome:
+  - success: agent.next_to(door)
+  - {failure: agent.next_to(door) and agent.did(done), id: late}
+check: [{never: agent.did(toggle)}]
+"""
+
+
+def test_deep_tries_what_has_no_errors_out(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("socialai_dsl.cli.check.ROOMS", 3)
+    Path("claiming.yaml").write_text(CLAIMING)
+    assert main(["validate", "--deep", "claiming.yaml", "broken.yaml", "--format", "json"]) == 1
+    found = {(d["file"], d["code"], d["line"]) for d in json.loads(capsys.readouterr().out)}
+    assert found >= {("claiming.yaml", "S801", 10), ("claiming.yaml", "W802", 9)}
+    assert {file for file, *_ in found} == {"claiming.yaml", "broken.yaml"}
+    Path("claiming.yaml").write_text(CLAIMING.partition("  - {failure")[0])
+    assert main(["validate", "--deep", "--strict", "claiming.yaml"]) == 0
+    said = capsys.readouterr().out
+    assert "claiming.yaml: 3 rooms of seed 0" in said
+    assert "a success can be reached in 3 of 3 rooms" in said
+    assert "1 file checked: 0 errors, 0 warnings" in said
 
 
 # -- standard input -----------------------------------------------------------------------------------------------

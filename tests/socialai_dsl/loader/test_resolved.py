@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import os
-import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +13,9 @@ import pytest
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.loader import library, names, resolved
 from socialai_dsl.loader.limits import MAX_CHAIN, MAX_FILES
+from socialai_dsl.loader.members import members_of
 from socialai_dsl.loader.resolved import resolve, shipped_names
+from tests.fuzzing.playground import listening
 
 FILES = {
     "shipped/market.yaml": "scenario: market\nhorizon: 10\ncast:\n  anna: {name: Anna}\n  bob: {name: Bob}\n",
@@ -382,28 +382,6 @@ def test_depth_after_merging_is_limited(write: Write) -> None:
     assert "S004 put together, the scenario is nested" in findings("bad.yaml")[0]
 
 
-@contextmanager
-def opened_files() -> Iterator[list[str]]:
-    """Every path that Python opens meanwhile."""
-    seen: list[str] = []
-    _hooks.append(seen)
-    try:
-        yield seen
-    finally:
-        _hooks.remove(seen)
-
-
-_hooks: list[list[str]] = []
-
-
-def _watch(event: str, arguments: tuple[Any, ...]) -> None:
-    if event == "open" and _hooks:
-        for seen in _hooks:
-            seen.append(str(arguments[0]))
-
-
-sys.addaudithook(_watch)
-
 VECTORS = [
     "../outside/secret.yaml",
     "../outside/secret",
@@ -435,11 +413,23 @@ VECTORS = [
     "*link.yaml",
     "../*/secret.yaml",
     "{tmp}/outside/s*.yaml",
+    "zoes/../zoes/../../outside/secret.yaml",
+    "zoes//..//..//outside/secret.yaml",
+    "./link.yaml",
+    "zoes/../link",
+    "linked/./secret",
+    "linked/secret.yaml+x",
+    "../outside/secret.yaml+x?n=1",
+    "../outside/../outside/secret",
+    "/proc/self/cwd/../outside/secret.yaml",
+    "//{tmp}/outside/secret.yaml",
+    "\\..\\..\\outside\\secret.yaml",
+    "..%2foutside%2fsecret.yaml",
 ]
 
 
 @pytest.mark.parametrize("vector", VECTORS)
-@pytest.mark.parametrize("form", ["extends", "of", "one_of"])
+@pytest.mark.parametrize("form", ["extends", "of", "one_of", "member"])
 def test_nothing_outside_the_folders_is_opened(vector: str, form: str, write: Write, tmp_path: Path) -> None:
     write("user2/secret.yaml", "scenario: secret\n")
     write("user.yaml", "scenario: secret\n")
@@ -451,10 +441,12 @@ def test_nothing_outside_the_folders_is_opened(vector: str, form: str, write: Wr
         "extends": f'scenario: f\nextends: "{text}"\n',
         "of": f'variant: f\nof: "{text}"\n',
         "one_of": f'scenario: f\ncast: {{a: {{one_of: "{text}"}}}}\n',
+        "member": f'suite: f\nmembers: ["{text}"]\n',
     }
     write("user/f.yaml", forms[form])
-    with opened_files() as seen, pytest.raises(ScenarioError) as raised:
-        resolve("f.yaml").include_all(("cast", "a", "one_of"))
+    with listening() as ear, pytest.raises(ScenarioError) as raised:
+        members_of(resolve("f.yaml")) if form == "member" else resolve("f.yaml").with_drawn_files()
+    seen = ear.opened
     assert {d.code for d in raised.value.diagnostics} <= {"S504", "S505"}
     inside = (tmp_path / "user").resolve(), (tmp_path / "shipped").resolve()
     opened = [
@@ -476,11 +468,11 @@ def test_the_folder_given_is_the_border(tmp_path: Path, write: Write) -> None:
 def test_variants_do_not_leave_the_folders_either(tmp_path: Path) -> None:
     os.symlink(tmp_path / "outside" / "secret.yaml", "mine_x.yaml")
     os.symlink(tmp_path / "outside" / "secret.yaml", "y.yaml")
-    with opened_files() as seen:
+    with listening() as ear:
         assert "S505" in findings("mine+x")[0]
         assert "S505" in findings("mine+y")[0]
         assert "S503" in findings("mine+zzz")[0]
-    assert not [path for path in seen if "secret" in os.path.realpath(path)]
+    assert not [path for path in ear.opened if "secret" in os.path.realpath(path)]
 
 
 def test_shipped_names_leave_out_variants_of_any_scenario() -> None:

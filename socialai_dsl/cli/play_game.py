@@ -1,0 +1,232 @@
+"""This module is a game as somebody plays it: where it stands, what was said, and every step back to its start."""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import socialai_dsl
+from socialai_dsl.checking import Loaded, LoadedSuite
+from socialai_dsl.cli.endings import Ending, endings_of
+from socialai_dsl.cli.episode import describe_step
+from socialai_dsl.cli.trace_episode import cast_of, played
+from socialai_dsl.cli.trace_text import present
+from socialai_dsl.cli.typed import Phrases
+from socialai_dsl.envs.panel import DialogueLine
+from socialai_dsl.program_suite import Playable, ProgramSuite, outcome_name
+
+_UNTOLD: Final = ("clock", "at", "color", "facing", "last", "poked", "state")
+"""What `describe` says of somebody that is shown otherwise, or only counts."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How an episode ended.
+
+    Attributes:
+        outcome: its name, as `Playable.outcomes` has it. success: whether it counts as success.
+        text: what the scenario's file says there.
+    """
+
+    outcome: str
+    success: bool
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """A moment of an episode.
+
+    Attributes:
+        snapshot: the environment's exact state.
+        view: what the agent sees, uint8 (7, 7, C).
+        member: of a suite, which scenario is played.
+        action: what led here, int64 (4,); None before the first step.
+        lines: what was said and heard so far.
+        reward: sum of the rewards so far.
+        ended: how the episode ended; None while it has not.
+    """
+
+    snapshot: bytes
+    view: NDArray[np.uint8]
+    member: str | None
+    action: NDArray[np.int64] | None = None
+    lines: tuple[DialogueLine, ...] = ()
+    reward: float = 0.0
+    ended: Ended | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """An episode as it was played to its end.
+
+    Attributes:
+        title: which one it was.
+        actions: int64 (4,) each.
+        reward: sum of the rewards.
+        ended: how it ended.
+    """
+
+    title: str
+    actions: list[NDArray[np.int64]]
+    reward: float
+    ended: Ended
+
+    def __str__(self) -> str:
+        """One line: which, how, after how many steps."""
+        verdict = "success" if self.ended.success else "no success"
+        steps = len(self.actions)
+        return f"{self.title}: {verdict} ({self.ended.text}) after {steps} steps, reward {self.reward:.3f}"
+
+
+class Game:
+    """One environment, and everything that happened in it since the reset.
+
+    Attributes:
+        title: which episode is played.
+        phrases: what can be done and said.
+
+    Args:
+        scenario: a path or a name.
+
+    Raises:
+        ScenarioError: the scenario has mistakes.
+    """
+
+    def __init__(self, scenario: str) -> None:
+        loaded = socialai_dsl.load(scenario)
+        self._program = socialai_dsl.compile(loaded)
+        self._endings: dict[str, Ending] = {e.name: e for e in endings_of(loaded, self._program)}
+        self._about = _abouts(loaded, self._program)
+        self._env: Any = socialai_dsl.make(scenario).unwrapped
+        self.phrases = Phrases(self._program.actions, self._program.templates, self._program.nouns)
+        self.title = ""
+        self._moments: list[Moment] = []
+
+    def begin(self, title: str, reset: dict[str, Any]) -> None:
+        """Start an episode with these arguments of `env.reset`.
+
+        Raises:
+            RoomError: no room that was drawn is as the scenario asks; the game stays where it was.
+        """
+        observation, info = self._env.reset(**reset)
+        self.title = title
+        self._moments = [Moment(self._env.snapshot(), observation["image"], info.get("member"))]
+
+    def act(self, movement: str | None, sentence: str | None) -> None:
+        """Play a step.
+
+        Raises:
+            ValueError: it cannot be done or said; the message says what was probably meant.
+        """
+        action = self._env.encode_action((movement, sentence))
+        before = self.now
+        observation, reward, terminated, truncated, info = self._env.step(action)
+        step = describe_step(self._program, action, len(self._moments), info["utterance"])
+        self._moments.append(
+            Moment(
+                self._env.snapshot(),
+                observation["image"],
+                info.get("member"),
+                action,
+                (*before.lines, *step.dialogue),
+                before.reward + float(reward),
+                self._ended(info) if terminated or truncated else None,
+            )
+        )
+
+    def undo(self) -> bool:
+        """Take the last step back, chance included; whether there was one."""
+        if not self.steps:
+            return False
+        self._moments.pop()
+        self._env.restore(self.now.snapshot)
+        return True
+
+    @property
+    def now(self) -> Moment:
+        """Where the game stands."""
+        return self._moments[-1]
+
+    @property
+    def about(self) -> str:
+        """What the scenario that is played says of itself."""
+        return self._about.get(self.now.member, "")
+
+    @property
+    def steps(self) -> int:
+        """How many steps were played."""
+        return len(self._moments) - 1
+
+    def room(self) -> str:
+        """The room as text with escape codes for colours."""
+        return str(self._env.coloured_text())
+
+    def place(self) -> tuple[int, int] | None:
+        """X and y of the agent; None if it has left."""
+        at = self._env.describe()["agent"]["at"]
+        return None if at is None else (at[0], at[1])
+
+    def backstage(self) -> list[str]:
+        """What a player does not see: states of frames, what was drawn, and what the cast remembers."""
+        state = self._env.describe()
+        program = played(self._program, {"member": self.now.member})
+        cast = cast_of(program)
+        lines = present(cast, state)
+        for key in dict.fromkeys(name.partition("[")[0] for name in cast):
+            found = state[key]
+            for number, one in enumerate(found if isinstance(found, list) else [found]):
+                name = f"{key}[{number}]" if isinstance(found, list) else key
+                lines += [f"{name}.{k} = {_plain(v)}" for k, v in one.items() if k not in _UNTOLD]
+        looks = _looks(state)
+        for group in ("let", "state", "one_of"):
+            lines += [
+                f"{key} = {_plain(value)}{looks.get(value, '') if isinstance(value, str) else ''}"
+                for key, value in state.get(group, {}).items()
+            ]
+        return lines
+
+    def played(self) -> Played | None:
+        """The episode, if it has ended."""
+        ended = self.now.ended
+        if ended is None:
+            return None
+        actions = [moment.action for moment in self._moments if moment.action is not None]
+        return Played(self.title, actions, self.now.reward, ended)
+
+    def close(self) -> None:
+        """Let the environment go."""
+        self._env.close()
+
+    def _ended(self, info: dict[str, Any]) -> Ended:
+        name = outcome_name(info)
+        return Ended(name, bool(info["success"]), self._endings[name].text)
+
+
+def _abouts(loaded: Loaded, program: Playable) -> dict[str | None, str]:
+    """What each scenario says of itself, by the member it is; None is one that plays alone."""
+    if not isinstance(loaded, LoadedSuite):
+        return {None: loaded.scenario.about or ""}
+    assert isinstance(program, ProgramSuite), "internal: a suite compiles to a suite"
+    members = zip(program.members, loaded.members, strict=True)
+    return {name: member.scenario.about or "" for name, member in members}
+
+
+def _looks(state: dict[str, Any]) -> dict[str, str]:
+    """Of everything in the room, by name: colour and place, to be put behind the name."""
+    looks = {}
+    for key, found in state.items():
+        for number, one in enumerate(found if isinstance(found, list) else [found]):
+            if isinstance(one, dict) and one.get("at") is not None:
+                name = f"{key}[{number}]" if isinstance(found, list) else key
+                looks[name] = f" ({one['color']}, at {one['at'][0]},{one['at'][1]})"
+    return looks
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_plain(part)}" for key, part in value.items())
+    if value is None:
+        return "nothing"
+    return str(value).lower() if isinstance(value, bool) else str(value)

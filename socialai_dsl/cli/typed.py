@@ -1,0 +1,59 @@
+"""This module reads what a player types: a movement, an utterance or both, completed and corrected."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from socialai_dsl.diagnostics import did_you_mean
+
+
+def split_line(line: str, actions: Sequence[str]) -> tuple[str | None, str | None]:
+    """Split what was typed into movement and utterance; a movement may be shortened while it is clear."""
+    first, _, rest = line.partition(" ")
+    meant = [action for action in actions if first and action.startswith(first.lower())]
+    if first.lower() in actions:
+        meant = [first.lower()]
+    # A capital begins an utterance unless the whole word is a movement.
+    if len(meant) == 1 and (first.islower() or first.lower() in actions):
+        return meant[0], rest.strip() or None
+    return None, line or None
+
+
+@dataclass(frozen=True)
+class Phrases:
+    """Everything that can be said.
+
+    Attributes:
+        actions: words for movements.
+        templates: each with its <noun>.
+        nouns: what the <noun> can be.
+    """
+
+    actions: Sequence[str]
+    templates: Sequence[str]
+    nouns: Sequence[str]
+
+    def sentences(self) -> list[str]:
+        """Each sentence once, by template, then by noun."""
+        pairs = (template.replace("<noun>", noun) for template in self.templates for noun in self.nouns)
+        return list(dict.fromkeys(pairs))
+
+    def completed(self, line: str) -> str | None:
+        """The line with its utterance written out, where what is typed begins one; None where nothing does."""
+        before, begun = self._parts(line)
+        if not begun:
+            return None
+        fitting = (said for said in self.sentences() if said.casefold().startswith(begun.casefold()))
+        found = next(fitting, None)
+        return None if found is None else before + found
+
+    def corrected(self, line: str) -> str | None:
+        """The line with the sentence that was probably meant; None where none is near."""
+        before, begun = self._parts(line)
+        near = did_you_mean(begun, self.sentences())
+        return None if near is None else before + near
+
+    def _parts(self, line: str) -> tuple[str, str]:
+        """What stands before the utterance, and the utterance as far as it is typed."""
+        _, said = split_line(line.lstrip(), self.actions)
+        begun = said or ""
+        return line[: len(line) - len(begun)] if line.endswith(begun) else "", begun

@@ -1,0 +1,56 @@
+"""What is typed becomes an action: split, completed and corrected."""
+
+import pytest
+
+from socialai_dsl.cli.typed import Phrases, split_line
+
+ACTIONS = ("left", "right", "forward", "pickup", "drop", "toggle", "done")
+PHRASES = Phrases(ACTIONS, ("Where is <noun>", "Hello"), ("the exit", "you"))
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("", (None, None)),
+        ("left", ("left", None)),
+        ("f", ("forward", None)),
+        ("Forward", ("forward", None)),
+        ("forward How are you", ("forward", "How are you")),
+        ("Open sesame", (None, "Open sesame")),
+        ("t  Open sesame", ("toggle", "Open sesame")),
+        ("d", (None, "d")),
+        ("do", ("done", None)),
+        ("Le mot", (None, "Le mot")),
+    ],
+)
+def test_a_line_is_a_movement_an_utterance_or_both(
+    line: str, expected: tuple[str | None, str | None]
+) -> None:
+    assert split_line(line, ACTIONS) == expected
+
+
+def test_a_template_without_a_noun_is_one_sentence() -> None:
+    assert PHRASES.sentences() == ["Where is the exit", "Where is you", "Hello"]
+
+
+@pytest.mark.parametrize(
+    ("line", "completed"),
+    [
+        ("wh", "Where is the exit"),
+        ("Where is y", "Where is you"),
+        ("f  Hel", "f  Hello"),
+        ("forward", None),
+        ("", None),
+        ("What", None),
+    ],
+)
+def test_completed(line: str, completed: str | None) -> None:
+    assert PHRASES.completed(line) == completed
+
+
+@pytest.mark.parametrize(
+    ("line", "corrected"),
+    [("Wher is teh exit", "Where is the exit"), ("left Helo", "left Hello"), ("Sing a song", None)],
+)
+def test_corrected(line: str, corrected: str | None) -> None:
+    assert PHRASES.corrected(line) == corrected
