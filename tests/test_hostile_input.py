@@ -339,7 +339,7 @@ def test_crowded_rooms_are_refused_or_drawn(count: int, tmp_path: Path) -> None:
 # -- no code from data ---------------------------------------------------------------------------------------------
 
 
-def test_reading_two_hundred_files_executes_nothing() -> None:
+def test_reading_a_hundred_files_executes_nothing() -> None:
     """In a process of its own, where everything that is imported late has been before."""
     program = """
 import sys
@@ -349,19 +349,19 @@ from tests.fuzzing.playground import DIAGNOSTICS, listening
 import os
 os.chdir(DIAGNOSTICS)
 files = sorted(Path(".").glob("[0-9]*.yaml"))
-for name in (*files[::7], "rich.yaml", "town.yaml", "social_env"):
+for name in (*files[::16], "rich.yaml", "town.yaml", "social_env"):
     check(name)
 with listening() as ear:
-    for file in files[::2]:
+    for file in files[::4]:
         check(file)
-print(len(files[::2]), sorted(set(ear.executed)))
+print(len(files[::4]), sorted(set(ear.executed)))
 """
     done = subprocess.run(
         [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert done.stderr == ""
     count, _, events = done.stdout.strip().partition(" ")
-    assert int(count) > 150
+    assert int(count) > 80
     assert events == "[]"
 
 
