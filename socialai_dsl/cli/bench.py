@@ -79,7 +79,7 @@ def _environments(arguments: argparse.Namespace) -> tuple[dict[str, Any], str]:
     from socialai_dsl.cli.bench_engine import Plan, measure_engine, parts
     from socialai_dsl.cli.shipped import shipped_scenarios
 
-    _check_names(arguments.only, parts())
+    _check_names(arguments.only, parts(), "; for a trainer, expected --train beside it")
     if arguments.plot:
         try:
             from socialai_dsl.cli.bench_plot import draw_report
@@ -99,10 +99,10 @@ def _environments(arguments: argparse.Namespace) -> tuple[dict[str, Any], str]:
     return report.as_json(), report.table()
 
 
-def _check_names(only: list[str] | None, known: list[str]) -> None:
+def _check_names(only: list[str] | None, known: list[str], advice: str = "") -> None:
     for name in only or ():
         if name not in known:
-            raise UsageError(f"--only: got {name!r}, expected one of {', '.join(known)}")
+            raise UsageError(f"--only: got {name!r}, expected one of {', '.join(known)}{advice}")
 
 
 def _training(arguments: argparse.Namespace) -> tuple[dict[str, Any], str]:
