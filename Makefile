@@ -10,7 +10,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 ARGS ?=
 
-.PHONY: help run test test-long test-faults lint format bench docs fidelity update-goldens clean
+.PHONY: help run test test-long test-faults lint format bench docs fidelity update-goldens clean test-bounds endurance
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -24,9 +24,7 @@ test: $(STAMP) ## run the tests
 test-long: $(STAMP) ## run the tests that take minutes
 	$(BIN)/python -m pytest -m slow $(ARGS)
 
-test-faults: $(STAMP) ## lose workers, nodes and the command of an experiment; installs Ray and submitit
-	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[ray,slurm]'
-	$(BIN)/python -m pytest -m "slow or not slow" tests/socialai_dsl/experiments $(ARGS)
+test-faults: $(STAMP) ## lose workers, nodes and the command of an experiment; installs Ray submitit PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[ray,slurm]' pytest "slow or not slow" tests/socialai_dsl/experiments $(ARGS) test-bounds: run engine's tests with bounds checks, guard cells around every array, one after another NUMBA_BOUNDSCHECK=1 --guards tests/socialai_dsl/engine tests/socialai_dsl/envs endurance: play 500 million steps all scenarios; watch memory, speed open files slow -s tests/test_endurance.py
 
 lint: $(STAMP) ## check formatting, style and types
 	$(BIN)/ruff format --check .
