@@ -107,7 +107,7 @@ def test_peers_run_or_it_is_said_why_not(monkeypatch: pytest.MonkeyPatch, capsys
         peer(
             "slow",
             "2.0",
-            lambda _: lambda steps: (played.append(steps), np.ones((300, 300)) @ np.ones(300)),
+            lambda _: lambda steps: (played.append(steps), [sum(range(1000)) for _ in range(steps)]),
             16,
         ),
     )
