@@ -12,7 +12,7 @@ ARGS ?=
 
 SECONDS_EACH ?= 60
 
-.PHONY: help run test test-long test-faults fuzz nightly lint format bench docs fidelity update-goldens clean
+.PHONY: help run test test-long test-faults test-bounds endurance fuzz nightly lint format bench docs fidelity update-goldens clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -30,6 +30,12 @@ test-faults: $(STAMP) ## lose workers, nodes and the command of an experiment; i
 	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[ray,slurm]'
 	$(BIN)/python -m pytest -m "slow or not slow" tests/socialai_dsl/experiments $(ARGS)
 
+test-bounds: $(STAMP) ## the engine's tests with checked bounds and guard cells around every array, one after another
+	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest --guards tests/socialai_dsl/engine tests/socialai_dsl/envs $(ARGS)
+
+endurance: $(STAMP) ## play 500 million steps over all scenarios and watch memory, speed and open files
+	$(BIN)/python -m pytest -m slow -s tests/test_endurance.py $(ARGS)
+
 fuzz: $(STAMP) ## throw made-up files at the loader, each target for SECONDS_EACH=60 seconds
 	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[fuzz]'
 	$(BIN)/python -m tests.fuzzing.run --seconds $(SECONDS_EACH) $(ARGS)
@@ -37,6 +43,7 @@ fuzz: $(STAMP) ## throw made-up files at the loader, each target for SECONDS_EAC
 nightly: $(STAMP) ## everything that takes long: the long tests, half an hour of fuzzing, planted mistakes
 	$(MAKE) test-long
 	$(MAKE) test-faults
+	$(MAKE) test-bounds
 	$(MAKE) fuzz SECONDS_EACH=600
 	$(MAKE) fuzz SECONDS_EACH=120 ARGS=--planted
 

@@ -24,30 +24,37 @@ def _register() -> None:
 
 
 class _Finder(MetaPathFinder):
-    """Finds `gymnasium` as Python would, once, and lets it be followed by our registration."""
+    """Finds `gymnasium` as Python would, and lets its first import be followed by our registration.
+
+    Libraries look for it without importing it, to know whether it is there: that changes nothing.
+    """
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
         if fullname != "gymnasium":
             return None
-        sys.meta_path.remove(self)
         spec = PathFinder.find_spec(fullname, path, target)
         if spec is not None and spec.loader is not None:
-            spec.loader = _Then(spec.loader)
+            spec.loader = _Then(spec.loader, self)
         return spec
 
 
 class _Then(Loader):
     """Gymnasium's own loader, then the registration."""
 
-    def __init__(self, loader: Loader) -> None:
-        self.loader = loader
+    def __init__(self, loader: Loader, finder: _Finder) -> None:
+        self.loader, self.finder = loader, finder
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self.loader, name)
 
     def create_module(self, spec: ModuleSpec) -> ModuleType | None:
         return self.loader.create_module(spec)
 
     def exec_module(self, module: ModuleType) -> None:
+        if self.finder in sys.meta_path:
+            sys.meta_path.remove(self.finder)
         self.loader.exec_module(module)
         # Python and its tools ask a module's loader for its source; give them the real one.
         if module.__spec__ is not None:

@@ -1,6 +1,7 @@
 """Settings shared by all tests."""
 
 import os
+from collections.abc import Iterator
 
 import pytest
 
@@ -12,6 +13,24 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--update-goldens", action="store_true", help="rewrite golden files instead of comparing with them"
     )
+    parser.addoption(
+        "--guards",
+        action="store_true",
+        help="put guard cells around every array of the engine, and watch them",
+    )
+
+
+@pytest.fixture(autouse=True)
+def guards(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """With --guards every array of a batch lies between cells that nobody may write to."""
+    if not request.config.getoption("--guards"):
+        yield
+        return
+    from tests.guards import Guards
+
+    watched = Guards(monkeypatch)
+    yield
+    assert watched.broken() == []
 
 
 @pytest.fixture

@@ -25,6 +25,7 @@ from tests.tiny import Folder
 ROOT = Path(__file__).parents[1]
 PAGES = sorted((ROOT / "docs").glob("*.md"))
 TUTORIAL = ROOT / "docs" / "tutorial.md"  # its steps are followed one by one: tests/test_tutorial.py
+INTEROP = ROOT / "docs" / "interop.md"  # it needs other libraries: tests/test_interop.py
 DOCUMENTS = [ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CHANGELOG.md")]
 DOCUMENTS += sorted((ROOT / "docs").rglob("*.md"))
 FINDINGS = (
@@ -158,7 +159,9 @@ def test_parts_in_the_reference_are_sound(text: str, tmp_path: Path) -> None:
     env.step(env.action_space.sample())
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if page != TUTORIAL], ids=lambda page: page.name)
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if page not in (TUTORIAL, INTEROP)], ids=lambda page: page.name
+)
 def test_python_in_the_pages_runs(page: Path, reader: Path) -> None:
     for number, example in enumerate(blocks(page, "python")):
         exec(compile(example, f"{page.name}, example {number + 1}", "exec"), {})

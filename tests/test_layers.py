@@ -60,6 +60,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"experiments"},
         {"numpy", "scipy", "matplotlib", "pydantic", "jinja2", "markupsafe", "pyarrow"},
     ),
+    "sb3": (set(), {"numpy", "gymnasium", "stable_baselines3"}),
     "_gymnasium_hook": ({"envs"}, set()),
     "__main__": ({"cli"}, set()),
     "": (

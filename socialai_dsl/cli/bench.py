@@ -4,12 +4,9 @@ import argparse
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from socialai_dsl.cli.errors import Exit, UsageError
-
-if TYPE_CHECKING:
-    from socialai_dsl.cli.measure import Report
 
 SUMMARY: Final = "measure the speed of the environments, or of training, on this machine"
 
@@ -45,11 +42,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="measure training instead: rollout and update of one SCENARIO, ours beside other trainers",
     )
     training.add_argument("--threads", type=int, metavar="N", help="cores to use (default: 1)")
-    training.add_argument(
-        "--only", action="append", metavar="NAME", help="measure only this trainer; may be given again"
+    parser.add_argument(
+        "--only",
+        action="append",
+        metavar="NAME",
+        help="measure only this: ours, rules, programs, threads, a peer, a limit; with --train a trainer; "
+        "may be given again",
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object instead of a table")
     parser.add_argument("--out", type=Path, metavar="FILE", help="also write the JSON object to a file")
+    parser.add_argument(
+        "--plot", type=Path, metavar="FILE", help="draw steps per second over the number of environments"
+    )
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
@@ -58,8 +62,10 @@ def execute(arguments: argparse.Namespace) -> Exit:
         raise UsageError("--repeat and --seconds: expected positive numbers")
     if arguments.all and arguments.scenarios:
         raise UsageError("--all: expected no SCENARIO beside it")
-    if not arguments.train and (arguments.threads is not None or arguments.only):
-        raise UsageError("--threads and --only: expected --train beside them")
+    if not arguments.train and arguments.threads is not None:
+        raise UsageError("--threads: expected --train beside it")
+    if arguments.train and arguments.plot:
+        raise UsageError("--plot: expected no --train beside it")
     content, table = (_training if arguments.train else _environments)(arguments)
     text = json.dumps(content, indent=2)
     if arguments.out:
@@ -70,17 +76,33 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
 def _environments(arguments: argparse.Namespace) -> tuple[dict[str, Any], str]:
     """Report on the environments, as an object and as a table."""
-    from socialai_dsl.cli.measure import measure_all
+    from socialai_dsl.cli.bench_engine import Plan, measure_engine, parts
     from socialai_dsl.cli.shipped import shipped_scenarios
 
-    report = measure_all(
+    _check_names(arguments.only, parts(), "; for a trainer, expected --train beside it")
+    if arguments.plot:
+        try:
+            from socialai_dsl.cli.bench_plot import draw_report
+        except ImportError as error:
+            raise UsageError(f"--plot: {error}; install the extra [train]") from error
+    plan = Plan(
         shipped_scenarios() if arguments.all else arguments.scenarios or ["talkitout"],
         arguments.batch,
         ("walk", "random") if arguments.mix == "both" else (arguments.mix,),
         arguments.repeat or 5,
         arguments.seconds or 0.3,
+        arguments.only or (),
     )
-    return report.as_json(), _table(report)
+    report = measure_engine(plan, _note)
+    if arguments.plot:
+        draw_report(report, arguments.plot)
+    return report.as_json(), report.table()
+
+
+def _check_names(only: list[str] | None, known: list[str], advice: str = "") -> None:
+    for name in only or ():
+        if name not in known:
+            raise UsageError(f"--only: got {name!r}, expected one of {', '.join(known)}{advice}")
 
 
 def _training(arguments: argparse.Namespace) -> tuple[dict[str, Any], str]:
@@ -99,10 +121,7 @@ def _training(arguments: argparse.Namespace) -> tuple[dict[str, Any], str]:
     if not 1 <= threads <= cores:
         raise UsageError(f"--threads: got {threads}, expected 1 to {cores}, the cores of this machine")
     known = entries()
-    names = [entry.name for entry in known]
-    for name in arguments.only or ():
-        if name not in names:
-            raise UsageError(f"--only: got {name!r}, expected one of {', '.join(names)}")
+    _check_names(arguments.only, [entry.name for entry in known])
     chosen = [entry for entry in known if not arguments.only or entry.name in arguments.only]
     scenario = arguments.scenarios[0] if arguments.scenarios else "talkitout"
     report = measure_training(
@@ -124,21 +143,3 @@ def _batches(text: str) -> list[int]:
     if not batches or min(batches) < 1:
         raise argparse.ArgumentTypeError(f"expected numbers such as 1,256, got {text!r}")
     return batches
-
-
-def _table(report: "Report") -> str:
-    lines = [
-        f"{report.machine}; one core; medians of {report.repetitions}",
-        f"reference loop: {report.reference / 1e6:.0f} M iterations per CPU second",
-        "",
-        f"{'what':<28} {'mix':<7} {'batch':>6} {'steps/s cpu':>12} {'steps/s wall':>13} "
-        f"{'resets/s':>10} {'ratio':>8}",
-    ]
-    for row in report.rows:
-        batch = "Env" if row.batch == 0 else str(row.batch)
-        lines.append(
-            f"{row.what[:28]:<28} {row.mix:<7} {batch:>6} {row.cpu:>12,.0f} {row.wall:>13,.0f} "
-            f"{row.resets:>10,.0f} {1000 * row.cpu / report.reference:>8.2f}"
-        )
-    lines += ["", "ratio: steps for every 1,000 iterations of the reference loop; compare machines by it"]
-    return "\n".join(lines)

@@ -22,14 +22,15 @@ def load() -> float | None:
 
 
 @contextmanager
-def on_cores(count: int) -> Iterator[None]:
-    """Keep this thread, and those it starts, on `count` cores meanwhile, where the system can."""
+def on_cores(count: int) -> Iterator[int]:
+    """Keep this thread, and those it starts, on `count` cores meanwhile, where the system can; how many there are."""
     if not hasattr(os, "sched_setaffinity"):
-        yield
+        yield min(count, os.cpu_count() or 1)
         return
     before = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, set(sorted(before)[-count:]))
+    cores = set(sorted(before)[-count:])
+    os.sched_setaffinity(0, cores)
     try:
-        yield
+        yield len(cores)
     finally:
         os.sched_setaffinity(0, before)

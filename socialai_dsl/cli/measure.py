@@ -1,183 +1,182 @@
-"""This module takes the measurements of `socialai bench`."""
+"""This module measures our environments for `socialai bench`."""
 
-import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
 
 import numpy as np
 
 import socialai_dsl
-from socialai_dsl.cli.machine import machine, on_cores
-from socialai_dsl.cli.mixes import BATCHES, Actions, Allowed, random_actions, walk_actions
-from socialai_dsl.cli.reference_loop import reference_speed
+from socialai_dsl.cli.bench_report import Memory, Row
+from socialai_dsl.cli.machine import on_cores
+from socialai_dsl.cli.mixes import BATCHES, Actions, Allowed, random_actions, translated, walk_actions
+from socialai_dsl.cli.rule_heavy import rule_heavy_actions
+from socialai_dsl.cli.timing import Speed, speed_of
+
+PROGRAMS: Final = 64
+"""How many different programs one batch is made of."""
 
 
-@dataclass(frozen=True)
-class Row:
-    """One measurement, in environment steps per second.
+class Ours:
+    """Measures our environments on the cores that this process may use.
 
-    Attributes:
-        what: the scenario, or what it is compared with.
-        mix: how the agent's actions were generated.
-        batch: environments stepped together; 0 is a single `gymnasium.Env`.
-        cpu: per second of CPU time of the process.
-        wall: per second on the clock.
-        resets: episodes ended per second of CPU time.
+    Args:
+        batches: environments stepped together.
+        mixes: how the agent's actions are generated: walk, random.
+        repetitions: of each measurement.
+        seconds: how long each repetition takes, about.
     """
 
-    what: str
-    mix: str
-    batch: int
-    cpu: float
-    wall: float
-    resets: float
+    def __init__(
+        self, batches: Sequence[int], mixes: Sequence[str], repetitions: int, seconds: float
+    ) -> None:
+        self._batches, self._mixes = batches, mixes
+        self._repetitions, self._seconds = repetitions, seconds
+        self._allowed: dict[str, Allowed] = {}
+
+    def scenario(self, name: str, mix: str) -> Iterator[Row]:
+        """A single environment, and a batch of each size."""
+        yield self._single(name, mix)
+        for batch in self._batches:
+            envs = socialai_dsl.make_vec(name, num_envs=batch, copy=False)
+            yield self._vector(name, mix, envs, self._actions(name, mix, envs))
+
+    def together(self, names: Sequence[str], mix: str) -> Row:
+        """All scenarios in one batch, environment i playing scenario i modulo their number."""
+        played = [names[i % len(names)] for i in range(max(self._batches))]
+        return self._mixture(f"{len(names)} scenarios mixed", played, mix, self._seconds)
+
+    def programs(self, names: Mapping[str, str], mix: str = "walk") -> Iterator[Row]:
+        """As many programs each alone, then all in one batch in random order.
+
+        Args:
+            names: scenario -> digest of its program.
+            mix: walk or random.
+        """
+        batch, seconds = max(self._batches), self._seconds / 4
+        alone = []
+        for name in names:
+            envs = socialai_dsl.make_vec(name, num_envs=batch, copy=False)
+            alone.append(self._vector(name, mix, envs, self._actions(name, mix, envs), seconds))
+        what = f"{len(names)} programs ({len(set(names.values()))} different), each alone"
+        yield Row(what, "ours", mix, batch, _mean_time(alone), _harmonic(row.resets or 0.0 for row in alone))
+        order = np.random.default_rng(1).permutation(np.arange(batch) % len(names))
+        played = [list(names)[i] for i in order.tolist()]
+        yield self._mixture(f"{len(names)} programs in one batch", played, mix, self._seconds)
+
+    def rules(self, name: str) -> Iterator[Row]:
+        """Somebody is spoken to, and answers, in nearly every step."""
+        envs: Any = socialai_dsl.make_vec(name, num_envs=max(self._batches), copy=False)
+        if not hasattr(envs.program, "words"):  # a suite; its members are scenarios
+            envs.close()
+            return
+        heavy = rule_heavy_actions(envs, self._allowed_in(name), 1)
+
+        def run(steps: int) -> None:
+            step = envs.step
+            for i in range(steps):
+                step(heavy.actions[i])
+
+        speed = speed_of(
+            run,
+            envs.num_envs,
+            self._repetitions,
+            self._seconds,
+            BATCHES,
+            lambda: envs.restore(heavy.start),
+        )
+        envs.close()
+        what = f"{name}, {heavy.fired:.2f} rules a step"
+        yield Row(what, "ours", "rules", envs.num_envs, speed, None)
+
+    def threads(self, name: str, mix: str = "walk") -> Iterator[Row]:
+        """The largest batch on one thread and on two, with a core for each."""
+        with on_cores(2) as cores:
+            for threads in (1, 2) if cores == 2 else ():
+                envs = socialai_dsl.make_vec(
+                    name, num_envs=max(self._batches), num_threads=threads, copy=False
+                )
+                actions = self._actions(name, mix, envs)
+                yield self._vector(f"{name}, {threads} of 2 threads", mix, envs, actions)
+
+    def memory(self, name: str) -> Memory:
+        """Bytes of one environment."""
+        envs: Any = socialai_dsl.make_vec(name, num_envs=1)
+        found = Memory(name, **envs.bytes_per_env())
+        envs.close()
+        return found
+
+    def _allowed_in(self, name: str) -> Allowed:
+        if name not in self._allowed:
+            self._allowed[name] = Allowed(name)
+        return self._allowed[name]
+
+    def _actions(self, name: str, mix: str, envs: Any) -> Actions:
+        return walk_actions(envs, self._allowed_in(name), 1) if mix == "walk" else random_actions(envs, 1)
+
+    def _vector(self, what: str, mix: str, envs: Any, actions: Actions, seconds: float | None = None) -> Row:
+        envs.reset(seed=1)
+        ended, passes = 0, 8  # long enough for episodes that nothing ends but time
+        for _ in range(passes):
+            for batch in actions:
+                *_, terminations, truncations, _ = envs.step(batch)
+                ended += int(np.count_nonzero(terminations | truncations))
+        share = ended / (passes * BATCHES * envs.num_envs)
+        speed = speed_of(playing(envs, actions), envs.num_envs, self._repetitions, seconds or self._seconds)
+        envs.close()
+        return Row(what, "ours", mix, envs.num_envs, speed, speed.cpu * share)
+
+    def _mixture(self, what: str, played: Sequence[str], mix: str, seconds: float) -> Row:
+        envs: Any = socialai_dsl.make_vec(list(played), num_envs=len(played), copy=False)
+        actions = random_actions(envs, 1)
+        if mix == "walk":
+            for name in dict.fromkeys(played):
+                rows = [i for i, other in enumerate(played) if other == name]
+                own = walk_actions(envs, self._allowed_in(name), 1)[:, rows]
+                actions[:, rows] = translated(own, name, envs.program)
+        return self._vector(what, mix, envs, actions, seconds)
+
+    def _single(self, name: str, mix: str) -> Row:
+        one = socialai_dsl.make_vec(name, num_envs=1)
+        actions = list(self._actions(name, mix, one)[:, 0])
+        one.close()
+        env: Any = socialai_dsl.make(name)
+        env.reset(seed=1)
+        episodes = 0
+
+        def run(steps: int) -> None:
+            nonlocal episodes
+            step, reset = env.step, env.reset
+            for i in range(steps):
+                *_, terminated, truncated, _ = step(actions[i % BATCHES])
+                if terminated or truncated:
+                    reset()
+                    episodes += 1
+
+        probe = 50 * BATCHES
+        run(probe)
+        share = episodes / probe
+        speed = speed_of(run, 1, self._repetitions, self._seconds)
+        env.close()
+        return Row(name, "ours", mix, 0, speed, speed.cpu * share)
 
 
-@dataclass
-class Report:
-    """Everything measured in one run."""
-
-    machine: str
-    repetitions: int
-    reference: float
-    rows: list[Row] = field(default_factory=list)
-
-    def as_json(self) -> dict[str, Any]:
-        """The report as a JSON-able object; `ratio` compares machines."""
-        rows = [asdict(row) | {"ratio": row.cpu / self.reference} for row in self.rows]
-        return {
-            "machine": self.machine,
-            "repetitions": self.repetitions,
-            "reference_iterations_per_second": self.reference,
-            "rows": rows,
-        }
-
-
-def measure_all(
-    scenarios: Sequence[str],
-    batches: Sequence[int],
-    mixes: Sequence[str],
-    repetitions: int,
-    seconds: float,
-) -> Report:
-    """Measure every scenario with every mix and batch size, and the peer."""
-    with on_cores(1):
-        report = Report(machine(), repetitions, reference_speed(repetitions))
-        for mix in mixes:
-            for name in scenarios:
-                report.rows += _measure_scenario(name, mix, batches, repetitions, seconds)
-            if len(scenarios) > 1:
-                report.rows.append(_measure_mixture(scenarios, mix, max(batches), repetitions, seconds))
-        report.rows += _measure_peer(repetitions, seconds)
-    return report
-
-
-def _measure_scenario(
-    name: str, mix: str, batches: Sequence[int], repetitions: int, seconds: float
-) -> Iterator[Row]:
-    allowed = Allowed(name) if mix == "walk" else None
-    yield _measure_single(name, mix, allowed, repetitions, seconds)
-    for batch in batches:
-        envs = socialai_dsl.make_vec(name, num_envs=batch, copy=False)
-        actions = walk_actions(envs, allowed, 1) if allowed else random_actions(envs, 1)
-        yield _measure_vector(name, mix, envs, actions, repetitions, seconds)
-
-
-def _measure_vector(
-    what: str, mix: str, envs: Any, actions: Actions, repetitions: int, seconds: float
-) -> Row:
-    envs.reset(seed=1)
-    ended, passes = 0, 8  # long enough for episodes that nothing ends but time
-    for _ in range(passes):
-        for batch in actions:
-            *_, terminations, truncations, _ = envs.step(batch)
-            ended += int(np.count_nonzero(terminations | truncations))
-    share = ended / (passes * BATCHES * envs.num_envs)
+def playing(envs: Any, actions: Actions) -> Any:
+    """A function that plays as many steps of a batch as it is called with."""
 
     def run(steps: int) -> None:
         step = envs.step
         for i in range(steps):
             step(actions[i % BATCHES])
 
-    cpu, wall = _time(run, envs.num_envs, repetitions, seconds)
-    envs.close()
-    return Row(what, mix, envs.num_envs, cpu, wall, cpu * share)
+    return run
 
 
-def _measure_single(name: str, mix: str, allowed: Allowed | None, repetitions: int, seconds: float) -> Row:
-    one = socialai_dsl.make_vec(name, num_envs=1)
-    batches = walk_actions(one, allowed, 1) if allowed else random_actions(one, 1)
-    one.close()
-    return _measure_env(name, mix, socialai_dsl.make(name), list(batches[:, 0]), repetitions, seconds)
+def _mean_time(rows: Sequence[Row]) -> Speed:
+    """The speed of a step that takes the mean of the times of these."""
+    names = ("cpu", "cpu_low", "cpu_high", "wall", "wall_low", "wall_high")
+    return Speed(*(_harmonic(getattr(row.speed, name) for row in rows) for name in names))
 
 
-def _measure_env(
-    what: str, mix: str, env: Any, actions: Sequence[Any], repetitions: int, seconds: float
-) -> Row:
-    env.reset(seed=1)
-    episodes = 0
-
-    def run(steps: int) -> None:
-        nonlocal episodes
-        step, reset = env.step, env.reset
-        for i in range(steps):
-            *_, terminated, truncated, _ = step(actions[i % BATCHES])
-            if terminated or truncated:
-                reset()
-                episodes += 1
-
-    probe = 50 * BATCHES
-    run(probe)
-    share = episodes / probe
-    cpu, wall = _time(run, 1, repetitions, seconds)
-    env.close()
-    return Row(what, mix, 0, cpu, wall, cpu * share)
-
-
-def _measure_mixture(scenarios: Sequence[str], mix: str, batch: int, repetitions: int, seconds: float) -> Row:
-    """All scenarios in one batch, environment i playing scenario i modulo their number."""
-    names = [scenarios[i % len(scenarios)] for i in range(batch)]
-    envs = socialai_dsl.make_vec(names, num_envs=batch, copy=False)
-    actions = random_actions(envs, 1)
-    if mix == "walk":
-        parts = {}
-        for name in scenarios:
-            parts[name] = walk_actions(envs, Allowed(name), 1)
-        actions = np.stack([parts[name][:, i] for i, name in enumerate(names)], axis=1)
-    return _measure_vector(f"{len(scenarios)} scenarios mixed", mix, envs, actions, repetitions, seconds)
-
-
-def _measure_peer(repetitions: int, seconds: float) -> Iterator[Row]:
-    """MiniGrid's empty room under random actions, if it is installed."""
-    try:
-        import gymnasium
-        import minigrid
-    except ImportError:
-        return
-    env = gymnasium.make("MiniGrid-Empty-8x8-v0")
-    env.action_space.seed(1)
-    actions = [env.action_space.sample() for _ in range(BATCHES)]
-    what = f"MiniGrid {minigrid.__version__} Empty-8x8"
-    yield _measure_env(what, "random", env, actions, repetitions, seconds)
-
-
-def _time(run: Callable[[int], None], per_step: int, repetitions: int, seconds: float) -> tuple[float, float]:
-    """Median steps per CPU second and per second on the clock; each repetition takes about `seconds`."""
-    steps, wall = 8, 0.0
-    while True:
-        start = time.perf_counter()
-        run(steps)
-        wall = time.perf_counter() - start
-        if wall > seconds / 4:
-            break
-        steps *= 2
-    steps = max(1, round(steps * seconds / wall))
-    cpu_speeds, wall_speeds = [], []
-    for _ in range(repetitions):
-        cpu_start, wall_start = time.process_time(), time.perf_counter()
-        run(steps)
-        cpu, wall = time.process_time() - cpu_start, time.perf_counter() - wall_start
-        cpu_speeds.append(steps * per_step / max(cpu, 1e-9))
-        wall_speeds.append(steps * per_step / wall)
-    return float(np.median(cpu_speeds)), float(np.median(wall_speeds))
+def _harmonic(numbers: Any) -> float:
+    values = np.array(list(numbers))
+    return float(len(values) / np.sum(1 / values)) if values.all() else 0.0

@@ -88,3 +88,24 @@ class Allowed:
                 ended[pairs[terminations]] = True
         harmless = np.flatnonzero(~ended)
         return np.stack([harmless // nouns, harmless % nouns], axis=1).astype(np.int64)
+
+
+def translated(actions: Actions, name: str, program: Any) -> Actions:
+    """Actions of a scenario as environments that play several with it take them: words are matched by spelling.
+
+    Args:
+        actions: int64 (..., 4), in the scenario's own action space.
+        name: the scenario.
+        program: what the environments play.
+    """
+    own: Any = socialai_dsl.compile(socialai_dsl.load(name))
+    pairs = (
+        ((*own.actions, "none"), (*program.actions, "none")),
+        (own.templates, program.templates),
+        (own.nouns, program.nouns),
+    )
+    result = actions.copy()
+    for column, (words, known) in zip((0, 2, 3), pairs, strict=True):
+        places = np.array([known.index(word) for word in words], np.int64)
+        result[..., column] = places[actions[..., column]]
+    return result

@@ -128,19 +128,25 @@ class _Implementation(CompileResultCacheImpl):  # type: ignore[misc]
     _locator_classes = (_Locator,)
 
 
+def _digest(name: str, body: bytes) -> bytes:
+    return hashlib.sha256(name.encode() + b"\0" + body).digest()
+
+
 class _Files(IndexDataCacheFile):  # type: ignore[misc]
-    """Data files that end with a digest of themselves, so that a damaged one is never loaded."""
+    """Data files that end with a digest of name and content: a damaged one, or another's, is never loaded."""
 
     def _load_data(self, name: str) -> Any:
+        if not name.startswith(self._index_name.removesuffix("nbi")):
+            raise ValueError(f"the index of another function, which names {name}")
         data = Path(self._data_path(name)).read_bytes()
-        if hashlib.sha256(data[:-_DIGEST_BYTES]).digest() != data[-_DIGEST_BYTES:]:
+        if _digest(name, data[:-_DIGEST_BYTES]) != data[-_DIGEST_BYTES:]:
             raise EOFError(f"damaged cache entry {name}")
         return super()._load_data(name)  # the format ends itself: what follows is not looked at
 
     def _save_data(self, name: str, data: Any) -> None:
         body = self._dump(data)
         with self._open_for_write(self._data_path(name)) as file:
-            file.write(body + hashlib.sha256(body).digest())
+            file.write(body + _digest(name, body))
 
 
 class CodeCache(FunctionCache):  # type: ignore[misc]

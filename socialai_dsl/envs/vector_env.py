@@ -210,6 +210,16 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
         """Counts since the environments were made: {"outcomes": {name: n}, "rules": {name: n}, "episodes": n}."""
         return self._table.counters()
 
+    def bytes_per_env(self) -> dict[str, int]:
+        """Bytes of one environment: its state, its observation, and what goes in and out of a step."""
+        state, ports = self._table.batch.state, self._table.batch.ports
+        arrays = {
+            "state": (state.registers, state.boards, state.keys),
+            "observation": (self._table.image, self._table.tokens),
+            "call": (ports.actions, ports.reward, ports.terminated, ports.truncated, ports.outcome),
+        }
+        return {name: sum(a.nbytes for a in parts) // self.num_envs for name, parts in arrays.items()}
+
     def snapshot(self) -> bytes:
         """The exact state of all environments, randomness included."""
         return self._table.snapshot()

@@ -35,6 +35,15 @@ def compiled() -> Any:
     return cache.entry(double)
 
 
+def other() -> Any:
+    """A dispatcher of another function, whose entries look the same from outside."""
+
+    def triple(number: int) -> int:
+        return 3 * number
+
+    return cache.entry(triple)
+
+
 def test_the_second_process_loads_what_the_first_compiled(folder: Path) -> None:
     first, second = compiled(), compiled()
     assert first(21) == 42
@@ -44,15 +53,18 @@ def test_the_second_process_loads_what_the_first_compiled(folder: Path) -> None:
     assert folder.name == cache.fingerprint()
 
 
-@pytest.mark.parametrize("damage", ["cut", "flip", "empty"])
+@pytest.mark.parametrize("damage", ["cut", "flip", "empty", "foreign"])
 @pytest.mark.parametrize("suffix", ["nbc", "nbi"])
 def test_damaged_entries_are_compiled_again(folder: Path, damage: str, suffix: str) -> None:
     compiled()(21)
-    (entry,) = folder.glob(f"*.{suffix}")
+    (entry,) = folder.glob(f"*double*.{suffix}")
+    other()(21)
+    (foreign,) = folder.glob(f"*triple*.{suffix}")
     data = bytearray(entry.read_bytes())
     if damage == "flip":
         data[len(data) // 2] ^= 0xFF
-    entry.write_bytes({"cut": data[: len(data) // 2], "flip": data, "empty": b""}[damage])
+    contents = {"cut": data[: len(data) // 2], "flip": data, "empty": b"", "foreign": foreign.read_bytes()}
+    entry.write_bytes(contents[damage])
     again = compiled()
     assert again(21) == 42
     third = compiled()
@@ -68,12 +80,19 @@ def test_the_folder_is_private(folder: Path) -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="permissions of POSIX")
+@pytest.mark.parametrize("whose", ["everybody's", "the group's", "a stranger's", "a link's"])
 def test_a_folder_that_others_can_write_to_is_not_used(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whose: str
 ) -> None:
     shared = tmp_path / "shared"
     shared.mkdir()
-    shared.chmod(0o777)
+    shared.chmod({"everybody's": 0o777, "the group's": 0o770}.get(whose, 0o700))
+    if whose == "a stranger's":
+        stranger = os.getuid() + 1
+        monkeypatch.setattr(cache, "_user", lambda: stranger)
+    if whose == "a link's":
+        shared.rename(tmp_path / "target")
+        shared.symlink_to(tmp_path / "target")
     monkeypatch.setenv("SOCIALAI_CACHE_DIR", str(shared))
     cache.cache_folder.cache_clear()
     try:

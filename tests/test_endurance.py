@@ -1,0 +1,66 @@
+"""Hundreds of millions of steps leave memory, speed and open files as they were."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import socialai_dsl as sd
+from socialai_dsl.cli.shipped import shipped_scenarios
+
+STEPS = int(os.environ.get("SOCIALAI_ENDURANCE_STEPS", 500_000_000))
+ROUNDS = 10
+ENVS = 4096
+MEGABYTE = 1 << 20
+
+
+def resident() -> int:
+    """Bytes of memory in use."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def open_files() -> int:
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
+def play(name: str, steps: int) -> float:
+    """Steps per CPU second of a new batch under random actions that move more than they end."""
+    envs: Any = sd.make_vec(name, num_envs=ENVS, copy=False)
+    plan = np.random.default_rng(1).integers(0, envs.single_action_space.nvec, (64, ENVS, 4))
+    plan[..., 0] %= 3
+    envs.reset(seed=1)
+    began = time.process_time()
+    for i in range(steps):
+        envs.step(plan[i % 64])
+    spent = time.process_time() - began
+    envs.close()
+    return steps * ENVS / spent
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(7200)
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the system does not tell")
+def test_nothing_grows_and_nothing_slows_down() -> None:
+    names = shipped_scenarios()
+    steps = -(-STEPS // (ROUNDS * len(names) * ENVS))
+    rows = []
+    for number in range(ROUNDS):
+        speeds = [play(name, steps) for name in names]
+        speed = len(speeds) / sum(1 / one for one in speeds)
+        rows.append((speed, resident(), open_files()))
+        print(
+            f"round {number}: {speed / 1e6:.2f} M steps per CPU second, "
+            f"{rows[-1][1] / MEGABYTE:.1f} MB, {rows[-1][2]} open files",
+            flush=True,
+        )
+    print(f"{ROUNDS * steps * len(names) * ENVS:,} steps of {len(names)} scenarios")
+    speed, memory, files = (list(column) for column in zip(*rows, strict=True))
+    assert max(memory[2:]) - memory[1] < 4 * MEGABYTE, "memory grows"
+    assert set(files) == {files[0]}, "files stay open"
+    half = ROUNDS // 2
+    assert np.median(speed[half:]) > 0.8 * np.median(speed[:half]), "it slows down"
