@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from operator import itemgetter
 
-from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag
+from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, did_you_mean
 from socialai_dsl.schema import PRIMITIVES, Scenario
 from socialai_dsl.schema.base import Expression
 from socialai_dsl.schema.positions import DataPath, Positions
@@ -72,9 +72,7 @@ def check_meaning(
         found = DiagnosticBag()
         findings = Findings(found, places, params or {}, substituted, data)
         if AGENT not in scenario.cast:
-            findings.error(
-                "S105", "the cast has no `agent`", places.key_span(("cast",)), hint="add `agent: {}`"
-            )
+            _no_agent(scenario, findings, places)
             break
         run = _Run(scenario, findings, prelude, words, ranges.now)
         checked = run.checked(name)
@@ -87,6 +85,15 @@ def check_meaning(
             break
     bag.extend(_without_consequences(found, scenario))
     return None if found.has_errors else checked
+
+
+def _no_agent(scenario: Scenario, findings: Findings, places: Positions) -> None:
+    """There is nobody to act; perhaps because the name is misspelt."""
+    message = "the cast has no `agent`"
+    if (near := did_you_mean(AGENT, scenario.cast)) is not None:
+        findings.error("S105", f"{message}, but `{near}`", places.key_span(("cast", near)), suggestion=AGENT)
+    else:
+        findings.error("S105", message, places.key_span(("cast",)), hint="add `agent: {}`")
 
 
 def _without_consequences(found: DiagnosticBag, scenario: Scenario) -> Iterator[Diagnostic]:

@@ -95,7 +95,19 @@ def test_validate(capsys: Capture) -> None:
 
 
 def test_bench(capsys: Capture) -> None:
-    quick = ["--batch", "8", "--mix", "walk", "--repeat", "1", "--seconds", "0.01", "--json"]
+    quick = [
+        "--batch",
+        "8",
+        "--mix",
+        "walk",
+        "--repeat",
+        "1",
+        "--seconds",
+        "0.01",
+        "--only",
+        "ours",
+        "--json",
+    ]
     assert main(["bench", "pair.yaml", *quick]) == 0
     rows = json.loads(capsys.readouterr().out)["rows"]
     assert [row["what"] for row in rows[:2]] == ["pair.yaml", "pair.yaml"]
