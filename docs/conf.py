@@ -12,5 +12,5 @@ suppress_warnings = ["myst.header"]
 
 html_theme = "furo"
 html_title = "socialai-dsl"
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "results"]
 nitpicky = True
