@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from socialai_dsl.checking.experiments import LoadedExperiment, from_anywhere
 from socialai_dsl.compilation import compile_loaded
+from socialai_dsl.experiments.folder import CHECKPOINTS
 from socialai_dsl.schema.experiment import AGENTS, Reference
 from socialai_dsl.semantics.experiment import Cell
 
@@ -190,7 +191,7 @@ def _weights_digest(path: Path) -> str:
     """Of a checkpoint's file: the newest of a run's folder or of a folder of checkpoints."""
     file = path
     if path.is_dir():
-        files = sorted(path.glob("*.safetensors")) or sorted((path / "checkpoints").glob("*.safetensors"))
+        files = sorted(path.glob("*.safetensors")) or sorted((path / CHECKPOINTS).glob("*.safetensors"))
         if not files:
             raise FileNotFoundError(2, "there is no checkpoint in this folder", str(path))
         file = files[-1]

@@ -92,9 +92,8 @@ class FastNet(ActorCritic):
         kinds = self.channels[channel, prepared.kinds].sum(1)  # (C, kind_size)
         mentioned = heard @ self.mentions[:, channel, prepared.kinds].sum(2)  # (S, C)
         scale, shift = self.film(state)[:, None].chunk(2, 2)
-        read = torch.relu(
-            torch.addcmul(kinds + shift, kinds, scale + mentioned[:, :, None])
-        )  # (S, C, kind_size)
+        scale = scale + mentioned[:, :, None]  # (S, C, kind_size)
+        read = torch.relu(torch.addcmul(kinds + shift, kinds, scale))  # (S, C, kind_size)
         rows = history[:, None] * len(kinds) + prepared.kind_of.index_select(0, image_index)  # (P, cells)
         cells = read.flatten(0, 1).index_select(0, rows.flatten()).view(len(rows), -1)
         said = self.words(state).index_select(0, history)

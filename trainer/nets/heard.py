@@ -30,9 +30,8 @@ class HeardWords(DialogueEncoder):
         """See `DialogueEncoder.forward`."""
         states = super().forward(tokens, parents, offsets)
         heard = states.new_zeros(len(states), self.size - self.hidden)
-        for first, behind in pairwise(
-            offsets
-        ):  # level by level: a history has the words of its parent, and one more
+        # Level by level: a history has the words of its parent, and one more.
+        for first, behind in pairwise(offsets):
             words = heard.index_select(0, parents[first:behind])
             heard[1 + first : 1 + behind] = words.scatter_(1, tokens[first:behind, None], 1)
         return torch.cat((states, heard), 1)
@@ -42,8 +41,7 @@ class HeardWords(DialogueEncoder):
         """See `DialogueEncoder.extend`."""
         recurrent, heard = self.split(states)
         heard = heard.clone()
-        new = torch.arange(tokens.shape[1], device=tokens.device) < torch.tensor(
-            lengths, device=tokens.device
-        ).unsqueeze(1)
+        behind = torch.tensor(lengths, device=tokens.device)
+        new = torch.arange(tokens.shape[1], device=tokens.device) < behind[:, None]
         heard[new.nonzero()[:, 0], tokens[new]] = 1
         return torch.cat((super().extend(recurrent, tokens, lengths, inputs), heard), 1)
