@@ -287,3 +287,36 @@ def test_a_push_is_for_what_is_in_the_way(tmp_path: Path) -> None:
         [("forward", None)],
     )
     assert (state["marble"]["at"], state["marble"]["state"]) == ([3, 1], "rolling")
+
+
+@pytest.mark.parametrize(
+    "asked", ["prev(min(0, agent.noun)) != agent.noun", "prev(agent.noun + 1) != agent.noun"]
+)
+def test_what_was_not_found_is_not_even_unlike_what_it_can_never_equal(tmp_path: Path, asked: str) -> None:
+    state = play(
+        tmp_path,
+        f"""
+        grammar: {{templates: [It is <noun>], nouns: ["1", "2"]}}
+        state: {{unlike: false}}
+        rules: [{{when: "{asked}", set: {{unlike: true}}}}]
+        """,
+        [STILL],
+    )
+    assert not state["state"]["unlike"]
+
+
+def test_nobody_arrives_at_the_cell_of_what_is_gone(tmp_path: Path) -> None:
+    state = play(
+        tmp_path,
+        """
+        objects: {coin: {type: ball, at: [3, 3]}}
+        frames:
+          walk: {steps: [{do: go_to(coin.cell)}, {do: stay, for: ever}]}
+        cast:
+          agent: {at: [1, 1]}
+          ann: {at: [5, 5], frame: walk}
+        rules: [{when: t == 1, cause: [coin.vanish]}]
+        """,
+        [STILL] * 4,
+    )
+    assert state["ann"]["state"] == "step0"

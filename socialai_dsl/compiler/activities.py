@@ -309,8 +309,10 @@ class Activities:
         if self.aim is None:
             return to.value(goal)
         noted = to.into_temporary(Op.LOAD, self.aim)
-        to.block.test(Op.IF_LE, constant(goal.type.low), noted, nothing)
-        return to.into_temporary(Op.MAX, noted, constant(goal.type.low))
+        # The cell of what is gone is an aim all the same, which nobody reaches.
+        lowest = constant(NOWHERE if goal.type.kind == "cell" else goal.type.low)
+        to.block.test(Op.IF_LE, lowest, noted, nothing)
+        return to.into_temporary(Op.MAX, noted, lowest)
 
 
 def _elements(activity: Activity) -> list[tuple[Term, Term]]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from socialai_dsl.compiler.classes import SILENCE, Classes
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.build import walk
+from socialai_dsl.semantics.build import may_find_nothing
 from socialai_dsl.semantics.terms import BOOL, Const, Term
 
 TRUE = Const(BOOL, 1)
@@ -84,16 +84,6 @@ def mentions(term: Any, kind: type) -> bool:
     if isinstance(term, tuple):
         return any(mentions(part, kind) for part in term)
     return is_dataclass(term) and any(mentions(getattr(term, item.name), kind) for item in fields(term))
-
-
-def may_find_nothing(term: Term) -> bool:
-    """Whether a term may need one of a group when none is what is wanted, or the noun of somebody who is silent."""
-    for part in walk(term):
-        if isinstance(part, terms.HeardNoun) or (isinstance(part, terms.World) and part.name == "noun"):
-            return True
-        if isinstance(part, terms.Quantified) and part.op in ("first", "pick", "nearest"):
-            return True
-    return False
 
 
 def _truth(value: bool) -> Const:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from socialai_dsl.compiler.cells import NOWHERE
-from socialai_dsl.compiler.folding import may_find_nothing
 from socialai_dsl.program import CELL, ENTITY_FIELDS, FIRST_ENTITY, Field, RegisterName
+from socialai_dsl.semantics.build import may_find_nothing
 from socialai_dsl.semantics.terms import ACTION, BOOL, Checked, Drawn, Entity, FramePlan, MemoryPlan, Type
 
 

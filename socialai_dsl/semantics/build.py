@@ -10,12 +10,15 @@ from socialai_dsl.semantics.terms import (
     BOOL,
     Compare,
     Const,
+    HeardNoun,
     Logic,
     ObjectType,
     Operation,
     Quantified,
+    Read,
     Term,
     Type,
+    World,
 )
 
 TRUE = Const(BOOL, 1)
@@ -148,6 +151,26 @@ def walk(term: Any) -> Iterator[Term]:
 def draws(term: Term) -> bool:
     """Whether something is drawn anew wherever a term is evaluated."""
     return any(isinstance(part, Quantified) and part.op == "pick" for part in walk(term))
+
+
+def may_find_nothing(term: Term) -> bool:
+    """Whether a term may need one of a group when none is what is wanted, or the noun of somebody who is silent.
+
+    What `prev` noted may have found nothing then.
+    """
+    for part in walk(term):
+        if isinstance(part, HeardNoun) or is_own_noun(part):
+            return True
+        if isinstance(part, Quantified) and part.op in ("first", "pick", "nearest"):
+            return True
+        if isinstance(part, Read) and part.path.startswith("prev."):
+            return True
+    return False
+
+
+def is_own_noun(term: Term) -> bool:
+    """Whether a term is `agent.noun`: while the agent is silent, that is unlike any noun."""
+    return isinstance(term, World) and term.name == "noun"
 
 
 def _parts(value: Any) -> Iterator[Term]:

@@ -9,7 +9,16 @@ from functools import cached_property
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import links, resolve_calls, resolve_groups, resolve_names, sequences, tables
-from socialai_dsl.semantics.build import all_of, any_of, arithmetic, between, number, one_of
+from socialai_dsl.semantics.build import (
+    all_of,
+    any_of,
+    arithmetic,
+    between,
+    is_own_noun,
+    may_find_nothing,
+    number,
+    one_of,
+)
 from socialai_dsl.semantics.findings import FailedError, Findings, Scalar, surviving
 from socialai_dsl.semantics.readings import Readings
 from socialai_dsl.semantics.registers import Registers
@@ -245,12 +254,15 @@ class Resolver:
             return Compare("==", left, right)
         worded = (*_WORDED, "int")
         if left.type.kind in worded and right.type.kind in worded and (left.type.words or right.type.words):
-            return any_of(
+            alike = any_of(
                 all_of([_is(left, i), _is(right, j)])
                 for i in range(left.type.low, left.type.high + 1)
                 for j in range(right.type.low, right.type.high + 1)
                 if spoken(left.type, i) == spoken(right.type, j)
             )
+            # Both are asked for, even if none of their values are called the same.
+            asked = [side for side in (left, right) if may_find_nothing(side) and not is_own_noun(side)]
+            return all_of([*(Compare("==", side, side) for side in asked), alike])
         message = f"{described(left.type)} and {described(right.type)} cannot be compared"
         colored = {left.type.kind, right.type.kind} == {"color", "entity"}
         hint = "the colour of something is `x.color`" if colored else None
