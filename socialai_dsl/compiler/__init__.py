@@ -23,6 +23,7 @@ from socialai_dsl.compiler.statuses import ComputedStatuses
 from socialai_dsl.compiler.tables import Tables
 from socialai_dsl.compiler.timers import tick
 from socialai_dsl.compiler.verifier import verify
+from socialai_dsl.compiler.waiting import Waiting
 from socialai_dsl.compiler.world_rules import world_rules
 from socialai_dsl.program import Flag, Header, Program
 from socialai_dsl.semantics.terms import Checked
@@ -73,6 +74,7 @@ def _compiled(checked: Checked, probes: Probes, numbered: Lines | None) -> tuple
     code = CodeTable()
     tables = Tables(checked, registers, classes, sites, lines, code)
     computed = ComputedStatuses(checked)
+    waiting = Waiting(checked, registers)
 
     def entry(label: str, *emitters: Callable[[Expressions], None]) -> int:
         to = Expressions(Block(), checked, registers, classes, sites)
@@ -87,10 +89,12 @@ def _compiled(checked: Checked, probes: Probes, numbered: Lines | None) -> tuple
     entries |= {
         Header.REQUIRE_PC: entry("require", require),
         Header.BEFORE_PC: entry("before", remember),
-        Header.LINKS_PC: entry("links", links),
+        Header.LINKS_PC: entry("links", links, waiting.note_change),
         Header.SETTLE_PC: entry("settle", computed.settle),
         Header.RULES_PC: entry(
-            "rules", push_acts, lambda to: world_rules(to, lines, homes, behaviour.rules, probes)
+            "rules",
+            push_acts,
+            lambda to: world_rules(to, lines, homes, waiting, behaviour.rules, probes),
         ),
         Header.TICK_PC: entry("tick", tick),
     }

@@ -9,21 +9,32 @@ from socialai_dsl.compiler.folding import FALSE, fold
 from socialai_dsl.compiler.homes import Homes
 from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.probes import NO_PROBES, Probes
+from socialai_dsl.compiler.waiting import Waiting, unless_due
 from socialai_dsl.program import Op
 from socialai_dsl.semantics.terms import BOOL, RulePlan
 
 
 def world_rules(
-    to: Expressions, lines: Lines, homes: Homes, counted: list[str], probes: Probes = NO_PROBES
+    to: Expressions,
+    lines: Lines,
+    homes: Homes,
+    waiting: Waiting,
+    counted: list[str],
+    probes: Probes = NO_PROBES,
 ) -> None:
     """Emit the rules top to bottom, and add their names to those that are counted."""
-    for rule in to.checked.rules:
-        counted.append(rule.name)
-        if rule.when is not None and fold(rule.when.term, to.facts, to.classes) == FALSE:
-            if probes.recording:
-                _ask_in_vain(to, rule, len(counted) - 1, probes)
-            continue
-        _rule(to, lines, homes, rule, len(counted) - 1, probes)
+    for rules, due in waiting.runs:
+        after = Label()
+        if due is not None and not probes.recording:  # to be told why a rule does not fire is to ask it
+            unless_due(to, due, after)
+        for rule in rules:
+            counted.append(rule.name)
+            if rule.when is not None and fold(rule.when.term, to.facts, to.classes) == FALSE:
+                if probes.recording:
+                    _ask_in_vain(to, rule, len(counted) - 1, probes)
+                continue
+            _rule(to, lines, homes, rule, due, len(counted) - 1, probes)
+        to.block.bind(after)
 
 
 def _ask_in_vain(to: Expressions, rule: RulePlan, counter: int, probes: Probes) -> None:
@@ -36,7 +47,15 @@ def _ask_in_vain(to: Expressions, rule: RulePlan, counter: int, probes: Probes) 
     to.block.bind(following)
 
 
-def _rule(to: Expressions, lines: Lines, homes: Homes, rule: RulePlan, counter: int, probes: Probes) -> None:
+def _rule(
+    to: Expressions,
+    lines: Lines,
+    homes: Homes,
+    rule: RulePlan,
+    due: int | None,
+    counter: int,
+    probes: Probes,
+) -> None:
     assert not rule.hears, "internal: the world has no ears"
     assert rule.say is None, "internal: the world has no voice"
     assert rule.do is None, "internal: the world has no body"
@@ -57,6 +76,8 @@ def _rule(to: Expressions, lines: Lines, homes: Homes, rule: RulePlan, counter: 
     Effects(to, lines, homes).emit(rule, counter, asked.nothing("values", following))
     if fired is not None:
         block.emit(Op.LOAD, fired, constant(1))
+    if due is not None:
+        block.emit(Op.LOAD, due, constant(1))
     asked.report(to, following)
     block.bind(following)
     block.release(mark)

@@ -58,7 +58,8 @@ def test_cells_sets_and_entries_are_readable() -> None:
         CELL, "nearest", "c", (), Relation("next_to", HERE, entity(BOX)), cell(5, 1), cells=True
     )
     seen = Sees(entity(GUIDE), CellOf(CELL, nearest), Const(DIRECTION, 2))
-    rule = RulePlan("law", "rules[0]", SPAN, when=Sited(seen, "rules[0].when", SPAN))
+    # By chance, so that it does not wait for a status to change.
+    rule = RulePlan("law", "rules[0]", SPAN, when=Sited(seen, "rules[0].when", SPAN), chance=0.5)
     program = compiled(replace(workbench(), rules=(rule,)))
     start = program.header(Header.RULES_PC)
     assert f"rules at {start}" in program.listing().splitlines()[3]
