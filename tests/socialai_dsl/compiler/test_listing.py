@@ -73,4 +73,4 @@ def test_cells_sets_and_entries_are_readable() -> None:
         "END_EACH",
         "NEAREST_CELL %1, 0, (5, 1)",
     ]
-    assert shown[-4:-2] == ["SEES %0, guide, %3", f"IF_NE %0, #0, -> {start + 16}"]
+    assert shown[-5:-3] == ["SEES %0, guide, %3", f"IF_NE %0, #0, -> {start + 17}"]
