@@ -12,6 +12,8 @@ from numba import config, njit, types
 from numba.core.typing.templates import signature
 from numba.extending import intrinsic
 
+from socialai_dsl.engine.merged import Merged
+
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
 
@@ -21,17 +23,18 @@ _OPTIONS: Final[dict[str, bool | str]] = {
     "_nrt": False,
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,
+    "no_rewrites": True,
 }
 
 
 def inline(function: _Function) -> _Function:
     """Compile a helper into each of its callers."""
-    return cast(_Function, njit(**_OPTIONS, forceinline=True)(function))
+    return cast(_Function, njit(**_OPTIONS, forceinline=True, pipeline_class=Merged)(function))
 
 
 def outline(function: _Function) -> _Function:
     """Compile a function that is called."""
-    return cast(_Function, njit(**_OPTIONS, forceinline=False)(function))
+    return cast(_Function, njit(**_OPTIONS, forceinline=False, pipeline_class=Merged)(function))
 
 
 def compiled(function: _Function) -> _Function:
