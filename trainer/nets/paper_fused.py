@@ -40,10 +40,28 @@ class Filters:
 
 
 def surroundings(images: Tensor) -> Tensor:
-    """What a 3 x 3 convolution sees at each cell, (I, H, W, 9 * C) in the weights' order, of images (I, H, W, C)."""
+    """What a 3 x 3 convolution sees at each cell, in the order of its weights, bfloat16.
+
+    Args:
+        images: uint8 (I, H, W, C).
+
+    Returns:
+        (J, H, W, 9 * C), where J is I rounded up as a block of `winograd.convolve` is; what is beyond I is 0.
+    """
     channels_first = images.permute(0, 3, 1, 2).float()
     columns = functional.unfold(channels_first, 3, padding=1).transpose(1, 2)
-    return columns.bfloat16().view(*images.shape[:3], -1)
+    seen = columns.bfloat16().view(*images.shape[:3], -1)
+    return functional.pad(seen, (0, 0) * 3 + (0, -len(seen) % winograd.GRAIN))
+
+
+def first_convolution(seen: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
+    """The first convolution, rectified, (J, H, W, D), of `surroundings`.
+
+    It is computed by blocks, because the products of every number of images that ever occurs are compiled and kept.
+    """
+    matrix, offset = weight.flatten(1).bfloat16(), bias.bfloat16()
+    blocks = [functional.linear(block, matrix, offset) for block in torch.split(seen, winograd.BLOCK)]
+    return torch.relu(torch.cat(blocks))
 
 
 class Convolution(torch.autograd.Function):

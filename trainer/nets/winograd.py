@@ -32,8 +32,8 @@ Tables = tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.int64], NDArra
 
 # Images convolved together: their products stay in the cache between the steps. A block has room for a multiple of
 # some, because the matrix products of each new shape are compiled and kept for good.
-_BLOCK: Final = 64
-_GRAIN: Final = 8
+BLOCK: Final = 64
+GRAIN: Final = 8
 
 
 @dataclass(frozen=True)
@@ -243,9 +243,9 @@ def convolve_backward(
 
 def _blocks(count: int) -> Iterator[tuple[slice, int]]:
     """Groups of images convolved together, each with the number of images to make room for."""
-    for begin in range(0, count, _BLOCK):
-        end = min(begin + _BLOCK, count)
-        yield slice(begin, end), -(-(end - begin) // _GRAIN) * _GRAIN
+    for begin in range(0, count, BLOCK):
+        end = min(begin + BLOCK, count)
+        yield slice(begin, end), -(-(end - begin) // GRAIN) * GRAIN
 
 
 def _spread(
