@@ -83,8 +83,10 @@ class Actor:
     def _perceive(self, pairs: Int64) -> None:
         """Compute the features of the pairs last added."""
         image_rows, image_index = np.unique(pairs[:, 0], return_inverse=True)
+        history_rows, text_index = np.unique(pairs[:, 1], return_inverse=True)
         prepared = self.net.prepare(self._move(self.images.data[image_rows]))
-        features = self.net.perceive(prepared, self._texts, self._move(image_index), self._move(pairs[:, 1]))
+        texts = self._texts[self._move(history_rows)]
+        features = self.net.perceive(prepared, texts, self._move(image_index), self._move(text_index))
         self._features = _with_room(self._features, self.pairs.size)
         self._features[self.pairs.size - len(pairs) : self.pairs.size] = features
 

@@ -1,5 +1,8 @@
 """Work is shared between threads without changing its result or hiding its errors."""
 
+import subprocess
+import sys
+import textwrap
 import threading
 from typing import Any
 
@@ -7,7 +10,7 @@ import pytest
 import torch
 
 from tests.trainer.fake_envs import EchoEnvs
-from trainer.crew import Crew, available_cores
+from trainer.crew import Crew, available_cores, keep_freed_memory
 from trainer.ppo import update
 from trainer.rollout import collect
 from trainer.session import Session
@@ -78,3 +81,28 @@ def test_shared_updates_are_those_of_one_thread(net: str, loss: str, small_confi
     assert (one - two).norm() < 1e-3 * one.norm()
     assert torch.equal(two, again), "the result depends on the threads' timing"
     assert statistics[0] == pytest.approx(statistics[1], rel=1e-3, abs=1e-5)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="asks Linux for its count of page faults")
+def test_memory_of_the_last_update_serves_the_next() -> None:
+    script = """
+        import resource, torch
+        from trainer.crew import Crew
+
+        def update():
+            blocks = [torch.ones(1 << 20) for _ in range(20)]  # 4 MB each
+
+        with Crew(1):
+            for _ in range(4):  # until the heap is large enough
+                update()
+            before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+            for _ in range(5):
+                update()
+        print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+    """
+    told = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True, check=True
+    )
+    if not keep_freed_memory():
+        pytest.skip("this C library has no such setting")
+    assert int(told.stdout) < 2000, "5 * 80 MB are 102,400 pages of 4 kB"

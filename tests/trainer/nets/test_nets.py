@@ -200,6 +200,48 @@ def test_bfloat16_changes_how_paper_computes_and_not_what_it_is() -> None:
             assert (one - other).norm() < 0.1 * one.norm()
 
 
+def test_fused_steps_compute_what_plain_ones_do_but_for_rounding() -> None:
+    exact, plain, fused = (
+        build_net("paper", SPEC, 0, precision) for precision in ("float32", "bfloat16", "bfloat16")
+    )
+    assert isinstance(plain, PaperNet)
+    assert isinstance(fused, PaperNet)
+    plain.may_fuse = False
+    assert [fused.fused, plain.fused] == [True, False]
+    images, texts = random_images(12), torch.randn(5, 128, generator=torch.Generator().manual_seed(0))
+    image_index, text_index = torch.arange(40) % 12, torch.arange(40) % 5
+    results = []
+    for net in (exact, plain, fused):
+        text = texts.clone().requires_grad_()
+        features = net.perceive(net.prepare(images), text, image_index, text_index)
+        used = [
+            value for name, value in net.named_parameters() if name.split(".")[0] in ("image_conv", "blocks")
+        ]
+        results.append([features, *torch.autograd.grad(features.sin().sum(), [text, *used])])
+    for correct, rounded, ours in zip(*results, strict=True):
+        assert ours.dtype == torch.float32
+        assert (ours - correct).norm() < 1.6 * (rounded - correct).norm() + 0.003 * correct.norm()
+
+
+def test_fused_steps_follow_the_weights() -> None:
+    net = build_net("paper", SPEC, 0, "bfloat16")
+    images, text, index = random_images(4), torch.zeros(1, 128), torch.arange(4)
+
+    def look() -> torch.Tensor:
+        with torch.no_grad():
+            return net.perceive(net.prepare(images), text, index, torch.zeros_like(index))
+
+    before = look()
+    optimizer = torch.optim.Adam(net.parameters(), lr=0.01, fused=True)
+    net.perceive(net.prepare(images), text, index, torch.zeros_like(index)).sum().backward()
+    optimizer.step()
+    after = look()
+    fresh = build_net("paper", SPEC, 1, "bfloat16")
+    fresh.load_state_dict(net.state_dict())
+    assert not torch.equal(before, after)
+    assert torch.equal(after, fresh.perceive(fresh.prepare(images), text, index, torch.zeros_like(index)))
+
+
 def test_bfloat16_is_for_networks_that_can() -> None:
     assert best_precision("fast", "cpu") == "float32"
     assert best_precision("paper-reference", "cpu") == "float32"

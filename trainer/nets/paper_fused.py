@@ -1,0 +1,151 @@
+"""This module computes the convolutions of the paper's network in bfloat16 on a CPU, with what lies between them.
+
+It does what `trainer.nets.paper` says in plain PyTorch, in other steps: convolutions by Winograd's method, each with
+its bias and rectifier in one pass, modulation and residual connection in another. Images are (N, H, W, C), bfloat16.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from trainer.nets import winograd
+from trainer.nets import winograd_kernels as kernels
+from trainer.nets.winograd import Plan, as_u16
+
+
+def fits(image_shape: tuple[int, ...], width: int) -> bool:
+    """Whether images of these cells and convolutions of this many channels can be computed here."""
+    return kernels.AVAILABLE and min(image_shape[:2]) > 1 and width % kernels.LANES == 0
+
+
+class Filters:
+    """The matrices of channels of one convolution, made anew when its weights have changed.
+
+    Whether they have is seen from the weights themselves, because fused optimisers leave no other trace of it.
+    """
+
+    def __init__(self) -> None:
+        self._made: tuple[Plan, Tensor, Tensor] | None = None
+
+    def of(self, weight: Tensor, height: int, width: int) -> Tensor:
+        """`Plan.filters` in bfloat16 for images of this size."""
+        plan, made = Plan.of(height, width), self._made
+        if made is None or made[0] is not plan or not torch.equal(made[1], weight):
+            self._made = made = (plan, weight.detach().clone(), plan.filters(weight).bfloat16())
+        return made[2]
+
+
+def surroundings(images: Tensor) -> Tensor:
+    """What a 3 x 3 convolution sees at each cell, in the order of its weights, bfloat16.
+
+    Args:
+        images: uint8 (I, H, W, C).
+
+    Returns:
+        (J, H, W, 9 * C), where J is I rounded up as a block of `winograd.convolve` is; what is beyond I is 0.
+    """
+    channels_first = images.permute(0, 3, 1, 2).float()
+    columns = functional.unfold(channels_first, 3, padding=1).transpose(1, 2)
+    seen = columns.bfloat16().view(*images.shape[:3], -1)
+    return functional.pad(seen, (0, 0) * 3 + (0, -len(seen) % winograd.GRAIN))
+
+
+def first_convolution(seen: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
+    """The first convolution, rectified, (J, H, W, D), of `surroundings`.
+
+    It is computed by blocks, because the products of every number of images that ever occurs are compiled and kept.
+    """
+    matrix, offset = weight.flatten(1).bfloat16(), bias.bfloat16()
+    blocks = [functional.linear(block, matrix, offset) for block in torch.split(seen, winograd.BLOCK)]
+    return torch.relu(torch.cat(blocks))
+
+
+class Convolution(torch.autograd.Function):
+    """A convolution and a rectifier, given images, weights, bias and the weights' `Filters`."""
+
+    @staticmethod
+    def forward(ctx: Any, images: Tensor, weight: Tensor, bias: Tensor, filters: Tensor) -> Tensor:
+        """Images (N, H, W, C) to (N, H, W, D)."""
+        outputs = winograd.convolve(images, filters, bias, rectified=True)
+        ctx.save_for_backward(images, filters, outputs)
+        return outputs
+
+    @staticmethod
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor | None, ...]:
+        """Gradients for what `forward` takes."""
+        images, filters, outputs = ctx.saved_tensors
+        return *winograd.convolve_backward(grad.contiguous(), images, filters, outputs), None
+
+
+class FilmBlock(torch.autograd.Function):
+    """Two convolutions, a rectifier between them, modulation, a rectifier and the residual connection.
+
+    Takes images, weights and biases of the convolutions, the tables of scales and shifts, float32 (D, C), the row of
+    them that is each image's, int64 (N,), and the convolutions' `Filters`.
+    """
+
+    @staticmethod
+    def forward(
+        ctx: Any,
+        images: Tensor,
+        weight1: Tensor,
+        bias1: Tensor,
+        weight2: Tensor,
+        bias2: Tensor,
+        scale: Tensor,
+        shift: Tensor,
+        text_index: Tensor,
+        filters1: Tensor,
+        filters2: Tensor,
+    ) -> Tensor:
+        """Images (N, H, W, C) to as many of that size."""
+        between = winograd.convolve(images, filters1, bias1, rectified=True)
+        hidden = winograd.convolve(between, filters2, bias2, rectified=False)
+        outputs = torch.empty_like(images)
+        tables = scale.detach().numpy(), shift.detach().numpy(), text_index.numpy()
+        kernels.modulate(as_u16(hidden), *tables, as_u16(images), as_u16(outputs))
+        ctx.save_for_backward(images, between, hidden, scale, shift, text_index, filters1, filters2)
+        return outputs
+
+    @staticmethod
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor | None, ...]:
+        """Gradients for what `forward` takes."""
+        images, between, hidden, scale, shift, text_index, filters1, filters2 = ctx.saved_tensors
+        grad = grad.contiguous()
+        d_hidden, d_scale, d_shift = (
+            torch.empty_like(hidden),
+            torch.zeros_like(scale),
+            torch.zeros_like(shift),
+        )
+        tables = scale.numpy(), shift.numpy(), text_index.numpy()
+        kernels.modulate_backward(
+            as_u16(grad), as_u16(hidden), *tables, as_u16(d_hidden), d_scale.numpy(), d_shift.numpy()
+        )
+        d_between, d_weight2, d_bias2 = winograd.convolve_backward(d_hidden, between, filters2)
+        d_images, d_weight1, d_bias1 = winograd.convolve_backward(
+            d_between, images, filters1, outputs=between, added=grad
+        )
+        return d_images, d_weight1, d_bias1, d_weight2, d_bias2, d_scale, d_shift, None, None, None
+
+
+class Chosen(torch.autograd.Function):
+    """Images by their numbers, int64 (P,); the gradients of one chosen often are added up in float32."""
+
+    @staticmethod
+    def forward(ctx: Any, images: Tensor, index: Tensor) -> Tensor:
+        """Images (I, H, W, C) to (P, H, W, C)."""
+        ctx.save_for_backward(index)
+        ctx.shape = images.shape
+        return images.index_select(0, index)
+
+    @staticmethod
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor | None, ...]:
+        """Gradients for what `forward` takes."""
+        (index,) = ctx.saved_tensors
+        total = torch.zeros(ctx.shape)
+        kernels.add_up(as_u16(grad.contiguous()), index.numpy(), total.numpy())
+        return total.bfloat16(), None
