@@ -129,6 +129,10 @@ def _draw_success(axes: Axes, curve: Curve) -> None:
 _BESIDE: Final = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "reverse": True}
 
 
+_DRAWN: Final = 5
+"""Of successes, and of failures, at most so many areas; a suite has dozens of outcomes."""
+
+
 def draw_outcomes(
     axes: Axes,
     frames: Sequence[float] | NDArray[np.float64],
@@ -148,16 +152,34 @@ def draw_outcomes(
     shares = {name: values for name, values in shares.items() if np.nanmax(values, initial=0.0) > 0}
     if not shares:
         return
-    ranks = {name: _rank(name, successes) for name in shares}
-    names = sorted(shares, key=lambda name: (ranks[name], -float(np.nanmean(shares[name]))))
+    ranked = _few({name: np.nan_to_num(values) for name, values in shares.items()}, successes)
     axes.stackplot(
         frames,
-        [np.nan_to_num(shares[name]) for name in names],
-        colors=_colours([ranks[name] for name in names]),
-        labels=names,
+        [values for _, _, values in ranked],
+        colors=_colours([rank for rank, _, _ in ranked]),
+        labels=[name for _, name, _ in ranked],
         linewidth=0,
     )
     axes.legend(fontsize=7, frameon=False, **legend)
+
+
+def _few(
+    shares: Mapping[str, NDArray[np.float64]], successes: frozenset[str]
+) -> list[tuple[int, str, NDArray[np.float64]]]:
+    """Rank, name and share of what is drawn, in order: of successes and of failures the most frequent, and the rest."""
+    drawn = []
+    for rank, called in enumerate(("successes", "failures", "ends")):
+        names = sorted(
+            (name for name in shares if _rank(name, successes) == rank),
+            key=lambda name: -float(np.mean(shares[name])),
+        )
+        kept = names if len(names) <= _DRAWN else names[: _DRAWN - 1]
+        drawn += [(rank, name, shares[name]) for name in kept]
+        if rest := names[len(kept) :]:
+            drawn.append(
+                (rank, f"{len(rest)} more {called}", np.sum([shares[name] for name in rest], axis=0))
+            )
+    return drawn
 
 
 def _rank(name: str, successes: frozenset[str]) -> int:

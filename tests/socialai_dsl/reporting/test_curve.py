@@ -4,9 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 
-from socialai_dsl.reporting.curve import Curve, draw_learning_curve, smooth
+from socialai_dsl.reporting.curve import Curve, draw_learning_curve, draw_outcomes, smooth
 
 NAN = float("nan")
 WINS = frozenset({"success@3"})
@@ -36,3 +37,16 @@ def test_a_picture_is_written(curve: Curve, tmp_path: Path) -> None:
     draw_learning_curve(curve, "title", tmp_path / "curve.png")
     with Image.open(tmp_path / "curve.png") as picture:
         assert min(picture.size) > 400
+
+
+def test_of_many_outcomes_the_most_frequent_are_drawn_and_the_rest_is_one() -> None:
+    axes = Figure().subplots()
+    shares = {f"failure@{k}": np.full(3, (k + 1) / 45.0) for k in range(9)}
+    draw_outcomes(axes, [0, 1, 2], shares, frozenset(), {})
+    legend = axes.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == [
+        *("failure@8", "failure@7", "failure@6", "failure@5", "5 more failures"),
+    ]
+    top = max(path.vertices[:, 1].max() for area in axes.collections for path in area.get_paths())  # type: ignore[index]
+    assert top == pytest.approx(1.0)
