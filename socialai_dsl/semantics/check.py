@@ -19,6 +19,7 @@ from socialai_dsl.semantics import (
     entities,
     sequences,
     setup,
+    shadowing,
     statuses,
     tables,
     world,
@@ -162,7 +163,7 @@ class _Run:
         if findings.bag.has_errors:
             return None
         for plan in plans:
-            checks.check_shadowed(plan, findings)
+            shadowing.check_shadowed(plan, findings)
         names = [resolver.registers.read(f"{member}.name") for member in self._symbols.cast]
         words = words_in_order(scenario.grammar, names, spoken.lines(self._symbols.cast))
         made = Checked(
