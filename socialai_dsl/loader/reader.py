@@ -121,7 +121,7 @@ class _Builder:
             handler(event)
 
     def refuse_many_directives(self) -> None:
-        """libyaml compares each `%TAG` with all before it; none may be used, so several need not be read."""
+        """Several `%TAG` lines, of which libyaml compares each with all before it: none may be used anyway."""
         found = list(islice(_TAG_DIRECTIVE.finditer(self.source.text), 2))
         if len(found) == 2:
             line = self.source.text.count("\n", 0, found[0].start()) + 1

@@ -11,7 +11,6 @@ from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.findings import Findings
 from socialai_dsl.semantics.terms import Chance, Const, FramePlan, Logic, Quantified, RulePlan, Term
 
-
 _FEW = 64
 """Utterances, up to which a rule is found by them."""
 
