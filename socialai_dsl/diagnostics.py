@@ -253,7 +253,7 @@ class _Effort:
 
 _effort: ContextVar[_Effort | None] = ContextVar("effort", default=None)
 
-_SUGGESTING: Final = 4_000_000
+_SUGGESTING: Final = 1_500_000
 _EFFORT_OF_A_LOOK: Final = 8
 _LONGEST_SUGGESTION: Final = 80
 

@@ -45,7 +45,7 @@ def follow(root: Node, path: str) -> Place | Miss:
         if isinstance(step, Miss):
             return step
         key, end = step
-        part = node.children.get(key) if isinstance(node.children, dict) else dict(node.items()).get(key)
+        part = node.children.get(str(key)) if isinstance(node.children, dict) else dict(node.items()).get(key)
         if end == len(path):
             return Place(node, key, part)
         if part is None:

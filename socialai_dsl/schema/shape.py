@@ -200,6 +200,8 @@ class _Report:
             if near is None and owner is Ranged:
                 near = self._left_over(finding.path[:-1], key, known)
             self._unknown_word(key, owner, called, known, near, span)
+        if owner is Ranged and near == "range" and ".." not in str(finding.value):
+            near = None  # `max: 9` is not a range under another name
         if near is None or near == "extends" or not self._repaired.rename(finding.path, near):
             self._repaired.leave_out(finding.path)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from functools import cached_property
 from itertools import product
@@ -14,6 +15,9 @@ from socialai_dsl.semantics.geometry import EXACT, Cell, Size, UnknownError, int
 from socialai_dsl.semantics.terms import Checked, Const, Placing, Region, Term
 
 _AROUND: Final = ((0, -1), (0, 1), (-1, 0), (1, 0))
+_NAMED: Final = 5
+"""How many of those are named that are in the way."""
+
 _TAKES_AWAY: Final = {"at": 1, "in_front_of": 1, "next_to": 4}
 """How many cells at most `not here.TEST(x)` excludes for each x."""
 
@@ -69,7 +73,7 @@ def _report(
     """`rivals` may take its cells, or are certain to."""
     name = _called(checked, placing.entity)
     where = f"a room of {size[0]}x{size[1]}"
-    before = ", ".join(f"`{key}`" for key in dict.fromkeys(checked.entities[number].key for number in rivals))
+    before = _named(list(dict.fromkeys(checked.entities[number].key for number in rivals)))
     if certain:
         taken = f"; {before} take all there are" if before else ""
         message = f"`{name}` has no free cell in {where}{taken}"
@@ -84,6 +88,12 @@ def _report(
     findings.warning("S601", message, placing.span, hint=hint)
 
 
+def _named(keys: Sequence[str]) -> str:
+    more = len(keys) - _NAMED if len(keys) > _NAMED + 1 else 0
+    names = ", ".join(f"`{key}`" for key in (keys[:_NAMED] if more else keys))
+    return f"{names} and {more} more" if more else names
+
+
 def _called(checked: Checked, number: int) -> str:
     entity = checked.entities[number]
     return entity.key if entity.index is None else f"{entity.key}[{entity.index}]"
@@ -93,7 +103,7 @@ class _Effort:
     """How much may still be computed: parts of conditions, each for one cell."""
 
     def __init__(self) -> None:
-        self._left = 1_000_000
+        self._left = 500_000
 
     def spend(self, amount: int) -> None:
         """Raises UnknownError when nothing is left."""
@@ -112,6 +122,8 @@ class _Room:
         self.placings = [item for item in checked.setup if isinstance(item, Placing)]
         self._places = _Places(self.placings)
         self._cells: dict[int, tuple[int, int]] = {}
+        self._counted = 0
+        self._put_down: Counter[int] = Counter()
         self._before: dict[int, list[int]] = {}
         self._shared: dict[tuple[int, int], bool] = {}
         self._homes_of: dict[int, set[Cell] | None] = {}
@@ -154,14 +166,16 @@ class _Room:
 
     def _surely_taken(self, number: int, cells: set[Cell]) -> int:
         """How many of these cells are taken in every room: what must be on one of them is on one of its own."""
-        return sum(
-            self._is_within(earlier, cells) and self.cells_for(earlier)[1] > 0
-            for earlier, other in enumerate(self.placings[:number])
-            if not (_is_sure(other) or other.overlap)
-        )
+        assert self._counted <= number, "internal: placements are looked at in order"
+        while self._counted < number:
+            placing = self.placings[self._counted]
+            if not (_is_sure(placing) or placing.overlap) and self.cells_for(self._counted)[1] > 0:
+                self._put_down[self._places.kinds[self._counted]] += 1
+            self._counted += 1
+        return sum(count for kind, count in self._put_down.items() if self._is_within(kind, cells))
 
-    def _is_within(self, number: int, cells: set[Cell]) -> bool:
-        homes = self._known_homes(self._places.kinds[number])
+    def _is_within(self, kind: int, cells: set[Cell]) -> bool:
+        homes = self._known_homes(kind)
         return homes is not None and homes <= cells
 
     def _known_homes(self, kind: int) -> set[Cell] | None:
