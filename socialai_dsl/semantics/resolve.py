@@ -9,7 +9,15 @@ from typing import Final
 
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.semantics import links, resolve_calls, resolve_groups, resolve_names, sequences, tables
+from socialai_dsl.semantics import (
+    contents,
+    links,
+    resolve_calls,
+    resolve_groups,
+    resolve_names,
+    sequences,
+    tables,
+)
 from socialai_dsl.semantics.build import (
     all_of,
     any_of,
@@ -100,6 +108,11 @@ class Resolver:
     def unlocks(self) -> Mapping[int, tuple[int, ...]]:
         """Object -> the objects it unlocks."""
         return links.unlocked(self)
+
+    @cached_property
+    def moved_inside(self) -> set[str]:
+        """Names of what some effect moves into something."""
+        return contents.moved_inside(self.symbols.scenario)
 
     @cached_property
     def opens(self) -> Mapping[int, tuple[int, ...]]:
