@@ -40,12 +40,13 @@ fuzz: $(STAMP) ## throw made-up files at the loader, each target for SECONDS_EAC
 	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[fuzz]'
 	$(BIN)/python -m tests.fuzzing.run --seconds $(SECONDS_EACH) $(ARGS)
 
-nightly: $(STAMP) ## everything that takes long: the long tests, half an hour of fuzzing, planted mistakes
+nightly: $(STAMP) ## everything that takes long: the long tests, half an hour of fuzzing, planted mistakes, how time grows
 	$(MAKE) test-long
 	$(MAKE) test-faults
 	$(MAKE) test-bounds
 	$(MAKE) fuzz SECONDS_EACH=600
 	$(MAKE) fuzz SECONDS_EACH=120 ARGS=--planted
+	$(BIN)/python -m tests.fuzzing.scaling
 
 lint: $(STAMP) ## check formatting, style and types
 	$(BIN)/ruff format --check .

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
@@ -209,14 +211,20 @@ def did_you_mean(word: str, candidates: Iterable[str]) -> str | None:
 
     Case, and `-` or a space for `_`, do not count. Up to a quarter of the letters may differ (an exchange of
     neighbours is one difference); a candidate that `word` begins, or that begins `word`, is near as well.
+    Inside of `bounded_suggestions` only as many candidates are looked at as its effort allows.
     """
     if not 2 <= len(word) <= _LONGEST_SUGGESTION:
         return None
     folded = _fold(word)
+    effort = _effort.get()
     best: tuple[int, int, str] | None = None
     for candidate in candidates:
         if candidate == word or len(candidate) > _LONGEST_SUGGESTION:
             continue
+        if effort is not None:
+            if effort.left <= 0:
+                break
+            effort.left -= _EFFORT_OF_A_LOOK + len(word) * len(candidate)
         distance = _nearness(folded, _fold(candidate))
         if distance is None:
             continue
@@ -226,6 +234,27 @@ def did_you_mean(word: str, candidates: Iterable[str]) -> str | None:
     return best[2] if best else None
 
 
+@contextmanager
+def bounded_suggestions() -> Iterator[None]:
+    """Look for suggestions with a fixed effort only, however many words are misspelt and names are known."""
+    token = _effort.set(_Effort(_SUGGESTING))
+    try:
+        yield
+    finally:
+        _effort.reset(token)
+
+
+@dataclass
+class _Effort:
+    """How many pairs of letters may still be compared."""
+
+    left: int
+
+
+_effort: ContextVar[_Effort | None] = ContextVar("effort", default=None)
+
+_SUGGESTING: Final = 1_500_000
+_EFFORT_OF_A_LOOK: Final = 8
 _LONGEST_SUGGESTION: Final = 80
 
 

@@ -22,7 +22,7 @@ from socialai_dsl.checking import (
     said_once,
     sift,
 )
-from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity
+from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity, bounded_suggestions
 from socialai_dsl.loader import Resolved, resolve
 from socialai_dsl.loader.files import display_name
 from socialai_dsl.schema import Scenario
@@ -136,7 +136,11 @@ def check(
         texts: resolved path -> text, for files that are not on the disk as they are meant: those of an editor.
         every_value: whether a scenario that is right is also checked with the other values of its parameters.
     """
-    name = str(name)
+    with bounded_suggestions():
+        return _check(str(name), texts, every_value)
+
+
+def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool) -> CheckResult:
     try:
         resolved = resolve(name, texts=texts)
     except ScenarioError as error:

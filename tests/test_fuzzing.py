@@ -74,13 +74,9 @@ def test_a_planted_mistake_is_found(place: Playground) -> None:
     assert executions_until_found("keys given twice in braces", 500, place) is not None
 
 
-HARD = ("IndexError on a rare token", "an entry behind the last")
-"""What changes by chance hardly ever hit upon: see docs/reliability.md."""
-
-
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
-@pytest.mark.parametrize("name", [name for name in PLANTED if name not in HARD])
+@pytest.mark.parametrize("name", PLANTED)
 def test_planted_mistakes_are_found(name: str, place: Playground) -> None:
     found = executions_until_found(name, 20_000, place)
     print(f"{name}: found after {found} inputs")

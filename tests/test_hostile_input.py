@@ -186,6 +186,58 @@ def test_files_that_name_files_without_end_are_refused(lay, tmp_path: Path, monk
     assert len(result.diagnostics) < 100
 
 
+# -- names that lead to names --------------------------------------------------------------------------------------
+
+
+def scenario_with(rest: str) -> str:
+    return (
+        "scenario: f\nhorizon: 5\ngrammar: {templates: [Say <noun>], nouns: [hi]}\nroom: {size: 8}\n"
+        f"cast: {{agent: {{}}, a: {{frame: f}}}}\n{rest}"
+    )
+
+
+def test_names_that_lead_to_names_without_end_are_refused(tmp_path: Path) -> None:
+    """Each was a traceback, or would have taken longer than anybody waits."""
+    frame = "frames: {f: {steps: [{say: hi}]}}\n"
+    outcome = "outcome: [{failure: agent.did(done)}]\n"
+    chain = "".join(f"  v{i}: v{i + 1}\n" for i in range(500)) + "  v500: 1\n"
+    circle = "".join(f"  v{i}: v{(i + 1) % 500}\n" for i in range(500))
+    double = "".join(f"  d{i}: d{i + 1} and d{i + 1}\n" for i in range(60)) + "  d60: t == 2\n"
+    for text in (
+        f"{frame}{outcome}let:\n{chain}",
+        f"{frame}{outcome}let:\n{circle}",
+        f"{frame}outcome: [{{failure: d0}}]\ndefine:\n{double}",
+    ):
+        (tmp_path / "f.yaml").write_text(scenario_with(text))
+        with in_time():
+            result = check(tmp_path / "f.yaml")
+        assert {found.code for found in result.diagnostics} == {"S212"}
+        assert len(result.diagnostics) < 20
+
+
+def test_states_that_lead_to_states_within_a_step_are_walked_once(tmp_path: Path) -> None:
+    """Each state has two ways to the next: 2 ** 60 ways in all."""
+    states = "".join(
+        f"      s{i}: {{then: [{{after: 1, goto_now: s{i + 1}}}, {{goto_now: s{i + 1}}}]}}\n"
+        for i in range(60)
+    )
+    frame = f"frames:\n  f:\n    states:\n{states}      s60: {{do: stay}}\n"
+    (tmp_path / "f.yaml").write_text(scenario_with(f"{frame}outcome: [{{failure: agent.did(done)}}]\n"))
+    with in_time():
+        assert not check(tmp_path / "f.yaml").has_errors
+
+
+def test_a_room_of_boxes_is_looked_at_in_time(tmp_path: Path) -> None:
+    """More boxes than an 8x8 room has cells for; and more bodies than any room may have."""
+    frame = "frames: {f: {steps: [{say: hi}]}}\noutcome: [{failure: agent.did(done)}]\n"
+    for count, code in ((60, "S601"), (130, "S106")):
+        boxes = "".join(f"  o{i}: {{type: box}}\n" for i in range(count))
+        (tmp_path / "f.yaml").write_text(scenario_with(f"{frame}objects:\n{boxes}"))
+        with in_time():
+            result = check(tmp_path / "f.yaml")
+        assert {found.code for found in result.diagnostics} == {code}
+
+
 # -- what reaches a terminal ---------------------------------------------------------------------------------------
 
 _NASTY = (

@@ -45,7 +45,7 @@ def follow(root: Node, path: str) -> Place | Miss:
         if isinstance(step, Miss):
             return step
         key, end = step
-        part = dict(node.items()).get(key)
+        part = node.children.get(str(key)) if isinstance(node.children, dict) else dict(node.items()).get(key)
         if end == len(path):
             return Place(node, key, part)
         if part is None:
@@ -61,10 +61,10 @@ def _key_step(node: Node, path: str, begin: int) -> tuple[str, int] | Miss:
     if not isinstance(node.children, dict):
         return Miss(f"`{_shown(path, begin)}` in {node.file} is {node.kind}, there is nothing below it")
     rest = path[begin:]
-    existing = [k for k in node.children if rest == k or rest.startswith((k + ".", k + "["))]
-    if existing:
-        key = max(existing, key=len)
-        return key, begin + len(key)
+    ends = [len(rest), *(end for end in range(len(rest) - 1, -1, -1) if rest[end] in ".[")]
+    for end in ends:
+        if rest[:end] in node.children:
+            return rest[:end], begin + end
     if path.startswith("[", begin):
         hint = f"write `{_shown(path, begin)}.` and the key"
         return Miss(f"`{_shown(path, begin)}` in {node.file} is a mapping, not a list", hint=hint)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,8 @@ from socialai_dsl.source import Source, Span
 
 # Only the event stream of libyaml is used: its composer and PyYAML's are recursive and can be made to crash.
 _EventParser: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
+
+_TAG_DIRECTIVE = re.compile(r"^%TAG\b", re.MULTILINE)
 
 _STYLES = {None: Style.PLAIN, "": Style.PLAIN} | {s.value: s for s in Style if len(s.value) == 1}
 
@@ -43,6 +47,7 @@ def read_document(file: Path | str | Source, name: str | None = None, path: Path
 def _parse(source: Source, path: Path | None) -> Document:
     builder = _Builder(source)
     try:
+        builder.refuse_many_directives()
         for event in _events(source.text):
             builder.take(event)
     except _LimitError:
@@ -115,6 +120,14 @@ class _Builder:
         if handler:
             handler(event)
 
+    def refuse_many_directives(self) -> None:
+        """Several `%TAG` lines, of which libyaml compares each with all before it: none may be used anyway."""
+        found = list(islice(_TAG_DIRECTIVE.finditer(self.source.text), 2))
+        if len(found) == 2:
+            line = self.source.text.count("\n", 0, found[0].start()) + 1
+            self._refuse_directives(self.source.span(line, 1))
+            raise _LimitError
+
     def document(self, path: Path | None) -> Document:
         if not self._spans:
             start = self.source.span(1, 1)
@@ -136,10 +149,13 @@ class _Builder:
     def _document_start(self, event: Any) -> None:
         self._documents += 1
         if event.version or event.tags:
-            self._error("S005", "directives (lines that begin with %) may not be used", self._span(event))
+            self._refuse_directives(self._span(event))
         if self._documents > 1:
             self._error("S001", "a file holds one document; here a second one begins", self._span(event))
             raise _LimitError
+
+    def _refuse_directives(self, span: Span) -> None:
+        self._error("S005", "directives (lines that begin with %) may not be used", span)
 
     def _alias(self, event: Any) -> None:
         span = self._span(event)
@@ -171,6 +187,7 @@ class _Builder:
                 self.found.add(forbidden_character(match.group(), self._span(event)))
         if self._stack and self._stack[-1].expects_key:
             self._key(text, style, self._span(event))
+            self._refuse_glued_question_mark(event.start_mark.index, self._span(event))
             return
         if style is not Style.PLAIN:
             self._value(text, event, style)
@@ -191,6 +208,12 @@ class _Builder:
         if text in frame.container:
             self._error("S002", f"`{text}` is given twice; the first is at line {first}", span)
         frame.key, frame.key_span = text, span
+
+    def _refuse_glued_question_mark(self, start: int, span: Span) -> None:
+        """In braces libyaml takes the `?` of `{?a: 1}` for a mark of its own, other readers for a letter."""
+        if self._stack[-1].flow and start and self.source.text[start - 1] == "?":
+            hint = "quote a key that begins with `?`"
+            self._error("S001", "not YAML: a key in braces or brackets cannot begin with `?`", span, hint)
 
     def _value(self, value: Data, event: Any, style: Style) -> DataPath:
         """Put a value where the next one belongs and return its path."""

@@ -20,9 +20,9 @@ from socialai_dsl.schema.annotations import (
     literals,
     model_at,
 )
-from socialai_dsl.schema.behaviour import Npc, State, ThenRule
+from socialai_dsl.schema.behaviour import Npc, Ranged, State, ThenRule
 from socialai_dsl.schema.positions import DataPath, Positions
-from socialai_dsl.schema.repair import RenamedPlaces, Repaired, copied, fill_gaps
+from socialai_dsl.schema.repair import RenamedPlaces, Repaired, copied, fill_gaps, part_at
 from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.source import Span
 
@@ -197,9 +197,20 @@ class _Report:
             near = None
         else:
             near = did_you_mean(key, known)
+            if near is None and owner is Ranged:
+                near = self._left_over(finding.path[:-1], key, known)
             self._unknown_word(key, owner, called, known, near, span)
+        if owner is Ranged and near == "range" and ".." not in str(finding.value):
+            near = None  # `max: 9` is not a range under another name
         if near is None or near == "extends" or not self._repaired.rename(finding.path, near):
             self._repaired.leave_out(finding.path)
+
+    def _left_over(self, parent: DataPath, key: str, known: list[str]) -> str | None:
+        """Where a mapping needs all its keys, an unknown one stands for one that is missing."""
+        given = set(part_at(self._data, parent))
+        extra = [word for word in self._extra[parent] if did_you_mean(word, known) is None]
+        missing = [word for word in known if word not in given]
+        return dict(zip(extra, missing, strict=False)).get(key)
 
     def _unknown_word(
         self, key: str, owner: type | None, called: str, known: list[str], near: str | None, span: Span
@@ -226,6 +237,8 @@ class _Report:
         if any(did_you_mean(word, ["extends"]) for word in self._extra.get((), ())):
             return  # the file it builds on may have it
         owner = model_at(self._model, parent)
+        if owner is Ranged and extra:
+            return  # which stand for it
         called = CALLED.get(owner, "this mapping") if owner is not None else "this mapping"
         if parent:
             called = f"`{parent[-1]}`" if isinstance(parent[-1], str) else called

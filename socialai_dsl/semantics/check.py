@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from operator import itemgetter
+from typing import Final
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, did_you_mean
 from socialai_dsl.schema import PRIMITIVES, Scenario
@@ -19,6 +20,7 @@ from socialai_dsl.semantics import (
     entities,
     sequences,
     setup,
+    shadowing,
     statuses,
     tables,
     world,
@@ -38,6 +40,9 @@ from socialai_dsl.semantics.utterances import MAX_TEXTS, number_of_texts, texts_
 from socialai_dsl.semantics.vocabulary import words_in_order
 
 _MAX_ROUNDS = 24
+
+MAX_BODIES: Final = 128
+"""How many objects and members of the cast a scenario may have."""
 
 
 def check_meaning(
@@ -140,6 +145,12 @@ class _Run:
     def checked(self, name: str) -> Checked | None:
         """The checked scenario; None if it cannot be put together."""
         scenario, resolver, findings = self._scenario, self.resolver, self._findings
+        if self._symbols.entities > MAX_BODIES:
+            part = "objects" if len(scenario.objects) > len(scenario.cast) else "cast"
+            found = self._symbols.entities
+            message = f"a room holds at most {MAX_BODIES} objects and members of the cast, this one {found}"
+            findings.error("S106", message, findings.places.key_span((part,)))
+            return None
         checks.check_grammar(scenario, findings)
         entities.declare_registers(resolver)
         entities.check_slots(resolver)
@@ -162,7 +173,7 @@ class _Run:
         if findings.bag.has_errors:
             return None
         for plan in plans:
-            checks.check_shadowed(plan, findings)
+            shadowing.check_shadowed(plan, findings)
         names = [resolver.registers.read(f"{member}.name") for member in self._symbols.cast]
         words = words_in_order(scenario.grammar, names, spoken.lines(self._symbols.cast))
         made = Checked(

@@ -1,17 +1,18 @@
-"""What can be wrong with a frame as a whole: its flow of states and steps, and rules that never fire."""
+"""What can be wrong with a grammar, and with a frame as a whole: its flow of states and steps."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.schema import Frame, Scenario, State
 from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.findings import Findings
 from socialai_dsl.semantics.scope import frames_of
-from socialai_dsl.semantics.terms import Chance, Const, FramePlan, Logic, Quantified, RulePlan, Term
+
+_TOLD = 12
+"""How many states of a circle are named."""
 
 GRAMMAR_CODE = "S104"
 """The code of a template that cannot be filled."""
@@ -102,25 +103,37 @@ def _reachable(start: str, targets: dict[str, list[str]]) -> set[str]:
 def _check_circles(states: dict[str, State], path: DataPath, findings: Findings) -> None:
     """`goto_now` reads the next state's `then` in the same step; it must come to an end."""
     edges = {state: [rule.goto_now for rule in body.then if rule.goto_now] for state, body in states.items()}
-    reported: set[str] = set()
-    for state in states:
-        circle = _circle_from(state, edges, [])
-        if circle and not reported & set(circle):
-            reported |= set(circle)
-            index = next(i for i, rule in enumerate(states[circle[0]].then) if rule.goto_now == circle[1])
-            span = findings.at((*path, "states", circle[0], "then", index, "goto_now"), 0, len(circle[1]))
-            message = f"would go round within one step: {' -> '.join(circle)}"
-            findings.error("S312", message, span, hint="write `goto` where the next step may come first")
+    for circle in _circles(edges):
+        index = next(i for i, rule in enumerate(states[circle[0]].then) if rule.goto_now == circle[1])
+        span = findings.at((*path, "states", circle[0], "then", index, "goto_now"), 0, len(circle[1]))
+        message = f"would go round within one step: {_told(circle)}"
+        findings.error("S312", message, span, hint="write `goto` where the next step may come first")
 
 
-def _circle_from(state: str, edges: dict[str, list[str]], trail: list[str]) -> list[str]:
-    if state in trail:
-        return [*trail[trail.index(state) :], state]
-    for target in edges[state]:
-        circle = _circle_from(target, edges, [*trail, state])
-        if circle:
-            return circle
-    return []
+def _circles(edges: dict[str, list[str]]) -> Iterator[list[str]]:
+    """Circles that have no state in common, each from a state back to it; every edge is walked once."""
+    done: set[str] = set()
+    for state in edges:
+        trail: dict[str, Iterator[str]] = {} if state in done else {state: iter(edges[state])}
+        while trail:
+            last = next(reversed(trail))
+            target = next(trail[last], None)
+            if target is None:
+                del trail[last]
+                done.add(last)
+            elif target in trail:
+                states = list(trail)
+                yield [*states[states.index(target) :], target]
+                done |= trail.keys()
+                break
+            elif target not in done:
+                trail[target] = iter(edges[target])
+
+
+def _told(circle: list[str]) -> str:
+    if len(circle) > _TOLD:
+        circle = [*circle[: _TOLD - 1], "...", circle[-1]]
+    return " -> ".join(circle)
 
 
 def _check_steps(frame: Frame, path: DataPath, findings: Findings) -> None:
@@ -137,58 +150,3 @@ def _check_steps(frame: Frame, path: DataPath, findings: Findings) -> None:
             hint = "the step before it lasts for ever"
             findings.warning("W306", "this step is never reached", span, hint=hint)
             return
-
-
-def check_shadowed(plan: FramePlan, findings: Findings) -> None:
-    """Rules that never fire because one above them holds whenever they do."""
-    for state in plan.states:
-        _check_rules(state.first, findings)
-        _check_rules(state.then, findings)
-
-
-def _check_rules(rules: Sequence[RulePlan], findings: Findings) -> None:
-    for i, rule in enumerate(rules):
-        above = next((other for other in rules[:i] if _covers(other, rule)), None)
-        if above is not None:
-            message = f"this rule never fires: line {above.span.line} holds whenever it does"
-            findings.warning(
-                "W311", message, rule.span, hint="the first rule that holds is the only one that fires"
-            )
-
-
-def _covers(above: RulePlan, below: RulePlan) -> bool:
-    """Whether `above` certainly holds whenever `below` does."""
-    if above.once or above.chance is not None or above.after > below.after:
-        return False
-    return _hears_all(above, below) and _asks_less(above, below)
-
-
-def _hears_all(above: RulePlan, below: RulePlan) -> bool:
-    if not above.hears:
-        return True
-    if not below.hears:
-        return False
-    pairs = frozenset().union(*(p.pairs for p in above.hears))
-    texts = frozenset().union(*(p.said_by_npcs for p in above.hears))
-    return all(p.pairs <= pairs and p.said_by_npcs <= texts for p in below.hears)
-
-
-def _asks_less(above: RulePlan, below: RulePlan) -> bool:
-    if above.when is None:
-        return True
-    if below.when is None or _draws(above.when.term):
-        return False
-    if isinstance(above.when.term, Const) and not above.when.term.value:
-        return False  # a parameter has switched it off
-    return set(_conjuncts(above.when.term)) <= set(_conjuncts(below.when.term))
-
-
-def _conjuncts(term: Term) -> tuple[Term, ...]:
-    return term.args if isinstance(term, Logic) and term.op == "and" else (term,)
-
-
-def _draws(term: Term) -> bool:
-    return any(
-        isinstance(part, Chance) or (isinstance(part, Quantified) and part.op == "pick")
-        for part in walk(term)
-    )

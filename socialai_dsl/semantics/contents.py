@@ -68,10 +68,10 @@ def container(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Te
 def can_lie_inside(resolver: Resolver, objects: Objects) -> bool:
     """Whether objects of this name ever lie in others: at first, or because an effect moves them there."""
     scenario = resolver.symbols.scenario
-    return scenario.objects[objects.name].inside is not None or objects.name in _moved_inside(scenario)
+    return scenario.objects[objects.name].inside is not None or objects.name in resolver.moved_inside
 
 
-def _moved_inside(scenario: Scenario) -> set[str]:
+def moved_inside(scenario: Scenario) -> set[str]:
     """All names in what is moved into something, and in what these names stand for."""
     subjects = [
         node.subject

@@ -435,7 +435,7 @@ def is_plain_name(resolver: Resolver, raw: str) -> bool:
     """Whether a name is meant as it is written: words, and not something that is declared, or an attribute of it."""
     words = raw.replace("'", " ").replace("-", " ").replace(".", " ").split()
     plain = bool(words) and all(word.isalnum() for word in words)
-    return plain and not (" " not in raw.strip() and words[0] in resolver.symbols.declared())
+    return plain and not (" " not in raw.strip() and words[0] in resolver.symbols.declared)
 
 
 def declare_frame(resolver: Resolver, played: PlayedFrame) -> None:

@@ -5,10 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
+from typing import Final
 
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.semantics import links, resolve_calls, resolve_groups, resolve_names, sequences, tables
+from socialai_dsl.semantics import (
+    contents,
+    links,
+    resolve_calls,
+    resolve_groups,
+    resolve_names,
+    sequences,
+    tables,
+)
 from socialai_dsl.semantics.build import (
     all_of,
     any_of,
@@ -37,6 +46,11 @@ from socialai_dsl.semantics.terms import (
 )
 from socialai_dsl.semantics.utterances import Utterances
 from socialai_dsl.semantics.wording import described, quoted, spoken, words_of
+
+MAX_NESTED: Final = 64
+MAX_PARTS: Final = 2_000
+MAX_ALL_PARTS: Final = 100_000
+"""How deep an expression may lead, and how many parts it and all of them may have, definitions written out."""
 
 INT = Type("int", 0, 0)
 """Expected: any number."""
@@ -75,6 +89,8 @@ class Resolver:
         self.npc_texts: dict[str, None] = {}
         self.said_by: dict[str, dict[str, None]] = {}
         self.readings = Readings()
+        self._within: list[tuple[ast.Expr, Scope]] = []
+        self._parts = self._all_parts = 0
         self._tables: dict[str, tuple[tuple[str, ...], tuple[Term, ...]] | None] = {}
 
     def table(self, name: str) -> tuple[tuple[str, ...], tuple[Term, ...]]:
@@ -92,6 +108,11 @@ class Resolver:
     def unlocks(self) -> Mapping[int, tuple[int, ...]]:
         """Object -> the objects it unlocks."""
         return links.unlocked(self)
+
+    @cached_property
+    def moved_inside(self) -> set[str]:
+        """Names of what some effect moves into something."""
+        return contents.moved_inside(self.symbols.scenario)
 
     @cached_property
     def opens(self) -> Mapping[int, tuple[int, ...]]:
@@ -120,11 +141,30 @@ class Resolver:
         """The term for a tree, of the expected type if one is given."""
         reading = self.readings.begin(node)
         term: Term | None = None
+        self._within.append((node, scope))
         try:
+            self._limit()
             term = self._value(node, expected, scope)
         finally:
+            self._within.pop()
             self.readings.end(reading, term, scope.draws.site)
         return term
+
+    def _limit(self) -> None:
+        """What names lead to, and theirs, could go as deep and grow as large as a file likes."""
+        if len(self._within) == 1:
+            self._parts = 0
+        self._parts += 1
+        self._all_parts += 1
+        if len(self._within) > MAX_NESTED:
+            message = f"names and definitions lead to one another more than {MAX_NESTED} deep"
+        elif self._parts > MAX_PARTS:
+            message = f"with its definitions written out, this has more than {MAX_PARTS} parts"
+        elif self._all_parts > MAX_ALL_PARTS:
+            message = f"with all definitions written out, the scenario has more than {MAX_ALL_PARTS} parts"
+        else:
+            return
+        raise self.fail("S212", message, *self._within[0])
 
     def _value(self, node: ast.Expr, expected: Type | None, scope: Scope) -> Term:
         match node:

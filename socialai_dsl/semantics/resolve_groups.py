@@ -179,7 +179,7 @@ def quantified(resolver: Resolver, node: ast.Quantifier, expected: Type | None, 
     if node.name not in QUANTIFIERS:
         near = did_you_mean(node.name, QUANTIFIERS)
         raise resolver.fail("S205", f"`{node.name}(d in ...)` is not known", node, scope, suggestion=near)
-    if node.var in WORDS or node.var in resolver.symbols.declared():
+    if node.var in WORDS or node.var in resolver.symbols.declared:
         message = f"the variable `{node.var}` has a name that means something already"
         raise resolver.fail("S213", message, node, scope, hint="call it by a letter, such as `d`")
     if node.name == "nearest" and node.to is None:

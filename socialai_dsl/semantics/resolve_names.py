@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
@@ -264,19 +264,25 @@ def suggestion(
     resolver: Resolver, word: str, expected: Type | None, scope: Scope
 ) -> tuple[str | None, str | None]:
     """The name that was probably meant, and where it is declared."""
-    declared = resolver.symbols.declared()
-    candidates = [*scope.variables, *declared, *(expected.words if expected else ())]
-    candidates += ["it"] * (scope.it is not None) + ["self"] * (scope.member is not None)
-    if scope.frame is not None:
-        frame = scope.frame
-        candidates += [*frame.model.slots, *frame.model.let, *frame.defines]
-    near = did_you_mean(word, candidates) or did_you_mean(word, [*WORDS, *VALUES])
+    declared = resolver.symbols.declared
+    near = did_you_mean(word, chain(declared, *_nearby(expected, scope))) or did_you_mean(
+        word, [*WORDS, *VALUES]
+    )
     if near is None or near not in declared:
         return near, None
     kind = declared[near]
     section = {"object": "objects"}.get(kind, kind)
     span = resolver.findings.places.key_span((section, near))
     return near, f"{kind}, line {span.line}"
+
+
+def _nearby(expected: Type | None, scope: Scope) -> Iterator[Iterable[str]]:
+    """What a name can mean at one place only."""
+    yield scope.variables
+    yield expected.words if expected else ()
+    yield ["it"] * (scope.it is not None) + ["self"] * (scope.member is not None)
+    if scope.frame is not None:
+        yield from (scope.frame.model.slots, scope.frame.model.let, scope.frame.defines)
 
 
 def is_bare(resolver: Resolver, node: ast.Expr, scope: Scope) -> bool:
@@ -310,7 +316,7 @@ def _names_something(resolver: Resolver, word: str, scope: Scope) -> bool:
     frame = scope.frame
     if (
         word in scope.variables
-        or word in resolver.symbols.declared()
+        or word in resolver.symbols.declared
         or word in ("t", "W", "H", "self", "it", "cells")
     ):
         return True

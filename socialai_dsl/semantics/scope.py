@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema import CastMember, Frame, Scenario
@@ -125,6 +126,7 @@ class Symbols:
             return self.scenario.frames[called], ("frames", called)
         return None
 
+    @cached_property
     def declared(self) -> dict[str, str]:
         """Every name of the scenario and what it is: let, object, cast, define, memory, roles."""
         found = dict.fromkeys(self.scenario.let, "let")

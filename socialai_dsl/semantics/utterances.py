@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import islice, product
 from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
@@ -52,6 +52,8 @@ class Utterances:
         self._grammar = grammar
         self._pairs: dict[str, set[tuple[int, int]]] = {}
         self._written: dict[int, tuple[ast.Text, Span]] = {}
+        self._by_normal: dict[str, list[tuple[int, str]]] = {}
+        self._known_texts = 0
         for t, n in product(range(len(grammar.templates)), range(len(grammar.nouns))):
             self._pairs.setdefault(normal(grammar.utterance(t, n)), set()).add((t, n))
 
@@ -228,10 +230,20 @@ class Utterances:
 
     def _said_by_npcs(self, said: str) -> dict[str, int | None]:
         """The texts of NPCs that fit, each with the noun that stands for `<noun>`."""
+        known = self._npc_texts()
         if "<noun>" not in said:
-            return {text: None for text in self._resolver.npc_texts if normal(text) == normal(said)}
+            return {text: None for _, text in known.get(normal(said), ())}
         wanted = {normal(said.replace("<noun>", str(noun))): i for i, noun in enumerate(self._grammar.nouns)}
-        return {text: wanted[normal(text)] for text in self._resolver.npc_texts if normal(text) in wanted}
+        found = sorted((place, text, i) for like, i in wanted.items() for place, text in known.get(like, ()))
+        return {text: i for _, text, i in found}
+
+    def _npc_texts(self) -> dict[str, list[tuple[int, str]]]:
+        """What NPCs say, by what counts of it, with its place among all texts, to which others only are added."""
+        texts = self._resolver.npc_texts
+        for place, text in enumerate(islice(texts, self._known_texts, None), self._known_texts):
+            self._by_normal.setdefault(normal(text), []).append((place, text))
+        self._known_texts = len(texts)
+        return self._by_normal
 
     def noun_in(self, said: str) -> int | None:
         """The noun of what the grammar can say; None where it cannot, or the template has no place for a noun."""

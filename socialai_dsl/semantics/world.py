@@ -82,7 +82,7 @@ def _not_of_the_world(resolver: Resolver, word: str, path: DataPath) -> FailedEr
         message = f"`{word}` is a register of the frame `{frame}`, which only the frame itself sets"
         return resolver.findings.fail("S305", message, span, hint=cure)
     near = did_you_mean(word, scenario.state)
-    hint = None if near or word in resolver.symbols.declared() else f"declare it: `state: {{{word}: 0}}`"
+    hint = None if near or word in resolver.symbols.declared else f"declare it: `state: {{{word}: 0}}`"
     message = f"`{word}` is not declared in `state`"
     return resolver.findings.fail("S305", message, span, suggestion=near, hint=hint)
 

@@ -77,7 +77,7 @@ def _changed(seed: bytes, other: bytes, rng: random.Random) -> bytes:
     at = rng.randrange(len(seed) + 1)
     if rng.random() < 0.6 and (ends := [found.end() for found in re.finditer(rb"[ :,{\[\n]", seed)]):
         at = rng.choice(ends)  # where a word begins
-    match rng.randrange(10):
+    match rng.randrange(11):
         case 0 | 1:
             return seed[:at] + rng.choice(WORDS).encode("utf-8") + seed[at:]
         case 2:
@@ -108,6 +108,10 @@ def _changed(seed: bytes, other: bytes, rng: random.Random) -> bytes:
             )
             first = seed.find(b"\n") + 1
             return seed[:first] + f"{key}: {file}\n".encode() + seed[first:]
+        case 9 if numbers := list(re.finditer(rb"(?<![\w.])\d{1,4}(?![\w.]{2})", seed)):
+            number = rng.choice(numbers)
+            other_number = max(0, int(number.group()) + rng.choice((-1, 1)))
+            return seed[: number.start()] + str(other_number).encode() + seed[number.end() :]
         case _:
             word = rng.choice(WORDS).encode("utf-8")
             end = at + len(re.match(rb"[\w./<>+-]*", seed[at:])[0])  # type: ignore[index]

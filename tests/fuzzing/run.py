@@ -68,7 +68,7 @@ def fuzz(target: str, seconds: int, plant: str | None = None, seed: int = 1) -> 
     where = re.search(r"Test unit written to (\S+)", said)
     finding = None
     if done.returncode:
-        lines = re.findall(r"^\w[\w.]*(?:Error|Violation|Exception|Interrupt)\b.*", said, re.MULTILINE)
+        lines = re.findall(r"^[\w.]*(?:Error|Violation|Exception|Interrupt)\b.*", said, re.MULTILINE)
         finding = next(iter(lines), f"ended with {done.returncode}: {said[-500:]}")
     return Outcome(
         max(executions, default=0), max(edges, default=0), took, finding, where[1] if where else None

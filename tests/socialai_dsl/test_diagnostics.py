@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from socialai_dsl.diagnostics import (
     DiagnosticBag,
     ScenarioError,
     Severity,
+    bounded_suggestions,
     did_you_mean,
     printable,
     render_text,
@@ -168,3 +170,19 @@ def test_every_code_in_the_product_is_in_the_catalogue() -> None:
         for code in re.findall(r'"([SW]\d{3})"', file.read_text("utf-8"))
     }
     assert used - CODES.keys() == set()
+
+
+def test_suggestions_are_looked_for_with_a_fixed_effort() -> None:
+    looked_at = 0
+
+    def names() -> Iterator[str]:
+        nonlocal looked_at
+        for i in range(1_000_000):
+            looked_at += 1
+            yield f"value{i}"
+
+    with bounded_suggestions():
+        assert did_you_mean("valeu1", names()) == "value1"
+        assert looked_at < 100_000
+        assert did_you_mean("valeu1", ["value1"]) is None
+    assert did_you_mean("valeu1", ["value1"]) == "value1"

@@ -167,6 +167,22 @@ def test_a_member_misspelt_in_the_cast_gives_one_error(scenarios: Path) -> None:
     assert made >= 10
 
 
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [("{value: 0, range: 0..9}", "start"), ("{start: 0, bounds: 0..9}", "range"), ("{value: 0}", "start")],
+)
+def test_another_word_for_a_key_of_a_register_gives_one_error(
+    scenarios: Path, written: str, meant: str
+) -> None:
+    text = (scenarios / "talkitout.yaml").read_text(encoding="utf-8")
+    word = "bounds" if "bounds" in written else "value"
+    (scenarios / "r.yaml").write_text(text + f"\nstate: {{mood: {written}}}\n", encoding="utf-8")
+    (found,) = check("r.yaml").diagnostics
+    line = text.count("\n") + 2
+    assert (found.code, found.suggestion, found.span.line) == ("S101", meant, line)
+    assert found.span.column == len("state: {mood: ") + written.index(word) + 1
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
 def test_one_mistake_anywhere_gives_one_error(scenarios: Path, kind: Callable[[str], Iterator[Site]]) -> None:

@@ -176,6 +176,28 @@ def test_refused_properties_on_keys(text: str) -> None:
 
 
 @each_parser
+def test_many_tag_directives_are_refused_before_they_are_read() -> None:
+    text = "".join(f"%TAG !a{i}! x\n" for i in range(60_000)) + "---\na: 1\n"
+    with pytest.raises(ScenarioError) as raised:
+        reader.read_document(Source("f.yaml", "# first\n" + text))
+    (found,) = raised.value.diagnostics
+    assert (found.code, found.span.line, found.span.column) == ("S005", 2, 1)
+
+
+@pytest.mark.parametrize(("text", "column"), [("{?a: 1}", 3), ("[?x]", 3), ("{b: 1, ?'a': 2}", 9)])
+def test_a_question_mark_before_a_key_in_braces_is_refused(text: str, column: int) -> None:
+    """YAML 1.2 has it as a letter of the key; libyaml leaves it out."""
+    with pytest.raises(ScenarioError) as raised:
+        reader.read_document(Source("f.yaml", text))
+    (found,) = raised.value.diagnostics
+    assert (found.code, found.span.column) == ("S001", column)
+    assert reader.read_document(Source("f.yaml", "{'?a': 1, b?: 2, ? c: 3}")).data == {
+        "?a": 1,
+        "b?": 2,
+        "c": 3,
+    }
+
+
 def test_a_second_document_is_refused() -> None:
     assert findings("a: 1\n---\nb: 2\n")[0].startswith("f.yaml:2:1: S001 a file holds one document")
 
