@@ -31,7 +31,7 @@ EFFORT = ("misspelt names among many", "places in rooms of many sizes")
 def test_the_work_grows_with_the_scenario(name: str, place: Playground) -> None:
     """Functions called, which no load of the machine changes."""
     most = SCENARIOS[name].most
-    size = max(min(most // 20, 70), min(most // 2, 24))
+    size = max(min(most // 20, 40), min(most // 2, 24))
     assert work(name, 2 * size, place) < MOST * work(name, size, place)
 
 

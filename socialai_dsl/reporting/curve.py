@@ -20,6 +20,8 @@ _GREYS: Final = ("#8d939d", "#b3b7be", "#d3d6da", "#e6e7ea")
 # Blue and orange, which colour-blind people tell apart.
 _SUCCESSES: Final = ("#0072b2", "#569fcd", "#a3cce6")
 _FAILURES: Final = ("#d55e00", "#e88c47", "#f2b586", "#f8dac3")
+_PALETTES: Final = (_SUCCESSES, _FAILURES, _GREYS)
+"""The colours of each rank, see `_rank`."""
 
 
 @dataclass(frozen=True)
@@ -129,10 +131,6 @@ def _draw_success(axes: Axes, curve: Curve) -> None:
 _BESIDE: Final = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "reverse": True}
 
 
-_DRAWN: Final = 5
-"""Of successes, and of failures, at most so many areas; a suite has dozens of outcomes."""
-
-
 def draw_outcomes(
     axes: Axes,
     frames: Sequence[float] | NDArray[np.float64],
@@ -166,14 +164,18 @@ def draw_outcomes(
 def _few(
     shares: Mapping[str, NDArray[np.float64]], successes: frozenset[str]
 ) -> list[tuple[int, str, NDArray[np.float64]]]:
-    """Rank, name and share of what is drawn, in order: of successes and of failures the most frequent, and the rest."""
+    """Rank, name and share of what is drawn, in order: of each rank the most frequent, and the rest as one.
+
+    A suite has dozens of outcomes; each that is drawn has a colour of its own.
+    """
     drawn = []
-    for rank, called in enumerate(("successes", "failures", "ends")):
+    for rank, called in enumerate(("successes", "failures", "time-outs")):
         names = sorted(
             (name for name in shares if _rank(name, successes) == rank),
             key=lambda name: -float(np.mean(shares[name])),
         )
-        kept = names if len(names) <= _DRAWN else names[: _DRAWN - 1]
+        colours = len(_PALETTES[rank])
+        kept = names if len(names) <= colours else names[: colours - 1]
         drawn += [(rank, name, shares[name]) for name in kept]
         if rest := names[len(kept) :]:
             drawn.append(
@@ -184,14 +186,13 @@ def _few(
 
 def _rank(name: str, successes: frozenset[str]) -> int:
     """Successes first, time-outs last."""
-    return 0 if name in successes else 2 if name == "timeout" else 1
+    return 0 if name in successes else 2 if name.rpartition(": ")[2] == "timeout" else 1
 
 
 def _colours(ranks: Sequence[int]) -> list[str]:
-    palettes = (_SUCCESSES, _FAILURES, _GREYS)
     used = [0, 0, 0]
     colours = []
     for rank in ranks:
-        colours.append(palettes[rank][used[rank] % len(palettes[rank])])
+        colours.append(_PALETTES[rank][used[rank] % len(_PALETTES[rank])])
         used[rank] += 1
     return colours
