@@ -43,14 +43,15 @@ class Waiting:
                 to.block.emit(Op.LOAD, due, constant(1))
 
 
-def unless_due(to: Expressions, due: int, otherwise: Label) -> None:
-    """Fall through if the rules are due, from now on no longer, else skip.
+def begin_run(to: Expressions, due: int, otherwise: Label, always: bool) -> None:
+    """Fall through if the rules are due, or `always`, else skip; from now on they are not due.
 
     What has changed in this step is not noted yet.
     """
-    mark = to.block.taken
-    to.block.test(Op.IF_NE, to.into_temporary(Op.ADD, due, Register.CHANGED), constant(0), otherwise)
-    to.block.release(mark)
+    if not always:
+        mark = to.block.taken
+        to.block.test(Op.IF_NE, to.into_temporary(Op.ADD, due, Register.CHANGED), constant(0), otherwise)
+        to.block.release(mark)
     to.block.emit(Op.LOAD, due, constant(0))
 
 

@@ -9,7 +9,7 @@ from socialai_dsl.compiler.folding import FALSE, fold
 from socialai_dsl.compiler.homes import Homes
 from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.probes import NO_PROBES, Probes
-from socialai_dsl.compiler.waiting import Waiting, unless_due
+from socialai_dsl.compiler.waiting import Waiting, begin_run
 from socialai_dsl.program import Op
 from socialai_dsl.semantics.terms import BOOL, RulePlan
 
@@ -25,8 +25,10 @@ def world_rules(
     """Emit the rules top to bottom, and add their names to those that are counted."""
     for rules, due in waiting.runs:
         after = Label()
-        if due is not None and not probes.recording:  # to be told why a rule does not fire is to ask it
-            unless_due(to, due, after)
+        if due is not None:
+            begin_run(
+                to, due, after, always=probes.recording
+            )  # to be told why a rule does not fire is to ask it
         for rule in rules:
             counted.append(rule.name)
             if rule.when is not None and fold(rule.when.term, to.facts, to.classes) == FALSE:

@@ -79,6 +79,14 @@ def test_what_costs_little_to_ask_does_not_wait(tmp_path: Path) -> None:
     assert gates(pair(tmp_path, "rules: [{when: near.opened, set: {seen: seen + 1}}]").env.program) == 0
 
 
+def test_a_step_is_explained_whether_rules_wait_or_not(tmp_path: Path) -> None:
+    env = pair(tmp_path, AGAIN).env
+    env.reset(seed=0)
+    for act in (None, None, "toggle", None, None):
+        env.step(env.encode_action((act, None)))
+        env.explain()  # which plays the step again, and fails if it went another way
+
+
 def test_a_program_that_says_why_rules_do_not_fire_asks_them_all(tmp_path: Path) -> None:
     path = str(Folder(tmp_path).write("tiny", BOXES + AGAIN))
     checked = load(path).checked
