@@ -20,8 +20,8 @@ help: ## list the targets
 run: $(STAMP) ## train and evaluate the TalkItOut agent; more options in ARGS="--frames 50000"
 	$(BIN)/socialai-run scenarios/talkitout.yaml $(ARGS)
 
-test: $(STAMP) ## run the tests
-	$(BIN)/python -m pytest $(ARGS)
+test: $(STAMP) ## run the tests, on up to four cores at once
+	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile $(ARGS)
 
 test-long: $(STAMP) ## run the tests that take minutes
 	$(BIN)/python -m pytest -m slow $(ARGS)
