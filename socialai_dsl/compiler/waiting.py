@@ -74,5 +74,4 @@ def _values(rule: RulePlan) -> Iterator[Term]:
 
 def _is_long(rule: RulePlan) -> bool:
     """Whether to ask a rule takes longer than to ask whether it is due: it goes through a group."""
-    asked = [*_values(rule), *([] if rule.when is None else [rule.when.term])]
-    return any(isinstance(part, Quantified) for term in asked for part in walk(term))
+    return any(isinstance(part, Quantified) for part in walk(rule))

@@ -26,9 +26,8 @@ def world_rules(
     for rules, due in waiting.runs:
         after = Label()
         if due is not None:
-            begin_run(
-                to, due, after, always=probes.recording
-            )  # to be told why a rule does not fire is to ask it
+            # To be told why a rule does not fire is to ask it.
+            begin_run(to, due, after, always=probes.recording)
         for rule in rules:
             counted.append(rule.name)
             if rule.when is not None and fold(rule.when.term, to.facts, to.classes) == FALSE:

@@ -150,12 +150,12 @@ def draw_outcomes(
     shares = {name: values for name, values in shares.items() if np.nanmax(values, initial=0.0) > 0}
     if not shares:
         return
-    ranked = _few({name: np.nan_to_num(values) for name, values in shares.items()}, successes)
+    drawn = _few({name: np.nan_to_num(values) for name, values in shares.items()}, successes)
     axes.stackplot(
         frames,
-        [values for _, _, values in ranked],
-        colors=_colours([rank for rank, _, _ in ranked]),
-        labels=[name for _, name, _ in ranked],
+        [values for _, _, values in drawn],
+        colors=[colour for colour, _, _ in drawn],
+        labels=[name for _, name, _ in drawn],
         linewidth=0,
     )
     axes.legend(fontsize=7, frameon=False, **legend)
@@ -163,36 +163,26 @@ def draw_outcomes(
 
 def _few(
     shares: Mapping[str, NDArray[np.float64]], successes: frozenset[str]
-) -> list[tuple[int, str, NDArray[np.float64]]]:
-    """Rank, name and share of what is drawn, in order: of each rank the most frequent, and the rest as one.
+) -> list[tuple[str, str, NDArray[np.float64]]]:
+    """Colour, name and share of what is drawn, in order: of each rank the most frequent, and the rest as one.
 
     A suite has dozens of outcomes; each that is drawn has a colour of its own.
     """
-    drawn = []
+    drawn: list[tuple[str, str, NDArray[np.float64]]] = []
     for rank, called in enumerate(("successes", "failures", "time-outs")):
         names = sorted(
             (name for name in shares if _rank(name, successes) == rank),
             key=lambda name: -float(np.mean(shares[name])),
         )
-        colours = len(_PALETTES[rank])
-        kept = names if len(names) <= colours else names[: colours - 1]
-        drawn += [(rank, name, shares[name]) for name in kept]
-        if rest := names[len(kept) :]:
-            drawn.append(
-                (rank, f"{len(rest)} more {called}", np.sum([shares[name] for name in rest], axis=0))
-            )
+        palette = _PALETTES[rank]
+        alone = len(names) if len(names) <= len(palette) else len(palette) - 1
+        drawn += [(colour, name, shares[name]) for colour, name in zip(palette, names[:alone], strict=False)]
+        if rest := names[alone:]:
+            together = np.sum([shares[name] for name in rest], axis=0)
+            drawn.append((palette[alone], f"{len(rest)} more {called}", together))
     return drawn
 
 
 def _rank(name: str, successes: frozenset[str]) -> int:
     """Successes first, time-outs last."""
     return 0 if name in successes else 2 if name.rpartition(": ")[2] == "timeout" else 1
-
-
-def _colours(ranks: Sequence[int]) -> list[str]:
-    used = [0, 0, 0]
-    colours = []
-    for rank in ranks:
-        colours.append(_PALETTES[rank][used[rank] % len(_PALETTES[rank])])
-        used[rank] += 1
-    return colours

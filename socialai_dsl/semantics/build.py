@@ -23,6 +23,8 @@ from socialai_dsl.semantics.terms import (
 
 TRUE = Const(BOOL, 1)
 FALSE = Const(BOOL, 0)
+NOTED = "prev."
+"""How the registers begin that `prev` notes values in."""
 
 
 def integer(low: int, high: int | None = None) -> Type:
@@ -163,7 +165,7 @@ def may_find_nothing(term: Term) -> bool:
             return True
         if isinstance(part, Quantified) and part.op in ("first", "pick", "nearest"):
             return True
-        if isinstance(part, Read) and part.path.startswith("prev."):
+        if isinstance(part, Read) and part.path.startswith(NOTED):
             return True
     return False
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import alternatives, resolve_names
+from socialai_dsl.semantics.build import NOTED
 from socialai_dsl.semantics.findings import FailedError, Scalar
 from socialai_dsl.semantics.scope import Scope
 from socialai_dsl.semantics.terms import Const, Drawn, Read, Sited, Term, Type
@@ -87,7 +88,7 @@ class Registers:
         """A register that takes a value at the start of every step."""
         known = next((drawn for drawn in self.remembered if drawn.value.term == value.term), None)
         if known is None:
-            known = Drawn(f"prev.{len(self.remembered)}", value.term.type, value)
+            known = Drawn(f"{NOTED}{len(self.remembered)}", value.term.type, value)
             self.remembered.append(known)
         return Read(known.type, known.path)
 

@@ -7,9 +7,9 @@ from collections.abc import Hashable, Iterator, Sequence
 from heapq import merge
 from itertools import product
 
-from socialai_dsl.semantics.build import walk
+from socialai_dsl.semantics.build import draws, walk
 from socialai_dsl.semantics.findings import Findings
-from socialai_dsl.semantics.terms import Chance, Const, FramePlan, Logic, Quantified, RulePlan, Term
+from socialai_dsl.semantics.terms import Chance, Const, FramePlan, Logic, RulePlan, Term
 
 _FEW = 64
 """Utterances, up to which a rule is found by them."""
@@ -103,7 +103,4 @@ def _conjuncts(term: Term) -> tuple[Term, ...]:
 
 
 def _draws(term: Term) -> bool:
-    return any(
-        isinstance(part, Chance) or (isinstance(part, Quantified) and part.op == "pick")
-        for part in walk(term)
-    )
+    return draws(term) or any(isinstance(part, Chance) for part in walk(term))
