@@ -9,6 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from trainer.crew import SOLO, Crew
 from trainer.distinct import DistinctRows, Int64, content_ids, history_lengths, prefix_tree
 from trainer.errors import ObservationError
 from trainer.nets import ActorCritic
@@ -49,7 +50,11 @@ class Actor:
 
     @torch.no_grad()
     def see(
-        self, images: NDArray[np.uint8], tokens: NDArray[np.int16], ids: tuple[Int64, Int64] | None = None
+        self,
+        images: NDArray[np.uint8],
+        tokens: NDArray[np.int16],
+        ids: tuple[Int64, Int64] | None = None,
+        crew: Crew = SOLO,
     ) -> tuple[Int64, Tensor]:
         """Take in one observation of every environment.
 
@@ -57,6 +62,7 @@ class Actor:
             images: uint8 (E, H, W, C).
             tokens: int16 (E, L), 0-padded.
             ids: 64-bit ids of the images and of the histories, int64 (E,) each; made from the content if absent.
+            crew: who computes the features.
 
         Returns:
             int64 (E,) row of `pairs` of every environment, and their features (E, F).
@@ -77,18 +83,27 @@ class Actor:
         pairs = np.stack((image_rows, history_rows), 1)
         rows, fresh = self.pairs.add(image_rows << 32 | history_rows, pairs)
         if len(fresh):
-            self._perceive(pairs[fresh])
+            self._perceive(pairs[fresh], crew)
         return rows, self._features[torch.from_numpy(rows).to(self.device)]
 
-    def _perceive(self, pairs: Int64) -> None:
+    def _perceive(self, pairs: Int64, crew: Crew) -> None:
         """Compute the features of the pairs last added."""
-        image_rows, image_index = np.unique(pairs[:, 0], return_inverse=True)
-        history_rows, text_index = np.unique(pairs[:, 1], return_inverse=True)
-        prepared = self.net.prepare(self._move(self.images.data[image_rows]))
-        texts = self._texts[self._move(history_rows)]
-        features = self.net.perceive(prepared, texts, self._move(image_index), self._move(text_index))
-        self._features = _with_room(self._features, self.pairs.size)
-        self._features[self.pairs.size - len(pairs) : self.pairs.size] = features
+        begin, self._features = self.pairs.size - len(pairs), _with_room(self._features, self.pairs.size)
+        # Those of an image lie together, so that few images are in two shares.
+        order = torch.from_numpy(np.argsort(pairs[:, 0], kind="stable"))
+
+        @torch.no_grad()
+        def perceive(share: Tensor) -> None:
+            chosen = pairs[share.numpy()]
+            image_rows, image_index = np.unique(chosen[:, 0], return_inverse=True)
+            history_rows, text_index = np.unique(chosen[:, 1], return_inverse=True)
+            prepared = self.net.prepare(self._move(self.images.data[image_rows]))
+            texts = self._texts[self._move(history_rows)]
+            features = self.net.perceive(prepared, texts, self._move(image_index), self._move(text_index))
+            self._features[begin + share.to(self.device)] = features
+
+        shared = self.net.shared_from is not None and len(pairs) >= self.net.shared_from
+        crew.map(perceive, crew.shares(order) if shared else [order])
 
     def _read(self, tokens: NDArray[np.int16]) -> NDArray[np.int16]:
         """The engine's tokens, once checked, as the words the network knows."""

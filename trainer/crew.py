@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
-from typing import Self, TypeVar
+from typing import Final, Self, TypeVar
 
 import torch
 from torch import Tensor
@@ -102,3 +102,7 @@ class Crew:
             if error is not None:
                 raise error
         return [result, *(future.result() for future in futures)]
+
+
+SOLO: Final = Crew(1)
+"""Nobody but the caller, who uses as many threads inside each operation as torch does."""

@@ -14,6 +14,7 @@ from trainer import actions as heads
 from trainer.actor import Actor
 from trainer.bonus import Bonus
 from trainer.config import TrainConfig
+from trainer.crew import SOLO, Crew
 from trainer.curricula import Tutor
 from trainer.distinct import Int64
 from trainer.errors import TrainingStopped
@@ -123,6 +124,7 @@ def collect(
     bonus: Bonus | None,
     tutor: Tutor | None = None,
     team: Team = ALONE,
+    crew: Crew = SOLO,
 ) -> Rollout:
     """Play `config.horizon` steps in every environment of this process; `state` is advanced in place.
 
@@ -139,7 +141,7 @@ def collect(
     logits = torch.empty_like(noise)
     actor.begin()
     with torch.no_grad():
-        rows, features = actor.see(state.image, state.tokens, _ids(envs))
+        rows, features = actor.see(state.image, state.tokens, _ids(envs), crew)
         for t in range(config.horizon):
             rollout.pair_rows[t] = rows
             _note_starts(rollout, state, t)
@@ -149,7 +151,7 @@ def collect(
             logits[t], rollout.values[t] = net.heads(state.memory[0])
             rollout.actions[t] = heads.choose(logits[t] + noise[t], sizes)
             observation = _step(actor, envs, state, config, bonus, tutor, rollout, t)
-            rows, features = actor.see(observation["image"], observation["tokens"], _ids(envs))
+            rows, features = actor.see(observation["image"], observation["tokens"], _ids(envs), crew)
         state.image, state.tokens = observation["image"].copy(), observation["tokens"].copy()
         kept = torch.from_numpy(~state.starts).to(actor.device)[:, None]
         rollout.next_value.copy_(net.heads(net.memory.step(features, state.memory * kept)[0])[1])

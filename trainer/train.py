@@ -138,6 +138,7 @@ def _loop(
             session.bonus,
             session.tutor,
             team,
+            crew,
         )
         losses = _learn(session, rollout, crew)
         _check(session, losses)

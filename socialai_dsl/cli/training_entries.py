@@ -125,7 +125,14 @@ def own_updates(config: TrainConfig, envs: Any, every_frame: bool) -> Iterator[U
         while True:
             began = time.perf_counter()
             rollout = collect(
-                session.actor, envs, session.state, config, session.generator, session.bonus, session.tutor
+                session.actor,
+                envs,
+                session.state,
+                config,
+                session.generator,
+                session.bonus,
+                session.tutor,
+                crew=crew,
             )
             seconds = time.perf_counter() - began
             learn(session.actor, session.optimizer, rollout, config, session.generator, crew)

@@ -6,14 +6,17 @@ import textwrap
 import threading
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
 
 from tests.trainer.fake_envs import EchoEnvs
+from trainer.actor import Actor
 from trainer.crew import Crew, available_cores, keep_freed_memory
+from trainer.nets import build_net
 from trainer.ppo import update
 from trainer.rollout import collect
-from trainer.session import Session
+from trainer.session import Session, net_spec
 
 
 def test_results_come_in_order_from_as_many_threads_as_items() -> None:
@@ -81,6 +84,21 @@ def test_shared_updates_are_those_of_one_thread(net: str, loss: str, small_confi
     assert (one - two).norm() < 1e-3 * one.norm()
     assert torch.equal(two, again), "the result depends on the threads' timing"
     assert statistics[0] == pytest.approx(statistics[1], rel=1e-3, abs=1e-5)
+
+
+def test_threads_that_share_a_step_see_what_one_sees() -> None:
+    envs = EchoEnvs(96, chatter=0.5, length=8)
+    net = build_net("paper", net_spec(envs), 0)
+    alone, shared = Actor(net, 8), Actor(net, 8)
+    observation, _ = envs.reset(seed=0)
+    generator = np.random.default_rng(0)
+    images = generator.integers(0, 2, observation["image"].shape).astype(np.uint8)
+    with Crew(2) as crew:
+        rows, features = alone.see(images, observation["tokens"])
+        same_rows, same = shared.see(images, observation["tokens"], crew=crew)
+    assert alone.pairs.size >= (net.shared_from or 0)
+    assert (rows == same_rows).all()
+    torch.testing.assert_close(features, same, rtol=1e-3, atol=1e-4)
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="asks Linux for its count of page faults")

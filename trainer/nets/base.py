@@ -111,6 +111,8 @@ class ActorCritic(nn.Module, ABC):
         distinct: whether equal frames may share their features; False for networks whose features depend on the
             rest of the batch.
         reducible: whether the network can do the bulk of its arithmetic in bfloat16.
+        shared_from: new frames from which on threads share a step while acting, None for never. Handing a share over
+            costs as much as a few dozen small operations.
         precision: number type of that bulk; all that is stored, and everything else, is float32.
         word_rows: the parameters that have a row for each word, by which an agent keeps what it knows of words in
             another vocabulary.
@@ -119,6 +121,7 @@ class ActorCritic(nn.Module, ABC):
 
     distinct = True
     reducible = False
+    shared_from: int | None = None
     precision: Precision = "float32"
     word_rows: tuple[str, ...] = ("dialogue.embedding.weight",)
     reader_class: type[Reader] = Reader

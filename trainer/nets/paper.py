@@ -86,6 +86,7 @@ class PaperNet(ActorCritic):
 
     batch_norm = False
     reducible = True
+    shared_from = 64
 
     def __init__(self, spec: NetSpec, width: int = 128) -> None:
         words = max(len(self.reader_class(spec.vocabulary).words), LetterReader.CAPACITY)
@@ -122,30 +123,27 @@ class PaperNet(ActorCritic):
     def perceive(self, prepared: Tensor, text: Tensor, image_index: Tensor, text_index: Tensor) -> Tensor:
         """Features (P, width) of the pairs; see `ActorCritic.perceive`."""
         if self.fused:
-            hidden = self._perceive_fused(prepared, text, image_index, text_index)
-        else:
-            number = torch.bfloat16 if self.precision == "bfloat16" else text.dtype
-            hidden = self.image_conv(prepared.to(number)).index_select(0, image_index)
-            for block in self.blocks:
-                hidden = block(hidden, text, text_index)
+            return torch.relu(self._perceive_fused(prepared, text, image_index, text_index))
+        number = torch.bfloat16 if self.precision == "bfloat16" else text.dtype
+        hidden = self.image_conv(prepared.to(number)).index_select(0, image_index)
+        for block in self.blocks:
+            hidden = block(hidden, text, text_index)
         pooled = functional.max_pool2d(hidden, tuple(hidden.shape[2:]))
         return torch.relu(pooled.flatten(1)).to(text.dtype)
 
     def _perceive_fused(
         self, prepared: Tensor, text: Tensor, image_index: Tensor, text_index: Tensor
     ) -> Tensor:
-        """Images after the last block, channels first, given `fused.surroundings` of the images."""
+        """Features before the last rectifier, float32, given `fused.surroundings` of the images."""
         first, second = (part for part in self.image_conv if isinstance(part, _Conv))
-        seen = torch.relu(
-            functional.linear(prepared, first.weight.flatten(1).bfloat16(), first.bias.bfloat16())
-        )
+        seen = fused.FirstConvolution.apply(prepared, first.weight, first.bias)  # type: ignore[no-untyped-call]
         matrices = second.filters(*seen.shape[1:3])
         hidden = fused.Convolution.apply(seen, second.weight, second.bias, matrices)  # type: ignore[no-untyped-call]
         hidden = fused.Chosen.apply(hidden, image_index)  # type: ignore[no-untyped-call]
         for block in cast(Iterable[_FilmBlock], self.blocks):
             hidden = block.fused(hidden, text, text_index)
-        channels_first: Tensor = hidden.permute(0, 3, 1, 2)
-        return channels_first
+        peaks: Tensor = fused.Peaks.apply(hidden)  # type: ignore[no-untyped-call]
+        return peaks
 
 
 class PaperReferenceNet(PaperNet):

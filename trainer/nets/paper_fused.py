@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
@@ -29,13 +31,13 @@ class Filters:
     """
 
     def __init__(self) -> None:
-        self._made: tuple[Plan, Tensor, Tensor] | None = None
+        self._made: tuple[Plan, NDArray[np.float32], Tensor] | None = None
 
     def of(self, weight: Tensor, height: int, width: int) -> Tensor:
         """`Plan.filters` in bfloat16 for images of this size."""
         plan, made = Plan.of(height, width), self._made
-        if made is None or made[0] is not plan or not torch.equal(made[1], weight):
-            self._made = made = (plan, weight.detach().clone(), plan.filters(weight).bfloat16())
+        if made is None or made[0] is not plan or not np.array_equal(made[1], weight.detach().numpy()):
+            self._made = made = (plan, weight.detach().clone().numpy(), plan.filters(weight).bfloat16())
         return made[2]
 
 
@@ -51,17 +53,41 @@ def surroundings(images: Tensor) -> Tensor:
     channels_first = images.permute(0, 3, 1, 2).float()
     columns = functional.unfold(channels_first, 3, padding=1).transpose(1, 2)
     seen = columns.bfloat16().view(*images.shape[:3], -1)
-    return functional.pad(seen, (0, 0) * 3 + (0, -len(seen) % winograd.GRAIN))
+    return functional.pad(seen, (0, 0) * 3 + (0, winograd.roomy(len(seen)) - len(seen)))
 
 
-def first_convolution(seen: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
-    """The first convolution, rectified, (J, H, W, D), of `surroundings`.
+class FirstConvolution(torch.autograd.Function):
+    """The first convolution and a rectifier, given `surroundings`, weights and bias.
 
     It is computed by blocks, because the products of every number of images that ever occurs are compiled and kept.
     """
-    matrix, offset = weight.flatten(1).bfloat16(), bias.bfloat16()
-    blocks = [functional.linear(block, matrix, offset) for block in torch.split(seen, winograd.BLOCK)]
-    return torch.relu(torch.cat(blocks))
+
+    @staticmethod
+    def forward(ctx: Any, seen: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
+        """What is seen, (J, H, W, 9 * C), to images (J, H, W, D)."""
+        outputs = seen.new_empty(*seen.shape[:3], len(weight))
+        matrix, offset = weight.flatten(1).bfloat16().t(), bias.bfloat16()
+        for given, made in zip(_rows(seen), _rows(outputs), strict=True):
+            torch.addmm(offset, given, matrix, out=made).relu_()
+        ctx.save_for_backward(seen, outputs)
+        ctx.shape = weight.shape
+        return outputs
+
+    @staticmethod
+    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor | None, ...]:
+        """Gradients for what `forward` takes; none for what is seen."""
+        seen, outputs = ctx.saved_tensors
+        d_weight, d_bias = torch.zeros(len(grad[0, 0, 0]), seen.shape[3]), torch.zeros(grad.shape[3])
+        for given, made, slopes in zip(_rows(seen), _rows(outputs), _rows(grad.contiguous()), strict=True):
+            passed = torch.ops.aten.threshold_backward(slopes, made, 0)
+            d_weight += passed.t() @ given
+            d_bias += passed.sum(0, dtype=torch.float32)
+        return None, d_weight.view(ctx.shape), d_bias
+
+
+def _rows(images: Tensor) -> list[Tensor]:
+    """The cells of images, (N * H * W, C), by blocks of images."""
+    return [block.flatten(0, 2) for block in torch.split(images, winograd.BLOCK)]
 
 
 class Convolution(torch.autograd.Function):
@@ -149,3 +175,23 @@ class Chosen(torch.autograd.Function):
         total = torch.zeros(ctx.shape)
         kernels.add_up(as_u16(grad.contiguous()), index.numpy(), total.numpy())
         return total.bfloat16(), None
+
+
+class Peaks(torch.autograd.Function):
+    """Max pooling over whole images: of cells that are equal the first has the gradient."""
+
+    @staticmethod
+    def forward(ctx: Any, images: Tensor) -> Tensor:
+        """Images (N, H, W, C) to float32 (N, C)."""
+        values = torch.empty(len(images), images.shape[3])
+        cells = np.empty(values.shape, np.uint16)
+        kernels.peaks(as_u16(images), values.numpy(), cells)
+        ctx.cells, ctx.shape = cells, images.shape
+        return values
+
+    @staticmethod
+    def backward(ctx: Any, grad: Tensor) -> Tensor:
+        """Gradient for the images."""
+        images = torch.empty(ctx.shape, dtype=torch.bfloat16)
+        kernels.peaks_backward(grad.contiguous().numpy(), ctx.cells, as_u16(images))
+        return images

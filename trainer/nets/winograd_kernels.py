@@ -293,3 +293,38 @@ def add_up(grads: U16, index: I64, total: F32) -> None:
                     into = total[index[n], y, x, start : start + LANES]
                     for c in range(LANES):
                         into[c] += _widened(grad[c])
+
+
+@_compiled
+def peaks(images: U16, values: F32, cells: U16) -> None:
+    """Write each channel's highest number and the first cell that has it, (N, C) both; NaN is above all numbers.
+
+    Images are (N, H, W, C) of at most 65,536 cells.
+    """
+    count, height, width, channels = images.shape
+    for n in range(count):
+        for start in range(0, channels, LANES):
+            best, where = values[n, start : start + LANES], cells[n, start : start + LANES]
+            best[:], where[:] = -np.inf, 0
+            for y in range(height):
+                for x in range(width):
+                    source, cell = images[n, y, x, start : start + LANES], np.uint16(y * width + x)
+                    for c in range(LANES):
+                        value = _widened(source[c])
+                        higher = value > best[c] or value != value
+                        where[c] = cell if higher else where[c]
+                        best[c] = value if higher else best[c]
+
+
+@_compiled
+def peaks_backward(grads: F32, cells: U16, images: U16) -> None:
+    """Write the gradient of `peaks` for its images; `grads` is that of its values."""
+    count, height, width, channels = images.shape
+    for n in range(count):
+        for start in range(0, channels, LANES):
+            grad, where = grads[n, start : start + LANES], cells[n, start : start + LANES]
+            for y in range(height):
+                for x in range(width):
+                    target, cell = images[n, y, x, start : start + LANES], np.uint16(y * width + x)
+                    for c in range(LANES):
+                        target[c] = _narrowed(grad[c] if where[c] == cell else np.float32(0))
