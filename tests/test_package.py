@@ -55,10 +55,12 @@ def test_a_wheel_carries_the_scenarios_and_the_data_files(tmp_path: Path) -> Non
     assert sources
     for path in sources:
         assert f"socialai_dsl/scenarios/{path.relative_to(ROOT / 'scenarios')}" in names
+    for path in (ROOT / "experiments").glob("*.yaml"):
+        assert f"socialai_dsl/experiments/shipped/{path.name}" in names
     for path in (ROOT / "docs" / "diagnostics").glob("*.md"):
         assert f"socialai_dsl/pages/{path.name}" in names
     for package in ("socialai_dsl", "trainer"):
         for path in (ROOT / package).rglob("*"):
-            if path.is_file() and path.suffix != ".pyc":
+            if path.is_file() and "__pycache__" not in path.parts:
                 assert str(path.relative_to(ROOT)) in names
     assert not [name for name in names if name.startswith(("tests/", "runs/", "benchmarks/"))]

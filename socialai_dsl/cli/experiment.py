@@ -41,7 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_file(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help="an experiment's file, or its folder once it was run")
+    parser.add_argument(
+        "file",
+        metavar="FILE",
+        help="an experiment's file, the name of a shipped one, or its folder once it was run",
+    )
     parser.add_argument("--profile", metavar="NAME", help="a profile of the file (default: as the file says)")
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="the experiment's folder (default: runs/experiments/NAME)"
@@ -143,6 +147,7 @@ def _document(arguments: argparse.Namespace) -> tuple[dict[str, Any], Path]:
     """What is to be run, and the folder for it."""
     from socialai_dsl.experiments.document import document_of
     from socialai_dsl.frontend import load_experiment
+    from socialai_dsl.loader.names import looks_like_path, shipped_experiments
 
     given = Path(arguments.file)
     if given.is_dir():
@@ -151,7 +156,14 @@ def _document(arguments: argparse.Namespace) -> tuple[dict[str, Any], Path]:
                 f"{given} is a folder, which says itself what is run; --out and --profile are for files"
             )
         return _kept(given), given
-    loaded = load_experiment(arguments.file)
+    if not given.exists() and not looks_like_path(arguments.file):
+        shipped = shipped_experiments()
+        if arguments.file not in shipped:
+            near = did_you_mean(arguments.file, shipped)
+            hint = f"did you mean {near}?" if near else f"those that are shipped are {', '.join(shipped)}"
+            raise UsageError(f"there is no experiment {arguments.file!r}; {hint}")
+        given = shipped[arguments.file]
+    loaded = load_experiment(given)
     profile = _profile(loaded, arguments.profile)
     document = document_of(loaded, profile)
     name = document["name"]

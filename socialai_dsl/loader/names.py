@@ -48,6 +48,14 @@ def shipped_folder() -> Path:
     return installed if installed.is_dir() else package.parent / "scenarios"
 
 
+def shipped_experiments() -> dict[str, Path]:
+    """The files of the experiments that come with the product, by name."""
+    package = Path(__file__).resolve().parent.parent
+    installed = package / "experiments" / "shipped"
+    folder = installed if installed.is_dir() else package.parent / "experiments"
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+
+
 def looks_like_path(text: str) -> bool:
     """Whether a name is meant as a file rather than as a shipped scenario."""
     return "/" in text or "\\" in text or text.endswith(SUFFIXES)

@@ -107,6 +107,17 @@ def test_wrong_usage(file: Path, capsys: Capture, words: list[str], said: str) -
     assert not (file.parent / "runs" / "experiments" / "tiny" / "runs").exists() or words[0] == "run"
 
 
+def test_shipped_experiments_have_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(estimate, "_cache_file", lambda: tmp_path / "speeds.json")
+    assert main(["experiment", "plan", "case_studies", "--profile", "smoke"]) == 0
+    assert "CoinThief" in capsys.readouterr().out
+    assert main(["experiment", "plan", "case_study"]) == 2
+    assert "there is no experiment 'case_study'; did you mean case_studies?" in capsys.readouterr().err
+
+
 def test_a_file_with_mistakes(file: Path, capsys: Capture) -> None:
     file.write_text(TINY.replace("envs: 4", "env: 4"))
     assert main(["experiment", "run", str(file)]) == 1
