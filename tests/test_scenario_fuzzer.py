@@ -8,6 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import socialai_dsl as sd
+from socialai_dsl.compiler.intervals import Ranges
+from socialai_dsl.envs.audit import first_unsound
 from socialai_dsl.frontend import load
 from tests.agreement import Pair
 from tests.scenario_fuzzer import write
@@ -34,6 +37,47 @@ def test_random_scenarios_agree(tmp_path: Path, first: int) -> None:
 def test_ten_thousand_random_scenarios_agree(tmp_path: Path, first: int) -> None:
     for seed in range(first, first + 500):
         compare(tmp_path, seed, episodes=2)
+
+
+def play_within(folder: Path, seed: int, steps: int) -> int:
+    """Play the program of a seed's scenario, and find every register within what was proven of it; how many moved."""
+    path = folder / f"random_{seed}.yaml"
+    path.write_text(write(seed), encoding="utf-8")
+    envs = sd.make_vec(str(path), num_envs=8)
+    envs.action_space.seed(seed)
+    envs.reset(seed=seed)
+    (program,), state = envs.programs, envs._table.state
+    low, high = np.array(Ranges.of(program).of_register).T
+    least = most = state.registers[:, : len(low)].copy()
+    for step in range(steps):
+        envs.step(envs.action_space.sample())
+        values = state.registers[:, : len(low)]
+        least, most = np.minimum(least, values), np.maximum(most, values)
+        if step % 10 == 9:
+            assert (unsound := first_unsound(program, state.registers)) is None, f"seed {seed}: {unsound}"
+    outside = np.flatnonzero((least < low).any(axis=0) | (most > high).any(axis=0))
+    envs.close()
+    assert not len(outside), (
+        f"seed {seed}: register {outside[0]} was {least[:, outside[0]].min()} to {most[:, outside[0]].max()}, "
+        f"proven {low[outside[0]]} to {high[outside[0]]}"
+    )
+    return int((least != most).any(axis=0).sum())
+
+
+def test_registers_stay_within_the_proven_intervals(tmp_path: Path) -> None:
+    moved = [play_within(tmp_path, seed, steps=40) for seed in range(100_000, 100_030)]
+    assert min(moved) > 1, "hardly anything happened"
+    assert sum(moved) > 30 * 10, "hardly anything happened"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("first", range(200_000, 210_000, 500))
+def test_registers_of_ten_thousand_programs_stay_within_the_proven_intervals(
+    tmp_path: Path, first: int
+) -> None:
+    for seed in range(first, first + 500):
+        play_within(tmp_path, seed, steps=40)
 
 
 def test_a_seed_makes_one_scenario() -> None:
