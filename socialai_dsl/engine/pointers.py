@@ -7,7 +7,6 @@ outside its row.
 """
 
 import operator
-from collections.abc import Sequence
 from typing import Any, Final, Generic, TypeVar
 
 import numpy as np
@@ -60,7 +59,7 @@ def _pointers_to(dtype: Any) -> Any:
     @intrinsic
     def pointer(context: Any, book: Any, which: Any, row: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            entries = context.make_array(book)(context, builder, arguments[0]).data
+            entries = arguments[0]
             first = builder.shl(arguments[1], arguments[1].type(1))
             address = builder.load(builder.gep(entries, [first]))
             stride = builder.load(builder.gep(entries, [builder.add(first, first.type(1))]))
@@ -85,19 +84,6 @@ bytes_of, int16_of, uint16_of, int32_of, uint32_of, int64_of, uint64_of, float64
     _guarded if config.DISABLE_JIT else _pointers_to(kind) for kind in _TYPES
 )
 """`int16_of(book, which, row)` and so on: a pointer to a row of an array of two dimensions, or into one of one."""
-
-
-def make_book(arrays: Sequence[NDArray[Any]]) -> Any:
-    """The arrays in the form that compiled code takes: int64, address and bytes of a row of each in turn.
-
-    The arrays must live, and stay where they are, as long as the book is used.
-    """
-    if config.DISABLE_JIT:
-        return list(arrays)
-    assert all(array.flags.c_contiguous for array in arrays), "internal: arrays of a book are contiguous"
-    return np.array(
-        [number for array in arrays for number in (array.ctypes.data, array.strides[0])], np.int64
-    )
 
 
 @infer_global(operator.getitem)

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from socialai_dsl.engine.boards import is_deadly
+from socialai_dsl.engine.calls import TERMINATED, TRUNCATED
 from socialai_dsl.engine.entities import field
 from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.picture import take_picture
@@ -24,9 +25,6 @@ from socialai_dsl.engine.turns import (
 )
 from socialai_dsl.engine.vm import run
 from socialai_dsl.program import Field, Flag, FrameColumn, Header, Register
-
-TERMINATED = 1
-TRUNCATED = 2
 
 
 @inline

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from socialai_dsl.draws import GOLDEN, MASK, below, draw, episode_key, mix, site
 from socialai_dsl.engine.batch import Batch
-from socialai_dsl.engine.kernel import BAD_ACTION, Task
+from socialai_dsl.engine.calls import BAD_ACTION, Task
 from socialai_dsl.engine.state import PIN_NONE, Key
 from socialai_dsl.envs import snapshot
 from socialai_dsl.envs.audit import first_unsound
