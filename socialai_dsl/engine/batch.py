@@ -92,7 +92,9 @@ class Batch:
         headers = [part.words for part in parts]
         registers = max(int(words[Header.REGISTERS]) for words in headers)
         board = max(
-            int(words[Header.CANVAS_WIDTH] * words[Header.CANVAS_HEIGHT] + 1 + words[Header.CANVAS_HEIGHT])
+            int(
+                words[Header.CANVAS_WIDTH] * words[Header.CANVAS_HEIGHT] + 1 + 2 * words[Header.CANVAS_HEIGHT]
+            )
             for words in headers
         )
         words, views, self.offsets, self.first_counters = _link(parts)

@@ -1,7 +1,7 @@
 """Compiled code on disk: private to the user, and never older than the package's sources.
 
 The folder is named by a digest of all sources of the engine, the versions, the processor and the settings that shape
-the code. Entries end with a digest of name and content: a damaged one, or another's, is never loaded but compiled again.
+the code. Entries end with a digest of name and content: what is damaged, or another's, is compiled again instead.
 """
 
 import hashlib

@@ -7,15 +7,11 @@ and lights the three cells before it in the next row.
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.engine.boards import built_opaque_line, type_row
-from socialai_dsl.engine.entities import field, is_present, step_x, step_y
+from socialai_dsl.engine.boards import is_opaque, note_opaque, opaque_line
+from socialai_dsl.engine.entities import step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.sets import add_cell, drop_cell, get_line, set_line
-from socialai_dsl.engine.state import FRONT, ONE, ZERO, Row
-from socialai_dsl.program import VIEW, Field, Header, TypeColumn
-
-OPAQUE = FRONT
-"""The board of `look_around`: cells that one cannot look through. Paths use it too."""
+from socialai_dsl.engine.state import ONE, RESETTING, ZERO, Row
+from socialai_dsl.program import VIEW, Header, Register
 
 _HALF = VIEW // 2
 _ROW = np.int64((1 << VIEW) - 1)
@@ -41,16 +37,9 @@ _PAIRS = np.uint64(0x0000FFFF0000FFFF)
 
 @inline
 def look_around(row: Row) -> None:
-    """Note where one cannot look through; `light_next` and `lit_cells` read it."""
-    for y in range(row.program[Header.CANVAS_HEIGHT]):
-        set_line(row, OPAQUE, y, built_opaque_line(row, y))
-    first = row.program[Header.NPCS] + 1
-    for entity in range(first, row.program[Header.ENTITIES]):  # what is furnished is not as it was built
-        if is_present(row, entity):
-            drop_cell(row, OPAQUE, field(row, entity, Field.X), field(row, entity, Field.Y))
-    for entity in range(first, row.program[Header.ENTITIES]):
-        if is_present(row, entity) and row.program[type_row(row, entity) + TypeColumn.TRANSPARENT] == 0:
-            add_cell(row, OPAQUE, field(row, entity, Field.X), field(row, entity, Field.Y))
+    """Called before anybody asks what is opaque or lit: while reset code runs nothing is drawn yet."""
+    if row.registers[Register.ENDED] == RESETTING:
+        note_opaque(row)
 
 
 @outline
@@ -73,7 +62,7 @@ def light_next(row: Row, x: int, y: int, direction: int, half: int, lit: int) ->
     right_y = step_x(direction)
     through = ZERO
     for i in range(2 * half + 1):
-        through |= _is_transparent(row, x + (i - half) * right_x, y + (i - half) * right_y) << i
+        through |= np.int64(not is_opaque(row, x + (i - half) * right_x, y + (i - half) * right_y)) << i
     passed = lit & through
     before = ZERO
     while passed != before:
@@ -89,14 +78,6 @@ def _beside(cells: int) -> int:
     return cells | cells << 1 | cells >> 1
 
 
-@inline
-def _is_transparent(row: Row, x: int, y: int) -> int:
-    """1 if one can look through this cell, else 0; nobody can off the canvas."""
-    if x < 0 or x >= row.program[Header.CANVAS_WIDTH] or y < 0 or y >= row.program[Header.CANVAS_HEIGHT]:
-        return ZERO
-    return 1 - ((get_line(row, OPAQUE, y) >> x) & 1)
-
-
 @outline
 def is_lit(row: Row, x: int, y: int, direction: int, half: int, ahead: int, right: int) -> bool:
     """Whether one who stands at (x, y) and looks in a direction has light from the cell so far ahead and to the right.
@@ -105,6 +86,9 @@ def is_lit(row: Row, x: int, y: int, direction: int, half: int, ahead: int, righ
     """
     stay_outline()
     look_around(row)
+    if half == _HALF:
+        cells = lit_cells(row, x, y, direction)
+        return (cells >> np.uint64(8 * (right + _HALF) + VIEW - 1 - ahead)) & np.uint64(1) != np.uint64(0)
     lit = ONE << half
     for _ in range(ahead):
         lit = light_next(row, x, y, direction, half, lit) >> 32
@@ -128,7 +112,7 @@ def lit_cells(row: Row, x: int, y: int, direction: int) -> np.uint64:
     for r in range(VIEW):
         line = np.int64(-1)
         if 0 <= top + r < row.program[Header.CANVAS_HEIGHT]:
-            line = (((get_line(row, OPAQUE, top + r) | beyond) << VIEW) | _ROW) >> (left + VIEW)
+            line = (((row.board[opaque_line(row, top + r)] | beyond) << VIEW) | _ROW) >> (left + VIEW)
         opaque |= np.uint64(line & _ROW) << np.uint64(8 * r)
     if direction & 1 == 0:
         opaque = _transposed(opaque)

@@ -136,7 +136,7 @@ class State(NamedTuple):
     registers: NDArray[np.int16]  # (E, R)
     boards: NDArray[
         np.uint32
-    ]  # (E, H * W + 1 + H) cells as seen, the last is off the canvas; then solid rows
+    ]  # (E, H * W + 1 + 2 * H) cells as seen, the last is off the canvas; then solid rows, then opaque ones
     keys: NDArray[np.uint64]  # (E, Key.WORDS)
     tokens: NDArray[np.int16]  # (E, L)
     image: NDArray[
