@@ -76,7 +76,7 @@ def take_picture(row: Row, link: int, book: Any, number: int) -> None:
                 _turn_npcs(row, field(row, AGENT, Field.DIR))
     row.image[OWN_PLACE] = OWN_LOOK
     if row.program[Header.FLAGS] & Trait.GESTURES:
-        _take_gestures(row, uint16_of(book, Book.EXTRA, number))
+        _take_gestures(row, uint16_of(book, Book.EXTRA, number), uint16_of(book, Book.PICTURE, number))
 
 
 @outline
@@ -120,8 +120,8 @@ def _turn_npcs(row: Row, direction: int) -> None:
 
 
 @outline
-def _take_gestures(row: Row, extra: NDArray[np.uint16]) -> None:
-    """Write where the NPCs in the picture point and what they did last, if the program shows it."""
+def _take_gestures(row: Row, extra: NDArray[np.uint16], picture: NDArray[np.uint16]) -> None:
+    """Write where the NPCs in the picture point and what they did last, if the program shows it, then all channels."""
     stay_outline()
     for i in range(CELLS):
         extra[i] = NO_GESTURE << 8 | NO_GESTURE
@@ -130,6 +130,10 @@ def _take_gestures(row: Row, extra: NDArray[np.uint16]) -> None:
             place = _place_in_picture(row, npc)
             if place >= 0:
                 extra[place] = _gesture(row, npc, field(row, AGENT, Field.DIR))
+    for i in range(CELLS):
+        picture[3 * i] = row.image[i]
+        picture[3 * i + 1] = row.image[i] >> 16
+        picture[3 * i + 2] = extra[i]
 
 
 @inline
