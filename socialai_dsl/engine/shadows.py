@@ -104,29 +104,33 @@ def lit_cells(row: Row, x: int, y: int, direction: int) -> np.uint64:
 
     The same as `light_next` row by row, with the whole view in one word. `look_around` must have been called.
     """
-    # Rows and columns of the room from the upper left corner of the view on, where off the canvas is opaque.
-    top = y - _HALF * (1 - step_y(direction)) if direction & 1 == 1 else y - _HALF
-    left = x - _HALF if direction & 1 == 1 else x - _HALF * (1 - step_x(direction))
+    # Rows and columns of the room from the upper left corner of the view on, where off the canvas is opaque. Nothing
+    # here branches: where somebody stands and looks is as good as random.
+    top = y - _HALF * (1 - step_y(direction))
+    left = x - _HALF * (1 - step_x(direction))
     beyond = np.int64(-1) << row.program[Header.CANVAS_WIDTH]
     opaque = np.uint64(0)
     for r in range(VIEW):
-        line = np.int64(-1)
-        if 0 <= top + r < row.program[Header.CANVAS_HEIGHT]:
-            line = (((row.board[opaque_line(row, top + r)] | beyond) << VIEW) | _ROW) >> (left + VIEW)
-        opaque |= np.uint64(line & _ROW) << np.uint64(8 * r)
-    if direction & 1 == 0:
-        opaque = _transposed(opaque)
-    backward = direction >= 2  # rows of the view are counted away from the agent
+        inside = np.int64(top + r >= 0) & np.int64(top + r < row.program[Header.CANVAS_HEIGHT])
+        line = row.board[opaque_line(row, (top + r) * inside)] | beyond | (inside - 1)
+        opaque |= np.uint64((((line << VIEW) | _ROW) >> (left + VIEW)) & _ROW) << np.uint64(8 * r)
+    opaque = _chosen(direction & 1, opaque, _transposed(opaque))
+    opaque = _chosen(direction >> 1, _swapped(opaque), opaque)  # rows of the view are counted away from the agent
     reached = ONE << _HALF
     lit = np.uint64(0)
     for ahead in range(VIEW):
-        byte = np.uint64(8 * (VIEW - 1 - ahead) if backward else 8 * ahead)
-        through = ~np.int64(opaque >> byte) & _ROW
+        through = ~np.int64(opaque >> np.uint64(8 * ahead)) & _ROW
         onward = np.int64(_ONWARD[reached << VIEW | through])
         lit |= np.uint64(reached | onward) << np.uint64(8 * (VIEW - 1 - ahead))
         reached = onward
     lit = _transposed(lit)
-    return _swapped(lit) if direction == 1 or direction == 2 else lit
+    return _chosen((direction ^ (direction >> 1)) & 1, _swapped(lit), lit)
+
+
+@inline
+def _chosen(which: int, if_one: np.uint64, if_zero: np.uint64) -> np.uint64:
+    """One of two words by a bit, without a branch."""
+    return if_zero ^ ((if_zero ^ if_one) & (np.uint64(0) - np.uint64(which)))
 
 
 @inline
