@@ -85,11 +85,8 @@ def _hide_unlit(row: Row, x: int, y: int, direction: int) -> None:
     stay_outline()
     look_around(row)
     lit = lit_cells(row, x, y, direction)
-    bits = np.uint64(0)  # the same without a gap between columns
-    for i in range(VIEW):
-        bits |= ((lit >> np.uint64(8 * i)) & np.uint64(0x7F)) << np.uint64(VIEW * i)
     for i in range(CELLS):
-        row.image[i] &= np.int64(-((bits >> np.uint64(i)) & np.uint64(1)))
+        row.image[i] &= np.int64(-((lit >> np.uint64(i)) & np.uint64(1)))
 
 
 @inline

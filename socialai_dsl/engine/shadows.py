@@ -26,7 +26,19 @@ def _onward() -> NDArray[np.uint8]:
     return ((passed | passed << 1 | passed >> 1) & _ROW).astype(np.uint8)
 
 
+def _spread() -> NDArray[np.uint64]:
+    """The cells of a row of a view as bits of a picture's last row, (256,): bit 7 i for image[i, 0].
+
+    By the cells, bit 0 the leftmost; from 128 on bit 0 is the rightmost.
+    """
+    cell = np.arange(VIEW)
+    shown = np.uint64(1) << np.stack([VIEW * cell, VIEW * cell[::-1]]).astype(np.uint64)
+    chosen = np.arange(1 << VIEW)[:, None] >> cell & 1
+    return (chosen.astype(np.uint64) @ shown.T).T.ravel().copy()
+
+
 _ONWARD = _onward()
+_SPREAD = _spread()
 # Masks of the three rounds in which a matrix of 8 x 8 bits is transposed: blocks of 1, 2 and 4 bits change places.
 _ONES = np.uint64(0x00AA00AA00AA00AA)
 _TWOS = np.uint64(0x0000CCCC0000CCCC)
@@ -88,7 +100,7 @@ def is_lit(row: Row, x: int, y: int, direction: int, half: int, ahead: int, righ
     look_around(row)
     if half == _HALF:
         cells = lit_cells(row, x, y, direction)
-        return (cells >> np.uint64(8 * (right + _HALF) + VIEW - 1 - ahead)) & np.uint64(1) != np.uint64(0)
+        return (cells >> np.uint64(VIEW * (right + _HALF) + VIEW - 1 - ahead)) & np.uint64(1) != np.uint64(0)
     lit = ONE << half
     for _ in range(ahead):
         lit = light_next(row, x, y, direction, half, lit) >> 32
@@ -100,7 +112,7 @@ def is_lit(row: Row, x: int, y: int, direction: int, half: int, ahead: int, righ
 
 @inline
 def lit_cells(row: Row, x: int, y: int, direction: int) -> np.uint64:
-    """The cells of the agent's picture that light reaches it from: bit 8 i + j for image[i, j].
+    """The cells of the agent's picture that light reaches it from: bit 7 i + j for image[i, j].
 
     The same as `light_next` row by row, with the whole view in one word. `look_around` must have been called.
     """
@@ -116,15 +128,16 @@ def lit_cells(row: Row, x: int, y: int, direction: int) -> np.uint64:
         opaque |= np.uint64((((line << VIEW) | _ROW) >> (left + VIEW)) & _ROW) << np.uint64(8 * r)
     opaque = _chosen(direction & 1, opaque, _transposed(opaque))
     opaque = _chosen(direction >> 1, _swapped(opaque), opaque)  # rows of the view are counted away from the agent
+    # Seen from here the rows of the room run to the right, those that look right or up see them so.
+    mirrored = ((direction ^ (direction >> 1)) & 1) << VIEW
     reached = ONE << _HALF
     lit = np.uint64(0)
     for ahead in range(VIEW):
         through = ~np.int64(opaque >> np.uint64(8 * ahead)) & _ROW
         onward = np.int64(_ONWARD[reached << VIEW | through])
-        lit |= np.uint64(reached | onward) << np.uint64(8 * (VIEW - 1 - ahead))
+        lit |= _SPREAD[mirrored | reached | onward] << np.uint64(VIEW - 1 - ahead)
         reached = onward
-    lit = _transposed(lit)
-    return _chosen((direction ^ (direction >> 1)) & 1, _swapped(lit), lit)
+    return lit
 
 
 @inline
