@@ -10,7 +10,9 @@ import operator
 from typing import Any, Final, Generic, TypeVar
 
 import numpy as np
+from llvmlite import ir
 from numba import config, types
+from numba.core import cgutils
 from numba.core.imputils import lower_builtin
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, models, register_model
@@ -118,6 +120,27 @@ def _store(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     builder.store(number, builder.gep(arguments[0], [arguments[1]]))
     return context.get_dummy_value()
 
+
+def _fetch_nothing(row: Any, index: int) -> None:
+    """Plain Python has nothing to fetch."""
+
+
+@intrinsic
+def _fetch(context: Any, row: Any, index: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        byte = ir.IntType(8).as_pointer()
+        number = ir.IntType(32)
+        kind = ir.FunctionType(ir.VoidType(), [byte, number, number, number])
+        fetch = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
+        place = builder.bitcast(builder.gep(arguments[0], [arguments[1]]), byte)
+        builder.call(fetch, [place, *(ir.Constant(number, n) for n in (1, 3, 1))])
+        return context.get_dummy_value()
+
+    return signature(types.none, row, types.intp), generate
+
+
+fetch = _fetch_nothing if config.DISABLE_JIT else _fetch
+"""`fetch(row, index)`: let the memory there come near while other work goes on; it is about to be written."""
 
 ROW_TYPES: Final = tuple(
     Pointer(kind)
