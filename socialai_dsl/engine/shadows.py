@@ -99,8 +99,7 @@ def is_lit(row: Row, x: int, y: int, direction: int, half: int, ahead: int, righ
     stay_outline()
     look_around(row)
     if half == _HALF:
-        cells = lit_cells(row, x, y, direction)
-        return (cells >> np.uint64(VIEW * (right + _HALF) + VIEW - 1 - ahead)) & np.uint64(1) != np.uint64(0)
+        return _is_lit_in_picture(row, x, y, direction, ahead, right)
     lit = ONE << half
     for _ in range(ahead):
         lit = light_next(row, x, y, direction, half, lit) >> 32
@@ -111,13 +110,53 @@ def is_lit(row: Row, x: int, y: int, direction: int, half: int, ahead: int, righ
 
 
 @inline
+def _is_lit_in_picture(row: Row, x: int, y: int, direction: int, ahead: int, right: int) -> bool:
+    """The same with the whole view in one word."""
+    opaque = _opaque_in_view(row, x, y, direction)
+    reached = ONE << _HALF
+    for i in range(ahead):
+        reached = _onward_from(opaque, i, reached)
+    reached |= _onward_from(opaque, ahead, reached)
+    place = _HALF - right if _is_mirrored(direction) == 1 else _HALF + right
+    return (reached >> place) & 1 == 1
+
+
+@inline
 def lit_cells(row: Row, x: int, y: int, direction: int) -> np.uint64:
     """The cells of the agent's picture that light reaches it from: bit 7 i + j for image[i, j].
 
     The same as `light_next` row by row, with the whole view in one word. `look_around` must have been called.
     """
-    # Rows and columns of the room from the upper left corner of the view on, where off the canvas is opaque. Nothing
-    # here branches: where somebody stands and looks is as good as random.
+    opaque = _opaque_in_view(row, x, y, direction)
+    mirrored = _is_mirrored(direction) << VIEW
+    reached = ONE << _HALF
+    lit = np.uint64(0)
+    for ahead in range(VIEW):
+        onward = _onward_from(opaque, ahead, reached)
+        lit |= _SPREAD[mirrored | reached | onward] << np.uint64(VIEW - 1 - ahead)
+        reached = onward
+    return lit
+
+
+@inline
+def _onward_from(opaque: np.uint64, ahead: int, reached: int) -> int:
+    """The cells that light goes on to from those that it reaches in a row of the view."""
+    through = ~np.int64(opaque >> np.uint64(8 * ahead)) & _ROW
+    return np.int64(_ONWARD[reached << VIEW | through])
+
+
+@inline
+def _is_mirrored(direction: int) -> int:
+    """1 if the columns of the view that `_opaque_in_view` gives run from right to left: who looks down or left."""
+    return (direction ^ (direction >> 1)) & 1
+
+
+@inline
+def _opaque_in_view(row: Row, x: int, y: int, direction: int) -> np.uint64:
+    """Where one cannot look through in the view of the agent's size: a byte for each row, the nearest the lowest.
+
+    Nothing branches: where somebody stands and looks is as good as random. Off the canvas is opaque.
+    """
     top = y - _HALF * (1 - step_y(direction))
     left = x - _HALF * (1 - step_x(direction))
     beyond = np.int64(-1) << row.program[Header.CANVAS_WIDTH]
@@ -127,17 +166,7 @@ def lit_cells(row: Row, x: int, y: int, direction: int) -> np.uint64:
         line = row.board[opaque_line(row, (top + r) * inside)] | beyond | (inside - 1)
         opaque |= np.uint64((((line << VIEW) | _ROW) >> (left + VIEW)) & _ROW) << np.uint64(8 * r)
     opaque = _chosen(direction & 1, opaque, _transposed(opaque))
-    opaque = _chosen(direction >> 1, _swapped(opaque), opaque)  # rows of the view are counted away from the agent
-    # Seen from here the rows of the room run to the right, those that look right or up see them so.
-    mirrored = ((direction ^ (direction >> 1)) & 1) << VIEW
-    reached = ONE << _HALF
-    lit = np.uint64(0)
-    for ahead in range(VIEW):
-        through = ~np.int64(opaque >> np.uint64(8 * ahead)) & _ROW
-        onward = np.int64(_ONWARD[reached << VIEW | through])
-        lit |= _SPREAD[mirrored | reached | onward] << np.uint64(VIEW - 1 - ahead)
-        reached = onward
-    return lit
+    return _chosen(direction >> 1, _swapped(opaque), opaque)  # from rows of the room to rows ahead
 
 
 @inline
