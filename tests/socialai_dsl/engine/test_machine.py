@@ -9,18 +9,20 @@ from pathlib import Path
 
 import pytest
 
-from socialai_dsl.engine import settings
-from socialai_dsl.engine.cache import cache_folder
+from socialai_dsl.engine import cache, machine, settings
+from socialai_dsl.engine.book import make_book
+from socialai_dsl.engine.machine import prepare_call
 
 pytestmark = pytest.mark.skipif(settings.is_interpreted(), reason="nothing is compiled")
 
+NAMES = ("serve", "identify")
 START = """
 import sys
 import socialai_dsl as sd
 envs = sd.make_vec("talkitout", num_envs=2)
 envs.reset(seed=1)
 image = envs.step([[2, 1, 0, 0]] * 2)[0]["image"]
-print(image.tobytes().hex(), "numba" in sys.modules)
+print(image.tobytes().hex(), *envs.image_ids(), "numba" in sys.modules)
 """
 
 
@@ -39,26 +41,39 @@ def python(code: str, **environment: str) -> list[str]:
     return result.stdout.split()
 
 
-def test_the_second_process_needs_no_compiler_and_damaged_code_is_replaced(tmp_path: Path) -> None:
-    folder = cache_folder()
-    assert folder is not None
-    python(START)  # so that there is code to copy
-    own = tmp_path / "cache" / folder.name
-    own.mkdir(parents=True, mode=0o700)
-    (tmp_path / "cache").chmod(0o700)
-    for name in ("interpreter", "serve"):
-        (own / name).write_bytes((folder / name).read_bytes())
-    seen, compiled = python(START, SOCIALAI_CACHE_DIR=str(tmp_path / "cache"))
-    assert compiled == "False"
-    sound = (own / "interpreter").read_bytes()
-    (own / "interpreter").write_bytes(sound[:-1])
-    assert python(START, SOCIALAI_CACHE_DIR=str(tmp_path / "cache")) == [seen, "True"]
-    assert (own / "interpreter").stat().st_size == len(sound), "the damaged code was not replaced"
+def test_code_from_the_disk_needs_no_compiler() -> None:
+    for name in NAMES:
+        prepare_call(name, make_book([]), 0, 0, 0)  # so that it is there
+    assert python(START)[-1] == "False"
+
+
+def test_damaged_code_is_made_anew_and_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Compiled:
+        def object_code(self) -> bytes:
+            return b"sound code"
+
+    loaded: list[bytes] = []
+    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(machine, "_separate", lambda name: Compiled())
+    monkeypatch.setattr(machine, "load_object", lambda symbol, code: loaded.append(code) or 1)
+    load = machine._load.__wrapped__
+    load("serve")
+    sound = (tmp_path / "serve").read_bytes()
+    (tmp_path / "serve").write_bytes(sound[:-1])
+    load("serve")
+    assert (tmp_path / "serve").read_bytes() == sound
+    monkeypatch.setattr(machine, "_separate", lambda name: pytest.fail("it was there"))
+    load("serve")
+    assert loaded == [b"sound code"] * 3
 
 
 def test_settings_are_read_without_numba_where_none_is_set() -> None:
     """What we take Numba's settings to be is what they are, so code is found whether Numba is loaded or not."""
-    code = "import {}; from socialai_dsl.engine.settings import settings; print(list(settings().values()))"
-    assert python(code.format("numba")) == python(code.format("sys"))
-    set_so = python(code.format("sys"), NUMBA_OPT="1", NUMBA_DISABLE_JIT="1")
-    assert set_so != python(code.format("sys"))
+    code = """
+from socialai_dsl.engine.settings import settings
+before = settings()
+import numba
+print(before == settings(), before["OPT"])
+"""
+    assert python(code) == ["True", "_OptLevel(3)"]
+    assert python(code, NUMBA_OPT="1") == ["True", "_OptLevel(1)"]
