@@ -8,6 +8,7 @@ import ctypes
 from collections.abc import Callable
 from functools import cache, partial
 from importlib import import_module
+from threading import RLock
 from typing import Any, Final
 
 import llvmlite.binding as llvm
@@ -25,6 +26,9 @@ _HOMES: Final = {
 """The module that has the function, a `Separate`, under this name."""
 
 _ENTRY: Final = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
+
+_LOADING: Final = RLock()
+_addresses: dict[str, int] = {}
 
 Call = Callable[[], int]
 
@@ -56,15 +60,16 @@ def load_object(symbol: str, code: bytes) -> int:
     return int(engine.get_function_address(symbol))
 
 
-@cache
 def _load(name: str) -> int:
-    code = read(name)
-    if code is None:
-        code = _separate(name).object_code()
-        keep(name, code)
-    address = load_object(symbol_of(name), code)
-    assert address != 0, f"internal: no {name} in its own code"
-    return address
+    with _LOADING:
+        if name not in _addresses:
+            code = read(name)
+            if code is None:
+                code = _separate(name).object_code()
+                keep(name, code)
+            _addresses[name] = load_object(symbol_of(name), code)
+            assert _addresses[name] != 0, f"internal: no {name} in its own code"
+        return _addresses[name]
 
 
 def _separate(name: str) -> Any:

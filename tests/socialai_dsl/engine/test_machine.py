@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -41,6 +43,12 @@ def python(code: str, **environment: str) -> list[str]:
     return result.stdout.split()
 
 
+def load(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Load code as a new process does."""
+    monkeypatch.setattr(machine, "_addresses", {})
+    machine._load(name)
+
+
 def test_code_from_the_disk_needs_no_compiler() -> None:
     for name in NAMES:
         prepare_call(name, make_book([]), 0, 0, 0)  # so that it is there
@@ -56,15 +64,30 @@ def test_damaged_code_is_made_anew_and_replaced(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
     monkeypatch.setattr(machine, "_separate", lambda name: Compiled())
     monkeypatch.setattr(machine, "load_object", lambda symbol, code: loaded.append(code) or 1)
-    load = machine._load.__wrapped__
-    load("serve")
+    load("serve", monkeypatch)
     sound = (tmp_path / "serve").read_bytes()
     (tmp_path / "serve").write_bytes(sound[:-1])
-    load("serve")
+    load("serve", monkeypatch)
     assert (tmp_path / "serve").read_bytes() == sound
     monkeypatch.setattr(machine, "_separate", lambda name: pytest.fail("it was there"))
-    load("serve")
+    load("serve", monkeypatch)
     assert loaded == [b"sound code"] * 3
+
+
+def test_threads_that_start_at_once_load_it_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded: list[str] = []
+
+    def load_slowly(symbol: str, code: bytes) -> int:
+        time.sleep(0.05)
+        loaded.append(symbol)
+        return 1
+
+    monkeypatch.setattr(machine, "_addresses", {})
+    monkeypatch.setattr(machine, "read", lambda name: b"code")
+    monkeypatch.setattr(machine, "load_object", load_slowly)
+    with ThreadPoolExecutor(4) as threads:
+        assert list(threads.map(machine._load, ["serve"] * 4)) == [1] * 4
+    assert loaded == [machine.symbol_of("serve")]
 
 
 def test_settings_are_read_without_numba_where_none_is_set() -> None:
