@@ -9,7 +9,7 @@ import numpy as np
 
 from socialai_dsl import draws
 from socialai_dsl.engine.batch import Batch, Part
-from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.program import (
     CONSTANT,

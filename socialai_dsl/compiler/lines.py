@@ -173,18 +173,18 @@ class Lines:
     @staticmethod
     def _index(to: Expressions, varying: Sequence[Term], first: int) -> int:
         """First + the values of the varying parts as one mixed-radix number."""
-        block = to.block
-        result = constant(first)
+        result: int | None = None
         stride = 1
         for part in reversed(varying):
             value = to.saturated(part)
-            scaled = block.temporary()
-            block.emit(Op.SUB, scaled, value, constant(part.type.low))
+            first -= part.type.low * stride
             if stride != 1:
-                block.emit(Op.MUL, scaled, scaled, constant(stride))
-            block.emit(Op.ADD, scaled, scaled, result)
-            result, stride = scaled, stride * part.type.size
-        return result
+                value = to.into_temporary(Op.MUL, value, constant(stride))
+            result = value if result is None else to.into_temporary(Op.ADD, result, value)
+            stride *= part.type.size
+        if result is None:
+            return constant(first)
+        return result if first == 0 else to.into_temporary(Op.ADD, result, constant(first))
 
     def _family(self, speaker: Entity, parts: tuple[str | Term, ...]) -> int:
         """Number of the first of all lines that these parts can make; the last varying part changes fastest."""

@@ -1,19 +1,18 @@
 """A batch of environments in memory: programs one behind the other, state, ports, and the threads that serve them."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.engine.book import make_book
+from socialai_dsl.engine.calls import BAD_ACTION, Task
 from socialai_dsl.engine.errors import RoomError
-from socialai_dsl.engine.kernel import BAD_ACTION, Task, prepare, serve
-from socialai_dsl.engine.picture import view_table
-from socialai_dsl.engine.pointers import make_book
-from socialai_dsl.engine.queries import identify, script
+from socialai_dsl.engine.machine import Call, prepare_call
 from socialai_dsl.engine.state import (
     ATTEMPTS,
     Key,
@@ -26,6 +25,7 @@ from socialai_dsl.engine.state import (
     empty_state,
     no_pins,
 )
+from socialai_dsl.engine.views import view_table
 from socialai_dsl.program import VIEW, EntityColumn, Flag, FrameColumn, Header, LineColumn, Op, TypeColumn
 
 _ROWS_WORTH_A_THREAD: Final = 64
@@ -88,11 +88,13 @@ class Batch:
                 have one horizon, and say which of their ways to end are successes.
         """
         _check_sequences(parts, [pools[number] for number in sequences])
-        rows = len(pool_of_row)
+        rows = self._rows = len(pool_of_row)
         headers = [part.words for part in parts]
         registers = max(int(words[Header.REGISTERS]) for words in headers)
         board = max(
-            int(words[Header.CANVAS_WIDTH] * words[Header.CANVAS_HEIGHT] + 1 + words[Header.CANVAS_HEIGHT])
+            int(
+                words[Header.CANVAS_WIDTH] * words[Header.CANVAS_HEIGHT] + 1 + 2 * words[Header.CANVAS_HEIGHT]
+            )
             for words in headers
         )
         words, views, self.offsets, self.first_counters = _link(parts)
@@ -111,12 +113,10 @@ class Batch:
             in_sequence = int(pool in sequences)
             self.state.keys[row, Key.POOL] = int(starts[pool]) | len(pools[pool]) << 32 | in_sequence << 63
             self.state.keys[row, Key.PROGRAM] = self.offsets[pools[pool][0]]
-        prepare()
-        self._rows = rows
         self._pool_starts = starts.tolist()
         self._names = [part.name or f"program {number}" for number, part in enumerate(parts)]
-        self._book = self._make_book()
         self._cuts = _cut(rows, threads)
+        self._open_book()
         self._executor = ThreadPoolExecutor(len(self._cuts) - 1) if len(self._cuts) > 1 else None
 
     def program_numbers(self) -> NDArray[np.intp]:
@@ -155,7 +155,7 @@ class Batch:
 
     def actions_fit(self) -> bool:
         """Whether all actions are inside the action space."""
-        return serve(self._book, int(Task.CHECK), 0, 0, self._rows) != BAD_ACTION
+        return self._check() != BAD_ACTION
 
     def reset(self, pins: NDArray[np.int16] | None = None) -> None:
         """Start the episodes that the keys of the rows `ports.chosen` name, from their layouts (`ports.layout`).
@@ -166,16 +166,16 @@ class Batch:
         if pins is not None or len(self.ports.pins) > 1:
             registers = self.state.registers.shape[1]
             self.ports = self.ports._replace(pins=no_pins(registers) if pins is None else pins)
-            self._book = self._make_book()
+            self._open_book()
         self._share(Task.RESET)
 
     def script(self) -> None:
         """Let `ports.actions` be what the agents' frames would do now."""
-        self._ask(script)
+        self._ask(self._prepare("script"))
 
     def identify(self) -> NDArray[np.int64]:
         """A digest of each picture, int64 (E,)."""
-        self._ask(identify)
+        self._ask(self._prepare("identify"))
         return self.ports.image_ids.view(np.int64).copy()
 
     def close(self) -> None:
@@ -184,17 +184,22 @@ class Batch:
             self._executor.shutdown()
             self._executor = None
 
-    def _make_book(self) -> Any:
+    def _open_book(self) -> None:
         tables = self.tables._replace(views=self.tables.views.reshape(-1))
         ports = self.ports._replace(counters=self.ports.counters.reshape(-1))
-        return make_book((*tables, *self.state, *ports))
+        self._book = make_book((*tables, *self.state, *ports))
+        self._tasks = [self._prepare("serve", task) for task in Task]
+        self._check = prepare_call("serve", self._book, Task.CHECK, 0, 0, self._rows)
+
+    def _prepare(self, name: str, *what: int) -> list[Call]:
+        """A call for each thread, which does its rows."""
+        return [
+            prepare_call(name, self._book, *what, thread, *rows) for thread, rows in enumerate(self._cuts)
+        ]
 
     def _share(self, task: Task) -> int:
         """Let every thread do its rows; how many episodes ended, or BAD_ACTION."""
-        if self._executor is None:
-            ended = serve(self._book, int(task), 0, 0, self._rows)
-        else:
-            ended = self._ask(lambda *part: serve(part[0], int(task), *part[1:]))
+        ended = self._ask(self._tasks[task])
         if ended < BAD_ACTION:
             self._report_refused()
         return ended
@@ -208,16 +213,12 @@ class Batch:
             f"{row} (seed {key[Key.SEED]}, index {key[Key.INDEX]}, episode {key[Key.EPISODE]})"
         )
 
-    def _ask(self, kernel: Callable[[Any, int, int, int], int]) -> int:
-        """Let every thread do its rows; the sum of what they return."""
+    def _ask(self, calls: Sequence[Call]) -> int:
+        """Make the calls side by side; the sum of what they return."""
         if self._executor is None:
-            return kernel(self._book, 0, 0, self._rows)
-        others = [
-            self._executor.submit(kernel, self._book, thread, first, last)
-            for thread, (first, last) in enumerate(self._cuts[1:], 1)
-        ]
-        done = kernel(self._book, 0, *self._cuts[0])
-        return done + sum(other.result() for other in others)
+            return calls[0]()
+        others = [self._executor.submit(call) for call in calls[1:]]
+        return calls[0]() + sum(other.result() for other in others)
 
 
 def _cut(rows: int, threads: int) -> list[tuple[int, int]]:

@@ -22,14 +22,32 @@ def solid_line(row: Row, y: int) -> int:
 
 
 @inline
-def _set_solid(row: Row, x: int, y: int, solid: bool) -> None:
-    """Let nobody, or anybody, enter this cell."""
+def opaque_line(row: Row, y: int) -> int:
+    """Where the cells of a line of the room that one cannot look through are in the board."""
+    return solid_line(row, y) + row.program[Header.CANVAS_HEIGHT]
+
+
+@inline
+def _set_bit(row: Row, line: int, x: int, value: bool) -> None:
+    """Write one bit of a word of the board."""
     bit = np.int64(1) << x
-    line = solid_line(row, y)
-    if solid:
+    if value:
         row.board[line] = row.board[line] | bit
     else:
         row.board[line] = row.board[line] & ~bit
+
+
+@inline
+def is_opaque(row: Row, x: int, y: int) -> bool:
+    """Whether one cannot look through this cell: walls, objects that are not transparent, all off the canvas.
+
+    While reset code runs that is so after `note_opaque` only.
+    """
+    width = row.program[Header.CANVAS_WIDTH]
+    height = row.program[Header.CANVAS_HEIGHT]
+    if x < 0 or x >= width or y < 0 or y >= height:
+        return True
+    return (row.board[opaque_line(row, y)] >> x) & 1 == 1
 
 
 @inline
@@ -61,7 +79,7 @@ def room_table(row: Row) -> int:
 
 
 @inline
-def built_opaque_line(row: Row, y: int) -> int:
+def _built_opaque_line(row: Row, y: int) -> int:
     """The cells of a line of the bare room that one cannot look through, bit x for column x."""
     height = row.program[Header.CANVAS_HEIGHT]
     return row.program[room_table(row) + row.program[Header.CANVAS_WIDTH] * height + 1 + 2 * height + y]
@@ -110,11 +128,33 @@ def is_in_the_way(row: Row, entity: int) -> bool:
     return row.program[type_row(row, entity) + TypeColumn.WALKABLE] == 0
 
 
+@inline
+def _hides(row: Row, entity: int) -> bool:
+    """Whether one cannot look through this object as it is now."""
+    return row.program[type_row(row, entity) + TypeColumn.TRANSPARENT] == 0
+
+
+@inline
+def note_opaque(row: Row) -> None:
+    """Note where one cannot look through in the whole room."""
+    for y in range(row.program[Header.CANVAS_HEIGHT]):
+        row.board[opaque_line(row, y)] = _built_opaque_line(row, y)
+    first = row.program[Header.NPCS] + 1
+    for entity in range(first, row.program[Header.ENTITIES]):  # what is furnished is not as it was built
+        if is_present(row, entity):
+            line = opaque_line(row, field(row, entity, Field.Y))
+            _set_bit(row, line, field(row, entity, Field.X), np.bool_(False))
+    for entity in range(first, row.program[Header.ENTITIES]):
+        if is_present(row, entity) and _hides(row, entity):
+            line = opaque_line(row, field(row, entity, Field.Y))
+            _set_bit(row, line, field(row, entity, Field.X), np.bool_(True))
+
+
 @outline
 def draw_cell(row: Row, x: int, y: int) -> None:
     """Draw one cell anew: the room, over it the last object there, over it the lowest NPC if NPCs are shown.
 
-    One object that is in the way is enough, wherever it lies.
+    One object that is in the way is enough, wherever it lies; so is one that cannot be looked through.
     """
     stay_outline()
     width = row.program[Header.CANVAS_WIDTH]
@@ -126,13 +166,16 @@ def draw_cell(row: Row, x: int, y: int) -> None:
     row.board[cell] = row.program[table + cell]
     npcs = row.program[Header.NPCS]
     solid = (row.program[table + width * height + 1 + y] >> x) & 1
+    opaque = (_built_opaque_line(row, y) >> x) & 1
     furnished = 0
     for entity in range(npcs + 1, row.program[Header.ENTITIES]):
         if is_at(row, entity, x, y):
             row.board[cell] = object_look(row, entity)
             solid = (solid & furnished) | np.int64(is_in_the_way(row, entity))
+            opaque = (opaque & furnished) | np.int64(_hides(row, entity))
             furnished = 1
-    _set_solid(row, x, y, solid == 1)
+    _set_bit(row, solid_line(row, y), x, solid == 1)
+    _set_bit(row, opaque_line(row, y), x, opaque == 1)
     if npcs_are_hidden(row):
         return
     for entity in range(1, npcs + 1):
@@ -167,11 +210,13 @@ def draw_all(row: Row) -> None:
             x = field(row, entity, Field.X)
             y = field(row, entity, Field.Y)
             row.board[y * width + x] = object_look(row, entity)
-            _set_solid(row, x, y, np.bool_(False))
+            _set_bit(row, solid_line(row, y), x, np.bool_(False))
     # What lies under something else may be in the way all the same.
     for entity in range(npcs + 1, entities):
         if is_present(row, entity) and is_in_the_way(row, entity):
-            _set_solid(row, field(row, entity, Field.X), field(row, entity, Field.Y), np.bool_(True))
+            line = solid_line(row, field(row, entity, Field.Y))
+            _set_bit(row, line, field(row, entity, Field.X), np.bool_(True))
+    note_opaque(row)
     if npcs_are_hidden(row):
         return
     for entity in range(npcs, 0, -1):

@@ -2,7 +2,7 @@
 
 `inline` is for helpers, which are merged into their callers. `outline` is for what runs rarely or is large: it begins
 with `stay_outline()`, without which LLVM merges it into each of its callers all the same. The interpreter itself is
-compiled apart (`separate`). Entry points called from Python are made by `cache.entry`. None of them allocates memory.
+compiled apart (`separate`), and so are the entry points called from Python. None of them allocates memory.
 """
 
 from collections.abc import Callable

@@ -1,17 +1,15 @@
 """The one compiled entry point: steps, resets or scripts the rows of a part of a batch."""
 
-import gc
-from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numba import config, types
 from numpy.typing import NDArray
 
 from socialai_dsl.engine import rng
-from socialai_dsl.engine.cache import entry
+from socialai_dsl.engine.calls import BAD_ACTION, NO_ROOM, TERMINATED, Task
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.picture import CELLS, take_picture
+from socialai_dsl.engine.machine import symbol_of
+from socialai_dsl.engine.picture import take_picture
 from socialai_dsl.engine.pointers import (
     bytes_of,
     float64_of,
@@ -24,26 +22,11 @@ from socialai_dsl.engine.pointers import (
 )
 from socialai_dsl.engine.reset import draw_member, reset_row
 from socialai_dsl.engine.rows import copy, open_row
+from socialai_dsl.engine.separate import entry
 from socialai_dsl.engine.state import PIN_NONE, ZERO, Book, Key, Link, Row, Size
-from socialai_dsl.engine.step import TERMINATED, step_row
-from socialai_dsl.engine.vm import interpreter
+from socialai_dsl.engine.step import step_row
+from socialai_dsl.engine.views import CELLS
 from socialai_dsl.program import Header, Register
-
-BAD_ACTION = -1
-"""Returned instead of stepping if an action is outside its space."""
-
-NO_ROOM = -(1 << 32)
-"""Added to what is returned for each row that found no room as required; `Ports.refused` tells which."""
-
-
-class Task(IntEnum):
-    """What a call of `serve` is to do."""
-
-    STEP_NEXT = 0  # step; an episode that has ended is reset by the next step
-    STEP_SAME = 1  # step; an episode that ends is reset at once, its last observation is kept
-    STEP_ONLY = 2  # step; resets are the caller's
-    CHECK = 3  # only look whether the actions are inside their space
-    RESET = 4  # reset the chosen rows to the episode named by their keys
 
 
 @outline
@@ -161,12 +144,12 @@ def _actions_fit(book: Any, first: int, last: int) -> bool:
     return not wrong
 
 
-@entry
+@entry(symbol_of("serve"))
 def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
     """Do a `Task` for the rows first to last - 1 with the scratch space of a thread.
 
     Args:
-        book: the arrays of `Book` (`pointers.make_book`).
+        book: the arrays of `Book` (`book.make_book`).
         task: a `Task`.
         thread: number of the thread.
         first: the first row.
@@ -217,18 +200,3 @@ def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
             ended += NO_ROOM
         take_picture(fresh, fresh.program[Header.SIZE], book, row)
     return ended
-
-
-def prepare() -> None:
-    """Compile the engine, or load it from the cache, unless that is done."""
-    if config.DISABLE_JIT or serve.overloads:  # type: ignore[attr-defined]
-        return
-    # The compiler makes millions of objects that live to its end: looking for garbage is a tenth of its time.
-    collecting = gc.isenabled()
-    gc.disable()
-    try:
-        interpreter.prepare()
-        serve.compile((types.int64[::1], *[types.int64] * 4))  # type: ignore[attr-defined]
-    finally:
-        if collecting:
-            gc.enable()

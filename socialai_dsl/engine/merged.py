@@ -1,20 +1,36 @@
 """A Numba pipeline for functions that are only ever merged into others: they are lowered, and that is all.
 
 Numba optimises each function that compiled code calls, and makes machine code of it, though here all of them are merged
-into two entry points, which are optimised as a whole: that was almost half of the time of a cold start.
+into a few entry points, which are optimised as a whole: that was almost half of the time of a cold start.
 """
 
 from typing import Any
 
+import llvmlite.binding
+from llvmlite import ir
 from numba import _dynfunc
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
 
 
-class _Code(JITCodeLibrary):  # type: ignore[misc]
+class Code(JITCodeLibrary):  # type: ignore[misc]
     """Code for merging, which the engine that makes machine code never sees."""
+
+    def object_code(self, symbol: str, entry: ir.Module) -> bytes:
+        """Machine code of everything in here that `symbol`, a function of the module `entry`, needs."""
+        with global_compiler_lock:
+            self._ensure_finalized()
+        module = self._final_module
+        module.link_in(llvmlite.binding.parse_assembly(str(entry)))
+        for part in (*module.functions, *module.global_variables):
+            if not part.is_declaration and part.name != symbol:
+                part.linkage = "internal"
+        super()._optimize_final_module()
+        module.verify()
+        return bytes(self._codegen._tm.emit_object(module))
 
     def _optimize_final_module(self) -> None:
         """Whoever it is merged into optimises it."""
@@ -30,7 +46,7 @@ class _LoweringOnly(NativeLowering):  # type: ignore[misc]
     _name = "lowering_only"
 
     def run_pass(self, state: Any) -> bool:
-        state.library = _Code(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library = Code(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)
         lowered = state["cr"]

@@ -11,6 +11,7 @@ from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.pointers import uint16_of
 from socialai_dsl.engine.shadows import lit_cells, look_around
 from socialai_dsl.engine.state import AGENT, NOTHING, Book, Link, Row, Trait
+from socialai_dsl.engine.views import CELLS
 from socialai_dsl.program import (
     CODES_OF_TYPES,
     LAST_ACTS,
@@ -23,7 +24,6 @@ from socialai_dsl.program import (
     pack_cell,
 )
 
-CELLS: Final = VIEW * VIEW
 OWN_PLACE: Final = (VIEW // 2) * VIEW + VIEW - 1
 """Where the agent is in the picture: image[3, 6]."""
 
@@ -41,22 +41,6 @@ _WORDS_OF_ACTS = {
 }
 _ACTS = tuple(LAST_ACTS[_WORDS_OF_ACTS.get(body, "none")] for body in Body)
 """The code in the sixth channel for each `Body`."""
-
-
-def view_table(width: int, height: int) -> NDArray[np.uint16]:
-    """The cell of the board for each cell of the picture, (height * width * 4, 49) by (y, x, direction).
-
-    image[i, j] shows the cell 6 - j ahead and i - 3 to the right of the agent; cell width * height is off the canvas.
-    """
-    y, x, direction, i, j = np.ogrid[:height, :width, :4, :VIEW, :VIEW]
-    ahead, right = VIEW - 1 - j, i - VIEW // 2
-    ahead_x, ahead_y = (1 - direction) * (1 - direction % 2), (2 - direction) * (direction % 2)
-    # The right-hand side of (dx, dy) is (-dy, dx), because y grows downwards.
-    seen_x = x + ahead * ahead_x - right * ahead_y
-    seen_y = y + ahead * ahead_y + right * ahead_x
-    on_canvas = (seen_x >= 0) & (seen_x < width) & (seen_y >= 0) & (seen_y < height)
-    cells = np.where(on_canvas, seen_y * width + seen_x, width * height)
-    return cells.reshape(-1, CELLS).astype(np.uint16)
 
 
 @inline
@@ -92,7 +76,7 @@ def take_picture(row: Row, link: int, book: Any, number: int) -> None:
                 _turn_npcs(row, field(row, AGENT, Field.DIR))
     row.image[OWN_PLACE] = OWN_LOOK
     if row.program[Header.FLAGS] & Trait.GESTURES:
-        _take_gestures(row, uint16_of(book, Book.EXTRA, number))
+        _take_gestures(row, uint16_of(book, Book.EXTRA, number), uint16_of(book, Book.PICTURE, number))
 
 
 @outline
@@ -101,10 +85,8 @@ def _hide_unlit(row: Row, x: int, y: int, direction: int) -> None:
     stay_outline()
     look_around(row)
     lit = lit_cells(row, x, y, direction)
-    for i in range(VIEW):
-        column = np.uint32((lit >> np.uint64(8 * i)) & np.uint64(0xFF))
-        for j in range(VIEW):
-            row.image[i * VIEW + j] &= np.uint32(0) - ((column >> np.uint32(j)) & np.uint32(1))
+    for i in range(CELLS):
+        row.image[i] &= np.int64(-((lit >> np.uint64(i)) & np.uint64(1)))
 
 
 @inline
@@ -136,8 +118,8 @@ def _turn_npcs(row: Row, direction: int) -> None:
 
 
 @outline
-def _take_gestures(row: Row, extra: NDArray[np.uint16]) -> None:
-    """Write where the NPCs in the picture point and what they did last, if the program shows it."""
+def _take_gestures(row: Row, extra: NDArray[np.uint16], picture: NDArray[np.uint16]) -> None:
+    """Write where the NPCs in the picture point and what they did last, if the program shows it, then all channels."""
     stay_outline()
     for i in range(CELLS):
         extra[i] = NO_GESTURE << 8 | NO_GESTURE
@@ -146,6 +128,10 @@ def _take_gestures(row: Row, extra: NDArray[np.uint16]) -> None:
             place = _place_in_picture(row, npc)
             if place >= 0:
                 extra[place] = _gesture(row, npc, field(row, AGENT, Field.DIR))
+    for i in range(CELLS):
+        picture[3 * i] = row.image[i]
+        picture[3 * i + 1] = row.image[i] >> 16
+        picture[3 * i + 2] = extra[i]
 
 
 @inline

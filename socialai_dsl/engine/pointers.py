@@ -7,11 +7,12 @@ outside its row.
 """
 
 import operator
-from collections.abc import Sequence
 from typing import Any, Final, Generic, TypeVar
 
 import numpy as np
+from llvmlite import ir
 from numba import config, types
+from numba.core import cgutils
 from numba.core.imputils import lower_builtin
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, models, register_model
@@ -60,7 +61,7 @@ def _pointers_to(dtype: Any) -> Any:
     @intrinsic
     def pointer(context: Any, book: Any, which: Any, row: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            entries = context.make_array(book)(context, builder, arguments[0]).data
+            entries = arguments[0]
             first = builder.shl(arguments[1], arguments[1].type(1))
             address = builder.load(builder.gep(entries, [first]))
             stride = builder.load(builder.gep(entries, [builder.add(first, first.type(1))]))
@@ -85,19 +86,6 @@ bytes_of, int16_of, uint16_of, int32_of, uint32_of, int64_of, uint64_of, float64
     _guarded if config.DISABLE_JIT else _pointers_to(kind) for kind in _TYPES
 )
 """`int16_of(book, which, row)` and so on: a pointer to a row of an array of two dimensions, or into one of one."""
-
-
-def make_book(arrays: Sequence[NDArray[Any]]) -> Any:
-    """The arrays in the form that compiled code takes: int64, address and bytes of a row of each in turn.
-
-    The arrays must live, and stay where they are, as long as the book is used.
-    """
-    if config.DISABLE_JIT:
-        return list(arrays)
-    assert all(array.flags.c_contiguous for array in arrays), "internal: arrays of a book are contiguous"
-    return np.array(
-        [number for array in arrays for number in (array.ctypes.data, array.strides[0])], np.int64
-    )
 
 
 @infer_global(operator.getitem)
@@ -132,6 +120,27 @@ def _store(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     builder.store(number, builder.gep(arguments[0], [arguments[1]]))
     return context.get_dummy_value()
 
+
+def _fetch_nothing(row: Any, index: int) -> None:
+    """Plain Python has nothing to fetch."""
+
+
+@intrinsic
+def _fetch(context: Any, row: Any, index: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        byte = ir.IntType(8).as_pointer()
+        number = ir.IntType(32)
+        kind = ir.FunctionType(ir.VoidType(), [byte, number, number, number])
+        fetch = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
+        place = builder.bitcast(builder.gep(arguments[0], [arguments[1]]), byte)
+        builder.call(fetch, [place, *(ir.Constant(number, n) for n in (1, 3, 1))])
+        return context.get_dummy_value()
+
+    return signature(types.none, row, types.intp), generate
+
+
+fetch = _fetch_nothing if config.DISABLE_JIT else _fetch
+"""`fetch(row, index)`: let the memory there come near while other work goes on; it is about to be written."""
 
 ROW_TYPES: Final = tuple(
     Pointer(kind)

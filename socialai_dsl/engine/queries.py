@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.engine.cache import entry
 from socialai_dsl.engine.jit import inline, outline, stay_outline
+from socialai_dsl.engine.machine import symbol_of
 from socialai_dsl.engine.picture import image_digest
 from socialai_dsl.engine.pointers import int16_of, int64_of, uint16_of, uint32_of, uint64_of
 from socialai_dsl.engine.rows import copy, open_row
+from socialai_dsl.engine.separate import entry
 from socialai_dsl.engine.speech import inbox_class
 from socialai_dsl.engine.state import STILL, ZERO, Book, Link, Row, Size, Trait
 from socialai_dsl.engine.step import be_silent, begin
@@ -110,7 +111,7 @@ def _script_row(book: Any, thread: int, row: int) -> None:
     copy(opened.counters, counters, count)
 
 
-@entry
+@entry(symbol_of("script"))
 def script(book: Any, thread: int, first: int, last: int) -> int:
     """Write what the agents' frames would do now into the actions of the rows first to last - 1."""
     for row in range(first, last):
@@ -118,7 +119,7 @@ def script(book: Any, thread: int, first: int, last: int) -> int:
     return 0
 
 
-@entry
+@entry(symbol_of("identify"))
 def identify(book: Any, thread: int, first: int, last: int) -> int:
     """Write digests of the pictures of the rows first to last - 1."""
     gestures = int64_of(book, Book.SIZES, ZERO)[Size.EXTRA]

@@ -7,15 +7,11 @@ and lights the three cells before it in the next row.
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.engine.boards import built_opaque_line, type_row
-from socialai_dsl.engine.entities import field, is_present, step_x, step_y
+from socialai_dsl.engine.boards import is_opaque, note_opaque, opaque_line
+from socialai_dsl.engine.entities import step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.sets import add_cell, drop_cell, get_line, set_line
-from socialai_dsl.engine.state import FRONT, ONE, ZERO, Row
-from socialai_dsl.program import VIEW, Field, Header, TypeColumn
-
-OPAQUE = FRONT
-"""The board of `look_around`: cells that one cannot look through. Paths use it too."""
+from socialai_dsl.engine.state import ONE, RESETTING, ZERO, Row
+from socialai_dsl.program import VIEW, Header, Register
 
 _HALF = VIEW // 2
 _ROW = np.int64((1 << VIEW) - 1)
@@ -30,7 +26,19 @@ def _onward() -> NDArray[np.uint8]:
     return ((passed | passed << 1 | passed >> 1) & _ROW).astype(np.uint8)
 
 
+def _spread() -> NDArray[np.uint64]:
+    """The cells of a row of a view as bits of a picture's last row, (256,): bit 7 i for image[i, 0].
+
+    By the cells, bit 0 the leftmost; from 128 on bit 0 is the rightmost.
+    """
+    cell = np.arange(VIEW)
+    shown = np.uint64(1) << np.stack([VIEW * cell, VIEW * cell[::-1]]).astype(np.uint64)
+    chosen = np.arange(1 << VIEW)[:, None] >> cell & 1
+    return (chosen.astype(np.uint64) @ shown.T).T.ravel().copy()
+
+
 _ONWARD = _onward()
+_SPREAD = _spread()
 # Masks of the three rounds in which a matrix of 8 x 8 bits is transposed: blocks of 1, 2 and 4 bits change places.
 _ONES = np.uint64(0x00AA00AA00AA00AA)
 _TWOS = np.uint64(0x0000CCCC0000CCCC)
@@ -41,16 +49,9 @@ _PAIRS = np.uint64(0x0000FFFF0000FFFF)
 
 @inline
 def look_around(row: Row) -> None:
-    """Note where one cannot look through; `light_next` and `lit_cells` read it."""
-    for y in range(row.program[Header.CANVAS_HEIGHT]):
-        set_line(row, OPAQUE, y, built_opaque_line(row, y))
-    first = row.program[Header.NPCS] + 1
-    for entity in range(first, row.program[Header.ENTITIES]):  # what is furnished is not as it was built
-        if is_present(row, entity):
-            drop_cell(row, OPAQUE, field(row, entity, Field.X), field(row, entity, Field.Y))
-    for entity in range(first, row.program[Header.ENTITIES]):
-        if is_present(row, entity) and row.program[type_row(row, entity) + TypeColumn.TRANSPARENT] == 0:
-            add_cell(row, OPAQUE, field(row, entity, Field.X), field(row, entity, Field.Y))
+    """Called before anybody asks what is opaque or lit: while reset code runs nothing is drawn yet."""
+    if row.registers[Register.ENDED] == RESETTING:
+        note_opaque(row)
 
 
 @outline
@@ -73,7 +74,7 @@ def light_next(row: Row, x: int, y: int, direction: int, half: int, lit: int) ->
     right_y = step_x(direction)
     through = ZERO
     for i in range(2 * half + 1):
-        through |= _is_transparent(row, x + (i - half) * right_x, y + (i - half) * right_y) << i
+        through |= np.int64(not is_opaque(row, x + (i - half) * right_x, y + (i - half) * right_y)) << i
     passed = lit & through
     before = ZERO
     while passed != before:
@@ -89,14 +90,6 @@ def _beside(cells: int) -> int:
     return cells | cells << 1 | cells >> 1
 
 
-@inline
-def _is_transparent(row: Row, x: int, y: int) -> int:
-    """1 if one can look through this cell, else 0; nobody can off the canvas."""
-    if x < 0 or x >= row.program[Header.CANVAS_WIDTH] or y < 0 or y >= row.program[Header.CANVAS_HEIGHT]:
-        return ZERO
-    return 1 - ((get_line(row, OPAQUE, y) >> x) & 1)
-
-
 @outline
 def is_lit(row: Row, x: int, y: int, direction: int, half: int, ahead: int, right: int) -> bool:
     """Whether one who stands at (x, y) and looks in a direction has light from the cell so far ahead and to the right.
@@ -105,6 +98,8 @@ def is_lit(row: Row, x: int, y: int, direction: int, half: int, ahead: int, righ
     """
     stay_outline()
     look_around(row)
+    if half == _HALF:
+        return _is_lit_in_picture(row, x, y, direction, ahead, right)
     lit = ONE << half
     for _ in range(ahead):
         lit = light_next(row, x, y, direction, half, lit) >> 32
@@ -115,34 +110,69 @@ def is_lit(row: Row, x: int, y: int, direction: int, half: int, ahead: int, righ
 
 
 @inline
+def _is_lit_in_picture(row: Row, x: int, y: int, direction: int, ahead: int, right: int) -> bool:
+    """The same with the whole view in one word."""
+    opaque = _opaque_in_view(row, x, y, direction)
+    reached = ONE << _HALF
+    for i in range(ahead):
+        reached = _onward_from(opaque, i, reached)
+    reached |= _onward_from(opaque, ahead, reached)
+    place = _HALF - right if _is_mirrored(direction) == 1 else _HALF + right
+    return (reached >> place) & 1 == 1
+
+
+@inline
 def lit_cells(row: Row, x: int, y: int, direction: int) -> np.uint64:
-    """The cells of the agent's picture that light reaches it from: bit 8 i + j for image[i, j].
+    """The cells of the agent's picture that light reaches it from: bit 7 i + j for image[i, j].
 
     The same as `light_next` row by row, with the whole view in one word. `look_around` must have been called.
     """
-    # Rows and columns of the room from the upper left corner of the view on, where off the canvas is opaque.
-    top = y - _HALF * (1 - step_y(direction)) if direction & 1 == 1 else y - _HALF
-    left = x - _HALF if direction & 1 == 1 else x - _HALF * (1 - step_x(direction))
-    beyond = np.int64(-1) << row.program[Header.CANVAS_WIDTH]
-    opaque = np.uint64(0)
-    for r in range(VIEW):
-        line = np.int64(-1)
-        if 0 <= top + r < row.program[Header.CANVAS_HEIGHT]:
-            line = (((get_line(row, OPAQUE, top + r) | beyond) << VIEW) | _ROW) >> (left + VIEW)
-        opaque |= np.uint64(line & _ROW) << np.uint64(8 * r)
-    if direction & 1 == 0:
-        opaque = _transposed(opaque)
-    backward = direction >= 2  # rows of the view are counted away from the agent
+    opaque = _opaque_in_view(row, x, y, direction)
+    mirrored = _is_mirrored(direction) << VIEW
     reached = ONE << _HALF
     lit = np.uint64(0)
     for ahead in range(VIEW):
-        byte = np.uint64(8 * (VIEW - 1 - ahead) if backward else 8 * ahead)
-        through = ~np.int64(opaque >> byte) & _ROW
-        onward = np.int64(_ONWARD[reached << VIEW | through])
-        lit |= np.uint64(reached | onward) << np.uint64(8 * (VIEW - 1 - ahead))
+        onward = _onward_from(opaque, ahead, reached)
+        lit |= _SPREAD[mirrored | reached | onward] << np.uint64(VIEW - 1 - ahead)
         reached = onward
-    lit = _transposed(lit)
-    return _swapped(lit) if direction == 1 or direction == 2 else lit
+    return lit
+
+
+@inline
+def _onward_from(opaque: np.uint64, ahead: int, reached: int) -> int:
+    """The cells that light goes on to from those that it reaches in a row of the view."""
+    through = ~np.int64(opaque >> np.uint64(8 * ahead)) & _ROW
+    return np.int64(_ONWARD[reached << VIEW | through])
+
+
+@inline
+def _is_mirrored(direction: int) -> int:
+    """1 if the columns of the view that `_opaque_in_view` gives run from right to left: who looks down or left."""
+    return (direction ^ (direction >> 1)) & 1
+
+
+@inline
+def _opaque_in_view(row: Row, x: int, y: int, direction: int) -> np.uint64:
+    """Where one cannot look through in the view of the agent's size: a byte for each row, the nearest the lowest.
+
+    Nothing branches: where somebody stands and looks is as good as random. Off the canvas is opaque.
+    """
+    top = y - _HALF * (1 - step_y(direction))
+    left = x - _HALF * (1 - step_x(direction))
+    beyond = np.int64(-1) << row.program[Header.CANVAS_WIDTH]
+    opaque = np.uint64(0)
+    for r in range(VIEW):
+        inside = np.int64(top + r >= 0) & np.int64(top + r < row.program[Header.CANVAS_HEIGHT])
+        line = row.board[opaque_line(row, (top + r) * inside)] | beyond | (inside - 1)
+        opaque |= np.uint64((((line << VIEW) | _ROW) >> (left + VIEW)) & _ROW) << np.uint64(8 * r)
+    opaque = _chosen(direction & 1, opaque, _transposed(opaque))
+    return _chosen(direction >> 1, _swapped(opaque), opaque)  # from rows of the room to rows ahead
+
+
+@inline
+def _chosen(which: int, if_one: np.uint64, if_zero: np.uint64) -> np.uint64:
+    """One of two words by a bit, without a branch."""
+    return if_zero ^ ((if_zero ^ if_one) & (np.uint64(0) - np.uint64(which)))
 
 
 @inline

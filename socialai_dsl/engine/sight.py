@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from socialai_dsl.engine.boards import built_opaque_line, type_row
-from socialai_dsl.engine.entities import column, is_at, step_x, step_y
-from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.shadows import is_lit
+from socialai_dsl.engine.boards import is_opaque
+from socialai_dsl.engine.entities import column, step_x, step_y
+from socialai_dsl.engine.jit import outline, stay_outline
+from socialai_dsl.engine.shadows import is_lit, look_around
 from socialai_dsl.engine.state import NO_CELL, Row
 from socialai_dsl.engine.whereabouts import is_somewhere, x_of, y_of
-from socialai_dsl.program import EntityColumn, Flag, Header, TypeColumn
+from socialai_dsl.program import EntityColumn, Flag, Header
 
 
 @outline
@@ -39,26 +39,12 @@ def is_in_view(row: Row, viewer: int, target: int, direction: int) -> bool:
 def is_unobstructed(row: Row, x: int, y: int, dx: int, dy: int) -> bool:
     """Whether nothing opaque lies strictly between (x, y) and the cell dx, dy away in its row or column."""
     stay_outline()
+    look_around(row)
     step_right = np.int64(dx > 0) - np.int64(dx < 0)
     step_down = np.int64(dy > 0) - np.int64(dy < 0)
     for _ in range(abs(dx) + abs(dy) - 1):
         x += step_right
         y += step_down
-        if _is_opaque(row, x, y):
+        if is_opaque(row, x, y):
             return np.bool_(False)
     return np.bool_(True)
-
-
-@inline
-def _is_opaque(row: Row, x: int, y: int) -> bool:
-    """Whether one cannot look through this cell: walls, objects that are not transparent, all off the canvas."""
-    width = row.program[Header.CANVAS_WIDTH]
-    if x < 0 or x >= width or y < 0 or y >= row.program[Header.CANVAS_HEIGHT]:
-        return np.bool_(True)
-    furnished = False
-    for entity in range(row.program[Header.NPCS] + 1, row.program[Header.ENTITIES]):
-        if is_at(row, entity, x, y):
-            if row.program[type_row(row, entity) + TypeColumn.TRANSPARENT] == 0:
-                return np.bool_(True)
-            furnished = True
-    return not furnished and (built_opaque_line(row, y) >> x) & 1 == 1

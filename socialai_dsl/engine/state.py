@@ -116,7 +116,8 @@ class Book(IntEnum):
     SPARE_COUNTERS = 27
     IMAGE_IDS = 28
     REFUSED = 29
-    SIZES = 30
+    PICTURE = 30
+    SIZES = 31
 
 
 class Size(IntEnum):
@@ -136,7 +137,7 @@ class State(NamedTuple):
     registers: NDArray[np.int16]  # (E, R)
     boards: NDArray[
         np.uint32
-    ]  # (E, H * W + 1 + H) cells as seen, the last is off the canvas; then solid rows
+    ]  # (E, H * W + 1 + 2 * H) cells as seen, the last is off the canvas; then solid rows, then opaque ones
     keys: NDArray[np.uint64]  # (E, Key.WORDS)
     tokens: NDArray[np.int16]  # (E, L)
     image: NDArray[
@@ -185,6 +186,7 @@ class Ports(NamedTuple):
     spare_counters: NDArray[np.int64]  # (threads, counters of all programs)
     image_ids: NDArray[np.uint64]  # (E,) digests of the pictures
     refused: NDArray[np.bool_]  # (E,) rows that were reset and found no room that is as required
+    picture: NDArray[np.uint16]  # (E, 147) `image` and `extra` cell by cell, six bytes each; or (E, 0)
     sizes: NDArray[np.int64]  # (Size.END,)
 
 
@@ -241,6 +243,7 @@ def empty_ports(state: State, counters: int, threads: int) -> Ports:
         spare_counters=np.zeros((threads, counters), np.int64),
         image_ids=np.zeros(rows, np.uint64),
         refused=np.zeros(rows, np.bool_),
+        picture=np.zeros((rows, 3 * state.extra.shape[1]), np.uint16),
         sizes=np.array(
             [registers, state.boards.shape[1], state.tokens.shape[1], counters, state.extra.shape[1]],
             np.int64,

@@ -5,9 +5,11 @@ from typing import Any
 import numpy as np
 
 from socialai_dsl.engine.boards import is_deadly
+from socialai_dsl.engine.calls import TERMINATED, TRUNCATED
 from socialai_dsl.engine.entities import field
 from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.picture import take_picture
+from socialai_dsl.engine.pointers import fetch
 from socialai_dsl.engine.speech import empty_inbox, inbox_class
 from socialai_dsl.engine.state import AGENT, Link, Row, Trait
 from socialai_dsl.engine.turns import (
@@ -25,8 +27,8 @@ from socialai_dsl.engine.turns import (
 from socialai_dsl.engine.vm import run
 from socialai_dsl.program import Field, Flag, FrameColumn, Header, Register
 
-TERMINATED = 1
-TRUNCATED = 2
+_LINE_OF_CACHE = 32
+"""Tokens in a line of the cache."""
 
 
 @inline
@@ -53,6 +55,16 @@ def be_silent(row: Row) -> None:
 
 
 @inline
+def _fetch_history(row: Row) -> None:
+    """Somebody will probably answer: a line is written behind the history, which may move to make room."""
+    for i in range(0, row.registers[Register.TOKENS] + 1, _LINE_OF_CACHE):
+        fetch(row.tokens, i)
+    log = row.program[Header.LOG]
+    for i in range(log, log + row.registers[Register.LOGGED] + 1, _LINE_OF_CACHE):
+        fetch(row.registers, i)
+
+
+@inline
 def decode(row: Row, link: int) -> None:
     """Note the agent's body action and utterance. A pair that its grammar lacks is silence."""
     registers = row.registers
@@ -70,6 +82,8 @@ def decode(row: Row, link: int) -> None:
             registers[Register.NOUN] = noun
             registers[Register.UTTERANCE] = 1 + pair
             registers[Register.CLASS] = program[program[Header.CLASS_AT] + pair]
+            if registers[Register.CLASS] > 1:
+                _fetch_history(row)
 
 
 @inline

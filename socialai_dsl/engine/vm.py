@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from numba import types
 
 from socialai_dsl.engine import paths
 from socialai_dsl.engine.bits import count_bits, lowest_bit, nth_bit
@@ -10,6 +11,7 @@ from socialai_dsl.engine.boards import draw_entity
 from socialai_dsl.engine.conditions import holds
 from socialai_dsl.engine.entities import field, quadrant, set_field
 from socialai_dsl.engine.jit import inline, outline, stay_outline
+from socialai_dsl.engine.machine import symbol_of
 from socialai_dsl.engine.operands import assign, draw_action, draw_below, value
 from socialai_dsl.engine.places import next_cell, place
 from socialai_dsl.engine.pointers import ROW_TYPES
@@ -230,5 +232,5 @@ def _like_run(row: Row, pc: int) -> None:
     """Run the code at `pc` to its `HALT`. Skips go forward and `EACH_CELL` counts cells, so it ends."""
 
 
-interpreter = Separate("socialai_dsl_run", _run, ROW_TYPES)
+interpreter = Separate(symbol_of("interpreter"), _run, (*ROW_TYPES, types.int64), types.none)
 run = interpreter.caller(_like_run)

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.draws import GOLDEN, mix
-from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.relevance import Relevance
 from socialai_dsl.envs.search import Search, Verdict
 from socialai_dsl.envs.table import Table

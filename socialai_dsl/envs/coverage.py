@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from socialai_dsl.checking import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
-from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.properties import Effort
 from socialai_dsl.envs.search import Search
 from socialai_dsl.envs.search import Verdict as Searched

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.compilation import Part, Probe, Value, scenario_of, with_probes
-from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.recording import Recording
 from socialai_dsl.envs.table import Table

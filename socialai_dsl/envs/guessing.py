@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.relevance import Relevance
 from socialai_dsl.envs.search import CHANCES, Search, Verdict, marks, multipliers, useful_actions

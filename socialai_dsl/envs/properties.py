@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from socialai_dsl.checking import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
-from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.guessing import Answer, Guess, Guessing
 from socialai_dsl.envs.muting import muted
 from socialai_dsl.envs.search import Finding, Search

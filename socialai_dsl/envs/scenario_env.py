@@ -9,9 +9,8 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.engine.kernel import BAD_ACTION, Task
+from socialai_dsl.engine.calls import BAD_ACTION, TRUNCATED, Task
 from socialai_dsl.engine.state import Key
-from socialai_dsl.engine.step import TRUNCATED
 from socialai_dsl.envs.actions import encode_action
 from socialai_dsl.envs.panel import Face
 from socialai_dsl.envs.picture import cast_of, coloured_text, frame

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.draws import GOLDEN, MASK, mix
-from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.relevance import Relevance
 from socialai_dsl.envs.table import Table

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from socialai_dsl.draws import GOLDEN, MASK, below, draw, episode_key, mix, site
 from socialai_dsl.engine.batch import Batch
-from socialai_dsl.engine.kernel import BAD_ACTION, Task
+from socialai_dsl.engine.calls import BAD_ACTION, Task
 from socialai_dsl.engine.state import PIN_NONE, Key
 from socialai_dsl.envs import snapshot
 from socialai_dsl.envs.audit import first_unsound
-from socialai_dsl.envs.channels import Channels
+from socialai_dsl.envs.channels import in_bytes, joined
 from socialai_dsl.envs.describe import describe
 from socialai_dsl.envs.layout import pinned_member, pins_of
 from socialai_dsl.envs.merge import Merged
@@ -65,8 +65,8 @@ class Table:
             [number for number, in_acts in enumerate(self._plays_acts) if in_acts],
         )
         self.state, self.rows = self.batch.state, rows
-        self._channels = Channels(self.state.image, self.state.extra)
-        self.image = self._channels.values
+        self._shows_gestures = bool(self.state.extra.size)
+        self.image = in_bytes(self.batch.ports.picture if self._shows_gestures else self.state.image)
         self.tokens = self.state.tokens
         self.fresh = True
         self._number_at = {offset: i for i, offset in enumerate(self.batch.offsets)}
@@ -98,7 +98,6 @@ class Table:
         for row in np.flatnonzero(chosen & (rows != 0)).tolist():
             self.state.keys[row, Key.SPOILED] = self._is_spoiled(layout, row)
         self._begin(chosen & (rows == 0))
-        self._channels.refresh()
 
     def step(self, task: Task, actions: Any) -> int:
         """Step all rows, int64 (E, 4); how many episodes ended. Raises ValueError for a bad action."""
@@ -127,7 +126,6 @@ class Table:
             self._begin(self.state.keys[:, Key.EPISODE] != episodes)
         else:
             ended = self.batch.step(task)
-        self._channels.refresh()
         return ended
 
     def _begin(self, fresh: NDArray[np.bool_]) -> None:
@@ -348,7 +346,8 @@ class Table:
         self.batch.ports.counters[:] = 0
         self.batch.ports.counters[0] = counters
         self.fresh = False
-        self._channels.refresh()
+        if self._shows_gestures:
+            self.image[...] = joined(self.state.image, self.state.extra)
 
     def _check(self, read: Mapping[str, NDArray[Any]]) -> None:
         """The engine trusts its state, so what comes from outside must be a state that it can be in."""

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.envs.values import shown
 from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, VIEW, Field, Flag, Header, Program, Register

@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.channels import joined
 from socialai_dsl.envs.picture import frame
 from socialai_dsl.envs.table import Table

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from socialai_dsl import draws
 from socialai_dsl.engine.batch import Batch
-from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import PIN_NONE, Key, no_pins
 from socialai_dsl.program import Body, Field, Op, Program, Register
 from tests.assembly import (

@@ -1,4 +1,4 @@
-"""Compiled code on disk is private, keyed by all sources, and replaced when it is damaged."""
+"""Compiled code on disk is private, keyed by all sources, and not read when it is damaged."""
 
 from __future__ import annotations
 
@@ -6,13 +6,10 @@ import os
 import stat
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from socialai_dsl.engine import cache
-
-pytestmark = pytest.mark.skipif(cache.config.DISABLE_JIT, reason="nothing is compiled")
 
 
 @pytest.fixture
@@ -26,52 +23,35 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     cache.cache_folder.cache_clear()
 
 
-def compiled() -> Any:
-    """A new dispatcher of one and the same function, as in a new process."""
-
-    def double(number: int) -> int:
-        return 2 * number
-
-    return cache.entry(double)
-
-
-def other() -> Any:
-    """A dispatcher of another function, whose entries look the same from outside."""
-
-    def triple(number: int) -> int:
-        return 3 * number
-
-    return cache.entry(triple)
-
-
-def test_the_second_process_loads_what_the_first_compiled(folder: Path) -> None:
-    first, second = compiled(), compiled()
-    assert first(21) == 42
-    assert sum(first.stats.cache_misses.values()) == 1
-    assert second(21) == 42
-    assert sum(second.stats.cache_hits.values()) == 1
+def test_what_one_process_keeps_another_reads(folder: Path) -> None:
+    assert cache.read("serve") is None
+    cache.keep("serve", b"code")
+    cache.keep("script", b"other code")
+    assert cache.read("serve") == b"code"
+    assert cache.read("script") == b"other code"
     assert folder.name == cache.fingerprint()
+    assert {path.name for path in folder.iterdir()} == {"serve", "script"}, "nothing is left over"
 
 
 @pytest.mark.parametrize("damage", ["cut", "flip", "empty", "foreign"])
-@pytest.mark.parametrize("suffix", ["nbc", "nbi"])
-def test_damaged_entries_are_compiled_again(folder: Path, damage: str, suffix: str) -> None:
-    compiled()(21)
-    (entry,) = folder.glob(f"*double*.{suffix}")
-    other()(21)
-    (foreign,) = folder.glob(f"*triple*.{suffix}")
-    data = bytearray(entry.read_bytes())
+def test_what_is_damaged_is_not_read_and_can_be_replaced(folder: Path, damage: str) -> None:
+    cache.keep("serve", bytes(range(100)))
+    cache.keep("script", bytes(100))
+    data = bytearray((folder / "serve").read_bytes())
     if damage == "flip":
         data[len(data) // 2] ^= 0xFF
-    contents = {"cut": data[: len(data) // 2], "flip": data, "empty": b"", "foreign": foreign.read_bytes()}
-    entry.write_bytes(contents[damage])
-    again = compiled()
-    assert again(21) == 42
-    third = compiled()
-    assert third(21) == 42
-    if suffix == "nbc":
-        assert not again.stats.cache_hits, "damaged code was loaded"
-    assert sum(third.stats.cache_hits.values()) == 1, "the damaged entry was not replaced"
+    foreign = (folder / "script").read_bytes()
+    contents = {"cut": data[: len(data) // 2], "flip": data, "empty": b"", "foreign": foreign}
+    (folder / "serve").write_bytes(contents[damage])
+    assert cache.read("serve") is None
+    cache.keep("serve", bytes(range(100)))
+    assert cache.read("serve") == bytes(range(100))
+
+
+def test_a_vanished_folder_stops_nothing(folder: Path) -> None:
+    folder.rmdir()
+    cache.keep("serve", b"code")
+    assert cache.read("serve") is None
 
 
 def test_the_folder_is_private(folder: Path) -> None:
@@ -97,8 +77,9 @@ def test_a_folder_that_others_can_write_to_is_not_used(
     cache.cache_folder.cache_clear()
     try:
         assert cache.cache_folder() is None
-        assert compiled()(21) == 42, "it works without a cache"
-        assert list(shared.rglob("*.nb?")) == []
+        cache.keep("serve", b"code")
+        assert cache.read("serve") is None
+        assert list(shared.rglob("serve")) == []
     finally:
         cache.cache_folder.cache_clear()
 

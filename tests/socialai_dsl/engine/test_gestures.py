@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from socialai_dsl.engine.batch import Batch
-from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.calls import Task
 from socialai_dsl.program import LAST_ACTS, NO_GESTURE, Body, Field, Flag, Op, Register
 from tests.assembly import (
     Assembly,

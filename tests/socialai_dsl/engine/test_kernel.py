@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from socialai_dsl.engine.batch import Batch, Part
-from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.program import Body, Field, Header, Op, Program, Register
 from tests.assembly import Assembly, FrameSpec, batch_of, constant, entity_register, temporary

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from socialai_dsl import draws
-from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.calls import Task
 from socialai_dsl.program import Body, Field, Op, Register
 from tests.assembly import CLOSED, HIDDEN, OPEN, Assembly, batch_of, constant, entity_register
 

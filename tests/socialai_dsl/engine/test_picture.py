@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from socialai_dsl.engine.picture import view_table
+from socialai_dsl.engine.views import view_table
 from socialai_dsl.program import Field, Flag, Op, pack_cell
 from tests.assembly import HIDDEN, Assembly, batch_of, constant, entity_register, step
 

@@ -6,7 +6,7 @@ import pytest
 
 from socialai_dsl import draws
 from socialai_dsl.engine.batch import Batch
-from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.program import Flag, Header, Op, Register
 from tests.assembly import HIDDEN, Assembly, FrameSpec, batch_of, constant

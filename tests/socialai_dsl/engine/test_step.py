@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from socialai_dsl.engine.batch import Batch
-from socialai_dsl.engine.kernel import BAD_ACTION, Task
+from socialai_dsl.engine.calls import BAD_ACTION, Task
 from socialai_dsl.program import Body, Flag, Op, Register
 from tests.assembly import Assembly, FrameSpec, batch_of, constant
 

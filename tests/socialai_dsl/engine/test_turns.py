@@ -7,7 +7,7 @@ import pytest
 
 from socialai_dsl import draws
 from socialai_dsl.engine.batch import Batch
-from socialai_dsl.engine.kernel import Task
+from socialai_dsl.engine.calls import Task
 from socialai_dsl.program import Body, Field, Flag, Op, Register
 from tests.assembly import (
     CLOSED,

@@ -1,0 +1,21 @@
+"""Arrays in the form that the engine takes them in."""
+
+import ctypes
+from collections.abc import Sequence
+from typing import Any
+
+from numpy.typing import NDArray
+
+from socialai_dsl.engine.settings import is_interpreted
+
+
+def make_book(arrays: Sequence[NDArray[Any]]) -> Any:
+    """The arrays as compiled code takes them: int64, address and bytes of a row of each in turn.
+
+    The arrays must live, and stay where they are, as long as the book is used.
+    """
+    if is_interpreted():
+        return list(arrays)
+    assert all(array.flags.c_contiguous for array in arrays), "internal: arrays of a book are contiguous"
+    numbers = [number for array in arrays for number in (array.ctypes.data, array.strides[0])]
+    return (ctypes.c_int64 * len(numbers))(*numbers)

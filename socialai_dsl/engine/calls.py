@@ -1,0 +1,22 @@
+"""What the engine can be asked for, and what it answers: numbers that its callers share with the compiled code."""
+
+from enum import IntEnum
+
+TERMINATED = 1
+TRUNCATED = 2
+
+BAD_ACTION = -1
+"""Returned instead of stepping if an action is outside its space."""
+
+NO_ROOM = -(1 << 32)
+"""Added to what is returned for each row that found no room as required; `Ports.refused` tells which."""
+
+
+class Task(IntEnum):
+    """What a call of `serve` is to do."""
+
+    STEP_NEXT = 0  # step; an episode that has ended is reset by the next step
+    STEP_SAME = 1  # step; an episode that ends is reset at once, its last observation is kept
+    STEP_ONLY = 2  # step; resets are the caller's
+    CHECK = 3  # only look whether the actions are inside their space
+    RESET = 4  # reset the chosen rows to the episode named by their keys
