@@ -300,10 +300,10 @@ def attempts(text: str) -> Iterator[list[str]]:
         "evaluate",
         "coverage",
         "check",
-        "run",
     ):
         yield [command, text]
     yield from (
+        ["run", text, "--agent", "random", "--eval-episodes", "2"],  # a file of this name is there, see above
         ["validate", f"talkitout+{text}"],
         ["validate", f"talkitout?{text}=1"],
         ["run", "--resume", text],
