@@ -1,6 +1,7 @@
 """Metrics are rates per episode, and a log is cut back to where a run resumes."""
 
 import json
+import time
 from pathlib import Path
 
 import pytest
@@ -72,6 +73,8 @@ def test_tensorboard_counts_frames_and_forgets_what_is_made_again(tmp_path: Path
         for update in range(1, 6):
             log.write(update, {"frames": 64 * update, "loss": 0.5, "outcomes": {"won": 0.25, "lost": None}})
     assert points(tmp_path, "loss") == [(64 * update, 0.5) for update in range(1, 6)]
+    # TensorBoard reads files in order of their names: second, process, and then a number of which 10 is before 9.
+    time.sleep(1)
     with MetricsLog(tmp_path, 2, tensorboard=True, frames=128) as log:
         for update in range(3, 7):
             log.write(update, {"frames": 64 * update, "loss": 0.25, "outcomes": {"won": 0.25}})
