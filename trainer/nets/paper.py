@@ -33,6 +33,12 @@ class _Conv(nn.Conv2d):
         return functional.conv2d(images, weight, bias, padding=1)
 
 
+def _with_room(rows: Tensor) -> Tensor:
+    """Rows and some of zeros, because convolutions of each new number of images are compiled and kept for good."""
+    grain = 8 if len(rows) <= 64 else 64
+    return functional.pad(rows, (0, 0) * (rows.dim() - 1) + (0, -len(rows) % grain))
+
+
 def _norm(width: int, batch_norm: bool) -> nn.Module:
     return nn.BatchNorm2d(width) if batch_norm else nn.Identity()
 
@@ -125,11 +131,14 @@ class PaperNet(ActorCritic):
         if self.fused:
             return torch.relu(self._perceive_fused(prepared, text, image_index, text_index))
         number = torch.bfloat16 if self.precision == "bfloat16" else text.dtype
+        count = len(image_index)
+        if not self.batch_norm:
+            prepared, image_index, text_index = map(_with_room, (prepared, image_index, text_index))
         hidden = self.image_conv(prepared.to(number)).index_select(0, image_index)
         for block in self.blocks:
             hidden = block(hidden, text, text_index)
         pooled = functional.max_pool2d(hidden, tuple(hidden.shape[2:]))
-        return torch.relu(pooled.flatten(1)).to(text.dtype)
+        return torch.relu(pooled.flatten(1)).to(text.dtype)[:count]
 
     def _perceive_fused(
         self, prepared: Tensor, text: Tensor, image_index: Tensor, text_index: Tensor

@@ -178,6 +178,20 @@ def test_shared_frames_have_the_features_of_separate_ones(name: str) -> None:
     assert torch.allclose(together, apart, rtol=0, atol=1e-10)
 
 
+def test_convolutions_are_asked_for_few_numbers_of_images() -> None:
+    """Each new one is compiled by PyTorch and kept until the process ends."""
+    net = PaperNet(SPEC, width=8)
+    seen: set[int] = set()
+    for convolution in (net.image_conv[0], net.blocks[0].conv1):
+        convolution.register_forward_hook(lambda _, given, __: seen.add(len(given[0])))
+    text = torch.zeros(1, net.dialogue.size)
+    for count in (1, 2, 7, 8, 9, 63, 64, 65, 100, 128):
+        rows = torch.arange(count)
+        features = net.perceive(net.prepare(random_images(count)), text, rows, torch.zeros_like(rows))
+        assert len(features) == count
+    assert seen == {8, 16, 64, 128}
+
+
 def test_bfloat16_changes_how_paper_computes_and_not_what_it_is() -> None:
     plain, reduced = (build_net("paper", SPEC, 0, precision) for precision in ("float32", "bfloat16"))
     images, text = random_images(8), torch.randn(3, 128, generator=torch.Generator().manual_seed(0))
