@@ -116,12 +116,13 @@ def test_wrong_usage(options: list[str], message: str, capsys: Capture) -> None:
 def test_operations_are_those_of_the_network() -> None:
     spec = NetSpec((8, 2, 4, 16), (7, 7, 4), (12, 5, 3, 3), tuple(map(str, range(40))))
     net = build_net("paper", spec, 0)
-    images = torch.zeros(3, 7, 7, 4, dtype=torch.uint8)
+    frames = 8  # a number that the network need not round up
+    images, pairs = torch.zeros(frames, 7, 7, 4, dtype=torch.uint8), torch.arange(frames)
     with FlopCounterMode(display=False) as counter:
         text = torch.zeros(1, 128)
-        features = net.perceive(net.prepare(images), text, torch.arange(3), torch.zeros(3, dtype=torch.int64))
-        net.heads(net.memory.step(features, net.memory.initial(3))[0])
-    counted = counter.get_total_flops() / 3
+        features = net.perceive(net.prepare(images), text, pairs, torch.zeros_like(pairs))
+        net.heads(net.memory.step(features, net.memory.initial(frames))[0])
+    counted = counter.get_total_flops() / frames
     assert Work(1, 1, 0, 0).flops(1, 0) == pytest.approx(counted, rel=0.003)
     assert every_frame(1, 4).flops(1, 4) == pytest.approx(951e6, rel=0.002)
     assert Work(2, 4, 0, 0).flops(0, 4) < 4 * Work(1, 1, 0, 0).flops(0, 4)
