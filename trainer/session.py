@@ -14,10 +14,11 @@ from trainer.actor import Actor
 from trainer.bonus import Bonus
 from trainer.checkpoint import Checkpoint, CheckpointMeta
 from trainer.config import RESUMABLE_FIELDS, TrainConfig
+from trainer.crew import Crew
 from trainer.curricula import Leaves, Tutor, build_curriculum
 from trainer.errors import CheckpointError
 from trainer.nets import NetSpec, build_net
-from trainer.rollout import RolloutState
+from trainer.rollout import Rollout, RolloutState, collect
 from trainer.team import ALONE, Team
 
 _ADAM = ("step", "exp_avg", "exp_avg_sq")
@@ -48,6 +49,20 @@ class Session:
     def frames(self) -> int:
         """Environment steps made, all environments together."""
         return self.update * self.config.frames_per_update
+
+    def play(self, crew: Crew) -> Rollout:
+        """`collect` the next rollout; see there for errors."""
+        return collect(
+            self.actor,
+            self.envs,
+            self.state,
+            self.config,
+            self.generator,
+            self.bonus,
+            self.tutor,
+            self.team,
+            crew,
+        )
 
     @classmethod
     def start(cls, config: TrainConfig, envs: Any, team: Team = ALONE) -> Session:

@@ -20,7 +20,7 @@ from trainer.errors import CheckpointError, ObservationError, TrainingStopped
 from trainer.metrics import MetricsLog, Tracker, add_up, episode_metrics
 from trainer.ppo import update
 from trainer.ppo_chunks import update_chunks
-from trainer.rollout import EpisodeTally, Rollout, collect
+from trainer.rollout import EpisodeTally, Rollout
 from trainer.session import Session
 from trainer.team import ALONE, Team
 
@@ -129,17 +129,7 @@ def _loop(
     _, _, counted = add_up(team, EpisodeTally(), 0.0, envs.counters())
     then = began
     while session.update < config.updates:
-        rollout = collect(
-            session.actor,
-            envs,
-            session.state,
-            config,
-            session.generator,
-            session.bonus,
-            session.tutor,
-            team,
-            crew,
-        )
+        rollout = session.play(crew)
         losses = _learn(session, rollout, crew)
         _check(session, losses)
         session.update += 1

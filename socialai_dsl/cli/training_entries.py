@@ -16,7 +16,6 @@ from trainer.crew import Crew
 from trainer.nets import best_precision
 from trainer.ppo import update
 from trainer.ppo_chunks import update_chunks
-from trainer.rollout import collect
 from trainer.session import Session
 
 
@@ -124,16 +123,7 @@ def own_updates(config: TrainConfig, envs: Any, every_frame: bool) -> Iterator[U
     with Crew(config.threads, divisible) as crew:
         while True:
             began = time.perf_counter()
-            rollout = collect(
-                session.actor,
-                envs,
-                session.state,
-                config,
-                session.generator,
-                session.bonus,
-                session.tutor,
-                crew=crew,
-            )
+            rollout = session.play(crew)
             seconds = time.perf_counter() - began
             learn(session.actor, session.optimizer, rollout, config, session.generator, crew)
             session.update += 1

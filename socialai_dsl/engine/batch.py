@@ -171,11 +171,11 @@ class Batch:
 
     def script(self) -> None:
         """Let `ports.actions` be what the agents' frames would do now."""
-        self._ask(self._prepare("script"))
+        self._ask(self._prepare_once("script"))
 
     def identify(self) -> NDArray[np.int64]:
         """A digest of each picture, int64 (E,)."""
-        self._ask(self._prepare("identify"))
+        self._ask(self._prepare_once("identify"))
         return self.ports.image_ids.view(np.int64).copy()
 
     def close(self) -> None:
@@ -190,12 +190,19 @@ class Batch:
         self._book = make_book((*tables, *self.state, *ports))
         self._tasks = [self._prepare("serve", task) for task in Task]
         self._check = prepare_call("serve", self._book, Task.CHECK, 0, 0, self._rows)
+        self._others: dict[str, list[Call]] = {}
 
     def _prepare(self, name: str, *what: int) -> list[Call]:
         """A call for each thread, which does its rows."""
         return [
             prepare_call(name, self._book, *what, thread, *rows) for thread, rows in enumerate(self._cuts)
         ]
+
+    def _prepare_once(self, name: str) -> list[Call]:
+        """The calls of what few batches are asked for, whose code is loaded when they are."""
+        if name not in self._others:
+            self._others[name] = self._prepare(name)
+        return self._others[name]
 
     def _share(self, task: Task) -> int:
         """Let every thread do its rows; how many episodes ended, or BAD_ACTION."""

@@ -33,7 +33,7 @@ class _Conv(nn.Conv2d):
         return functional.conv2d(images, weight, bias, padding=1)
 
 
-def _with_room(rows: Tensor) -> Tensor:
+def _rounded_up(rows: Tensor) -> Tensor:
     """Rows and some of zeros, because convolutions of each new number of images are compiled and kept for good."""
     grain = 8 if len(rows) <= 64 else 64
     return functional.pad(rows, (0, 0) * (rows.dim() - 1) + (0, -len(rows) % grain))
@@ -133,7 +133,7 @@ class PaperNet(ActorCritic):
         number = torch.bfloat16 if self.precision == "bfloat16" else text.dtype
         count = len(image_index)
         if not self.batch_norm:
-            prepared, image_index, text_index = map(_with_room, (prepared, image_index, text_index))
+            prepared, image_index, text_index = map(_rounded_up, (prepared, image_index, text_index))
         hidden = self.image_conv(prepared.to(number)).index_select(0, image_index)
         for block in self.blocks:
             hidden = block(hidden, text, text_index)

@@ -77,7 +77,7 @@ class FirstConvolution(torch.autograd.Function):
     def backward(ctx: Any, grad: Tensor) -> tuple[Tensor | None, ...]:
         """Gradients for what `forward` takes; none for what is seen."""
         seen, outputs = ctx.saved_tensors
-        d_weight, d_bias = torch.zeros(len(grad[0, 0, 0]), seen.shape[3]), torch.zeros(grad.shape[3])
+        d_weight, d_bias = torch.zeros(grad.shape[3], seen.shape[3]), torch.zeros(grad.shape[3])
         for given, made, slopes in zip(_rows(seen), _rows(outputs), _rows(grad.contiguous()), strict=True):
             passed = torch.ops.aten.threshold_backward(slopes, made, 0)
             d_weight += passed.t() @ given
