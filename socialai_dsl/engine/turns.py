@@ -95,10 +95,14 @@ def _toggle_ahead(row: Row) -> None:
 
 @inline
 def move_agent(row: Row, action: int) -> None:
-    """The agent's body action."""
+    """The agent's body action; out of the room it has none to do."""
     direction = field(row, AGENT, Field.DIR)
+    x = field(row, AGENT, Field.X)
+    set_field(row, AGENT, Field.LAST, action)
+    if x < 0:
+        return
     if action == Body.FORWARD:
-        x = field(row, AGENT, Field.X) + step_x(direction)
+        x += step_x(direction)
         y = field(row, AGENT, Field.Y) + step_y(direction)
         if is_solid(row, x, y):
             if row.program[Header.FLAGS] & Trait.PUSHED:
@@ -110,7 +114,6 @@ def move_agent(row: Row, action: int) -> None:
         set_field(row, AGENT, Field.DIR, (direction + 2 * action - 1) & 3)
     elif action == Body.TOGGLE:
         _toggle_ahead(row)
-    set_field(row, AGENT, Field.LAST, action)
 
 
 @outline

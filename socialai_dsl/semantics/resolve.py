@@ -31,7 +31,7 @@ from socialai_dsl.semantics.build import (
 from socialai_dsl.semantics.findings import FailedError, Findings, Scalar, surviving
 from socialai_dsl.semantics.readings import Readings
 from socialai_dsl.semantics.registers import Registers
-from socialai_dsl.semantics.scope import PlayedFrame, Scope, Symbols
+from socialai_dsl.semantics.scope import Draws, PlayedFrame, Scope, Symbols
 from socialai_dsl.semantics.terms import (
     BOOL,
     DIRECTION,
@@ -312,13 +312,18 @@ class Resolver:
         options = self._options(node.right)
         lead = next((o for o in options if not resolve_names.is_bare(self, o, scope)), None)
         if resolve_names.is_bare(self, node.left, scope) and lead is not None:
-            element = resolve_groups.group(self, lead, None, scope).type if resolve_groups.is_group(self, lead, scope) \
-                else self.value(lead, None, scope).type  # fmt: skip
-            left = self.value(node.left, element, scope)
+            left = self.value(node.left, self._element(lead, scope), scope)
         else:
             left = self.value(node.left, None, scope)
         found = any_of(self._among(left, option, node, scope) for option in options)
         return _negated(found) if node.negated else found
+
+    def _element(self, option: ast.Expr, scope: Scope) -> Type:
+        """The type of an option, or of what is in it; it is asked for its type alone, so its picks are not numbered."""
+        asked = replace(scope, draws=Draws(scope.draws.site))
+        if resolve_groups.is_group(self, option, scope):
+            return resolve_groups.group(self, option, None, asked).type
+        return self.value(option, None, asked).type
 
     def _options(self, node: ast.Expr) -> tuple[ast.Expr, ...]:
         return node.options if isinstance(node, ast.Alternatives) else (node,)

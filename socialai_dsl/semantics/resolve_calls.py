@@ -284,10 +284,12 @@ def _sees(resolver: Resolver, viewer: Term, node: ast.Call, scope: Scope) -> Ter
     """`a.sees(x)`, `a.would_see(x, direction)`; of a group, any of it."""
     _check_viewer(resolver, viewer, node, scope)
     target, *rest = node.args
-    facing = resolver.value(rest[0], DIRECTION, scope) if rest else None
-    if resolve_groups.is_group(resolver, target, scope):
-        return resolve_groups.any_member(resolver, target, scope, lambda other: Sees(viewer, other, facing))
-    return Sees(viewer, somewhere(resolver, target, scope), facing)
+
+    def seen(other: Term) -> Term:
+        # After what is seen: picks are numbered in source order.
+        return Sees(viewer, other, resolver.value(rest[0], DIRECTION, scope) if rest else None)
+
+    return _each(resolver, target, scope, seen)
 
 
 def _check_viewer(resolver: Resolver, viewer: Term, node: ast.Call, scope: Scope) -> None:

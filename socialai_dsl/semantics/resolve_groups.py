@@ -189,8 +189,8 @@ def quantified(resolver: Resolver, node: ast.Quantifier, expected: Type | None, 
     if node.name in ("any", "all") and node.where is None:
         raise resolver.fail("S211", f"`{node.name}` needs `where` and a condition", node, scope)
     chooses = node.name in ("pick", "first", "nearest")
-    members = group(resolver, node.group, _open(expected) if chooses else None, scope)
     ordinal = scope.draws.number() if node.name == "pick" else 0
+    members = group(resolver, node.group, _open(expected) if chooses else None, scope)
     variable = _named(node.var, scope)
     inner = replace(scope.binding(node.var, Variable(members.type, variable)), nested=scope.nested + 1)
     condition = resolver.value(node.where, BOOL, inner) if node.where is not None else None
@@ -200,8 +200,8 @@ def quantified(resolver: Resolver, node: ast.Quantifier, expected: Type | None, 
 
 def pick(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope) -> Term:
     """`pick(group)` and `first(group)`, `count(group)`: without a condition."""
-    members = group(resolver, node.args[0], _open(expected) if node.name != "count" else None, scope)
     ordinal = scope.draws.number() if node.name == "pick" else 0
+    members = group(resolver, node.args[0], _open(expected) if node.name != "count" else None, scope)
     return made(cast(Op, node.name), members, _named("each", scope), None, scope, ordinal)
 
 

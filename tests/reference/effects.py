@@ -97,11 +97,18 @@ def reset(world: World, target: Entity) -> None:
     status, cell, facing, inside = target.at_reset
     if target.sort == "object":
         target.status, target.inside, target.counted = status, inside, 0
+        for content in contents_at_reset(world, target):
+            content.cell, content.inside = None, target
     else:
         target.pointing, target.facing = None, facing
         if cell is None or not geometry.free(world, cell, target):
             return
     target.cell, target.facing = cell, facing
+
+
+def contents_at_reset(world: World, holder: Entity) -> list[Entity]:
+    """What lay in a thing when the episode began."""
+    return [one for one in world.things() if one.at_reset[1] is None and one.at_reset[3] is holder]
 
 
 def vanish(target: Entity) -> None:
