@@ -7,14 +7,18 @@ import contextlib
 import random
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+import socialai_dsl
 from socialai_dsl.cli.main import main
 from socialai_dsl.cli.reporters import REPORTERS
 from socialai_dsl.diagnostics import ScenarioError
+from socialai_dsl.engine.errors import RoomError
 from socialai_dsl.frontend import check
 from socialai_dsl.grammar.parser import ParseProblem, parse_expression
 from socialai_dsl.loader.reader import read_document
@@ -358,13 +362,29 @@ def crowded(rng: random.Random) -> str:
     )
 
 
+SECONDS_OF_A_RESET = 0.01
+"""Of processor time, when rooms are drawn again and again until one is as required, or none is."""
+
+
+def reset_in_time(env: Any, seed: int) -> None:
+    """Reset twice, alike: the less of the times counts, should the machine have been busy. Raises RoomError."""
+    spent, error = [], None
+    for _ in range(2):
+        before = time.process_time()
+        try:
+            env.reset(seed=seed)
+        except RoomError as impossible:
+            error = impossible
+        spent.append(time.process_time() - before)
+    assert min(spent) < SECONDS_OF_A_RESET
+    if error is not None:
+        raise error
+
+
 @pytest.mark.parametrize(
     "count", [40, pytest.param(2000, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])]
 )
 def test_crowded_rooms_are_refused_or_drawn(count: int, tmp_path: Path) -> None:
-    import socialai_dsl
-    from socialai_dsl.engine.errors import RoomError
-
     rng, refused, drawn, impossible = random.Random(8), 0, 0, 0
     file = tmp_path / "crowded.yaml"
     for _ in range(count):
@@ -377,7 +397,7 @@ def test_crowded_rooms_are_refused_or_drawn(count: int, tmp_path: Path) -> None:
             env = socialai_dsl.make(str(file))
             try:
                 for seed in range(3):
-                    env.reset(seed=seed)
+                    reset_in_time(env, seed)
                 drawn += 1
             except RoomError:
                 impossible += 1
