@@ -51,6 +51,7 @@ _LITERALS: dict[Op, tuple[int, ...]] = {
     Op.SET_FIELD: (1,),
     Op.GOTO: (0, 1),
     Op.COUNT: (0,),
+    Op.ANSWER: (0, 2),
     Op.END: (0, 1),
     Op.END_GRADED: (0,),
     **dict.fromkeys((Op.HEARD_FROM, Op.HEARD_NOUN), (1, 2)),
@@ -181,6 +182,8 @@ class _Names:
     def _operand(self, op: Op, position: int, word: int, count: int) -> str:
         if op == Op.COUNT:
             return self.program.rules[word] if position == 0 else "0"
+        if op == Op.ANSWER and position != 1:
+            return self.program.rules[word] if position == 0 else _goal(word)
         if op in (Op.END, Op.END_GRADED) and position == 0:
             return self.program.outcomes[word]
         if op == Op.CHOOSE and position == 0:
@@ -202,6 +205,11 @@ class _Names:
         if number < CELL:
             return str(self.program.entities[number])
         return f"({(number - CELL) % 32}, {(number - CELL) // 32})"
+
+
+def _goal(word: int) -> str:
+    """Where an answer goes: frame and state, as a GOTO shows them."""
+    return f"{word >> 8}, {(word & 255) - 1}" if word else "0"
 
 
 def _least_operands(op: Op) -> int:

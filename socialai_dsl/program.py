@@ -71,7 +71,7 @@ class Header(IntEnum):
     HORIZON = 10
     FLAGS = 11  # see Flag
     TOKENS = 12  # L, length of the history buffer
-    LOG = 13  # first register of the log; entries are line numbers, oldest first
+    LOG = 13  # first register of the log, a ring of line numbers that begins at Register.OLDEST
     LOG_SIZE = 14  # how many lines it holds: never more than fit into L tokens
     HEARD = 15  # first register of the lines the agent heard this step, in the order spoken
     HEARD_SIZE = 16
@@ -165,6 +165,7 @@ class Register(IntEnum):
         20  # how many rooms of this episode were not as required; part of the key of every draw at reset
     )
     BONUS = 21  # per cent of the success reward that rules add to the reward of this step
+    OLDEST = 22  # where in the log its oldest line is
 
 
 class Field(IntEnum):
@@ -322,16 +323,19 @@ class Op(IntEnum):
     PLACE = 47  # e(a) is put on the cell of e(b), in the room; it may share the cell
     REWARD = 48  # Register.BONUS += v(a)
     END_GRADED = 49  # the episode ends: outcome a (literal), v(b) per cent of the reward, cut to 0..100
+    # A rule that answers, in one instruction: counter a (literal) += 1, line v(b) is said as by SAY, and, unless c
+    # (literal) is 0, frame c >> 8 enters state (c & 255) - 1, as by GOTO.
+    ANSWER = 50
     # Activities: choose the body action of the entity on turn.
-    BODY = 50  # action v(a)
+    BODY = 51  # action v(a)
     TURN_TO = (
-        51  # e(a) makes one quarter turn towards direction v(b), none if it faces it; behind: site c decides
+        52  # e(a) makes one quarter turn towards direction v(b), none if it faces it; behind: site c decides
     )
-    GO_TO = 52  # e(a) takes one step of a shortest path to the cell of e(b); site c for turning round
-    GO_NEXT_TO = 53  # e(a) takes one step of a shortest path to a free cell next to e(b); site c
-    POINT = 54  # e(a) points in direction v(b)
+    GO_TO = 53  # e(a) takes one step of a shortest path to the cell of e(b); site c for turning round
+    GO_NEXT_TO = 54  # e(a) takes one step of a shortest path to a free cell next to e(b); site c
+    POINT = 55  # e(a) points in direction v(b)
     # One of b (literal) actions, drawn at site c: action k is in the bits 4 k to 4 k + 3 of a (literal).
-    CHOOSE = 55
+    CHOOSE = 56
     # Boards: sets of cells, numbered 0 to BOARDS - 1 (literals). They carry nothing from run to run; B_FREE and PUT
     # belong to reset code.
     B_FLOOR = 60  # board a = cells of plain floor

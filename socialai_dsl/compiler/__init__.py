@@ -12,6 +12,7 @@ from socialai_dsl.compiler.behaviour import Behaviour
 from socialai_dsl.compiler.classes import Classes
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.homes import Homes
+from socialai_dsl.compiler.kept_lines import KeptLines
 from socialai_dsl.compiler.lines import Lines, note_what_is_said
 from socialai_dsl.compiler.links import links
 from socialai_dsl.compiler.memories import push_acts, remember
@@ -66,10 +67,12 @@ def _compiled(checked: Checked, probes: Probes, numbered: Lines | None) -> tuple
     registers = Registers.of(checked)
     classes = Classes(checked)
     sites = Sites()
-    lines = Lines(checked, classes)
+    kept = KeptLines(checked, registers)
+    lines = Lines(checked, classes, kept)
     if numbered is not None:
         lines.adopt(numbered)
     note_what_is_said(checked, lines, registers)
+    kept.reserve(lines.bounds)
     homes = Homes(checked, registers)
     code = CodeTable()
     tables = Tables(checked, registers, classes, sites, lines, code)
@@ -82,7 +85,7 @@ def _compiled(checked: Checked, probes: Probes, numbered: Lines | None) -> tuple
             emit(to)
         return code.add(to.block, label)
 
-    entries = {Header.RESET_PC: entry("reset", lambda to: reset(to, computed, homes))}
+    entries = {Header.RESET_PC: entry("reset", lambda to: reset(to, computed, homes, kept))}
     inboxes = tables.reserve_inboxes()
     behaviour = Behaviour(checked, registers, classes, sites, lines, homes, code, [], inboxes, probes)
     frames = [behaviour.frame(number, frame) for number, frame in enumerate(checked.frames)]

@@ -9,6 +9,8 @@ from socialai_dsl.program import BOARDS, CONSTANT, TEMPORARIES, TEMPORARY, Op
 from socialai_dsl.source import Span
 
 LARGEST = CONSTANT // 2 - 1
+_STATES_OF_AN_ANSWER = 255
+"""States that `Op.ANSWER` has room for."""
 
 
 def constant(value: int) -> int:
@@ -74,6 +76,18 @@ class Block:
         label.position = len(self.instructions)
         for use in label.uses:
             self.instructions[use][3] = label.position - use - 1
+
+    def fuse_answer(self, start: int) -> None:
+        """Put what begins at `start` into one instruction, if all of it is to count, to say and perhaps to go on."""
+        ops = [Op(instruction[0]) for instruction in self.instructions[start:]]
+        if ops not in ([Op.COUNT, Op.SAY, Op.HALT], [Op.COUNT, Op.SAY, Op.GOTO, Op.HALT]):
+            return
+        (_, counter, _, _), (_, _, line, _), (_, frame, state, _) = self.instructions[start : start + 3]
+        if Op.GOTO in ops and state >= _STATES_OF_AN_ANSWER:
+            return
+        goal = frame << 8 | state + 1 if Op.GOTO in ops else 0
+        self.instructions[start:-1] = [[int(Op.ANSWER), counter, line, goal]]
+        del self.spans[start + 1 : -1]
 
     def halt(self) -> None:
         """End of this path."""

@@ -247,6 +247,7 @@ class _FrameCompiler:
         asked = self._asked(to, rule)
         self._conditions(to, rule, asked, following)
         operands = self._effects(to).compute(rule, asked.nothing("values", following), self.speaker)
+        start = len(block.instructions)
         block.emit(Op.COUNT, self.counters[rule.name])
         if rule.do is None:
             self._effects(to).carry_out(rule, operands, self.speaker)
@@ -257,6 +258,7 @@ class _FrameCompiler:
         block.span = rule.span
         if rule.do is None:
             self._go(to, rule, follow)
+            block.fuse_answer(start)
         else:
             self._activities(to).emit(rule.do)
             block.halt()
@@ -338,9 +340,13 @@ class _FrameCompiler:
             self._activities(to, self.aims.get(k)).unless_finished(step.activity, unfinished, ended)
         block.bind(ended)
         failed = asked.nothing("values", running)
-        self._effects(to).emit(step, self.counters[step.name], failed, self.speaker)
+        operands = self._effects(to).compute(step, failed, self.speaker)
+        start = len(block.instructions)
+        block.emit(Op.COUNT, self.counters[step.name])
+        self._effects(to).carry_out(step, operands, self.speaker)
         block.emit(Op.GOTO, self.number, self._next(k))
         block.halt()
+        block.fuse_answer(start)
         asked.report(to, running)
         block.bind(running)
         block.halt()

@@ -249,6 +249,10 @@ class _Instruction:
     def count(self, a: int, _b: int, _c: int) -> str | None:
         return self.literal(a, 0, len(self.program.rules) - 1)
 
+    def answer(self, a: int, b: int, c: int) -> str | None:
+        problem = self.count(a, 0, 0) or self.value(b, 0, self.program.header(Header.LINES) - 1)
+        return problem or (self.goto(c >> 8, (c & 255) - 1, 0) if c != 0 else None)
+
     def end(self, a: int, b: int, _c: int) -> str | None:
         return self.literal(a, 0, len(self.program.outcome_table) - 3) or self.literal(b, 0, 100)
 
@@ -389,6 +393,7 @@ _CHECKS: dict[Op, Callable[[_Instruction, int, int, int], str | None]] = {
     Op.SAY: _Instruction.say,
     Op.GOTO: _Instruction.goto,
     Op.COUNT: _Instruction.count,
+    Op.ANSWER: _Instruction.answer,
     Op.END: _Instruction.end,
     Op.END_GRADED: _Instruction.end_graded,
     Op.REWARD: _Instruction.reward,

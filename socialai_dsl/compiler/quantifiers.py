@@ -48,9 +48,35 @@ def picked_thing(to: Expressions, term: terms.Quantified) -> int:
     if term.condition is not None and len(term.items) > _SET:
         choices = to.into_temporary(Op.MAX, _count_one_by_one(to, term), constant(1))
         return _nth(to, term, to.into_temporary(Op.DRAW, choices, site))
+    if (other := _but_one(term)) is not None:
+        return _any_other(to, term, other, site)
     if term.condition is not None:
         return _chosen(to, term, Op.PICK_BIT, site)
     return _item(to, term.items, to.into_temporary(Op.DRAW, constant(len(term.items)), site))
+
+
+def _but_one(term: terms.Quantified) -> terms.Term | None:
+    """The one of its things that `pick(x in group where x != one)` leaves out, if that is what the term is."""
+    match term.condition:
+        case terms.Compare("!=", terms.Variable(name=name), terms.Const() | terms.Read() as one):
+            first, last = term.items[0].value, term.items[-1].value
+            in_a_row = [item.value for item in term.items] == list(range(first, last + 1))
+            among = first <= one.type.low and one.type.high <= last
+            if name == term.variable and in_a_row and among and first < last and one.type.kind == "entity":
+                return one
+    return None
+
+
+def _any_other(to: Expressions, term: terms.Quantified, one: terms.Term, site: int) -> int:
+    """A number below that of all others, and from the one that is left out on the next higher."""
+    left_out = to.value(one)
+    position = to.into_temporary(Op.DRAW, constant(len(term.items) - 1), site)
+    result = to.into_temporary(Op.ADD, position, constant(term.items[0].value))
+    before = Label()
+    to.block.test(Op.IF_LE, left_out, result, before)
+    to.block.emit(Op.ADD, result, result, constant(1))
+    to.block.bind(before)
+    return result
 
 
 def _chosen(to: Expressions, term: terms.Quantified, op: Op, site: int = 0) -> int:

@@ -105,7 +105,7 @@ def _pin(row: Row, first: int) -> None:
     log = row.program[Header.LOG]
     end = log + row.program[Header.LOG_SIZE]
     for i in range(first, row.program[Header.REGISTERS]):
-        told = log <= i < end or i == Register.LOGGED or i == Register.TOKENS
+        told = log <= i < end or i == Register.LOGGED or i == Register.OLDEST or i == Register.TOKENS
         if row.pins[i] != PIN_NONE and not told:
             row.registers[i] = row.pins[i]
 

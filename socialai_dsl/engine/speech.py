@@ -21,23 +21,22 @@ def _forget_oldest(row: Row, words: int) -> None:
     lines = registers[Register.LOGGED]
     most = row.program[Header.TOKENS] - words
     left = registers[Register.TOKENS]
-    gone = 0
-    while gone < lines and (left > most or lines - gone >= row.program[Header.LOG_SIZE]):
-        left -= _line(row, registers[log + gone], LineColumn.TOKENS)
-        gone += 1
-    if gone == 0:
+    size = row.program[Header.LOG_SIZE]
+    if left <= most and lines < size:
         return
+    oldest = registers[Register.OLDEST]
+    while lines > 0 and (left > most or lines >= size):
+        left -= _line(row, registers[log + oldest], LineColumn.TOKENS)
+        oldest = oldest + 1 if oldest + 1 < size else 0
+        lines -= 1
     left = max(left, 0)
     shift = registers[Register.TOKENS] - left
-    for i in range(lines - gone):
-        registers[log + i] = registers[log + gone + i]
     for i in range(left):
         row.tokens[i] = row.tokens[shift + i]
     for i in range(left, registers[Register.TOKENS]):
         row.tokens[i] = 0
-    for i in range(lines - gone, lines):
-        registers[log + i] = 0
-    registers[Register.LOGGED] = lines - gone
+    registers[Register.OLDEST] = oldest
+    registers[Register.LOGGED] = lines
     registers[Register.TOKENS] = left
 
 
@@ -53,7 +52,9 @@ def remember(row: Row, line: int) -> None:
     words = min(words, row.program[Header.TOKENS] - start)
     for i in range(words):
         row.tokens[start + i] = row.program[first + i]
-    registers[row.program[Header.LOG] + registers[Register.LOGGED]] = line
+    place = registers[Register.OLDEST] + registers[Register.LOGGED]
+    size = row.program[Header.LOG_SIZE]
+    registers[row.program[Header.LOG] + (place if place < size else place - size)] = line
     registers[Register.LOGGED] += 1
     registers[Register.TOKENS] = start + words
     row.key[Key.DIGEST] = fold(row.key[Key.DIGEST], line)

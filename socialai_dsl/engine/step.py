@@ -59,9 +59,7 @@ def _fetch_history(row: Row) -> None:
     """Somebody will probably answer: a line is written behind the history, which may move to make room."""
     for i in range(0, row.registers[Register.TOKENS] + 1, _LINE_OF_CACHE):
         fetch(row.tokens, i)
-    log = row.program[Header.LOG]
-    for i in range(log, log + row.registers[Register.LOGGED] + 1, _LINE_OF_CACHE):
-        fetch(row.registers, i)
+    fetch(row.registers, row.program[Header.LOG] + row.registers[Register.OLDEST])
 
 
 @inline

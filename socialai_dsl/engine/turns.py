@@ -15,7 +15,7 @@ from socialai_dsl.engine.operands import draw_action
 from socialai_dsl.engine.pushing import is_free, push, roll
 from socialai_dsl.engine.speech import deliver, empty_inbox, hear, inbox_class, speak
 from socialai_dsl.engine.state import AGENT, NOTHING, ONE, STILL, ZERO, Row, Trait
-from socialai_dsl.engine.vm import run
+from socialai_dsl.engine.vm import answer, run
 from socialai_dsl.program import Body, Field, Flag, FrameColumn, Header, Op, Register, TypeColumn
 
 
@@ -199,7 +199,12 @@ def conclude(row: Row, frame: int, heard: int, chosen: bool, flags: int) -> None
     if not chosen:
         pc = row.program[_state_table(row, frame) + 2 + row.program[Header.CLASSES] + heard]
         if pc != 0:
-            run(row, pc)
+            code = row.program[Header.CODE_AT] + 4 * pc
+            if row.program[code] == Op.ANSWER and row.program[code + 4] == Op.HALT:
+                # As in `act`: this is what rules do most often.
+                answer(row, row.program[code + 1], row.program[code + 2], row.program[code + 3])
+            else:
+                run(row, pc)
     elif flags & Trait.APART:
         _do_the_rest(row, frame)
 

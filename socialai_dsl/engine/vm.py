@@ -98,16 +98,39 @@ def _bits(row: Row, op: int, word: int, site: int) -> int:
 
 
 @inline
+def _say(row: Row, line: int) -> None:
+    """Say a line, unless something is said already."""
+    if row.registers[Register.SAID_LINE] == 0:
+        row.registers[Register.SAID_LINE] = value(row, line) + 1
+
+
+@inline
+def _go(row: Row, number: int, state: int) -> None:
+    """Let a frame enter a state."""
+    frame = row.program[Header.FRAME_AT] + FrameColumn.COLUMNS * number
+    row.registers[row.program[frame + FrameColumn.STATE]] = state
+    row.registers[row.program[frame + FrameColumn.CLOCK]] = 0
+
+
+@inline
+def answer(row: Row, counter: int, line: int, goal: int) -> None:
+    """All that most rules do; see `Op.ANSWER`."""
+    row.counters[counter] += 1
+    _say(row, line)
+    if goal != 0:
+        _go(row, goal >> 8, (goal & 255) - 1)
+
+
+@inline
 def _effect(row: Row, op: int, a: int, b: int, c: int) -> None:
     """Instructions that change the world."""
     registers = row.registers
-    if op == Op.SAY:
-        if registers[Register.SAID_LINE] == 0:
-            registers[Register.SAID_LINE] = value(row, b) + 1
+    if op == Op.ANSWER:
+        answer(row, a, b, c)
+    elif op == Op.SAY:
+        _say(row, b)
     elif op == Op.GOTO:
-        frame = row.program[Header.FRAME_AT] + FrameColumn.COLUMNS * a
-        registers[row.program[frame + FrameColumn.STATE]] = b
-        registers[row.program[frame + FrameColumn.CLOCK]] = 0
+        _go(row, a, b)
     elif op == Op.COUNT:
         row.counters[a] += 1
     elif op == Op.END:

@@ -74,6 +74,7 @@ def _common(program: Program) -> list[Range]:
         Register.PERCENT: (0, 100),
         Register.HEARD: (0, h(Header.HEARD_SIZE)),
         Register.LOGGED: (0, h(Header.LOG_SIZE)),
+        Register.OLDEST: (0, max(h(Header.LOG_SIZE) - 1, 0)),
         Register.TOKENS: (0, h(Header.TOKENS)),
         Register.ENDED: (0, 2),
         Register.POKED: (-1, h(Header.ENTITIES) - 1),

@@ -63,10 +63,16 @@ def describe(program: Program, registers: Row) -> dict[str, Any]:
         state["memory"] = _memories(program, registers, addresses)
     if state["t"]:
         state["last"] = _last(program, registers)
-    log = program.header(Header.LOG)
-    state["heard"] = [program.lines[line] for line in registers[log : log + int(registers[Register.LOGGED])]]
+    state["heard"] = history(program, registers)
     state["pending"] = _pending(program, registers)
     return state
+
+
+def history(program: Program, registers: Row) -> list[str]:
+    """Lines heard since the reset, as far as they are kept, oldest first."""
+    log, size = program.header(Header.LOG), program.header(Header.LOG_SIZE)
+    places = int(registers[Register.OLDEST]) + np.arange(int(registers[Register.LOGGED]))
+    return [program.lines[line] for line in registers[log + places % max(size, 1)]]
 
 
 def _value(program: Program, registers: Row, name: RegisterName) -> Any:

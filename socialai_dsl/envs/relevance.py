@@ -43,7 +43,10 @@ _OF_ONE_STEP = (
 )
 """Written anew in every step; code can read what the last step left only at BEFORE_PC."""
 
-_RECORDS = (Register.HEARD, Register.LOGGED, Register.TOKENS, Register.ATTEMPT, Register.ACCEPTED)
+_RECORDS = (
+    *(Register.HEARD, Register.LOGGED, Register.OLDEST, Register.TOKENS),
+    *(Register.ATTEMPT, Register.ACCEPTED),
+)
 """For the observation and for resets alone."""
 
 _WHOLE_UTTERANCE = (Register.TEMPLATE, Register.NOUN, Register.UTTERANCE)
@@ -58,7 +61,7 @@ _READ: dict[Op, tuple[int, ...]] = {
     **dict.fromkeys((Op.COUNT_BITS, Op.LOWEST_BIT, Op.PICK_BIT), (1,)),
     **dict.fromkeys((Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.MOD, Op.MIN, Op.MAX), (1, 2)),
     **dict.fromkeys((Op.DISTANCE, Op.QUADRANT, Op.CELL_BESIDE), (1, 2)),
-    **dict.fromkeys((Op.HEARD_FROM, Op.HEARD_NOUN, Op.END_GRADED), (1,)),
+    **dict.fromkeys((Op.HEARD_FROM, Op.HEARD_NOUN, Op.END_GRADED, Op.ANSWER), (1,)),
     Op.SET_BIT: (0, 1),
     Op.SEES: (0, 1, 2),
     Op.SET_FIELD: (0, 2),
@@ -213,7 +216,7 @@ def _draws_matter(program: Program, block: list[Instruction]) -> bool:
         if op in _VALUES or op in _DRAWS:
             continue
         used = [position for position in _READ.get(op, (0, 1, 2)) if operands[position] in drawn]
-        if used and not (op == Op.SAY and used == [1] and not _lines_are_triggers(program)):
+        if used and not (op in (Op.SAY, Op.ANSWER) and used == [1] and not _lines_are_triggers(program)):
             return True
     return False
 

@@ -15,7 +15,7 @@ from socialai_dsl.engine.state import PIN_NONE, Key
 from socialai_dsl.envs import snapshot
 from socialai_dsl.envs.audit import first_unsound
 from socialai_dsl.envs.channels import in_bytes, joined
-from socialai_dsl.envs.describe import describe
+from socialai_dsl.envs.describe import describe, history
 from socialai_dsl.envs.layout import pinned_member, pins_of
 from socialai_dsl.envs.merge import Merged
 from socialai_dsl.envs.seats import check_options, choose_episodes
@@ -252,9 +252,7 @@ class Table:
 
     def history(self, row: int) -> list[str]:
         """Lines heard since the reset, as far as they are kept."""
-        program, registers = self.program(row), self.state.registers[row]
-        first = program.header(Header.LOG)
-        return [program.lines[line] for line in registers[first : first + int(registers[Register.LOGGED])]]
+        return history(self.program(row), self.state.registers[row])
 
     def describe(self, row: int) -> dict[str, Any]:
         """The state of a row in the scenario's own names; a superset of a layout."""

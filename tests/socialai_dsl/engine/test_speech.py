@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from socialai_dsl import draws
@@ -28,8 +29,9 @@ def say(line: int) -> list[tuple[int, ...]]:
 
 def logged(room: Assembly, batch: Batch) -> list[int]:
     program = room.program()
-    first = program.header(Header.LOG)
-    return batch.state.registers[0, first : first + int(batch.state.registers[0, Register.LOGGED])].tolist()
+    log, registers = program.header(Header.LOG), batch.state.registers[0]
+    places = int(registers[Register.OLDEST]) + np.arange(int(registers[Register.LOGGED]))
+    return registers[log + places % program.header(Header.LOG_SIZE)].tolist()
 
 
 @pytest.mark.parametrize(
