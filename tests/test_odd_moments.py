@@ -320,3 +320,53 @@ def test_nobody_arrives_at_the_cell_of_what_is_gone(tmp_path: Path) -> None:
         [STILL] * 4,
     )
     assert state["ann"]["state"] == "step0"
+
+
+COUNTING = """
+frames:
+  count:
+    let: {coins: {start: 1, range: 0..9}}
+    states:
+      counting:
+        then: [{when: t <= 2, set: {coins: coins + 3}, say: I have <coins>}]
+cast: {ann: {frame: count, at: [2, 2], facing: down}, agent: {at: [3, 2], facing: left}}
+"""
+
+
+def test_what_is_said_is_worked_out_before_anything_is_set(tmp_path: Path) -> None:
+    """Even if the register that is set is, as the first line of all, the number of the line."""
+    state = play(tmp_path, COUNTING, [STILL] * 3)
+    assert state["heard"] == ["Ann: I have 1", "Ann: I have 4"]
+    assert registers(state)["coins"] == 7
+
+
+def test_an_agent_without_a_cell_does_nothing(tmp_path: Path) -> None:
+    pair = crowded(tmp_path, "5..6", 9)
+    absent = []
+    for episode in range(10):
+        pair.reset(0, episode)
+        before = pair.env.describe()["agent"]
+        for action in (0, 1, 1, 2, 3):
+            pair.step((action, 0, 0, 0))
+        absent += [pair.env.describe()["agent"]["facing"] == before["facing"]] if before["at"] is None else []
+    assert absent
+    assert all(absent)
+
+
+RESTORED = """
+objects:
+  box: {type: box, at: [3, 3]}
+  coin: {type: ball, inside: box}
+rules:
+  - {when: t == 1, cause: [box.reveal]}
+  - {when: t == 3, cause: [box.reset]}
+state: {seen: false, hidden: false}
+cast: {agent: {at: [1, 1]}}
+"""
+
+
+def test_a_box_is_put_back_with_what_lay_in_it(tmp_path: Path) -> None:
+    assert play(tmp_path, RESTORED, [STILL] * 2)["coin"]["at"] == [3, 3]
+    state = play(tmp_path, RESTORED, [STILL] * 3)
+    assert state["coin"].get("gone")
+    assert state["box"]["at"] == [3, 3]

@@ -56,12 +56,12 @@ class Effects:
         values: list[int | None] = []
         for effect in what.causes:
             to.site = effect.site
-            targets.append(tuple(self._steady(entity, what) for entity in effect.entities))
-            values.append(None if effect.value is None else self._steady(effect.value, what))
+            targets.append(tuple(self._steady(to.value(entity), what) for entity in effect.entities))
+            values.append(None if effect.value is None else self._steady(to.value(effect.value), what))
         line = None
         if what.say is not None:
             assert speaker is not None, "internal: nobody is there to say it"
-            line = self.lines.say(to, speaker, what.say)
+            line = self._steady(self.lines.say(to, speaker, what.say), what)
         to.failed = None
         to.block.span = what.span
         return Operands(sets, tuple(targets), tuple(values), line)
@@ -83,9 +83,8 @@ class Effects:
         """A value in a temporary, so that no later effect of the same rule can change it."""
         return self.to.into_temporary(Op.LOAD, self.to.sited_value(sited))
 
-    def _steady(self, term: Term, what: RulePlan | StepPlan) -> int:
-        """A value that nothing the rule sets can change."""
-        value = self.to.value(term)
+    def _steady(self, value: int, what: RulePlan | StepPlan) -> int:
+        """The operand of a value that nothing the rule sets can change."""
         is_set = value in {self.registers.by_path[path] for path, _ in what.sets}
         return self.to.into_temporary(Op.LOAD, value) if is_set else value
 

@@ -160,6 +160,8 @@ REFUSED: dict[str, tuple[Header, Code]] = {
     "a view in no direction": (RULES, [(Op.LOAD, temp(0), const(4)), (Op.SEES, temp(0), const(0), const(1))]),
     "a view in a direction that was never written": (RULES, [(Op.SEES, temp(0), const(0), const(1))]),
     "a view that turns a register": (RULES, [(Op.SEES, Register.ACCEPTED, const(0), const(1))]),
+    "a line that does not exist": (RULES, [(Op.SAY, const(1), const(4000))]),
+    "a line below zero": (RULES, [(Op.SAY, const(1), const(-1))]),
     "a cell that says something": (RULES, [(Op.SAY, cell(1, 1), const(0))]),
     "a cell that vanishes": (RULES, [(Op.VANISH, cell(1, 1))]),
     "a cell with a status": (RULES, [(Op.BECOME, cell(1, 1), const(0))]),

@@ -481,3 +481,20 @@ def test_a_turn_shows_the_lowest_npc_of_its_cell() -> None:
     play(batch, body(Body.NONE))
     assert entity(batch, 2, Field.DIR) == [3]
     assert np.array_equal(batch.state.boards, before), "the other one stands in front of it"
+
+
+ANSWER_AND_GO = (Op.ANSWER, 2, constant(1), 0 << 8 | 2)
+"""Counter 2, line 1, the frame's second state."""
+
+
+@pytest.mark.parametrize("through", [[], [(Op.IF_LE, constant(0), Register.T, 0)]], ids=["alone", "in code"])
+def test_an_answer_counts_says_and_goes_on(through: list[tuple[int, ...]]) -> None:
+    """As its first instruction `conclude` takes the answer itself; behind another the interpreter does."""
+    frame = FrameSpec(1, ([], []), then=({-1: [*through, ANSWER_AND_GO]}, {}))
+    lines = (("hello", (2,), 1), ("bye", (3,), 1))
+    batch = batch_of(Assembly(at=((1, 1), (2, 1)), npcs=1, frames=(frame,), lines=lines).program())
+    play(batch, body(Body.NONE), body(Body.NONE))
+    registers = batch.state.registers[0]
+    assert batch.ports.counters[0][2] == 1, "the second state has no rule"
+    assert batch.state.tokens[0][:2].tolist() == [3, 0]
+    assert registers[Register.HEARD] == 0
