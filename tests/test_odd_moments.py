@@ -370,3 +370,22 @@ def test_a_box_is_put_back_with_what_lay_in_it(tmp_path: Path) -> None:
     state = play(tmp_path, RESTORED, [STILL] * 3)
     assert state["coin"].get("gone")
     assert state["box"]["at"] == [3, 3]
+
+
+POINTING = """
+frames:
+  show:
+    states:
+      pointing: {do: point(agent)}
+cast: {ann: {frame: show, at: [2, 2], facing: down}, agent: {at: [2, 4], facing: up}}
+rules: [{when: t == 2, cause: [ann.reset]}]
+observe: {channels: [type, color, status, orientation, pointing, last_act]}
+"""
+
+
+def test_who_is_put_back_takes_the_arm_down(tmp_path: Path) -> None:
+    """Even who can neither walk nor turn nor vanish, so that nothing else is put back."""
+    state = play(tmp_path, POINTING, [STILL])
+    assert state["ann"]["pointing"] == "down"
+    assert state["ann"]["at"] == [2, 2]
+    assert "pointing" not in play(tmp_path, POINTING, [STILL] * 2)["ann"]

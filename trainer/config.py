@@ -89,6 +89,9 @@ class TrainConfig(BaseModel):
         description="who chooses members of a suite: none, expert, progress, reverse, a .yaml file of phases, or "
         "my.module:MyCurriculum",
     )
+    compile: bool = Field(
+        False, description="let torch.compile make the part of the network that reads images and dialogue"
+    )
     device: str = Field("cpu", min_length=1, description="torch device the network runs on")
     threads: int = Field(
         0,

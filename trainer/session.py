@@ -79,6 +79,8 @@ class Session:
             )
         spec = net_spec(envs)
         net = build_net(config.net, spec, config.seed, config.precision).to(config.device)
+        if config.compile:
+            net.compile_perception()
         if team.size > 1 and not net.distinct:
             raise ValueError(
                 f"net: {config.net} normalises over the batch, which {team.size} processes do not share; "

@@ -1,13 +1,15 @@
 """This module trains agents for the commands, by way of the trainer."""
 
 import contextlib
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Final, Literal
 
 from socialai_dsl.cli.errors import RunFailed, UsageError
+from socialai_dsl.diagnostics import did_you_mean
 
 if TYPE_CHECKING:
     from socialai_dsl.cli.settings import Settings
@@ -80,6 +82,61 @@ def resolve_exploration(kind: str, scenario: str) -> tuple[Literal["none", "lang
     return ("cell" if kind == "cell" else "none"), float(scale)
 
 
+_BY_OPTION: Final = {
+    "frames": "frames",
+    "seed": "seed",
+    "num_envs": "envs",
+    "net": "net",
+    "explo": "explo",
+    "precision": "precision",
+    "compile": "compile",
+    "curriculum": "curriculum",
+    "device": "device",
+    "threads": "threads",
+    "checkpoint_every": "checkpoint_every",
+}
+"""Fields of the trainer's configuration that have an option of their own, and its name."""
+
+
+def resolve_hyper(given: Sequence[str]) -> dict[str, bool | int | float | str]:
+    """Hyper-parameters given as NAME=VALUE, by name; whether their values are possible is the trainer's to say.
+
+    Raises:
+        UsageError: something else is given, or there is no such hyper-parameter.
+    """
+    from trainer.config import TrainConfig
+
+    found: dict[str, bool | int | float | str] = {}
+    free = [name for name in TrainConfig.model_fields if name not in (*_BY_OPTION, "tensorboard")]
+    for text in given:
+        name, equals, written = text.partition("=")
+        if not equals or not written:
+            raise UsageError(f"--hyper: got {text!r}, expected NAME=VALUE, such as lr=1e-4")
+        if name in _BY_OPTION:
+            raise UsageError(
+                f"--hyper: {name} has an option of its own, --{_BY_OPTION[name].replace('_', '-')}"
+            )
+        if name not in free:
+            near = did_you_mean(name, free)
+            hint = f"did you mean {near}?" if near else f"expected one of {', '.join(free)}"
+            raise UsageError(f"--hyper: got {name!r}; {hint}")
+        if name in found:
+            raise UsageError(f"--hyper: {name} is given twice")
+        found[name] = _plain_value(name, written)
+    return found
+
+
+def _plain_value(name: str, written: str) -> bool | int | float | str:
+    """A number, true or false as JSON writes them; else the word itself."""
+    try:
+        value = json.loads(written)
+    except ValueError:
+        return written
+    if not isinstance(value, bool | int | float | str):
+        raise UsageError(f"--hyper: got {name}={written}, expected a number, a word, true or false")
+    return value
+
+
 def default_envs(net: str) -> int:
     """How many environments an agent trains on unless told otherwise."""
     from trainer.config import configure
@@ -97,22 +154,12 @@ def train_config(settings: "Settings") -> "TrainConfig":
 
     from trainer.config import PRESETS, configure
 
+    given = {name: getattr(settings, option) for name, option in _BY_OPTION.items() if name != "net"}
     # A small batch of environments cannot be cut into as many parts as the default has; a preset's number is its own.
     parts = {} if settings.net in PRESETS else {"minibatches": min(4, settings.envs)}
     try:
         return configure(
-            settings.net,
-            frames=settings.frames,
-            seed=settings.seed,
-            num_envs=settings.envs,
-            **parts,
-            explo=settings.explo,
-            explo_c=settings.explo_c,
-            precision=settings.precision,
-            curriculum=settings.curriculum,
-            device=settings.device,
-            threads=settings.threads,
-            checkpoint_every=settings.checkpoint_every,
+            settings.net, **(parts | given | {"explo_c": settings.explo_c} | dict(settings.hyper))
         )
     except ValidationError as error:
         first = error.errors()[0]

@@ -1,6 +1,7 @@
 """This module writes a model card: what an agent is, how well it does, and how to load it, beside its weights."""
 
 import argparse
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -153,8 +154,21 @@ def _command(settings: Settings) -> str:
     run.add_arguments(parser)
     usual, asked = vars(parser.parse_args([])), asdict(settings)
     names = [name for name in asked if name in usual and name not in _NOT_REPEATED]
-    options = [f"--{name.replace('_', '-')} {asked[name]}" for name in names if asked[name] != usual[name]]
+    options = [
+        option for name in names if asked[name] != usual[name] for option in _options(name, asked[name])
+    ]
     return " ".join(["socialai-run", settings.scenario, *options])
+
+
+def _options(name: str, value: Any) -> list[str]:
+    """An option as it is typed: a switch alone, what is given by name once for each."""
+    option = f"--{name.replace('_', '-')}"
+    if isinstance(value, Mapping):
+        return [
+            f"{option} {key}={each if isinstance(each, str) else json.dumps(each)}"
+            for key, each in value.items()
+        ]
+    return [option] if value is True else [f"{option} {value}"]
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

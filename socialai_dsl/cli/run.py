@@ -79,6 +79,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="auto",
         help="numbers the convolutions of `paper` compute with (default: auto, bfloat16 where the device has it)",
     )
+    parser.add_argument(
+        "--hyper",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="a hyper-parameter of the trainer, such as lr=1e-4 or entropy_coef=0.02; may be given again",
+    )
+    parser.add_argument(
+        "--compile",
+        action="store_true",
+        help="let torch.compile make the part of the network that reads images and dialogue; meant for GPUs",
+    )
     parser.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help="default: auto")
     parser.add_argument(
         "--threads",
@@ -218,6 +230,7 @@ def _started(arguments: argparse.Namespace) -> Settings:
         default_envs,
         resolve_device,
         resolve_exploration,
+        resolve_hyper,
         resolve_precision,
         resolve_threads,
     )
@@ -236,6 +249,10 @@ def _started(arguments: argparse.Namespace) -> Settings:
         raise UsageError(f"--curriculum: the agent {arguments.agent!r} is not trained")
     if arguments.agent == "human" and arguments.json:
         raise UsageError("--json: the agent 'human' plays on standard output")
+    if not trains and arguments.hyper:
+        raise UsageError(f"--hyper: the agent {arguments.agent!r} is not trained")
+    if not trains and arguments.compile:
+        raise UsageError(f"--compile: the agent {arguments.agent!r} is not trained")
     device = resolve_device(arguments.device)
     explo, explo_c = resolve_exploration(arguments.explo, arguments.scenario)
     return Settings(
@@ -250,6 +267,8 @@ def _started(arguments: argparse.Namespace) -> Settings:
         device=device,
         eval_episodes=arguments.eval_episodes,
         precision=resolve_precision(arguments.precision, arguments.net, device),
+        compile=arguments.compile,
+        hyper=resolve_hyper(arguments.hyper),
         curriculum=arguments.curriculum,
         threads=resolve_threads(arguments.threads) if trains else 0,
         checkpoint_every=arguments.checkpoint_every,

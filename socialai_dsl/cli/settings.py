@@ -1,7 +1,8 @@
 """This module is what a run was asked for, as its folder remembers it."""
 
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -24,6 +25,8 @@ class Settings:
         explo_c: scale of the bonus.
         device: where the network runs.
         precision: number type of the network's bulk of arithmetic, with `auto` resolved.
+        compile: whether torch.compile makes the part of the network that reads images and dialogue.
+        hyper: hyper-parameters of the trainer that are not as its network or preset has them, by name.
         curriculum: who chooses the members of a suite while training, as the trainer names it; `none`: chance.
         threads: CPU threads that train, in each process; bits depend on them, so "one per core" is resolved. 0 for
             agents that are not trained here.
@@ -43,6 +46,8 @@ class Settings:
     device: str
     eval_episodes: int
     precision: Literal["float32", "bfloat16"] = "float32"
+    compile: bool = False
+    hyper: Mapping[str, bool | int | float | str] = field(default_factory=dict)
     curriculum: str = "none"
     threads: int = 0
     checkpoint_every: int = 50

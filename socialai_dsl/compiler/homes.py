@@ -53,7 +53,8 @@ class Homes:
 
     def is_fixed(self, thing: Entity) -> bool:
         """Whether nothing but its status can change."""
-        return self.of[thing.number] == Home(None, None, None, None) and not thing.contains
+        points = thing.role == "npc" and self.pointing
+        return self.of[thing.number] == Home(None, None, None, None) and not thing.contains and not points
 
     def put_back(self, block: Block, number: int) -> None:
         """Emit that a thing is where and as it was, and what lay in it lies in it again; its status is left alone."""

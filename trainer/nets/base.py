@@ -137,6 +137,21 @@ class ActorCritic(nn.Module, ABC):
         self.memory = Memory(features, memory_size)
         self.heads = Heads(memory_size, spec.action_sizes)
 
+    def compile_perception(self) -> None:
+        """From now on let `perceive` run as `torch.compile` makes it, after a pause at the first call of each kind.
+
+        The other parts are no single computation: dialogue and memory go from word to word and from step to step.
+
+        Raises:
+            ValueError: nothing can be compiled here, for want of a C++ compiler, say, or of Triton.
+        """
+        try:
+            torch.compile(torch.neg)(self.heads.hidden.bias.detach())
+        except RuntimeError as error:
+            reason = str(error).splitlines()[0]
+            raise ValueError(f"compile: torch.compile does not work here: {reason}") from error
+        self.perceive = torch.compile(self.perceive, dynamic=True)  # type: ignore[method-assign]
+
     @abstractmethod
     def prepare(self, images: Tensor) -> Any:
         """Whatever `perceive` wants to know about images, uint8 (I, H, W, C), that no weight influences."""

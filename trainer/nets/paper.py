@@ -140,6 +140,7 @@ class PaperNet(ActorCritic):
         pooled = functional.max_pool2d(hidden, tuple(hidden.shape[2:]))
         return torch.relu(pooled.flatten(1)).to(text.dtype)[:count]
 
+    @torch.compiler.disable  # type: ignore[untyped-decorator]
     def _perceive_fused(
         self, prepared: Tensor, text: Tensor, image_index: Tensor, text_index: Tensor
     ) -> Tensor:

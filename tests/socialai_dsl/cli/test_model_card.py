@@ -23,6 +23,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with contextlib.chdir(folder):
         assert main(["new", "corridor"]) == 0
         command = ["corridor.yaml", *QUICK, "--seed", "3", "--explo", "lang", "--out", "runs/here"]
+        command += ["--hyper", "lr=3e-4", "--hyper", "loss=per_head"]
         assert run_main(command) == 0
     return folder
 
@@ -80,6 +81,7 @@ def test_its_code_plays_an_episode(card: str) -> None:
 def test_its_command_trains_the_same_agent(card: str, tmp_path: Path) -> None:
     (command,) = re.findall(r"Trained again by `socialai-run ([^`]+)`", card)
     given = "corridor.yaml --seed 3 --frames 1500 --envs 32 --explo lang --precision float32"
+    given += " --hyper lr=0.0003 --hyper loss=per_head"
     assert re.fullmatch(re.escape(given) + r" --threads \d", command), "its bits depend on the threads, too"
     again = tmp_path / "again"
     options = ["--eval-episodes", "30", "--device", "cpu", "--out", str(again)]

@@ -146,6 +146,22 @@ def test_the_number_of_environments_is_the_preset_s_unless_given(
     assert settings.threads >= 1
 
 
+def test_hyper_parameters_are_the_trainer_s_and_stay_with_the_run() -> None:
+    given = [
+        "--hyper",
+        "entropy_coef=0.02",
+        "--hyper",
+        "explo_formula=as_printed",
+        "--hyper",
+        "clip_value=true",
+    ]
+    assert run_main(["corridor.yaml", *QUICK, *given, "--out", "here"]) == 0
+    assert run_main(["--resume", "here", "--frames", "4000"]) == 0
+    used = json.loads(Path("here", "config.json").read_text())["trainer"]
+    assert used["frames"] == 4000
+    assert (used["entropy_coef"], used["explo_formula"], used["clip_value"]) == (0.02, "as_printed", True)
+
+
 def test_random_play_is_the_same_every_time() -> None:
     for name in ("one", "two"):
         assert run_main(["corridor.yaml", "--agent", "random", "--eval-episodes", "60", "--out", name]) == 0
@@ -182,6 +198,21 @@ def test_a_trained_agent_is_evaluated_elsewhere(capsys: Capture) -> None:
             "--wandb: the agent 'random' is not trained",
         ),
         (["--resume", "nowhere"], "is not a run's folder"),
+        (
+            ["corridor.yaml", "--agent", "random", "--hyper", "lr=1"],
+            "--hyper: the agent 'random' is not trained",
+        ),
+        (
+            ["corridor.yaml", "--agent", "random", "--compile"],
+            "--compile: the agent 'random' is not trained",
+        ),
+        (["corridor.yaml", "--hyper", "lr"], "--hyper: got 'lr', expected NAME=VALUE"),
+        (["corridor.yaml", "--hyper", "entropy_coeff=1"], "'entropy_coeff'; did you mean entropy_coef?"),
+        (["corridor.yaml", "--hyper", "banana=1"], "'banana'; expected one of horizon, bptt,"),
+        (["corridor.yaml", "--hyper", "num_envs=3"], "num_envs has an option of its own, --envs"),
+        (["corridor.yaml", "--hyper", "lr=1", "--hyper", "lr=2"], "--hyper: lr is given twice"),
+        (["corridor.yaml", "--hyper", "lr=[1]"], "expected a number, a word, true or false"),
+        (["corridor.yaml", "--hyper", "lr=-1"], "lr: Input should be greater than 0, got -1"),
         (["nowhere.yaml"], "there is no such file"),
         (["corridor.yaml", "--agent", "corridor.yaml"], "corridor.yaml"),
     ],
