@@ -1,10 +1,9 @@
 """A batch of environments in memory: programs one behind the other, state, ports, and the threads that serve them."""
 
 from collections.abc import Collection, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
+from typing import Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,9 @@ from numpy.typing import NDArray
 from socialai_dsl.engine.book import make_book
 from socialai_dsl.engine.calls import BAD_ACTION, Task
 from socialai_dsl.engine.errors import RoomError
-from socialai_dsl.engine.machine import Call, prepare_call
+from socialai_dsl.engine.machine import Call, MachineCall, prepare_call
+from socialai_dsl.engine.relay import Relay
+from socialai_dsl.engine.settings import is_interpreted
 from socialai_dsl.engine.state import (
     ATTEMPTS,
     Key,
@@ -21,6 +22,7 @@ from socialai_dsl.engine.state import (
     State,
     Tables,
     Trait,
+    all_counters,
     empty_ports,
     empty_state,
     no_pins,
@@ -117,7 +119,7 @@ class Batch:
         self._names = [part.name or f"program {number}" for number, part in enumerate(parts)]
         self._cuts = _cut(rows, threads)
         self._open_book()
-        self._executor = ThreadPoolExecutor(len(self._cuts) - 1) if len(self._cuts) > 1 else None
+        self._relay = Relay(len(self._cuts) - 1) if len(self._cuts) > 1 and not is_interpreted() else None
 
     def program_numbers(self) -> NDArray[np.intp]:
         """Which program each row plays, (E,)."""
@@ -149,13 +151,13 @@ class Batch:
             RoomError: all rows were stepped, but one that was reset found no room as its scenario requires; it
                 is in the last room that was drawn, and play may go on.
         """
-        if self._executor is not None and not self.actions_fit():
+        if len(self._cuts) > 1 and not self.actions_fit():
             return BAD_ACTION
         return self._share(task)
 
     def actions_fit(self) -> bool:
         """Whether all actions are inside the action space."""
-        return self._check() != BAD_ACTION
+        return self._ask(self._checks) == 0
 
     def reset(self, pins: NDArray[np.int16] | None = None) -> None:
         """Start the episodes that the keys of the rows `ports.chosen` name, from their layouts (`ports.layout`).
@@ -180,16 +182,16 @@ class Batch:
 
     def close(self) -> None:
         """Let the threads go."""
-        if self._executor is not None:
-            self._executor.shutdown()
-            self._executor = None
+        if self._relay is not None:
+            self._relay.close()
+            self._relay = None
 
     def _open_book(self) -> None:
         tables = self.tables._replace(views=self.tables.views.reshape(-1))
-        ports = self.ports._replace(counters=self.ports.counters.reshape(-1))
+        ports = self.ports._replace(counters=all_counters(self.ports))
         self._book = make_book((*tables, *self.state, *ports))
         self._tasks = [self._prepare("serve", task) for task in Task]
-        self._check = prepare_call("serve", self._book, Task.CHECK, 0, 0, self._rows)
+        self._checks = self._tasks[Task.CHECK]
         self._others: dict[str, list[Call]] = {}
 
     def _prepare(self, name: str, *what: int) -> list[Call]:
@@ -222,10 +224,9 @@ class Batch:
 
     def _ask(self, calls: Sequence[Call]) -> int:
         """Make the calls side by side; the sum of what they return."""
-        if self._executor is None:
-            return calls[0]()
-        others = [self._executor.submit(call) for call in calls[1:]]
-        return calls[0]() + sum(other.result() for other in others)
+        if self._relay is None:
+            return sum(call() for call in calls)
+        return self._relay.make(cast(Sequence[MachineCall], calls))
 
 
 def _cut(rows: int, threads: int) -> list[tuple[int, int]]:

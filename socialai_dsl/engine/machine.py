@@ -5,7 +5,8 @@ where there is something to compile.
 """
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import cache, partial
 from importlib import import_module
 from threading import RLock
@@ -33,6 +34,23 @@ _addresses: dict[str, int] = {}
 Call = Callable[[], int]
 
 
+@dataclass(frozen=True, slots=True)
+class MachineCall:
+    """A function of machine code and the address of its arguments, which it keeps alive; both are called together.
+
+    Attributes:
+        function: takes the address. address: of the function. arguments: theirs.
+    """
+
+    function: Any
+    address: int
+    arguments: Any
+
+    def __call__(self) -> int:
+        """Make the call; other threads run meanwhile."""
+        return int(self.function(self.arguments))
+
+
 def prepare_call(name: str, book: Any, *numbers: int) -> Call:
     """A call of `serve`, `script` or `identify` with a book (`book.make_book`) and numbers.
 
@@ -44,7 +62,8 @@ def prepare_call(name: str, book: Any, *numbers: int) -> Call:
     _load(_INTERPRETER)
     arguments = (ctypes.c_int64 * (1 + len(numbers)))(ctypes.addressof(book), *numbers)
     pointer = ctypes.cast(arguments, ctypes.c_void_p)  # it keeps them alive
-    return partial(_ENTRY(_load(name)), pointer)
+    address = _load(name)
+    return MachineCall(_ENTRY(address), address, pointer)
 
 
 def symbol_of(name: str) -> str:
@@ -58,6 +77,15 @@ def load_object(symbol: str, code: bytes) -> int:
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
     return int(engine.get_function_address(symbol))
+
+
+def load_assembly(text: str, symbols: Iterable[str]) -> list[int]:
+    """The addresses of functions that are written in LLVM's assembly."""
+    with _LOADING:
+        engine = _engine()
+        engine.add_module(llvm.parse_assembly(text))
+        engine.finalize_object()
+        return [int(engine.get_function_address(symbol)) for symbol in symbols]
 
 
 def _load(name: str) -> int:

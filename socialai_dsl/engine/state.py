@@ -222,6 +222,8 @@ def empty_state(rows: int, registers: int, board: int, tokens: int, view: int, g
 def empty_ports(state: State, counters: int, threads: int) -> Ports:
     """Ports that fit a state, with nothing pinned and no outcome."""
     rows, registers = state.registers.shape
+    # Threads that write to one line of the cache take it from each other: a line lies between their counters.
+    apart = -(-counters // 8) * 8 + 8
     return Ports(
         actions=np.zeros((rows, 4), np.int64),
         pins=no_pins(registers),
@@ -235,7 +237,7 @@ def empty_ports(state: State, counters: int, threads: int) -> Ports:
         final_tokens=np.zeros_like(state.tokens),
         final_extra=np.zeros_like(state.extra),
         spoiled=np.zeros(rows, np.bool_),
-        counters=np.zeros((threads, counters), np.int64),
+        counters=np.zeros(threads * apart, np.int64).reshape(threads, apart)[:, :counters],
         scratch=np.zeros((threads, TEMPORARIES), np.int64),
         sets=np.zeros((threads, SCRATCH_BOARDS * MAX_SIDE), np.uint32),
         spare_registers=np.zeros((threads, registers), np.int16),
@@ -245,10 +247,17 @@ def empty_ports(state: State, counters: int, threads: int) -> Ports:
         refused=np.zeros(rows, np.bool_),
         picture=np.zeros((rows, 3 * state.extra.shape[1]), np.uint16),
         sizes=np.array(
-            [registers, state.boards.shape[1], state.tokens.shape[1], counters, state.extra.shape[1]],
+            [registers, state.boards.shape[1], state.tokens.shape[1], apart, state.extra.shape[1]],
             np.int64,
         ),
     )
+
+
+def all_counters(ports: Ports) -> NDArray[np.int64]:
+    """The counters of all threads one behind the other, with what lies between them."""
+    whole = ports.counters.base
+    assert whole is not None, "internal: counters are a part of an array of their own"
+    return whole
 
 
 def no_pins(registers: int) -> NDArray[np.int16]:
