@@ -389,3 +389,25 @@ def test_who_is_put_back_takes_the_arm_down(tmp_path: Path) -> None:
     assert state["ann"]["pointing"] == "down"
     assert state["ann"]["at"] == [2, 2]
     assert "pointing" not in play(tmp_path, POINTING, [STILL] * 2)["ann"]
+
+
+BRIDGE = """
+objects:
+  lava: {type: lava, at: [2, 1]}
+  plank: {type: floor, at: [2, 1], overlap: true}
+cast: {agent: {at: [1, 1], facing: right}}
+rules: [{when: t == 2, cause: [plank.vanish]}]
+"""
+
+
+@pytest.mark.parametrize(
+    ("acts", "ended"), [([("forward", None)], False), ([("forward", None), STILL], True)]
+)
+def test_what_is_seen_of_a_cell_decides_whether_it_is_deadly(
+    tmp_path: Path, acts: Sequence[Act], ended: bool
+) -> None:
+    """A plank over lava is a bridge, until it is taken away."""
+    pair = Pair.of(load(str(Folder(tmp_path).write("tiny", BRIDGE))), number_words=False)
+    pair.reset(seed=0)
+    over = [pair.step(tuple(map(int, np.asarray(pair.env.encode_action(act))))) for act in acts]  # type: ignore[arg-type]
+    assert over[-1] == ended

@@ -1,7 +1,7 @@
 """Hands calls to threads that wait for them awake, since waking a thread takes as long as a step of a thousand rows.
 
 A waiting thread asks one word of memory over and over. After a tenth of a millisecond without work it goes to sleep, so
-that whoever steps now and then, a trainer between two rollouts, has its core back. The machine code is written out here,
+that whoever steps now and then, as a trainer does, has its core back. The machine code is written out here,
 because it needs atomic loads and stores, which neither Python nor Numba has.
 """
 

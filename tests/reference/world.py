@@ -282,9 +282,10 @@ class World:
         return self._holds(cell, "transparent")
 
     def deadly(self, cell: Cell) -> bool:
-        """Whether the cell kills the agent."""
-        here = [thing.type for thing in self.objects_at(cell)] or [self.terrain.get(cell)]
-        return any(type_ is not None and TYPES[type_].deadly for type_ in here)
+        """Whether the cell kills the agent: what is seen there decides."""
+        thing = self.object_at(cell)
+        seen = self.terrain.get(cell) if thing is None else thing.type
+        return seen is not None and TYPES[seen].deadly
 
 
 def default_name(key: str) -> str:
