@@ -3,7 +3,7 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final, cast
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from socialai_dsl.engine.book import make_book
 from socialai_dsl.engine.calls import BAD_ACTION, Task
 from socialai_dsl.engine.errors import RoomError
-from socialai_dsl.engine.machine import Call, MachineCall, prepare_call
-from socialai_dsl.engine.relay import Relay
+from socialai_dsl.engine.machine import Call, prepare_call
+from socialai_dsl.engine.relay import Posts, Relay, posts_of
 from socialai_dsl.engine.settings import is_interpreted
 from socialai_dsl.engine.state import (
     ATTEMPTS,
@@ -58,6 +58,14 @@ class Part:
     tokens: Sequence[int]
     name: str = ""
     successes: Sequence[bool] = ()
+
+
+class _Shares(NamedTuple):
+    """One call for each thread: the caller's, those of the others, and these as they are posted."""
+
+    own: Call
+    others: list[Call]
+    posts: Posts
 
 
 class Batch:
@@ -192,15 +200,16 @@ class Batch:
         self._book = make_book((*tables, *self.state, *ports))
         self._tasks = [self._prepare("serve", task) for task in Task]
         self._checks = self._tasks[Task.CHECK]
-        self._others: dict[str, list[Call]] = {}
+        self._others: dict[str, _Shares] = {}
 
-    def _prepare(self, name: str, *what: int) -> list[Call]:
+    def _prepare(self, name: str, *what: int) -> _Shares:
         """A call for each thread, which does its rows."""
-        return [
+        own, *others = [
             prepare_call(name, self._book, *what, thread, *rows) for thread, rows in enumerate(self._cuts)
         ]
+        return _Shares(own, others, [] if is_interpreted() else posts_of(others))
 
-    def _prepare_once(self, name: str) -> list[Call]:
+    def _prepare_once(self, name: str) -> _Shares:
         """The calls of what few batches are asked for, whose code is loaded when they are."""
         if name not in self._others:
             self._others[name] = self._prepare(name)
@@ -222,11 +231,11 @@ class Batch:
             f"{row} (seed {key[Key.SEED]}, index {key[Key.INDEX]}, episode {key[Key.EPISODE]})"
         )
 
-    def _ask(self, calls: Sequence[Call]) -> int:
+    def _ask(self, shares: _Shares) -> int:
         """Make the calls side by side; the sum of what they return."""
-        if self._relay is None:
-            return sum(call() for call in calls)
-        return self._relay.make(cast(Sequence[MachineCall], calls))
+        if self._relay is not None:
+            return self._relay.make(shares.own, shares.posts)
+        return shares.own() + sum(call() for call in shares.others) if shares.others else shares.own()
 
 
 def _cut(rows: int, threads: int) -> list[tuple[int, int]]:

@@ -6,7 +6,6 @@ where there is something to compile.
 
 import ctypes
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import cache, partial
 from importlib import import_module
 from threading import RLock
@@ -34,23 +33,6 @@ _addresses: dict[str, int] = {}
 Call = Callable[[], int]
 
 
-@dataclass(frozen=True, slots=True)
-class MachineCall:
-    """A function of machine code and the address of its arguments, which it keeps alive; both are called together.
-
-    Attributes:
-        function: takes the address. address: of the function. arguments: theirs.
-    """
-
-    function: Any
-    address: int
-    arguments: Any
-
-    def __call__(self) -> int:
-        """Make the call; other threads run meanwhile."""
-        return int(self.function(self.arguments))
-
-
 def prepare_call(name: str, book: Any, *numbers: int) -> Call:
     """A call of `serve`, `script` or `identify` with a book (`book.make_book`) and numbers.
 
@@ -62,8 +44,13 @@ def prepare_call(name: str, book: Any, *numbers: int) -> Call:
     _load(_INTERPRETER)
     arguments = (ctypes.c_int64 * (1 + len(numbers)))(ctypes.addressof(book), *numbers)
     pointer = ctypes.cast(arguments, ctypes.c_void_p)  # it keeps them alive
-    address = _load(name)
-    return MachineCall(_ENTRY(address), address, pointer)
+    return partial(_ENTRY(_load(name)), pointer)
+
+
+def addresses_of(call: Call) -> tuple[int, Any]:
+    """The address of what a prepared call calls, and that of its arguments, for others to call it from machine code."""
+    assert isinstance(call, partial), "internal: the engine is run as plain Python, which has no address"
+    return ctypes.cast(call.func, ctypes.c_void_p).value or 0, call.args[0]
 
 
 def symbol_of(name: str) -> str:

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import llvmlite.binding as llvm
 
-from socialai_dsl.engine.machine import MachineCall, load_assembly
+from socialai_dsl.engine.machine import Call, addresses_of, load_assembly
 
 _SPINS: Final = 5_000
 """How often a thread asks before it sleeps: about a tenth of a millisecond, two on processors that pause longer."""
@@ -131,6 +131,15 @@ def _functions() -> tuple[Any, Any, Any]:
     return ctypes.PYFUNCTYPE(word, pointer, word, pointer)(post), waits(is_done), waits(stand_by)
 
 
+Posts = Sequence[tuple[int, Any]]
+"""For each thread the address of a function, and of its arguments."""
+
+
+def posts_of(calls: Sequence[Call]) -> Posts:
+    """Prepared calls as they are posted."""
+    return [addresses_of(call) for call in calls]
+
+
 class _Desk:
     """What a thread and those who post to it share."""
 
@@ -170,12 +179,11 @@ class Relay:
             thread.start()
         self._finish = weakref.finalize(self, _close, self._desks, self._threads)
 
-    def make(self, calls: Sequence[MachineCall]) -> int:
-        """Make one call more than there are threads, side by side; the sum of what they return."""
+    def make(self, own: Call, others: Posts) -> int:
+        """Make a call, and let each thread make one; the sum of what they return."""
         post, is_done, _ = _functions()
-        own, *others = calls
-        for desk, call in zip(self._desks, others, strict=True):
-            if post(desk.words, call.address, call.arguments):
+        for desk, (function, arguments) in zip(self._desks, others, strict=True):
+            if post(desk.words, function, arguments):
                 desk.wake.set()
         total = own()
         for desk, thread in zip(self._desks, self._threads, strict=True):

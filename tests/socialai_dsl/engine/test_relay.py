@@ -1,6 +1,7 @@
 """Threads make the calls that are posted to them, each once, awake or asleep, until they are let go."""
 
 import ctypes
+import functools
 import gc
 import subprocess
 import sys
@@ -12,18 +13,15 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
-from socialai_dsl.engine.machine import MachineCall
-from socialai_dsl.engine.relay import Relay
+from socialai_dsl.engine.machine import Call
+from socialai_dsl.engine.relay import Relay, posts_of
 
 ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
 
 
-def call_of(function: Callable[[], int]) -> MachineCall:
-    """A call of a Python function by its address."""
-    entry = ENTRY(lambda _arguments: function())
-    address = ctypes.cast(entry, ctypes.c_void_p).value
-    assert address is not None
-    return MachineCall(entry, address, None)
+def call_of(function: Callable[[], int]) -> Call:
+    """A call of a Python function as the engine's are prepared, which has an address."""
+    return functools.partial(ENTRY(lambda _arguments: function()), None)
 
 
 @pytest.mark.parametrize(
@@ -39,8 +37,9 @@ def test_every_call_is_made_once_in_a_thread_of_its_own(pause: float) -> None:
     relay = Relay(2)
     calls = [call_of(lambda number=number: work(number)) for number in range(3)]
     rounds = 30 if pause > 1e-3 else 400
+    posts = posts_of(calls[1:])
     for _ in range(rounds):
-        assert relay.make(calls) == 111
+        assert relay.make(calls[0], posts) == 111
         time.sleep(pause)
     relay.close()
     assert [len(threads) for threads in made] == [rounds] * 3
@@ -55,8 +54,8 @@ def test_a_slow_call_is_waited_for() -> None:
         time.sleep(0.05)
         return 7
 
-    assert relay.make([call_of(lambda: 1), call_of(slow)]) == 8
-    assert relay.make([call_of(slow), call_of(lambda: 1)]) == 8
+    for own, other in ((call_of(lambda: 1), call_of(slow)), (call_of(slow), call_of(lambda: 1))):
+        assert relay.make(own, posts_of([other])) == 8
     relay.close()
 
 
