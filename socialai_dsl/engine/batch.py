@@ -22,7 +22,6 @@ from socialai_dsl.engine.state import (
     State,
     Tables,
     Trait,
-    all_counters,
     empty_ports,
     empty_state,
     no_pins,
@@ -75,6 +74,7 @@ class Batch:
         state, ports: arrays, one row for each environment.
         tables: programs, views and pools.
         offsets, first_counters: where each program begins in the words, and where its counters.
+        counters: int64 (threads, counters of all programs), how often each thread has seen what is counted.
     """
 
     def __init__(
@@ -119,6 +119,7 @@ class Batch:
         self.state: State = empty_state(rows, registers, board, length, VIEW, gestures)
         counters = int(sum(int(header[Header.COUNTERS]) for header in headers))
         self.ports: Ports = empty_ports(self.state, counters, threads)
+        self.counters = self.ports.counters[:, :counters]
         for row, pool in enumerate(pool_of_row):
             in_sequence = int(pool in sequences)
             self.state.keys[row, Key.POOL] = int(starts[pool]) | len(pools[pool]) << 32 | in_sequence << 63
@@ -196,7 +197,7 @@ class Batch:
 
     def _open_book(self) -> None:
         tables = self.tables._replace(views=self.tables.views.reshape(-1))
-        ports = self.ports._replace(counters=all_counters(self.ports))
+        ports = self.ports._replace(counters=self.ports.counters.reshape(-1))
         self._book = make_book((*tables, *self.state, *ports))
         self._tasks = [self._prepare("serve", task) for task in Task]
         self._checks = self._tasks[Task.CHECK]

@@ -178,7 +178,9 @@ class Ports(NamedTuple):
     spoiled: NDArray[
         np.bool_
     ]  # (E,) the episode that ended in this step had other acts, and not all were a success
-    counters: NDArray[np.int64]  # (threads, counters of all programs)
+    counters: NDArray[
+        np.int64
+    ]  # (threads, counters of all programs, then a line of the cache that is nobody's)
     scratch: NDArray[np.int64]  # (threads, TEMPORARIES)
     sets: NDArray[np.uint32]  # (threads, SCRATCH_BOARDS * MAX_SIDE)
     spare_registers: NDArray[np.int16]  # (threads, R) of a row that is played on for a look
@@ -237,7 +239,7 @@ def empty_ports(state: State, counters: int, threads: int) -> Ports:
         final_tokens=np.zeros_like(state.tokens),
         final_extra=np.zeros_like(state.extra),
         spoiled=np.zeros(rows, np.bool_),
-        counters=np.zeros(threads * apart, np.int64).reshape(threads, apart)[:, :counters],
+        counters=np.zeros((threads, apart), np.int64),
         scratch=np.zeros((threads, TEMPORARIES), np.int64),
         sets=np.zeros((threads, SCRATCH_BOARDS * MAX_SIDE), np.uint32),
         spare_registers=np.zeros((threads, registers), np.int16),
@@ -251,13 +253,6 @@ def empty_ports(state: State, counters: int, threads: int) -> Ports:
             np.int64,
         ),
     )
-
-
-def all_counters(ports: Ports) -> NDArray[np.int64]:
-    """The counters of all threads one behind the other, with what lies between them."""
-    whole = ports.counters.base
-    assert whole is not None, "internal: counters are a part of an array of their own"
-    return whole
 
 
 def no_pins(registers: int) -> NDArray[np.int16]:

@@ -68,7 +68,7 @@ class Explainer:
 
     def _play(self, recording: Recording) -> NDArray[np.int64]:
         """Play the recording; which counters the last step has raised."""
-        state, ports = self._table.state, self._table.batch.ports
+        state, batch = self._table.state, self._table.batch
         own = [Key.PROGRAM, Key.POOL]
         start, key = recording.start, recording.start.key.copy()
         key[own] = state.keys[0, own]
@@ -77,13 +77,13 @@ class Explainer:
         state.registers[0, : self._probed.first] = start.registers[: self._probed.first]
         state.boards[0] = start.board[: state.boards.shape[1]]
         state.tokens[:] = 0
-        before = ports.counters[0].copy()
+        before = batch.counters[0].copy()
         for action in recording.actions:
             state.registers[0, self._probed.first :] = 0
-            before = ports.counters[0].copy()
-            ports.actions[0] = np.frombuffer(action, np.int64)
-            self._table.batch.step(Task.STEP_ONLY)
-        return np.asarray(ports.counters[0] - before)
+            before = batch.counters[0].copy()
+            batch.ports.actions[0] = np.frombuffer(action, np.int64)
+            batch.step(Task.STEP_ONLY)
+        return np.asarray(batch.counters[0] - before)
 
 
 def _alone(program: Program, suite: ProgramSuite | None, number: int) -> Program | ProgramSuite:

@@ -309,7 +309,7 @@ class Table:
 
         With several programs, names are preceded by the member's or scenario's: `dance: timeout`.
         """
-        totals = self.batch.ports.counters.sum(axis=0)
+        totals = self.batch.counters.sum(axis=0)
         counted: dict[str, Any] = {"outcomes": {}, "rules": {}, "episodes": 0}
         alone = isinstance(self.merged.playable, Program)
         for member, program, first in zip(
@@ -341,8 +341,8 @@ class Table:
         counters = read.pop("counters")
         for name, array in read.items():
             arrays[name][...] = array
-        self.batch.ports.counters[:] = 0
-        self.batch.ports.counters[0] = counters
+        self.batch.counters[:] = 0
+        self.batch.counters[0] = counters
         self.fresh = False
         if self._shows_gestures:
             self.image[...] = joined(self.state.image, self.state.extra)
@@ -381,7 +381,7 @@ class Table:
     def _arrays(self) -> dict[str, NDArray[Any]]:
         return {
             **self.state._asdict(),
-            "counters": self.batch.ports.counters.sum(axis=0),
+            "counters": self.batch.counters.sum(axis=0),
             "weights": self.batch.tables.weights,
         }
 

@@ -87,7 +87,7 @@ def test_the_acts_of_an_episode_follow_each_other_on_one_clock() -> None:
     assert batch.ports.terminated[0]
     assert batch.ports.outcome[0] == WON
     assert not batch.ports.spoiled[0]
-    counters = batch.ports.counters.sum(axis=0)
+    counters = batch.counters.sum(axis=0)
     assert counters[[first + 1 + WON for first in batch.first_counters]].tolist() == [1, 1, 1]
 
 

@@ -125,7 +125,7 @@ def test_counters_are_the_same_for_any_number_of_threads() -> None:
     for threads in (1, 2, 3):
         batch = batch_of(program, 512, threads=threads)
         record(batch, steps, Task.STEP_NEXT)
-        totals.append(batch.ports.counters.sum(axis=0).tolist())
+        totals.append(batch.counters.sum(axis=0).tolist())
         batch.close()
     assert totals[0] == totals[1] == totals[2]
     assert totals[0][-1] == sum(totals[0][1:-1]), "every episode ended in one way"

@@ -281,10 +281,10 @@ def test_a_scripted_look_disturbs_nothing() -> None:
     }
     batch = batch_of(Assembly(**room).program(), 3)  # type: ignore[arg-type]
     batch.state.registers[:, Register.CHANGED] = (0, 1, 1)
-    before = [array.copy() for array in (*batch.state, batch.ports.counters)]
+    before = [array.copy() for array in (*batch.state, batch.counters)]
     batch.script()
     assert batch.ports.actions[:, 0].tolist() == [Body.TOGGLE] * 3
-    for was, now in zip(before, (*batch.state, batch.ports.counters), strict=True):
+    for was, now in zip(before, (*batch.state, batch.counters), strict=True):
         np.testing.assert_array_equal(was, now)
     batch.step(Task.STEP_ONLY)
     assert batch.state.registers[:, entity_register(1, Field.GONE)].tolist() == [1] * 3

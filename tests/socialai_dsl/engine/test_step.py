@@ -33,7 +33,7 @@ def test_time_runs_out() -> None:
     assert play(batch, SILENT) == [1]
     assert ends(batch) == (False, True, 3, 0.0)
     assert batch.state.registers[0, Register.ENDED] == 2
-    assert batch.ports.counters[0].tolist() == [0, 0, 0, 0, 1, 1]
+    assert batch.counters[0].tolist() == [0, 0, 0, 0, 1, 1]
 
 
 def test_an_outcome_in_the_last_step_is_not_a_time_out() -> None:

@@ -269,10 +269,10 @@ def test_scripted_actions_leave_everything_as_it_is() -> None:
         agent_says=3,
     )
     batch = batch_of(room.program(), 3)
-    before = [array.copy() for array in (*batch.state, batch.ports.counters)]
+    before = [array.copy() for array in (*batch.state, batch.counters)]
     batch.script()
     assert batch.ports.actions.tolist() == [[Body.TOGGLE, 1, 1, 1]] * 3, "pair 4 is template 1, noun 1"
-    for was, now in zip(before, (*batch.state, batch.ports.counters), strict=True):
+    for was, now in zip(before, (*batch.state, batch.counters), strict=True):
         np.testing.assert_array_equal(was, now)
     batch.ports.actions[:] = (2, 0, 0, 0)
     batch.step(Task.STEP_ONLY)
@@ -495,6 +495,6 @@ def test_an_answer_counts_says_and_goes_on(through: list[tuple[int, ...]]) -> No
     batch = batch_of(Assembly(at=((1, 1), (2, 1)), npcs=1, frames=(frame,), lines=lines).program())
     play(batch, body(Body.NONE), body(Body.NONE))
     registers = batch.state.registers[0]
-    assert batch.ports.counters[0][2] == 1, "the second state has no rule"
+    assert batch.counters[0][2] == 1, "the second state has no rule"
     assert batch.state.tokens[0][:2].tolist() == [3, 0]
     assert registers[Register.HEARD] == 0
