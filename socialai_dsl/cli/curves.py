@@ -13,9 +13,6 @@ if TYPE_CHECKING:
 
 SUMMARY: Final = "draw the learning curves of several runs, seeds of one condition together"
 
-_SHOWN: Final = ("net", "explo", "curriculum")
-"""Settings that a title names where they are not the default."""
-
 _ROWS: Final = 8
 _WORTH_SHOWING: Final = 0.005
 
@@ -58,8 +55,9 @@ def _read(run: Path, name: str) -> dict[str, Any]:
 
 def _title(settings: dict[str, Any]) -> str:
     """What was run, without the seed."""
-    named = [f"{key} {settings[key]}" for key in _SHOWN if settings.get(key) not in (None, "none", "fast")]
-    return ", ".join([scenario_folder_name(str(settings["scenario"])), *named])
+    from socialai_dsl.reporting.collect import unusual
+
+    return ", ".join([scenario_folder_name(str(settings["scenario"])), *unusual(settings)])
 
 
 def _condition(title: str, runs: list[Path]) -> "Condition":

@@ -179,8 +179,14 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
 
 def _column(settings: Mapping[str, Any]) -> str:
     """Who played, and what of it is not the default."""
+    return ", ".join([str(settings.get("agent", "ppo")), *unusual(settings)])
+
+
+def unusual(settings: Mapping[str, Any]) -> list[str]:
+    """Which of a run's settings are not the default and make it another condition, each as it is shown."""
     named = [f"{key} {settings[key]}" for key in _SHOWN if settings.get(key) not in _USUAL]
-    return ", ".join([str(settings.get("agent", "ppo")), *named])
+    hyper = settings.get("hyper")
+    return named + [f"{k}={v}" for k, v in sorted(hyper.items())] if isinstance(hyper, Mapping) else named
 
 
 def _read_run(folder: Path, name: str, seed: int) -> Run:

@@ -30,6 +30,12 @@ class Seeds:
     success: Float
     rates: Mapping[str, Float]
 
+    @property
+    def shortest(self) -> float:
+        """Frames of the run that ended first; what is known beyond is of the others alone."""
+        bins = np.arange(len(self.frames))
+        return float(self.frames[np.where(np.isnan(self.success), 0, bins).max(1).min()])
+
     def part(self, kind: str) -> dict[str, Float]:
         """The rates of `outcomes` or of `rules`, by their own names."""
         start = f"{kind}/"

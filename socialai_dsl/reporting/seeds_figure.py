@@ -48,6 +48,8 @@ def draw_conditions(conditions: Sequence[Condition], path: Path) -> None:
         draw_outcomes(outcomes, condition.seeds.frames, means, condition.successes, _BELOW)
         _draw_rules(rules, condition.seeds)
         for axes in column:
+            if condition.seeds.shortest < condition.seeds.frames[-1]:
+                axes.axvline(condition.seeds.shortest, color="#888888", linewidth=1, linestyle=":")
             axes.set_xlim(0, float(condition.seeds.frames[-1]) * 1.02)
             axes.xaxis.set_major_formatter(EngFormatter(sep=""))
             axes.spines[["top", "right"]].set_visible(False)
@@ -73,7 +75,12 @@ def _draw_success(axes: Axes, condition: Condition) -> None:
     label = (
         f"training, mean of {len(seeds.success)} seeds" if len(seeds.success) > 1 else "training, one seed"
     )
-    axes.plot(seeds.frames, mean_over_seeds(seeds.success), color=BLUE, linewidth=2, label=label)
+    of_all = seeds.frames <= seeds.shortest
+    axes.plot(
+        seeds.frames[of_all], mean_over_seeds(seeds.success)[of_all], color=BLUE, linewidth=2, label=label
+    )
+    if not of_all.all():
+        axes.plot([], [], color="#888888", linewidth=1, linestyle=":", label="from here on fewer seeds")
     if condition.tests:
         frames, rates = zip(*condition.tests, strict=True)
         axes.plot(frames, rates, "o", color=RED, markersize=5, clip_on=False, zorder=3, label="test set")

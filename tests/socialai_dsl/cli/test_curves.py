@@ -53,6 +53,8 @@ def test_a_shorter_run_is_unknown_after_its_end(tmp_path: Path) -> None:
     assert seeds.success[1, :4].tolist() == [0.0] * 4
     assert np.isnan(seeds.success[1, 4:]).all()
     assert mean_over_seeds(seeds.success).tolist() == [0.5] * 4 + [1.0] * 4
+    assert seeds.shortest == 400
+    assert read_seeds([long]).shortest == 800
 
 
 def make_run(folder: Path, scenario: str, seed: int, rate: float, explo: str = "none") -> Path:
@@ -78,6 +80,18 @@ def test_seeds_of_one_condition_share_a_column_and_a_table(
     assert "test set: 0.200, 0.300" in printed
     assert "talkitout, explo lang\n" in printed
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_runs_with_other_hyper_parameters_are_another_condition(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runs = [make_run(tmp_path, "talkitout", seed, 0.5) for seed in (0, 1)]
+    settings = json.loads((runs[1] / "config.json").read_text())
+    (runs[1] / "config.json").write_text(json.dumps(settings | {"hyper": {"lr": 0.1, "entropy_coef": 0.02}}))
+    assert main(["curves", *map(str, runs), "--out", str(tmp_path / "curves.png")]) == 0
+    printed = capsys.readouterr().out
+    assert "talkitout\n" in printed
+    assert "talkitout, entropy_coef=0.02, lr=0.1\n" in printed
 
 
 def test_what_is_no_finished_run_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
