@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Final
 
 from socialai_dsl.cli.errors import RunFailed
+from socialai_dsl.experiments.arguments import typed
 
 if TYPE_CHECKING:
     from socialai_dsl.experiments.estimate import Speeds
@@ -53,9 +54,9 @@ def _measured(run: "Run") -> float:
             "--frames",
             str(frames),
         ]
-        for key in ("net", "envs", "threads", "device", "precision"):
+        for key in ("net", "envs", "threads", "device", "precision", "hyper"):
             if key in options:
-                command += [f"--{key}", str(options[key])]
+                command += [word for words in typed(key, options[key]) for word in words]
         command += ["--eval-episodes", "1", "--out", place + "/run"]
         done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         if done.returncode:

@@ -1,7 +1,6 @@
 """This module writes a model card: what an agent is, how well it does, and how to load it, beside its weights."""
 
 import argparse
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -13,6 +12,7 @@ from socialai_dsl.cli import run
 from socialai_dsl.cli.evaluation_report import ending_rows, summary_rows
 from socialai_dsl.cli.run_folder import scenario_folder_name
 from socialai_dsl.cli.settings import Settings
+from socialai_dsl.experiments.arguments import typed
 
 FILE: Final = "model_card.md"
 # Options that do not change what is learnt.
@@ -154,21 +154,8 @@ def _command(settings: Settings) -> str:
     run.add_arguments(parser)
     usual, asked = vars(parser.parse_args([])), asdict(settings)
     names = [name for name in asked if name in usual and name not in _NOT_REPEATED]
-    options = [
-        option for name in names if asked[name] != usual[name] for option in _options(name, asked[name])
-    ]
-    return " ".join(["socialai-run", settings.scenario, *options])
-
-
-def _options(name: str, value: Any) -> list[str]:
-    """An option as it is typed: a switch alone, what is given by name once for each."""
-    option = f"--{name.replace('_', '-')}"
-    if isinstance(value, Mapping):
-        return [
-            f"{option} {key}={each if isinstance(each, str) else json.dumps(each)}"
-            for key, each in value.items()
-        ]
-    return [option] if value is True else [f"{option} {value}"]
+    words = [each for name in names if asked[name] != usual[name] for each in typed(name, asked[name])]
+    return " ".join(["socialai-run", settings.scenario, *(word for each in words for word in each)])
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

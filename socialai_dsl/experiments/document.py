@@ -98,9 +98,9 @@ def run_id(cell: Cell, seed: int, program: str, agent: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:_ID_LENGTH]
 
 
-def options_of(cell: Cell) -> dict[str, str | int]:
+def options_of(cell: Cell) -> dict[str, Any]:
     """The options of a condition's runs, without those that its agent has no use for."""
-    options = dict(DEFAULTS) | dict(cell.options)
+    options: dict[str, Any] = dict(DEFAULTS) | dict(cell.options)
     if cell.trains:
         return options
     return {key: value for key, value in options.items() if key in OF_ANY_AGENT}

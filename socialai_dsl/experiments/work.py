@@ -19,6 +19,7 @@ from typing import IO, Any, Final
 
 from socialai_dsl.atomic import write_json
 from socialai_dsl.experiments import claims
+from socialai_dsl.experiments.arguments import typed
 from socialai_dsl.experiments.claims import Claim
 from socialai_dsl.experiments.cores import lent_cores
 from socialai_dsl.experiments.folder import (
@@ -230,7 +231,7 @@ class _Work:
         if condition["frames"] is not None:
             command += ["--frames", str(condition["frames"])]
         for key, value in condition["options"].items():
-            command += ["--" + key.replace("_", "-"), str(value)]
+            command += [word for words in typed(key, value) for word in words]
         return [*command, "--out", str(path), "--json"]
 
     def _test_command(self, scenarios: Sequence[str]) -> list[str]:

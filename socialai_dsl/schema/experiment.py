@@ -50,6 +50,36 @@ Test = Annotated[
 ]
 
 
+class Hyper(Model):
+    """Hyper-parameters of the trainer that have no key of their own; what is left out is as the network has it."""
+
+    horizon: int | None = Field(None, ge=1, description="steps per environment in one rollout")
+    bptt: int | None = Field(None, ge=0, description="steps back-propagation goes back; 0: the whole rollout")
+    update: Literal["environments", "chunks"] | None = Field(None, description="what a minibatch is made of")
+    epochs: int | None = Field(None, ge=1, description="passes over each rollout")
+    minibatches: int | None = Field(None, ge=1, description="parts a rollout is cut into")
+    lr: float | int | None = Field(None, gt=0, description="Adam's learning rate")
+    adam_eps: float | int | None = Field(None, gt=0, description="Adam's epsilon")
+    gamma: float | int | None = Field(None, ge=0, le=1, description="discount per step")
+    gae_lambda: float | int | None = Field(None, ge=0, le=1, description="lambda of the advantages (GAE)")
+    clip: float | int | None = Field(None, gt=0, description="clipping range of the probability ratio")
+    clip_value: bool | None = Field(None, description="whether to clip the value's change as well")
+    value_coef: float | int | None = Field(None, ge=0, description="weight of the squared value error")
+    entropy_coef: float | int | None = Field(None, ge=0, description="weight of each head's entropy")
+    max_grad_norm: float | int | None = Field(None, gt=0, description="norm that gradients are clipped to")
+    normalize_advantages: bool | None = Field(None, description="whether to scale a rollout's advantages")
+    loss: Literal["joint", "per_head"] | None = Field(
+        None, description="one ratio of the action, or one per head"
+    )
+    bootstrap_timeouts: bool | None = Field(None, description="whether the value goes on through a time-out")
+    explo_c: float | int | None = Field(None, ge=0, description="C of the exploration bonus")
+    explo_m: float | int | None = Field(None, ge=0, description="M of the exploration bonus")
+    explo_t: float | int | None = Field(None, gt=0, description="T of the exploration bonus")
+    explo_formula: Literal["as_coded", "as_printed"] | None = Field(
+        None, description="the bonus of the paper's code, or of its text"
+    )
+
+
 class Settings(Model):
     """What can be said of runs; a key that is left out is as `socialai-run` has it."""
 
@@ -90,6 +120,7 @@ class Settings(Model):
     precision: Literal["auto", "float32", "bfloat16"] | None = Field(
         None, description="numbers the convolutions of `paper` compute with"
     )
+    hyper: Hyper | None = Field(None, description="any other hyper-parameter of the trainer")
     device: Literal["auto", "cpu", "cuda"] | None = Field(None, description="default here: cpu")
     threads: int | None = Field(None, ge=1, le=64, description="CPU threads of each run; default here: 1")
     checkpoint_every: int | None = Field(None, ge=1, description="updates between checkpoints")

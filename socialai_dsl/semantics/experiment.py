@@ -14,6 +14,7 @@ from socialai_dsl.schema.experiment import (
     Condition,
     Experiment,
     Grid,
+    Hyper,
     Override,
     Profile,
     Reference,
@@ -27,7 +28,8 @@ MAX_RUNS: Final = 10_000
 """How many runs an experiment may have."""
 
 OPTIONS: Final = (
-    "net", "explo", "envs", "curriculum", "precision", "device", "threads", "checkpoint_every", "eval_episodes"
+    "net", "explo", "envs", "curriculum", "precision", "hyper", "device", "threads", "checkpoint_every",
+    "eval_episodes",
 )  # fmt: skip
 """Settings that are options of `socialai-run`, under its names with `_` for `-`."""
 
@@ -57,7 +59,7 @@ class Cell:
     agent: str
     frames: int | None
     seeds: tuple[int, ...]
-    options: Mapping[str, str | int]
+    options: Mapping[str, Any]
     tests: Mapping[str, Reference | None]
     reference: Reference | None
     place: DataPath
@@ -287,6 +289,8 @@ class _Expansion:
         places: dict[str, DataPath] = {}
         for layer in draft.layers:
             for name, value, place in layer.given():
+                if isinstance(value, Hyper):  # of two layers each may give some
+                    value = given.get(name, {}) | value.model_dump(exclude_none=True)
                 given[name], places[name] = value, place
         if "scenario" not in given:
             message = f"the condition `{draft.name}` needs a key `scenario`"

@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 
 from socialai_dsl.checking import LoadedExperiment
+from socialai_dsl.experiments.arguments import typed
 from socialai_dsl.experiments.document import differences, document_of
 from socialai_dsl.frontend import load_experiment
-from socialai_dsl.schema.experiment import NETS
+from socialai_dsl.schema.experiment import NETS, Hyper
 
 ROOT = Path(__file__).parents[3]
 
@@ -58,6 +59,7 @@ def test_what_makes_no_difference(tmp_path, condition):
         ", agent: random",
         ", eval_episodes: 7",
         ", curriculum: progress",
+        ", hyper: {lr: 0.001}",
     ],
 )
 def test_what_makes_a_difference(tmp_path, condition):
@@ -194,6 +196,54 @@ def test_conditions_that_both_files_have_are_the_same_runs(shipped):
     assert len(shared) == 11
     assert all(paper[name] == studies[name] for name in shared)
     assert len({identity for runs in paper.values() for identity in runs}) == 64
+
+
+def test_the_hyper_parameters_are_those_of_the_trainer():
+    from trainer.config import TrainConfig
+
+    with_options = {
+        "frames",
+        "seed",
+        "num_envs",
+        "net",
+        "explo",
+        "precision",
+        "compile",
+        "curriculum",
+        "device",
+    }
+    with_options |= {"threads", "checkpoint_every", "tensorboard"}
+    assert set(Hyper.model_fields) == set(TrainConfig.model_fields) - with_options
+    for name, mine in Hyper.model_fields.items():
+        theirs = TrainConfig.model_fields[name]
+        assert set(map(str, mine.metadata)) == set(map(str, theirs.metadata)), f"{name} has other bounds"
+        usual = theirs.default
+        assert getattr(Hyper.model_validate({name: usual}), name) == usual
+
+
+def test_hyper_parameters_of_several_places_are_put_together(tmp_path):
+    text = """
+experiment: tuning
+set: {scenario: dance, frames: 100, hyper: {lr: 0.001, clip: 0.1}}
+conditions:
+  - {name: a}
+  - {name: b, hyper: {lr: 0.01, loss: per_head}}
+"""
+    (tmp_path / "tuning.yaml").write_text(text)
+    document = document_of(load_experiment(tmp_path / "tuning.yaml"), None)
+    a, b = (condition["options"]["hyper"] for condition in document["conditions"])
+    assert a == {"lr": 0.001, "clip": 0.1}
+    assert b == {"lr": 0.01, "clip": 0.1, "loss": "per_head"}
+
+
+def test_settings_are_typed_as_options():
+    assert typed("checkpoint_every", 3) == [["--checkpoint-every", "3"]]
+    assert typed("compile", True) == [["--compile"]]
+    assert typed("hyper", {"lr": 1e-4, "loss": "per_head", "clip_value": True}) == [
+        ["--hyper", "lr=0.0001"],
+        ["--hyper", "loss=per_head"],
+        ["--hyper", "clip_value=true"],
+    ]
 
 
 def test_the_networks_are_those_of_the_trainer():
