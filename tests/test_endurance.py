@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import time
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,16 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.cli.shipped import shipped_scenarios
+
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+IN_FOLDERS = [
+    f"{path.parent.name}/{path.stem}"
+    for folder in ("novel", "school")
+    for path in sorted((SCENARIOS / folder).glob("*.yaml"))
+    if re.search(r"^scenario: ", path.read_text(encoding="utf-8"), re.MULTILINE)
+    and not re.search(r"^abstract: true", path.read_text(encoding="utf-8"), re.MULTILINE)
+]
+"""Those that a file of theirs describes whole; their variants are played by other tests."""
 
 STEPS = int(os.environ.get("SOCIALAI_ENDURANCE_STEPS", 500_000_000))
 ROUNDS = 10
@@ -46,7 +57,7 @@ def play(name: str, steps: int) -> float:
 @pytest.mark.timeout(7200)
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the system does not tell")
 def test_nothing_grows_and_nothing_slows_down() -> None:
-    names = shipped_scenarios()
+    names = [*shipped_scenarios(), *IN_FOLDERS]
     steps = -(-STEPS // (ROUNDS * len(names) * ENVS))
     rows = []
     for number in range(ROUNDS):
