@@ -411,3 +411,22 @@ def test_what_is_seen_of_a_cell_decides_whether_it_is_deadly(
     pair.reset(seed=0)
     over = [pair.step(tuple(map(int, np.asarray(pair.env.encode_action(act))))) for act in acts]  # type: ignore[arg-type]
     assert over[-1] == ended
+
+
+BACK = """
+frames:
+  drift:
+    states:
+      turning: {do: left}
+cast: {ann: {frame: drift, at: [2, 2], facing: down}, agent: {at: [2, 4], facing: up}}
+rules:
+  - {when: t == 1, cause: [ann.vanish]}
+  - {when: t == 2, cause: [ann.put(agent.cell), ann.reset]}
+observe: {channels: [type, color, status, orientation, pointing, last_act]}
+"""
+
+
+def test_who_comes_back_has_done_nothing_in_between(tmp_path: Path) -> None:
+    """The picture, which both sides take, shows no act of her."""
+    state = play(tmp_path, BACK, [STILL] * 3)
+    assert (state["ann"]["at"], state["ann"]["facing"]) == ([2, 2], "right")

@@ -235,6 +235,7 @@ class Reference:
         self.forget_use(npc)
         if npc.gone:
             npc.inbox.clear()
+            npc.last_act = "none"
             return
         runner = FrameRunner(self.sources, self.world, npc)
         turn = runner.begin()
