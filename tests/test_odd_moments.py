@@ -360,7 +360,6 @@ objects:
 rules:
   - {when: t == 1, cause: [box.reveal]}
   - {when: t == 3, cause: [box.reset]}
-state: {seen: false, hidden: false}
 cast: {agent: {at: [1, 1]}}
 """
 

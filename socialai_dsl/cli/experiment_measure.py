@@ -56,7 +56,7 @@ def _measured(run: "Run") -> float:
         ]
         for key in ("net", "envs", "threads", "device", "precision", "hyper"):
             if key in options:
-                command += [word for words in typed(key, options[key]) for word in words]
+                command += typed(key, options[key])
         command += ["--eval-episodes", "1", "--out", place + "/run"]
         done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         if done.returncode:

@@ -154,8 +154,8 @@ def _command(settings: Settings) -> str:
     run.add_arguments(parser)
     usual, asked = vars(parser.parse_args([])), asdict(settings)
     names = [name for name in asked if name in usual and name not in _NOT_REPEATED]
-    words = [each for name in names if asked[name] != usual[name] for each in typed(name, asked[name])]
-    return " ".join(["socialai-run", settings.scenario, *(word for each in words for word in each)])
+    words = [word for name in names if asked[name] != usual[name] for word in typed(name, asked[name])]
+    return " ".join(["socialai-run", settings.scenario, *words])
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

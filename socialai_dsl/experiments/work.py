@@ -231,7 +231,7 @@ class _Work:
         if condition["frames"] is not None:
             command += ["--frames", str(condition["frames"])]
         for key, value in condition["options"].items():
-            command += [word for words in typed(key, value) for word in words]
+            command += typed(key, value)
         return [*command, "--out", str(path), "--json"]
 
     def _test_command(self, scenarios: Sequence[str]) -> list[str]:

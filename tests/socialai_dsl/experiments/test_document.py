@@ -237,12 +237,12 @@ conditions:
 
 
 def test_settings_are_typed_as_options():
-    assert typed("checkpoint_every", 3) == [["--checkpoint-every", "3"]]
-    assert typed("compile", True) == [["--compile"]]
+    assert typed("checkpoint_every", 3) == ["--checkpoint-every", "3"]
+    assert typed("compile", True) == ["--compile"]
     assert typed("hyper", {"lr": 1e-4, "loss": "per_head", "clip_value": True}) == [
-        ["--hyper", "lr=0.0001"],
-        ["--hyper", "loss=per_head"],
-        ["--hyper", "clip_value=true"],
+        *("--hyper", "lr=0.0001"),
+        *("--hyper", "loss=per_head"),
+        *("--hyper", "clip_value=true"),
     ]
 
 
