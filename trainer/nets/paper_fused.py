@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from trainer.nets import winograd
-from trainer.nets import winograd_kernels as kernels
+from trainer.nets import image_kernels, lanes, tiles, winograd
+from trainer.nets.kernels import AVAILABLE
 from trainer.nets.winograd import Plan, as_u16
 
 
 def fits(image_shape: tuple[int, ...], width: int) -> bool:
     """Whether images of these cells and convolutions of this many channels can be computed here."""
-    return kernels.AVAILABLE and min(image_shape[:2]) > 1 and width % kernels.LANES == 0
+    return AVAILABLE and min(image_shape[:2]) > 1 and width % lanes.LANES == 0
 
 
 class Filters:
@@ -34,10 +34,12 @@ class Filters:
         self._made: tuple[Plan, NDArray[np.float32], Tensor] | None = None
 
     def of(self, weight: Tensor, height: int, width: int) -> Tensor:
-        """`Plan.filters` in bfloat16 for images of this size."""
+        """`Plan.filters` as `winograd.convolve` takes them for images of this size."""
         plan, made = Plan.of(height, width), self._made
         if made is None or made[0] is not plan or not np.array_equal(made[1], weight.detach().numpy()):
-            self._made = made = (plan, weight.detach().clone().numpy(), plan.filters(weight).bfloat16())
+            filters = plan.filters(weight)
+            ready = winograd.packed(filters) if tiles.NATIVE else filters.bfloat16()
+            self._made = made = (plan, weight.detach().clone().numpy(), ready)
         return made[2]
 
 
@@ -133,7 +135,7 @@ class FilmBlock(torch.autograd.Function):
         hidden = winograd.convolve(between, filters2, bias2, rectified=False)
         outputs = torch.empty_like(images)
         tables = scale.detach().numpy(), shift.detach().numpy(), text_index.numpy()
-        kernels.modulate(as_u16(hidden), *tables, as_u16(images), as_u16(outputs))
+        image_kernels.modulate(as_u16(hidden), *tables, as_u16(images), as_u16(outputs))
         ctx.save_for_backward(images, between, hidden, scale, shift, text_index, filters1, filters2)
         return outputs
 
@@ -148,7 +150,7 @@ class FilmBlock(torch.autograd.Function):
             torch.zeros_like(shift),
         )
         tables = scale.numpy(), shift.numpy(), text_index.numpy()
-        kernels.modulate_backward(
+        image_kernels.modulate_backward(
             as_u16(grad), as_u16(hidden), *tables, as_u16(d_hidden), d_scale.numpy(), d_shift.numpy()
         )
         d_between, d_weight2, d_bias2 = winograd.convolve_backward(d_hidden, between, filters2)
@@ -173,7 +175,7 @@ class Chosen(torch.autograd.Function):
         """Gradients for what `forward` takes."""
         (index,) = ctx.saved_tensors
         total = torch.zeros(ctx.shape)
-        kernels.add_up(as_u16(grad.contiguous()), index.numpy(), total.numpy())
+        image_kernels.add_up(as_u16(grad.contiguous()), index.numpy(), total.numpy())
         return total.bfloat16(), None
 
 
@@ -185,7 +187,7 @@ class Peaks(torch.autograd.Function):
         """Images (N, H, W, C) to float32 (N, C)."""
         values = torch.empty(len(images), images.shape[3])
         cells = np.empty(values.shape, np.uint16)
-        kernels.peaks(as_u16(images), values.numpy(), cells)
+        image_kernels.peaks(as_u16(images), values.numpy(), cells)
         ctx.cells, ctx.shape = cells, images.shape
         return values
 
@@ -193,5 +195,5 @@ class Peaks(torch.autograd.Function):
     def backward(ctx: Any, grad: Tensor) -> Tensor:
         """Gradient for the images."""
         images = torch.empty(ctx.shape, dtype=torch.bfloat16)
-        kernels.peaks_backward(grad.contiguous().numpy(), ctx.cells, as_u16(images))
+        image_kernels.peaks_backward(grad.contiguous().numpy(), ctx.cells, as_u16(images))
         return images

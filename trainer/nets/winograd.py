@@ -21,17 +21,19 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from trainer.nets import winograd_kernels as kernels
+from trainer.nets.image_kernels import add_up
+from trainer.nets.winograd_kernels import Layout, Tables
 
 _TILE_KERNEL: Final = ((1, 0, 0), (0.5, 0.5, 0.5), (0.5, -0.5, 0.5), (0, 0, 1))
 _TILE_INPUT: Final = ((1, 0, -1, 0), (0, 1, 1, 0), (0, -1, 1, 0), (0, 1, 0, -1))
 _TILE_OUTPUT: Final = ((1, 0), (1, 1), (1, -1), (0, -1))
 _LAST_KERNEL: Final = ((1, 0, 0), (0, 1, 0))
 
-Tables = tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.int64], NDArray[np.float32]]
-"""A sparse matrix for the rows and one for the columns: see `_sparse`."""
-
-# Images convolved together: their products stay in the cache between the steps.
 BLOCK: Final = 64
+"""Images convolved together where a library multiplies: few calls, and products that hardly leave the cache."""
+
+_OWN_BLOCK: Final = 16
+"""Images convolved together where this package does: their products stay in the cache next to the core."""
 
 
 @dataclass(frozen=True)
@@ -91,20 +93,20 @@ class Plan:
     Attributes:
         positions: products of an image.
         kernels: float32 (K, 9), what each of K matrices of channels is made of, from the nine taps.
-        batches: of each pair of groups the first of its kernels, how many, and its places.
+        batches: int64 (G, 3), of each pair of groups the first of its kernels, how many, and its places.
         spread_input, gather_output: tables of the kernels of that name for the images; spread_grad, gather_grad: those
             for the gradients of the outputs and of the inputs.
-        layout: first, step and place of each product, see `winograd_kernels.spread`.
+        layout: where products are.
     """
 
     positions: int
     kernels: Tensor
-    batches: tuple[tuple[int, int, int], ...]
+    batches: NDArray[np.int64]
     spread_input: Tables
     spread_grad: Tables
     gather_output: Tables
     gather_grad: Tables
-    layout: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
+    layout: Layout
 
     @classmethod
     @cache
@@ -132,7 +134,7 @@ class Plan:
         return cls(
             total,
             torch.from_numpy(np.array(taps, np.float32)),
-            tuple(batches),
+            np.array(batches, np.int64),
             (*_sparse(down.inputs, 2), *_sparse(across.inputs, 2)),
             (*_sparse(down.outputs, 2), *_sparse(across.outputs, 2)),
             (*_sparse(down.outputs.T, 4), *_sparse(across.outputs.T, 4)),
@@ -154,7 +156,7 @@ class Plan:
     def parts(self, products: Tensor) -> Iterator[tuple[Tensor, slice]]:
         """The batches of a block's products, (positions * images, C), each with the kernels it belongs to."""
         begin, room = 0, len(products) // self.positions
-        for first, many, places in self.batches:
+        for first, many, places in self.batches.tolist():
             rows = many * places * room
             yield products[begin : begin + rows].view(many, places * room, -1), slice(first, first + many)
             begin += rows
@@ -174,12 +176,28 @@ def _sparse(matrix: NDArray[np.float32], most: int) -> tuple[NDArray[np.int64], 
     return places, values
 
 
+def packed(filters: Tensor) -> Tensor:
+    """Filters in the order `convolve` and `convolve_backward` take them where this package multiplies.
+
+    Args:
+        filters: float32 (K, C, C), from `Plan.filters`.
+
+    Returns:
+        bfloat16 (2, K, C / 2, C, 2): numbers of two rows that are one above the other lie together; of the matrices,
+        then of them transposed.
+    """
+    count, depth, width = filters.shape
+    both = torch.empty((2, count, depth // 2, width, 2), dtype=torch.bfloat16)
+    kernels.pack(filters.contiguous().numpy(), both.view(torch.uint32).squeeze(-1).numpy())
+    return both
+
+
 def convolve(images: Tensor, filters: Tensor, bias: Tensor, rectified: bool) -> Tensor:
     """Convolve images, bfloat16 (N, H, W, C), without gradients.
 
     Args:
-        images: on the CPU, C a multiple of `winograd_kernels.LANES`.
-        filters: bfloat16 (K, C, D), from `Plan.filters`.
+        images: on the CPU, C a multiple of `lanes.LANES`.
+        filters: bfloat16 (K, C, D), from `Plan.filters`, for a library to multiply by; or `packed`.
         bias: float32 (D,).
         rectified: whether negative outputs become 0.
 
@@ -187,7 +205,21 @@ def convolve(images: Tensor, filters: Tensor, bias: Tensor, rectified: bool) -> 
         bfloat16 (N, H, W, D).
     """
     plan = Plan.of(*images.shape[1:3])
-    outputs = images.new_empty(*images.shape[:3], filters.shape[2])
+    outputs = images.new_empty(*images.shape[:3], len(bias))
+    if _is_packed(filters):
+        kernels.convolve(
+            as_u16(images),
+            as_u16(filters[0]),
+            bias.detach().numpy(),
+            rectified,
+            plan.spread_input,
+            plan.gather_output,
+            plan.layout,
+            plan.batches,
+            _OWN_BLOCK,
+            as_u16(outputs),
+        )
+        return outputs
     for block, room in _blocks(len(images)):
         inputs = _spread(plan, plan.spread_input, images[block], room)
         products = inputs.new_empty(len(inputs), filters.shape[2])
@@ -213,30 +245,44 @@ def convolve_backward(
         bfloat16 like images; float32 (D, C, 3, 3) and (D,).
     """
     plan = Plan.of(*images.shape[1:3])
-    bias_grad = torch.zeros(filters.shape[2])
-    filters_grad = torch.zeros(filters.shape)
+    bias_grad = torch.zeros(grads.shape[3])
+    filters_grad = torch.zeros(len(plan.kernels), images.shape[3], grads.shape[3])
     images_grad = torch.empty_like(images)
+    gates, more = grads[:0] if outputs is None else outputs, images[:0] if added is None else added
+    if _is_packed(filters):
+        kernels.convolve_backward(
+            as_u16(grads),
+            as_u16(gates),
+            as_u16(images),
+            as_u16(filters[1]),
+            as_u16(more),
+            plan.spread_input,
+            plan.spread_grad,
+            plan.gather_grad,
+            plan.layout,
+            plan.batches,
+            _OWN_BLOCK,
+            as_u16(images_grad),
+            filters_grad.numpy(),
+            bias_grad.numpy(),
+        )
+        return images_grad, plan.weight_grad(filters_grad), bias_grad
     made, every = torch.empty_like(filters), np.arange(len(filters))
     for block, room in _blocks(len(images)):
-        products = _spread(
-            plan, plan.spread_grad, grads[block], room, bias_grad, None if outputs is None else outputs[block]
-        )
+        products = _spread(plan, plan.spread_grad, grads[block], room, bias_grad, gates[block])
         inputs = _spread(plan, plan.spread_input, images[block], room)
         for (given, chosen), (slopes, _) in zip(plan.parts(inputs), plan.parts(products), strict=True):
             torch.bmm(given.transpose(1, 2), slopes, out=made[chosen])
             torch.bmm(
                 slopes, filters[chosen].transpose(1, 2), out=given
             )  # whose inputs are not needed any more
-        kernels.add_up(as_u16(made.unsqueeze(1)), every, filters_grad.unsqueeze(1).numpy())
-        _gather(
-            plan,
-            plan.gather_grad,
-            inputs,
-            room,
-            images_grad[block],
-            added=None if added is None else added[block],
-        )
+        add_up(as_u16(made.unsqueeze(1)), every, filters_grad.unsqueeze(1).numpy())
+        _gather(plan, plan.gather_grad, inputs, room, images_grad[block], added=more[block])
     return images_grad, plan.weight_grad(filters_grad), bias_grad
+
+
+def _is_packed(filters: Tensor) -> bool:
+    return filters.dim() == 5
 
 
 def _blocks(count: int) -> Iterator[tuple[slice, int]]:
@@ -261,20 +307,12 @@ def _spread(
     images: Tensor,
     room: int,
     sums: Tensor | None = None,
-    outputs: Tensor | None = None,
+    gates: Tensor | None = None,
 ) -> Tensor:
     products = images.new_empty(plan.positions * room, images.shape[3])
-    total = torch.zeros(images.shape[3]) if sums is None else sums
-    kernels.spread(
-        as_u16(images),
-        as_u16(images if outputs is None else outputs),
-        outputs is not None,
-        total.numpy(),
-        *tables,
-        *plan.layout,
-        room,
-        as_u16(products),
-    )
+    total = torch.empty(0) if sums is None else sums
+    open_ = images[:0] if gates is None else gates
+    kernels.spread(as_u16(images), as_u16(open_), total.numpy(), tables, plan.layout, room, as_u16(products))
     return products
 
 
@@ -288,16 +326,10 @@ def _gather(
     rectified: bool = False,
     added: Tensor | None = None,
 ) -> None:
-    offset = torch.zeros(images.shape[3]) if bias is None else bias
+    offset = torch.zeros(images.shape[3]) if bias is None else bias.detach()
+    more = images[:0] if added is None else added
     kernels.gather(
-        as_u16(products),
-        room,
-        *tables,
-        *plan.layout,
-        offset.numpy(),
-        rectified,
-        as_u16(images[:0] if added is None else added),
-        as_u16(images),
+        as_u16(products), room, tables, plan.layout, offset.numpy(), rectified, as_u16(more), as_u16(images)
     )
 
 

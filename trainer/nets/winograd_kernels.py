@@ -1,153 +1,164 @@
-"""This module moves images to and from the products of a convolution by Winograd's method, in compiled loops.
+"""This module does the three steps of a convolution by Winograd's method, in compiled loops.
 
-Numbers are bfloat16, kept as uint16 because NumPy has no such type; sums are float32. Indices come from slices so that
-the compiler sees them rise from 0 and uses whole vectors.
+Numbers are bfloat16, kept as uint16 because NumPy has no such type; sums are float32. Arrays are flat where vectors
+are read and written, and indices count their elements.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Final, TypeVar, cast
+from typing import Any, Final
 
 import numpy as np
-from numba import config, njit
-from numpy.typing import NDArray
 
-LANES: Final = 128
-"""Channels an image must have, or a multiple: the loops over them have this length when they are compiled."""
+from trainer.nets import tiles
+from trainer.nets.kernels import F32, I64, U16, U32, compiled, inlined
+from trainer.nets.lanes import LANES, Lanes, over_lanes
 
-AVAILABLE: Final = not config.DISABLE_JIT
-"""Whether the loops are compiled; as Python they would take minutes."""
+Tables = tuple[I64, F32, I64, F32]
+"""A sparse matrix for the rows and one for the columns, of each its columns and values; see `spread` and `gather`."""
 
-U16 = NDArray[np.uint16]
-F32 = NDArray[np.float32]
-I64 = NDArray[np.int64]
+Layout = tuple[I64, I64, I64]
+"""First, step and place, int64 (P, Q) each.
 
-_Function = TypeVar("_Function", bound=Callable[..., Any])
-
-
-def _compiled(function: _Function) -> _Function:
-    # Threads of a crew run these side by side. A sum may be rounded once less, by a fused multiplication.
-    return cast(_Function, njit(nogil=True, error_model="numpy", fastmath={"contract"}, cache=True)(function))
+Among the products of R images, product (p, q) of image n is in row `first * R + n * step + place`.
+"""
 
 
-def _inlined(function: _Function) -> _Function:
-    return cast(_Function, njit(inline="always", error_model="numpy")(function))
+_TURNED: Final = 16
+"""Rows that are transposed together: as many numbers as a line of the cache has."""
 
 
-@_inlined
-def _widened(number: Any) -> Any:
-    """A bfloat16 as float32."""
-    return np.uint32(np.uint32(number) << np.uint32(16)).view(np.float32)
+@over_lanes
+def _copy(lanes: Lanes, into: Any, at: Any, source: Any, a: Any) -> None:
+    lanes.put(into, at, lanes.get(source, a))
 
 
-@_inlined
-def _narrowed(number: Any) -> Any:
-    """A finite float32 as bfloat16, rounded to the nearest, to even between two; infinity stays, and so does NaN."""
-    bits = np.float32(number).view(np.uint32)
-    odd = np.uint32(np.uint32(bits >> np.uint32(16)) & np.uint32(1))
-    up = np.uint32(np.uint32(bits + np.uint32(0x7FFF)) + odd)
-    return np.uint16(np.uint32((up if number == number else np.uint32(0x7FC00000)) >> np.uint32(16)))
+@over_lanes
+def _copy_open(lanes: Lanes, into: Any, at: Any, source: Any, gates: Any, a: Any) -> None:
+    lanes.put(into, at, lanes.where_positive(lanes.get(source, a), lanes.get(gates, a)))
 
 
-@_inlined
-def _sum_of_two(into: F32, at: Any, source: F32, i: Any, u: Any, j: Any, v: Any) -> None:
-    """One cell's channels: into[at] = u * source[i] + v * source[j]."""
-    for c in range(LANES):
-        k = np.uintp(c)
-        into[at + k] = u * source[i + k] + v * source[j + k]
+@over_lanes
+def _add(lanes: Lanes, into: Any, at: Any, source: Any, a: Any) -> None:
+    lanes.put(into, at, lanes.plus(lanes.get(into, at), lanes.get(source, a)))
 
 
-@_compiled
+@over_lanes
+def _two(lanes: Lanes, into: Any, at: Any, source: Any, a: Any, u: Any, b: Any, v: Any) -> None:
+    lanes.put(into, at, lanes.weighted(lanes.get(source, a), u, lanes.get(source, b), v))
+
+
+def _weighted(lanes: Lanes, source: Any, *terms: Any) -> Any:
+    """The sum of what an array holds times numbers."""
+    held = [lanes.get(source, index) for index in terms[::2]]
+    return lanes.weighted(*(part for term in zip(held, terms[1::2], strict=True) for part in term))
+
+
+@over_lanes
+def _three(
+    lanes: Lanes, into: Any, at: Any, source: Any, a: Any, t: Any, b: Any, u: Any, c: Any, v: Any
+) -> None:
+    lanes.put(into, at, _weighted(lanes, source, a, t, b, u, c, v))
+
+
+@over_lanes
+def _four(
+    lanes: Lanes,
+    into: Any,
+    at: Any,
+    source: Any,
+    a: Any,
+    t: Any,
+    b: Any,
+    u: Any,
+    c: Any,
+    v: Any,
+    d: Any,
+    w: Any,
+) -> None:
+    lanes.put(into, at, _weighted(lanes, source, a, t, b, u, c, v, d, w))
+
+
+@over_lanes
+def _four_bounded(
+    lanes: Lanes,
+    into: Any,
+    at: Any,
+    source: Any,
+    a: Any,
+    t: Any,
+    b: Any,
+    u: Any,
+    c: Any,
+    v: Any,
+    d: Any,
+    w: Any,
+    more: Any,
+    i: Any,
+    lowest: Any,
+) -> None:
+    total = lanes.plus(_weighted(lanes, source, a, t, b, u, c, v, d, w), lanes.get(more, i))
+    lanes.put(into, at, lanes.at_least(total, lowest))
+
+
+@over_lanes
+def _pair_up(lanes: Lanes, into: Any, at: Any, source: Any, above: Any, below: Any) -> None:
+    lanes.put_pairs(into, at, lanes.get(source, above), lanes.get(source, below))
+
+
+@compiled
 def spread(
-    images: U16,
-    outputs: U16,
-    masked: bool,
-    sums: F32,
-    rows: I64,
-    row_weights: F32,
-    columns: I64,
-    column_weights: F32,
-    first: I64,
-    step: I64,
-    place: I64,
-    room: int,
-    products: U16,
+    images: U16, gates: U16, sums: F32, tables: Tables, layout: Layout, room: int, products: U16
 ) -> None:
     """Write what one side of the products is made of: rows' matrix times image times columns' matrix transposed.
 
     Args:
         images: (N, H, W, C).
-        outputs: like images; where `masked`, an image's numbers count as 0 where this is not positive.
-        masked: see above.
-        sums: (C,), where the images' sums over all cells are added, after masking.
-        rows: (P, 2), where the first matrix is not 0, two entries in each row.
-        row_weights: (P, 2), those entries.
-        columns: (Q, 2), where the second matrix is not 0.
-        column_weights: (Q, 2), those entries.
-        first: (P, Q), product (p, q) of image n goes to row `first * room + n * step + place`.
-        step: (P, Q), see above.
-        place: (P, Q), see above.
+        gates: like images; where this is not positive, an image's numbers count as 0. Without images none does.
+        sums: (C,), where the images' sums over all cells are added, after that; or empty.
+        tables: the two matrices, (P, H) and (Q, W), two entries in each row: columns (P, 2) and values (P, 2).
+        layout: where products are.
         room: images that `products` has room for; those beyond the N given are 0.
-        products: (positions * room, C).
+        products: (positions * room, C), or with more rows.
     """
     count, height, width, channels = images.shape
+    rows, row_weights, columns, column_weights = tables
+    first, step, place = layout
     cells = height * width
-    source, open_, target = images.reshape(-1), outputs.reshape(-1), products.reshape(-1)
-    image = np.empty(cells * LANES, np.float32)
-    scratch = np.empty(len(rows) * width * LANES, np.float32)
-    total = np.empty(LANES, np.float32)
+    source, open_, target = images.reshape(-1), gates.reshape(-1), products.reshape(-1)
+    image, line = np.empty(cells * LANES, np.float32), np.empty(width * LANES, np.float32)
     for n in range(count):
         for start in range(0, channels, LANES):
-            total[:] = 0
             for cell in range(cells):
-                at = np.uintp((n * cells + cell) * channels + start)
-                to = np.uintp(cell * LANES)
-                if masked:
-                    for c in range(LANES):
-                        k = np.uintp(c)
-                        # As integers the positive numbers are those from 1 to 0x7FFF.
-                        passes = np.uint16(open_[at + k] - np.uint16(1)) < np.uint16(0x7FFF)
-                        image[to + k] = _widened(source[at + k]) if passes else np.float32(0)
-                        total[k] += image[to + k]
+                at = (n * cells + cell) * channels + start
+                if len(gates):
+                    _copy_open(image, cell * LANES, source, open_, at)
                 else:
-                    for c in range(LANES):
-                        k = np.uintp(c)
-                        image[to + k] = _widened(source[at + k])
-                        total[k] += image[to + k]
-            sums[start : start + LANES] += total
+                    _copy(image, cell * LANES, source, at)
+                if len(sums):
+                    _add(sums, start, image, cell * LANES)
             for p in range(len(rows)):
+                above, below = rows[p, 0] * width * LANES, rows[p, 1] * width * LANES
                 u, v = row_weights[p, 0], row_weights[p, 1]
-                for x in range(width):
-                    i = np.uintp((rows[p, 0] * width + x) * LANES)
-                    j = np.uintp((rows[p, 1] * width + x) * LANES)
-                    _sum_of_two(scratch, np.uintp((p * width + x) * LANES), image, i, u, j, v)
-            for p in range(len(rows)):
+                for x in range(0, width * LANES, LANES):
+                    _two(line, x, image, above + x, u, below + x, v)
                 for q in range(len(columns)):
+                    row = first[p, q] * room + n * step[p, q] + place[p, q]
+                    left, right = columns[q, 0] * LANES, columns[q, 1] * LANES
                     u, v = column_weights[q, 0], column_weights[q, 1]
-                    i = np.uintp((p * width + columns[q, 0]) * LANES)
-                    j = np.uintp((p * width + columns[q, 1]) * LANES)
-                    to = np.uintp((first[p, q] * room + n * step[p, q] + place[p, q]) * channels + start)
-                    for c in range(LANES):
-                        k = np.uintp(c)
-                        target[to + k] = _narrowed(u * scratch[i + k] + v * scratch[j + k])
+                    _two(target, row * channels + start, line, left, u, right, v)
     for n in range(count, room):
         for p in range(len(rows)):
             for q in range(len(columns)):
                 products[first[p, q] * room + n * step[p, q] + place[p, q]] = 0
 
 
-@_compiled
+@compiled
 def gather(
     products: U16,
     room: int,
-    rows: I64,
-    row_weights: F32,
-    columns: I64,
-    column_weights: F32,
-    first: I64,
-    step: I64,
-    place: I64,
+    tables: Tables,
+    layout: Layout,
     bias: F32,
     rectified: bool,
     added: U16,
@@ -156,175 +167,239 @@ def gather(
     """Write images: rows' matrix times products times columns' matrix transposed, plus a bias, perhaps rectified.
 
     Args:
-        products: (positions * room, C).
+        products: (positions * room, C), or with more rows.
         room: images that `products` has room for.
-        rows: (H, 4), where the first matrix is not 0, at most four entries in each row, filled up.
-        row_weights: (H, 4), those entries, or 0.
-        columns: (W, 4), where the second matrix is not 0.
-        column_weights: (W, 4), those entries, or 0.
-        first: (P, Q), for each product, as for `spread`.
-        step: (P, Q), as for `spread`.
-        place: (P, Q), as for `spread`.
+        tables: the two matrices, (H, P) and (W, Q), four entries in each row, filled up with zeros.
+        layout: where products are.
         bias: (C,).
         rectified: whether negative numbers become 0.
-        added: like images, what is added instead of a bias; without images for nothing.
+        added: like images, what is added instead of a bias; without images the bias is.
         images: (N, H, W, C), written.
     """
     count, height, width, channels = images.shape
-    cells, positions = height * width, first.shape[0]
+    rows, row_weights, columns, column_weights = tables
+    first, step, place = layout
+    cells, positions, across = height * width, first.shape[0], first.shape[1]
     source, more, target = products.reshape(-1), added.reshape(-1), images.reshape(-1)
-    scratch = np.empty(positions * width * LANES, np.float32)
-    places = np.empty(first.shape[1], np.uintp)
+    column = np.empty(positions * LANES, np.float32)
+    starts = np.empty(first.shape, np.int64)
     lowest = np.float32(0) if rectified else np.float32(-np.inf)
     for n in range(count):
+        for p in range(positions):
+            for q in range(across):
+                starts[p, q] = (first[p, q] * room + n * step[p, q] + place[p, q]) * channels
         for start in range(0, channels, LANES):
-            for p in range(positions):
-                for q in range(len(places)):
-                    row = first[p, q] * room + n * step[p, q] + place[p, q]
-                    places[q] = np.uintp(row * channels + start)
-                for x in range(width):
-                    f, g = places[columns[x, 0]], places[columns[x, 1]]
-                    h, i = places[columns[x, 2]], places[columns[x, 3]]
-                    u, v = column_weights[x, 0], column_weights[x, 1]
-                    w, z = column_weights[x, 2], column_weights[x, 3]
-                    to = np.uintp((p * width + x) * LANES)
-                    if z == 0:
-                        for c in range(LANES):
-                            k = np.uintp(c)
-                            one, two = _widened(source[f + k]), _widened(source[g + k])
-                            scratch[to + k] = u * one + v * two + w * _widened(source[h + k])
-                    else:
-                        for c in range(LANES):
-                            k = np.uintp(c)
-                            one, two = _widened(source[f + k]), _widened(source[g + k])
-                            three, four = _widened(source[h + k]), _widened(source[i + k])
-                            scratch[to + k] = u * one + v * two + w * three + z * four
-            for y in range(height):
-                for x in range(width):
-                    f, g = (
-                        np.uintp((rows[y, 0] * width + x) * LANES),
-                        np.uintp((rows[y, 1] * width + x) * LANES),
-                    )
-                    h, i = (
-                        np.uintp((rows[y, 2] * width + x) * LANES),
-                        np.uintp((rows[y, 3] * width + x) * LANES),
-                    )
-                    u, v, w, z = row_weights[y, 0], row_weights[y, 1], row_weights[y, 2], row_weights[y, 3]
-                    to = np.uintp((n * cells + y * width + x) * channels + start)
-                    offset = np.uintp(start)
-                    if len(more):
-                        for c in range(LANES):
-                            k = np.uintp(c)
-                            one, two = (
-                                u * scratch[f + k] + v * scratch[g + k],
-                                w * scratch[h + k] + z * scratch[i + k],
-                            )
-                            target[to + k] = _narrowed(one + two + _widened(more[to + k]))
-                    else:
-                        for c in range(LANES):
-                            k = np.uintp(c)
-                            one, two = (
-                                u * scratch[f + k] + v * scratch[g + k],
-                                w * scratch[h + k] + z * scratch[i + k],
-                            )
-                            value = one + two + bias[offset + k]
-                            target[to + k] = _narrowed(lowest if value < lowest else value)  # NaN stays
-
-
-@_compiled
-def modulate(hidden: U16, scale: F32, shift: F32, text: I64, added: U16, images: U16) -> None:
-    """Write the images `max(hidden * scale + shift, 0) + added`, where row `text[n]` of both tables is image n's.
-
-    Images are (N, H, W, C), the tables (D, C), and `text` is (N,).
-    """
-    count, height, width, channels = images.shape
-    for n in range(count):
-        for start in range(0, channels, LANES):
-            by, up = scale[text[n], start : start + LANES], shift[text[n], start : start + LANES]
-            for y in range(height):
-                for x in range(width):
-                    source, more = (
-                        hidden[n, y, x, start : start + LANES],
-                        added[n, y, x, start : start + LANES],
-                    )
-                    target = images[n, y, x, start : start + LANES]
-                    for c in range(LANES):
-                        value = _widened(source[c]) * by[c] + up[c]
-                        target[c] = _narrowed((np.float32(0) if value < 0 else value) + _widened(more[c]))
-
-
-@_compiled
-def modulate_backward(
-    grads: U16, hidden: U16, scale: F32, shift: F32, text: I64, d_hidden: U16, d_scale: F32, d_shift: F32
-) -> None:
-    """Write the gradient of `modulate` for `hidden`, and add to those for its tables; `grads` is that of its images."""
-    count, height, width, channels = hidden.shape
-    for n in range(count):
-        for start in range(0, channels, LANES):
-            by, up = scale[text[n], start : start + LANES], shift[text[n], start : start + LANES]
-            to_scale, to_shift = (
-                d_scale[text[n], start : start + LANES],
-                d_shift[text[n], start : start + LANES],
-            )
-            for y in range(height):
-                for x in range(width):
-                    source, grad = (
-                        hidden[n, y, x, start : start + LANES],
-                        grads[n, y, x, start : start + LANES],
-                    )
-                    target = d_hidden[n, y, x, start : start + LANES]
-                    for c in range(LANES):
-                        value = _widened(source[c])
-                        slope = np.float32(0) if value * by[c] + up[c] <= 0 else _widened(grad[c])
-                        target[c] = _narrowed(slope * by[c])
-                        to_scale[c] += slope * value
-                        to_shift[c] += slope
-
-
-@_compiled
-def add_up(grads: U16, index: I64, total: F32) -> None:
-    """Add image n of `grads`, (N, H, W, C), to number `index[n]` of `total`, (I, H, W, C)."""
-    count, height, width, channels = grads.shape
-    for n in range(count):
-        for y in range(height):
             for x in range(width):
-                for start in range(0, channels, LANES):
-                    grad = grads[n, y, x, start : start + LANES]
-                    into = total[index[n], y, x, start : start + LANES]
-                    for c in range(LANES):
-                        into[c] += _widened(grad[c])
+                t, u = column_weights[x, 0], column_weights[x, 1]
+                v, w = column_weights[x, 2], column_weights[x, 3]
+                for p in range(positions):
+                    a, b = starts[p, columns[x, 0]] + start, starts[p, columns[x, 1]] + start
+                    c, d = starts[p, columns[x, 2]] + start, starts[p, columns[x, 3]] + start
+                    if w == 0:
+                        _three(column, p * LANES, source, a, t, b, u, c, v)
+                    else:
+                        _four(column, p * LANES, source, a, t, b, u, c, v, d, w)
+                for y in range(height):
+                    a, b, c, d = (
+                        rows[y, 0] * LANES,
+                        rows[y, 1] * LANES,
+                        rows[y, 2] * LANES,
+                        rows[y, 3] * LANES,
+                    )
+                    t, u, v, w = row_weights[y, 0], row_weights[y, 1], row_weights[y, 2], row_weights[y, 3]
+                    at = (n * cells + y * width + x) * channels + start
+                    if len(added):
+                        _four_bounded(target, at, column, a, t, b, u, c, v, d, w, more, at, lowest)
+                    else:
+                        _four_bounded(target, at, column, a, t, b, u, c, v, d, w, bias, start, lowest)
 
 
-@_compiled
-def peaks(images: U16, values: F32, cells: U16) -> None:
-    """Write each channel's highest number and the first cell that has it, (N, C) both; NaN is above all numbers.
+@inlined
+def _multiply(given: U16, filters: U16, batches: I64, room: int, depth: int, width: int, made: U16) -> None:
+    """Multiply the rows of each filter, of `depth` channels, by it, to rows of `width` channels.
 
-    Images are (N, H, W, C) of at most 65,536 cells.
+    A tile may end behind the rows of its filter. What it writes there is written anew by the next filter, or is behind
+    the last row that counts.
     """
-    count, height, width, channels = images.shape
-    for n in range(count):
-        for start in range(0, channels, LANES):
-            best, where = values[n, start : start + LANES], cells[n, start : start + LANES]
-            best[:], where[:] = -np.inf, 0
-            for y in range(height):
-                for x in range(width):
-                    source, cell = images[n, y, x, start : start + LANES], np.uint16(y * width + x)
-                    for c in range(LANES):
-                        value = _widened(source[c])
-                        higher = value > best[c] or value != value
-                        where[c] = cell if higher else where[c]
-                        best[c] = value if higher else best[c]
+    begin = 0
+    for batch in range(len(batches)):
+        first, many, places = batches[batch]
+        for kernel in range(first, first + many):
+            end = begin + places * room
+            for panel in range(0, width, tiles.PANEL):
+                chosen = kernel * depth * width + 2 * panel
+                for row in range(begin, end, tiles.ROWS):
+                    tiles.multiply(
+                        given,
+                        row * depth,
+                        depth,
+                        2,
+                        filters,
+                        chosen,
+                        2 * width,
+                        made,
+                        row * width + panel,
+                        width,
+                        depth // 2,
+                    )
+            begin = end
 
 
-@_compiled
-def peaks_backward(grads: F32, cells: U16, images: U16) -> None:
-    """Write the gradient of `peaks` for its images; `grads` is that of its values."""
-    count, height, width, channels = images.shape
-    for n in range(count):
+@inlined
+def _multiply_add(
+    inputs: U32, slopes: U32, batches: I64, room: int, depth: int, width: int, total: F32
+) -> None:
+    """Add the products of inputs, transposed, and slopes over the rows of each filter to its `total`.
+
+    Both are pairs of rows, of `depth` and `width` channels; a filter's total is (depth, width).
+    """
+    begin = 0
+    for batch in range(len(batches)):
+        first, many, places = batches[batch]
+        pairs = places * room // 2
+        for kernel in range(first, first + many):
+            for column in range(0, width, tiles.ADDED_COLUMNS):
+                for row in range(0, depth, tiles.ADDED_ROWS):
+                    tiles.multiply_add(
+                        inputs,
+                        begin * depth + row,
+                        1,
+                        depth,
+                        slopes,
+                        begin * width + column,
+                        width,
+                        total,
+                        (kernel * depth + row) * width + column,
+                        width,
+                        pairs,
+                    )
+            begin += pairs
+
+
+@inlined
+def _pair_up_rows(rows: U16, count: int, channels: int, pairs: U32) -> None:
+    """Let the first `count` rows, an even number, be pairs."""
+    for row in range(0, count, 2):
         for start in range(0, channels, LANES):
-            grad, where = grads[n, start : start + LANES], cells[n, start : start + LANES]
-            for y in range(height):
-                for x in range(width):
-                    target, cell = images[n, y, x, start : start + LANES], np.uint16(y * width + x)
-                    for c in range(LANES):
-                        target[c] = _narrowed(grad[c] if where[c] == cell else np.float32(0))
+            above = row * channels + start
+            _pair_up(pairs, row // 2 * channels + start, rows, above, above + channels)
+
+
+@compiled
+def pack(filters: F32, pairs: U32) -> None:
+    """Write `winograd.packed` of filters, (K, C, C), to `pairs`, (2, K, C / 2, C)."""
+    count, channels, _ = filters.shape
+    matrix, columns = filters.reshape(-1), np.empty((channels, channels), np.float32)
+    as_rows, as_columns = pairs[0].reshape(-1), pairs[1].reshape(-1)
+    for kernel in range(count):
+        for start in range(0, channels, _TURNED):
+            for d in range(channels):
+                for c in range(start, start + _TURNED):
+                    columns[d, c] = filters[kernel, c, d]
+        for row in range(0, channels, 2):
+            for start in range(0, channels, LANES):
+                at = (kernel * channels + row) // 2 * channels + start
+                above = (kernel * channels + row) * channels + start
+                _pair_up(as_rows, at, matrix, above, above + channels)
+                above = row * channels + start
+                _pair_up(as_columns, at, columns.reshape(-1), above, above + channels)
+
+
+@compiled
+def convolve(
+    images: U16,
+    filters: U16,
+    bias: F32,
+    rectified: bool,
+    spreading: Tables,
+    gathering: Tables,
+    layout: Layout,
+    batches: I64,
+    block: int,
+    outputs: U16,
+) -> None:
+    """Write to `outputs` what `winograd.convolve` makes of images.
+
+    Args:
+        images: (N, H, W, C).
+        filters: (K, C / 2, D, 2), the first half of `winograd.packed`.
+        bias: (D,).
+        rectified: whether negative outputs become 0.
+        spreading: tables for `spread`.
+        gathering: tables for `gather`.
+        layout: where products are.
+        batches: (G, 3): the first of the filters of each batch, how many, and its places in an image.
+        block: images that are convolved together.
+        outputs: (N, H, W, D).
+    """
+    depth, width = images.shape[3], outputs.shape[3]
+    rows = layout[0].size * min(len(images), block) + tiles.ROWS - 1
+    given, made = np.empty((rows, depth), np.uint16), np.empty((rows, width), np.uint16)
+    no_sums = np.empty(0, np.float32)
+    for begin in range(0, len(images), block):
+        some = images[begin : begin + block]
+        spread(some, some[:0], no_sums, spreading, layout, len(some), given)
+        _multiply(given.reshape(-1), filters.reshape(-1), batches, len(some), depth, width, made.reshape(-1))
+        into = outputs[begin : begin + block]
+        gather(made, len(some), gathering, layout, bias, rectified, some[:0], into)
+
+
+@compiled
+def convolve_backward(
+    grads: U16,
+    gates: U16,
+    images: U16,
+    filters: U16,
+    added: U16,
+    spreading: Tables,
+    spreading_grads: Tables,
+    gathering_grads: Tables,
+    layout: Layout,
+    batches: I64,
+    block: int,
+    images_grad: U16,
+    filters_grad: F32,
+    bias_grad: F32,
+) -> None:
+    """Write the gradient of `convolve` for images, and add to those for filters and bias.
+
+    Args:
+        grads: (N, H, W, D), gradient for the outputs.
+        gates: the outputs if they were rectified, else none of them.
+        images: (N, H, W, C).
+        filters: (K, D / 2, C, 2), the second half of `winograd.packed`.
+        added: like images, what to add to their gradient, or none of them.
+        spreading: tables for `spread` for the images.
+        spreading_grads: tables for `spread` for the gradients.
+        gathering_grads: tables for `gather` for the gradient of the images.
+        layout: where products are.
+        batches: as for `convolve`.
+        block: images that are convolved together, an even number.
+        images_grad: (N, H, W, C).
+        filters_grad: (K, C, D).
+        bias_grad: (D,).
+    """
+    depth, width = images.shape[3], grads.shape[3]
+    most = layout[0].size * min(_even(len(images)), block)
+    inputs = np.empty((most + tiles.ROWS - 1, depth), np.uint16)
+    slopes = np.empty((most + tiles.ROWS - 1, width), np.uint16)
+    input_pairs, slope_pairs = np.empty(most // 2 * depth, np.uint32), np.empty(most // 2 * width, np.uint32)
+    no_sums, no_bias = np.empty(0, np.float32), np.zeros(depth, np.float32)
+    for begin in range(0, len(images), block):
+        end = min(begin + block, len(images))
+        room = _even(end - begin)
+        rows = layout[0].size * room
+        spread(grads[begin:end], gates[begin:end], bias_grad, spreading_grads, layout, room, slopes)
+        spread(images[begin:end], images[:0], no_sums, spreading, layout, room, inputs)
+        _pair_up_rows(inputs.reshape(-1), rows, depth, input_pairs)
+        _pair_up_rows(slopes.reshape(-1), rows, width, slope_pairs)
+        _multiply_add(input_pairs, slope_pairs, batches, room, depth, width, filters_grad.reshape(-1))
+        _multiply(slopes.reshape(-1), filters.reshape(-1), batches, room, width, depth, inputs.reshape(-1))
+        into, more = images_grad[begin:end], added[begin:end]
+        gather(inputs, room, gathering_grads, layout, no_bias, False, more, into)
+
+
+@inlined
+def _even(count: int) -> int:
+    """The next even number: rows are multiplied in pairs."""
+    return count + (count & 1)

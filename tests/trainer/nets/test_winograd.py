@@ -1,16 +1,28 @@
 """Winograd's method computes what a plain convolution computes, in values and gradients, and the loops what it says."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import torch
 from torch import Tensor
 from torch.nn import functional
 
-from trainer.nets import winograd
+from trainer.nets import tiles, winograd
 from trainer.nets.winograd import Axis, Plan
 
 WIDTH = 128
 SIZES = [(7, 7), (2, 3), (6, 5)]
+
+
+@pytest.fixture(params=["by a library", "by tiles"])
+def ready(request: pytest.FixtureRequest) -> Callable[[Tensor], Tensor]:
+    """Filters as they are taken by each of the two ways to multiply."""
+    if request.param == "by a library":
+        return Tensor.bfloat16
+    if not tiles.NATIVE:
+        pytest.skip("this processor has no dot products of bfloat16")
+    return winograd.packed
 
 
 def drawn(*shape: int, seed: int = 0) -> Tensor:
@@ -53,14 +65,14 @@ def test_gradients_for_the_matrices_of_channels_become_those_for_the_weights() -
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("rectified", [False, True])
 def test_values_and_gradients_are_those_of_a_convolution_but_for_rounding(
-    size: tuple[int, int], rectified: bool
+    size: tuple[int, int], rectified: bool, ready: Callable[[Tensor], Tensor]
 ) -> None:
-    count = 67  # more than a block
+    count = 67  # more than a block, and odd
     weight, bias = (drawn(WIDTH, WIDTH, 3, 3, seed=2) / 34).float(), drawn(WIDTH, seed=3).float()
     # Sums far from 0, so that a rectifier lets the same ones through.
     bias = torch.where(bias > 0, bias + 8, bias - 8)
     images, slopes = drawn(count, *size, WIDTH).bfloat16(), drawn(count, *size, WIDTH, seed=1).bfloat16()
-    filters = Plan.of(*size).filters(weight).bfloat16()
+    filters = ready(Plan.of(*size).filters(weight))
     outputs = winograd.convolve(images, filters, bias, rectified)
     got = winograd.convolve_backward(slopes, images, filters, outputs if rectified else None, added=slopes)
 
@@ -74,18 +86,42 @@ def test_values_and_gradients_are_those_of_a_convolution_but_for_rounding(
     assert [distance(*pair) < 0.008 for pair in zip(got, expected, strict=True)] == [True] * 3
 
 
-def test_what_an_image_becomes_does_not_depend_on_the_others() -> None:
+def test_what_an_image_becomes_does_not_depend_on_the_others(ready: Callable[[Tensor], Tensor]) -> None:
     images = drawn(70, 7, 7, WIDTH).bfloat16()
-    filters = Plan.of(7, 7).filters(drawn(WIDTH, WIDTH, 3, 3, seed=1)).bfloat16()
+    filters = ready(Plan.of(7, 7).filters(drawn(WIDTH, WIDTH, 3, 3, seed=1).float()))
     together = winograd.convolve(images, filters, torch.zeros(WIDTH), rectified=False)
     alone = winograd.convolve(images[66:67], filters, torch.zeros(WIDTH), rectified=False)
     assert torch.equal(together[66:67], alone)
 
 
-def test_a_number_that_is_none_is_not_lost() -> None:
+def test_a_number_that_is_none_is_not_lost(ready: Callable[[Tensor], Tensor]) -> None:
     images = drawn(2, 3, 3, WIDTH).bfloat16()
     images[1, 1, 1, 0] = torch.nan
-    filters = Plan.of(3, 3).filters(drawn(WIDTH, WIDTH, 3, 3, seed=1)).bfloat16()
+    filters = ready(Plan.of(3, 3).filters(drawn(WIDTH, WIDTH, 3, 3, seed=1).float()))
     outputs = winograd.convolve(images, filters, torch.zeros(WIDTH), rectified=True)
     assert torch.isfinite(outputs[0]).all()
     assert torch.isnan(outputs[1, 1, 1]).all()
+
+
+@pytest.mark.skipif(not tiles.NATIVE, reason="this processor has no dot products of bfloat16")
+@pytest.mark.parametrize("width", [WIDTH, 2 * WIDTH])
+def test_images_of_every_number_and_width_are_convolved_alike_both_ways(width: int) -> None:
+    """Tiles end behind the rows of a filter, and behind the last row, unless their number happens to fit."""
+    weight, bias = (drawn(width, width, 3, 3, seed=2) / 34).float(), drawn(width, seed=3).float()
+    filters = Plan.of(3, 5).filters(weight)
+    for count in range(1, 20):
+        images, slopes = drawn(count, 3, 5, width).bfloat16(), drawn(count, 3, 5, width, seed=1).bfloat16()
+        ways = []
+        for taken in (filters.bfloat16(), winograd.packed(filters)):
+            outputs = winograd.convolve(images, taken, bias, rectified=False)
+            ways.append((outputs, *winograd.convolve_backward(slopes, images, taken)))
+        # The library rounds its sums for the weights to bfloat16 after each block, the tiles keep them in float32.
+        for library, own in zip(*ways, strict=True):
+            assert distance(own, library.double()) < 0.004, count
+
+
+def test_packed_filters_are_those_of_the_matrices_and_of_them_transposed() -> None:
+    filters = drawn(2, WIDTH, WIDTH).float()
+    packed = winograd.packed(filters)
+    assert torch.equal(packed[0].transpose(2, 3).flatten(1, 2), filters.bfloat16())
+    assert torch.equal(packed[1].transpose(2, 3).flatten(1, 2), filters.bfloat16().transpose(1, 2))
