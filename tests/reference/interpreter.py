@@ -143,7 +143,8 @@ class Reference:
         bodies.act(world, world.agent, self.primitive(action))
         # Links are direct consequences and part of an early picture; computed statuses are not.
         self.settling.links()
-        early = picture(world, self.canvas)
+        is_early = self.scenario.observe.image == "before_npcs"
+        image = picture(world, self.canvas) if is_early else None
         self.settling.statuses()
         # Step 2: what counts, then what moves by itself.
         self.go_on()
@@ -165,7 +166,7 @@ class Reference:
         result = self.judge()
         result.reward += world.bonus / 100 + self.scenario.reward.each_step
         # Step 9: the observation.
-        result.image = early if self.scenario.observe.image == "before_npcs" else picture(world, self.canvas)
+        result.image = picture(world, self.canvas) if image is None else image
         result.words = [word for line in self.history for word in line]
         result.tokens = self.vocabulary.tokens(result.words)
         result.heard = tuple(self.line(speaker, text) for speaker, text in world.lines)

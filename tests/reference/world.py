@@ -256,7 +256,8 @@ class World:
 
     def objects_at(self, cell: Cell) -> list[Entity]:
         """All objects in a cell, those that were written first at the bottom."""
-        return [thing for thing in self.things() if thing.cell == cell]
+        groups = self.objects.values()
+        return [thing for group in groups for thing in as_list(group) if thing.cell == cell]
 
     def object_at(self, cell: Cell) -> Entity | None:
         """The object in a cell; of several, the one on top."""
