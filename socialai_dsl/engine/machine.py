@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterable
 from functools import cache, partial
 from importlib import import_module
 from threading import RLock
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import llvmlite.binding as llvm
 
 from socialai_dsl.engine.cache import keep, read
+from socialai_dsl.engine.helper import Helper
 from socialai_dsl.engine.settings import is_interpreted
 
 _INTERPRETER: Final = "interpreter"
@@ -41,10 +42,10 @@ def prepare_call(name: str, book: Any, *numbers: int) -> Call:
     """
     if is_interpreted():
         return partial(_separate(name).function, book, *numbers)
-    _load(_INTERPRETER)
+    address = _load(_INTERPRETER, name)
     arguments = (ctypes.c_int64 * (1 + len(numbers)))(ctypes.addressof(book), *numbers)
     pointer = ctypes.cast(arguments, ctypes.c_void_p)  # it keeps them alive
-    return partial(_ENTRY(_load(name)), pointer)
+    return partial(_ENTRY(address), pointer)
 
 
 def addresses_of(call: Call) -> tuple[int, Any]:
@@ -75,16 +76,29 @@ def load_assembly(text: str, symbols: Iterable[str]) -> list[int]:
         return [int(engine.get_function_address(symbol)) for symbol in symbols]
 
 
-def _load(name: str) -> int:
+def provide(name: str) -> bytes:
+    """The machine code of a function, from the disk, or compiled and kept there."""
+    code = read(name)
+    if code is None:
+        code = cast(bytes, _separate(name).object_code())
+        keep(name, code)
+    return code
+
+
+def _load(*names: str) -> int:
+    """Load functions in this order, as each may call those before it; the address of the last."""
     with _LOADING:
-        if name not in _addresses:
-            code = read(name)
-            if code is None:
-                code = _separate(name).object_code()
-                keep(name, code)
-            _addresses[name] = load_object(symbol_of(name), code)
-            assert _addresses[name] != 0, f"internal: no {name} in its own code"
-        return _addresses[name]
+        missing = [name for name in names if name not in _addresses and read(name) is None]
+        helpers = {name: Helper(name) for name in missing[1:]}
+        codes = {name: provide(name) for name in missing[:1]}
+        for name in names:
+            if name not in _addresses:
+                if name in helpers:
+                    helpers[name].wait()
+                code = codes.get(name) or provide(name)
+                _addresses[name] = load_object(symbol_of(name), code)
+                assert _addresses[name] != 0, f"internal: no {name} in its own code"
+        return _addresses[names[-1]]
 
 
 def _separate(name: str) -> Any:

@@ -70,6 +70,41 @@ def test_damaged_code_is_made_anew_and_replaced(tmp_path: Path, monkeypatch: pyt
     assert loaded == [b"sound code"] * 3
 
 
+@pytest.mark.parametrize("helps", [True, False])
+def test_a_helper_makes_the_other_half_or_it_is_made_here(
+    helps: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+    loaded: list[bytes] = []
+
+    class Separate:
+        def __init__(self, name: str) -> None:
+            self.name = name
+
+        def object_code(self) -> bytes:
+            made.append(self.name)
+            return self.name.encode()
+
+    class Helper:
+        def __init__(self, name: str) -> None:
+            self.name = name
+
+        def wait(self) -> None:
+            if helps:
+                cache.keep(self.name, b"made by the helper")
+
+    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(machine, "_addresses", {})
+    monkeypatch.setattr(machine, "_separate", Separate)
+    monkeypatch.setattr(machine, "Helper", Helper)
+    monkeypatch.setattr(machine, "load_object", lambda symbol, code: loaded.append(code) or len(loaded))
+    assert machine._load("interpreter", "serve") == 2
+    assert made == (["interpreter"] if helps else ["interpreter", "serve"])
+    assert loaded == [b"interpreter", b"made by the helper" if helps else b"serve"]
+    assert machine._load("interpreter", "serve") == 2
+    assert len(loaded) == 2, "what is loaded is not loaded again"
+
+
 def test_threads_that_start_at_once_load_it_once(monkeypatch: pytest.MonkeyPatch) -> None:
     loaded: list[str] = []
 
