@@ -3,19 +3,20 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.engine.book import make_book
-from socialai_dsl.engine.calls import BAD_ACTION, Task
+from socialai_dsl.engine.book import make_book, put_back, replace_in
+from socialai_dsl.engine.calls import BAD_ACTION, CHECKED, Task
 from socialai_dsl.engine.errors import RoomError
 from socialai_dsl.engine.machine import Call, prepare_call
-from socialai_dsl.engine.relay import Posts, Relay, posts_of
+from socialai_dsl.engine.relay import Relay, order_of
 from socialai_dsl.engine.settings import is_interpreted
 from socialai_dsl.engine.state import (
     ATTEMPTS,
+    Book,
     Key,
     Link,
     Ports,
@@ -44,8 +45,8 @@ class Part:
         actions: Body of each body action of the batch.
         templates, nouns: the program's own index of each of the batch's, -1 if it has no such.
         tokens: the batch's id of each token id of the program.
+        successes: whether each way to end is a success.
         name: what an error calls the program.
-        successes: whether each way to end is a success; needed of programs that are acts of an episode.
     """
 
     words: NDArray[np.int32]
@@ -55,16 +56,16 @@ class Part:
     templates: Sequence[int]
     nouns: Sequence[int]
     tokens: Sequence[int]
+    successes: Sequence[bool]
     name: str = ""
-    successes: Sequence[bool] = ()
 
 
 class _Shares(NamedTuple):
-    """One call for each thread: the caller's, those of the others, and these as they are posted."""
+    """One call for each thread: the caller's, those of the others, and all of them as they are handed over."""
 
     own: Call
     others: list[Call]
-    posts: Posts
+    order: Any
 
 
 class Batch:
@@ -95,7 +96,7 @@ class Batch:
             length: tokens in a history.
             threads: how many threads share the work.
             sequences: numbers of the pools whose programs are the acts of one episode, played one after another. They
-                have one horizon, and say which of their ways to end are successes.
+                have one horizon.
         """
         _check_sequences(parts, [pools[number] for number in sequences])
         rows = self._rows = len(pool_of_row)
@@ -153,16 +154,30 @@ class Batch:
             )
         self.tables.weights[start:end] = np.cumsum(given)
 
-    def step(self, task: Task) -> int:
-        """Step all rows with `ports.actions`; how many episodes ended, or BAD_ACTION and nothing happened.
+    def step(self, task: Task, actions: NDArray[np.int64] | None = None) -> int:
+        """Step all rows; how many episodes ended, or BAD_ACTION and nothing happened.
+
+        Args:
+            task: one of the steps.
+            actions: int64 (E, 4), contiguous; left out, `ports.actions`.
 
         Raises:
             RoomError: all rows were stepped, but one that was reset found no room as its scenario requires; it
                 is in the last room that was drawn, and play may go on.
         """
-        if len(self._cuts) > 1 and not self.actions_fit():
-            return BAD_ACTION
-        return self._share(task)
+        if actions is None:
+            return self._step(task)
+        # Each thread copies the actions of its rows: from another core's cache they come late.
+        replaced = replace_in(self._book, Book.GIVEN, actions)
+        try:
+            return self._step(task)
+        finally:
+            put_back(self._book, replaced)
+
+    def _step(self, task: Task) -> int:
+        if len(self._cuts) == 1:
+            return self._share(self._tasks[task])
+        return self._share(self._checked[task]) if self.actions_fit() else BAD_ACTION
 
     def actions_fit(self) -> bool:
         """Whether all actions are inside the action space."""
@@ -178,7 +193,7 @@ class Batch:
             registers = self.state.registers.shape[1]
             self.ports = self.ports._replace(pins=no_pins(registers) if pins is None else pins)
             self._open_book()
-        self._share(Task.RESET)
+        self._share(self._tasks[Task.RESET])
 
     def script(self) -> None:
         """Let `ports.actions` be what the agents' frames would do now."""
@@ -198,8 +213,9 @@ class Batch:
     def _open_book(self) -> None:
         tables = self.tables._replace(views=self.tables.views.reshape(-1))
         ports = self.ports._replace(counters=self.ports.counters.reshape(-1))
-        self._book = make_book((*tables, *self.state, *ports))
+        self._book = make_book((*tables, *self.state, *ports, ports.actions))
         self._tasks = [self._prepare("serve", task) for task in Task]
+        self._checked = [self._prepare("serve", task + CHECKED) for task in Task if task < Task.CHECK]
         self._checks = self._tasks[Task.CHECK]
         self._others: dict[str, _Shares] = {}
 
@@ -208,7 +224,7 @@ class Batch:
         own, *others = [
             prepare_call(name, self._book, *what, thread, *rows) for thread, rows in enumerate(self._cuts)
         ]
-        return _Shares(own, others, [] if is_interpreted() else posts_of(others))
+        return _Shares(own, others, None if is_interpreted() else order_of([own, *others]))
 
     def _prepare_once(self, name: str) -> _Shares:
         """The calls of what few batches are asked for, whose code is loaded when they are."""
@@ -216,9 +232,9 @@ class Batch:
             self._others[name] = self._prepare(name)
         return self._others[name]
 
-    def _share(self, task: Task) -> int:
+    def _share(self, shares: _Shares) -> int:
         """Let every thread do its rows; how many episodes ended, or BAD_ACTION."""
-        ended = self._ask(self._tasks[task])
+        ended = self._ask(shares)
         if ended < BAD_ACTION:
             self._report_refused()
         return ended
@@ -235,7 +251,7 @@ class Batch:
     def _ask(self, shares: _Shares) -> int:
         """Make the calls side by side; the sum of what they return."""
         if self._relay is not None:
-            return self._relay.make(shares.own, shares.posts)
+            return self._relay.make(shares.order)
         return shares.own() + sum(call() for call in shares.others) if shares.others else shares.own()
 
 
@@ -247,14 +263,11 @@ def _cut(rows: int, threads: int) -> list[tuple[int, int]]:
 
 
 def _check_sequences(parts: Sequence[Part], sequences: Sequence[Sequence[int]]) -> None:
-    """The clock of an episode in acts is one, so its end must be; and the engine asks how each act ended."""
+    """The clock of an episode in acts is one, so its end must be."""
     for sequence in sequences:
         acts = [parts[number] for number in sequence]
         horizons = {int(part.words[Header.HORIZON]) for part in acts}
         assert len(horizons) == 1, f"internal: acts of one episode have the horizons {sorted(horizons)}"
-        assert all(len(part.successes) == len(part.outcomes) for part in acts), (
-            "internal: acts without success"
-        )
 
 
 def _link(
@@ -271,6 +284,9 @@ def _link(
         if canvas not in views:
             views[canvas] = poses
             poses += canvas[0] * canvas[1] * 4
+        assert len(part.successes) == len(part.outcomes), (
+            "internal: ways to end that are neither success nor not"
+        )
         link = np.zeros(Link.END, np.int32)
         link[Link.NUMBER] = number
         link[Link.COUNTERS] = counter

@@ -19,3 +19,16 @@ def make_book(arrays: Sequence[NDArray[Any]]) -> Any:
     assert all(array.flags.c_contiguous for array in arrays), "internal: arrays of a book are contiguous"
     numbers = [number for array in arrays for number in (array.ctypes.data, array.strides[0])]
     return (ctypes.c_int64 * len(numbers))(*numbers)
+
+
+def replace_in(book: Any, which: int, array: NDArray[Any]) -> Any:
+    """Put an array where one of the same type and shape was; what `put_back` takes to undo it."""
+    place, entry = (which, array) if isinstance(book, list) else (2 * which, array.ctypes.data)
+    before, book[place] = book[place], entry
+    return place, before
+
+
+def put_back(book: Any, replaced: Any) -> None:
+    """Undo a `replace_in`."""
+    place, before = replaced
+    book[place] = before

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.engine import rng
-from socialai_dsl.engine.calls import BAD_ACTION, NO_ROOM, TERMINATED, Task
+from socialai_dsl.engine.calls import BAD_ACTION, CHECKED, NO_ROOM, TERMINATED, Task
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.machine import symbol_of
 from socialai_dsl.engine.picture import take_picture
@@ -61,6 +61,12 @@ def _plays_acts(key: NDArray[np.uint64]) -> bool:
     return key[Key.POOL] >> np.uint64(63) != np.uint64(0)
 
 
+@inline
+def _is_success(row: Row) -> bool:
+    """Whether the program ended with a success."""
+    return row.program[_how_it_ended(row) + row.program[row.program[Header.SIZE] + Link.OUTCOMES]] != 0
+
+
 @outline
 def _open_act(book: Any, opened: Row) -> int:
     """After an act has ended let the row's key and program be those of the next; the step of its start.
@@ -73,10 +79,7 @@ def _open_act(book: Any, opened: Row) -> int:
     t = opened.registers[Register.T]
     if opened.registers[Register.ENDED] != TERMINATED or not 0 < act < _pool_size(key):
         return ZERO
-    success = opened.program[
-        _how_it_ended(opened) + opened.program[opened.program[Header.SIZE] + Link.OUTCOMES]
-    ]
-    if success == 0 or t >= opened.program[Header.HORIZON]:
+    if not _is_success(opened) or t >= opened.program[Header.HORIZON]:
         key[Key.SPOILED] = np.uint64(1)
     if t >= opened.program[Header.HORIZON]:
         return ZERO
@@ -120,7 +123,8 @@ def _report_nothing(book: Any, row: int) -> None:
 @inline
 def _report_end(book: Any, row: int, opened: Row) -> None:
     int16_of(book, Book.OUTCOME, ZERO)[row] = opened.program[_how_it_ended(opened)]
-    bytes_of(book, Book.SPOILED, ZERO)[row] = np.int64(opened.key[Key.SPOILED])
+    success = _is_success(opened) and opened.key[Key.SPOILED] == np.uint64(0)
+    bytes_of(book, Book.SUCCESS, ZERO)[row] = np.int64(success)
     if opened.registers[Register.ENDED] == TERMINATED:
         bytes_of(book, Book.TERMINATED, ZERO)[row] = 1
     else:
@@ -128,19 +132,25 @@ def _report_end(book: Any, row: int, opened: Row) -> None:
 
 
 @inline
-def _actions_fit(book: Any, first: int, last: int) -> bool:
+def _take_actions(book: Any, first: int, last: int) -> bool:
+    """Copy the given actions to those of the step; whether all are inside the action space."""
     program = int32_of(book, Book.WORDS, np.int64(uint64_of(book, Book.KEYS, first)[Key.PROGRAM]))
     link = program[Header.SIZE]
-    primitives = program[link + Link.ACTIONS]
-    templates = program[link + Link.TEMPLATES]
-    nouns = program[link + Link.NOUNS]
+    primitives = np.uint64(program[link + Link.ACTIONS])
+    templates = np.uint64(program[link + Link.TEMPLATES])
+    nouns = np.uint64(program[link + Link.NOUNS])
     wrong = False
     for row in range(first, last):
-        action = int64_of(book, Book.ACTIONS, row)
-        wrong |= (action[0] < 0) | (action[0] >= primitives)
-        wrong |= (action[1] < 0) | (action[1] > 1)
-        wrong |= (action[2] < 0) | (action[2] >= templates)
-        wrong |= (action[3] < 0) | (action[3] >= nouns)
+        given = uint64_of(book, Book.GIVEN, row)
+        # Read once, because another thread of the caller's may be writing there. What is negative is large unsigned.
+        primitive, speak, template, noun = given[0], given[1], given[2], given[3]
+        wrong |= (primitive >= primitives) | (speak >= np.uint64(2))
+        wrong |= (template >= templates) | (noun >= nouns)
+        action = uint64_of(book, Book.ACTIONS, row)
+        action[0] = primitive
+        action[1] = speak
+        action[2] = template
+        action[3] = noun
     return not wrong
 
 
@@ -150,7 +160,7 @@ def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
 
     Args:
         book: the arrays of `Book` (`book.make_book`).
-        task: a `Task`.
+        task: a `Task`, or a step with CHECKED added.
         thread: number of the thread.
         first: the first row.
         last: the row after the last.
@@ -159,7 +169,9 @@ def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
         How many episodes ended, plus NO_ROOM for each row without a room, or BAD_ACTION (then nothing was done).
     """
     ended = 0
-    if task <= Task.CHECK and not _actions_fit(book, first, last):
+    if task >= CHECKED:
+        task -= CHECKED
+    elif task <= Task.CHECK and not _take_actions(book, first, last):
         return BAD_ACTION
     if task == Task.CHECK:
         return 0

@@ -48,10 +48,14 @@ def prepare_call(name: str, book: Any, *numbers: int) -> Call:
     return partial(_ENTRY(address), pointer)
 
 
-def addresses_of(call: Call) -> tuple[int, Any]:
-    """The address of what a prepared call calls, and that of its arguments, for others to call it from machine code."""
+def addresses_of(call: Call) -> tuple[int, int]:
+    """The address of what a prepared call calls, and that of its arguments, for others to call it from machine code.
+
+    The call must live as long as they do.
+    """
     assert isinstance(call, partial), "internal: the engine is run as plain Python, which has no address"
-    return ctypes.cast(call.func, ctypes.c_void_p).value or 0, call.args[0]
+    pointer = call.args[0]
+    return ctypes.cast(call.func, ctypes.c_void_p).value or 0, (pointer.value or 0) if pointer else 0
 
 
 def symbol_of(name: str) -> str:

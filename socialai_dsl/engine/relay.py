@@ -12,6 +12,7 @@ import weakref
 from collections.abc import Sequence
 from enum import IntEnum
 from functools import cache
+from itertools import chain
 from typing import Any, Final
 
 import llvmlite.binding as llvm
@@ -37,43 +38,111 @@ class _Word(IntEnum):
     END = 16
 
 
+class _Order(IntEnum):
+    """The calls that are made side by side, int64 each: what they returned in all, the caller's, and the others."""
+
+    SUM = 0
+    FUNCTION = 1
+    ARGUMENTS = 2
+    OTHERS = 3  # function and arguments of each
+
+
+class _Progress(IntEnum):
+    """How far the calls are: made; not all of them are; or some thread has to be woken."""
+
+    DONE = 0
+    LATE = 1
+    ASLEEP = 2
+
+
 _CODE: Final = f"""
 declare void @llvm.PAUSE()
 
-define i64 @socialai_dsl_post(ptr %words, i64 %function, ptr %arguments) {{
+define i64 @socialai_dsl_share(ptr %order, ptr %desks, i64 %count, i64 %spins) {{
+entry:
+  br label %post
+post:
+  %desk = phi i64 [ 0, %entry ], [ %next, %post ]
+  %sleepers = phi i64 [ 0, %entry ], [ %asleep_now, %post ]
+  %words_at = getelementptr ptr, ptr %desks, i64 %desk
+  %words = load ptr, ptr %words_at
+  %twice = shl i64 %desk, 1
+  %call_number = add i64 %twice, {_Order.OTHERS.value}
+  %call_at = getelementptr i64, ptr %order, i64 %call_number
+  %function = load i64, ptr %call_at
   %function_at = getelementptr i64, ptr %words, i64 {_Word.FUNCTION.value}
   store i64 %function, ptr %function_at
+  %given_at = getelementptr i64, ptr %call_at, i64 1
+  %arguments = load i64, ptr %given_at
   %arguments_at = getelementptr i64, ptr %words, i64 {_Word.ARGUMENTS.value}
-  store ptr %arguments, ptr %arguments_at
+  store i64 %arguments, ptr %arguments_at
   %before = load i64, ptr %words
   %posted = add i64 %before, 1
   store atomic i64 %posted, ptr %words seq_cst, align 8
   %asleep_at = getelementptr i64, ptr %words, i64 {_Word.ASLEEP.value}
   %asleep = load atomic i64, ptr %asleep_at seq_cst, align 8
-  ret i64 %asleep
+  %asleep_now = or i64 %sleepers, %asleep
+  %next = add i64 %desk, 1
+  %more = icmp ult i64 %next, %count
+  br i1 %more, label %post, label %posted_all
+posted_all:
+  %awake = icmp eq i64 %asleep_now, 0
+  br i1 %awake, label %go, label %wake
+wake:
+  ret i64 {_Progress.ASLEEP.value}
+go:
+  %progress = tail call i64 @socialai_dsl_finish(ptr %order, ptr %desks, i64 %count, i64 %spins)
+  ret i64 %progress
 }}
 
-define i64 @socialai_dsl_is_done(ptr %words, i64 %spins) {{
+define i64 @socialai_dsl_finish(ptr %order, ptr %desks, i64 %count, i64 %spins) {{
+  %own_at = getelementptr i64, ptr %order, i64 {_Order.FUNCTION.value}
+  %address = load i64, ptr %own_at
+  %function = inttoptr i64 %address to ptr
+  %arguments_at = getelementptr i64, ptr %order, i64 {_Order.ARGUMENTS.value}
+  %arguments = load ptr, ptr %arguments_at
+  %result = call i64 %function(ptr %arguments)
+  store i64 %result, ptr %order
+  %progress = tail call i64 @socialai_dsl_wait(ptr %order, ptr %desks, i64 %count, i64 %spins)
+  ret i64 %progress
+}}
+
+define i64 @socialai_dsl_wait(ptr %order, ptr %desks, i64 %count, i64 %spins) {{
 entry:
+  %own = load i64, ptr %order
+  br label %turn
+turn:
+  %desk = phi i64 [ 0, %entry ], [ %next, %done_one ]
+  %total = phi i64 [ %own, %entry ], [ %sum, %done_one ]
+  %words_at = getelementptr ptr, ptr %desks, i64 %desk
+  %words = load ptr, ptr %words_at
   %posted = load i64, ptr %words
   %done_at = getelementptr i64, ptr %words, i64 {_Word.DONE.value}
   br label %ask
 ask:
-  %spin = phi i64 [ 0, %entry ], [ %next, %again ]
+  %spin = phi i64 [ 0, %turn ], [ %again_number, %again ]
   %done = load atomic i64, ptr %done_at acquire, align 8
   %over = icmp eq i64 %done, %posted
-  br i1 %over, label %yes, label %no
+  br i1 %over, label %done_one, label %no
 no:
-  %next = add i64 %spin, 1
-  %patient = icmp ult i64 %next, %spins
+  %again_number = add i64 %spin, 1
+  %patient = icmp ult i64 %again_number, %spins
   br i1 %patient, label %again, label %late
 again:
   call void @llvm.PAUSE()
   br label %ask
-yes:
-  ret i64 1
 late:
-  ret i64 0
+  ret i64 {_Progress.LATE.value}
+done_one:
+  %result_at = getelementptr i64, ptr %words, i64 {_Word.RESULT.value}
+  %result = load i64, ptr %result_at
+  %sum = add i64 %total, %result
+  %next = add i64 %desk, 1
+  %more = icmp ult i64 %next, %count
+  br i1 %more, label %turn, label %finished
+finished:
+  store i64 %sum, ptr %order
+  ret i64 {_Progress.DONE.value}
 }}
 
 define i64 @socialai_dsl_stand_by(ptr %words, i64 %spins) {{
@@ -121,23 +190,20 @@ sleep:
 
 
 @cache
-def _functions() -> tuple[Any, Any, Any]:
-    """`post`, which keeps the interpreter's lock, and `is_done` and `stand_by`, which let other threads run."""
+def _functions() -> tuple[Any, ...]:
+    """`share`, `finish`, `wait` and `stand_by`, which let other threads run meanwhile."""
     pause = "x86.sse2.pause" if llvm.get_process_triple().startswith("x86_64") else "donothing"
-    names = ("socialai_dsl_post", "socialai_dsl_is_done", "socialai_dsl_stand_by")
-    post, is_done, stand_by = load_assembly(_CODE.replace("llvm.PAUSE", f"llvm.{pause}"), names)
+    names = [f"socialai_dsl_{name}" for name in ("share", "finish", "wait", "stand_by")]
+    *makes, stand_by = load_assembly(_CODE.replace("llvm.PAUSE", f"llvm.{pause}"), names)
     word, pointer = ctypes.c_int64, ctypes.c_void_p
-    waits = ctypes.CFUNCTYPE(word, pointer, word)
-    return ctypes.PYFUNCTYPE(word, pointer, word, pointer)(post), waits(is_done), waits(stand_by)
+    make = ctypes.CFUNCTYPE(word, pointer, pointer, word, word)
+    return *map(make, makes), ctypes.CFUNCTYPE(word, pointer, word)(stand_by)
 
 
-Posts = Sequence[tuple[int, Any]]
-"""For each thread the address of a function, and of its arguments."""
-
-
-def posts_of(calls: Sequence[Call]) -> Posts:
-    """Prepared calls as they are posted."""
-    return [addresses_of(call) for call in calls]
+def order_of(calls: Sequence[Call]) -> Any:
+    """Prepared calls, which must live on, as `Relay.make` takes them, the caller's first."""
+    numbers = [0, *chain.from_iterable(map(addresses_of, calls))]
+    return (ctypes.c_int64 * len(numbers))(*numbers)
 
 
 class _Desk:
@@ -154,15 +220,11 @@ class _Desk:
 
     def serve(self) -> None:
         """Make the calls that are posted, until the desk is closed."""
-        stand_by = _functions()[2]
+        *_, stand_by = _functions()
         while not self.closed:
             stand_by(self.words, _SPINS)
             self.wake.wait()
             self.wake.clear()
-
-    def result(self) -> int:
-        """What the last call returned."""
-        return int(ctypes.c_int64.from_address(self.words + 8 * _Word.RESULT).value)
 
 
 class Relay:
@@ -178,21 +240,25 @@ class Relay:
         for thread in self._threads:
             thread.start()
         self._finish = weakref.finalize(self, _close, self._desks, self._threads)
+        self._words = (ctypes.c_int64 * threads)(*(desk.words for desk in self._desks))
 
-    def make(self, own: Call, others: Posts) -> int:
-        """Make a call, and let each thread make one; the sum of what they return."""
-        post, is_done, _ = _functions()
-        for desk, (function, arguments) in zip(self._desks, others, strict=True):
-            if post(desk.words, function, arguments):
+    def make(self, order: Any) -> int:
+        """Make a call, and let each thread make one (`order_of`); the sum of what they return."""
+        share, finish, wait, _ = _functions()
+        given = order, self._words, len(self._desks), _SPINS
+        progress = share(*given)
+        if progress == _Progress.ASLEEP:
+            for desk in self._desks:
                 desk.wake.set()
-        total = own()
-        for desk, thread in zip(self._desks, self._threads, strict=True):
-            while not is_done(desk.words, _SPINS):
-                if not thread.is_alive():  # this process was forked from the one that has the thread
-                    raise RuntimeError(_FORKED)
-                time.sleep(_NAP)
-            total += desk.result()
-        return total
+            progress = finish(*given)
+        while progress != _Progress.DONE:
+            if not all(
+                thread.is_alive() for thread in self._threads
+            ):  # they are in the process that forked this one
+                raise RuntimeError(_FORKED)
+            time.sleep(_NAP)
+            progress = wait(*given)
+        return int(order[_Order.SUM])
 
     def close(self) -> None:
         """Let the threads go."""

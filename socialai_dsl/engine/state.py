@@ -84,7 +84,7 @@ class Trait(IntEnum):
 
 
 class Book(IntEnum):
-    """The arrays of `Tables`, `State` and `Ports` in the order in which a call gets them, then some sizes."""
+    """The arrays of `Tables`, `State` and `Ports` in the order in which a call gets them, and then one more."""
 
     WORDS = 0
     VIEWS = 1
@@ -107,7 +107,7 @@ class Book(IntEnum):
     FINAL_IMAGE = 18
     FINAL_TOKENS = 19
     FINAL_EXTRA = 20
-    SPOILED = 21
+    SUCCESS = 21
     COUNTERS = 22
     SCRATCH = 23
     SETS = 24
@@ -118,6 +118,7 @@ class Book(IntEnum):
     REFUSED = 29
     PICTURE = 30
     SIZES = 31
+    GIVEN = 32  # int64 (E, 4), the actions as the caller has them; those in the ports, unless a step is given others
 
 
 class Size(IntEnum):
@@ -175,9 +176,7 @@ class Ports(NamedTuple):
     final_image: NDArray[np.uint32]  # (E, 49) last picture of an episode that was reset in the same step
     final_tokens: NDArray[np.int16]  # (E, L)
     final_extra: NDArray[np.uint16]  # (E, 49) or (E, 0)
-    spoiled: NDArray[
-        np.bool_
-    ]  # (E,) the episode that ended in this step had other acts, and not all were a success
+    success: NDArray[np.bool_]  # (E,) where an episode has ended: whether it was a success, in all its acts
     counters: NDArray[
         np.int64
     ]  # (threads, counters of all programs, then a line of the cache that is nobody's)
@@ -238,7 +237,7 @@ def empty_ports(state: State, counters: int, threads: int) -> Ports:
         final_image=np.zeros_like(state.image),
         final_tokens=np.zeros_like(state.tokens),
         final_extra=np.zeros_like(state.extra),
-        spoiled=np.zeros(rows, np.bool_),
+        success=np.zeros(rows, np.bool_),
         counters=np.zeros((threads, apart), np.int64),
         scratch=np.zeros((threads, TEMPORARIES), np.int64),
         sets=np.zeros((threads, SCRATCH_BOARDS * MAX_SIDE), np.uint32),

@@ -56,7 +56,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._registers = self._table.state.registers[0]
         self._action = self._table.batch.ports.actions[0]
         self._reward = self._table.batch.ports.reward
-        self._spoiled = self._table.batch.ports.spoiled
+        self._success = self._table.batch.ports.success
         self._history = ""
         self._ended = True
         self._playing = self._table.program(0)
@@ -112,7 +112,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
             terminated = not truncated
             outcome = self._registers.item(Register.OUTCOME)
             info |= {
-                "success": self._playing.outcome_table[outcome].success and not self._spoiled.item(0),
+                "success": self._success.item(0),
                 "outcome": self._playing.outcomes[outcome],
             }
         if self.render_mode == "human":

@@ -108,8 +108,7 @@ class Table:
             raise ValueError(
                 f"step: got actions of shape {given.shape} and type {given.dtype}; expected integers ({self.rows}, 4)"
             )
-        self.batch.ports.actions[:] = given
-        ended = self.play(task)
+        ended = self.play(task, np.ascontiguousarray(given, np.int64))
         if ended == BAD_ACTION:
             space = self.merged.action_space()
             row = next(i for i, action in enumerate(given) if not space.contains(action.astype(space.dtype)))
@@ -118,14 +117,14 @@ class Table:
             )
         return ended
 
-    def play(self, task: Task) -> int:
-        """Step all rows with the actions in the ports; how many episodes ended, or BAD_ACTION and nothing happened."""
+    def play(self, task: Task, actions: NDArray[np.int64] | None = None) -> int:
+        """`Batch.step`, after which episodes that begin are where their members begin."""
         if self._starts:
             episodes = self.state.keys[:, Key.EPISODE].copy()
-            ended = self.batch.step(task)
+            ended = self.batch.step(task, actions)
             self._begin(self.state.keys[:, Key.EPISODE] != episodes)
         else:
-            ended = self.batch.step(task)
+            ended = self.batch.step(task, actions)
         return ended
 
     def _begin(self, fresh: NDArray[np.bool_]) -> None:

@@ -74,8 +74,6 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
         self._task = _TASKS[self.autoreset_mode]
         self._table = Table(playables, int(num_envs), int(num_threads))
         self._copy = copy
-        # The last entry answers for -1: nothing ended.
-        self._successes = np.array([success for _, success in self._table.merged.outcomes] + [False])
         self.num_envs = int(num_envs)
         self.render_mode = render_mode
         self.single_observation_space = self._table.merged.observation_space()
@@ -140,7 +138,7 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
         ports = self._table.batch.ports
         ended = ports.terminated | ports.truncated
         outcome = ports.outcome.copy()
-        success = ended & self._successes[outcome] & ~ports.spoiled
+        success = ended & ports.success
         infos: dict[str, Any] = {
             "success": success,
             "_success": ended,

@@ -86,7 +86,7 @@ def test_the_acts_of_an_episode_follow_each_other_on_one_clock() -> None:
     assert (reward, ended) == (pytest.approx((1 - 0.9 * 5 / 8) / 3), 1)
     assert batch.ports.terminated[0]
     assert batch.ports.outcome[0] == WON
-    assert not batch.ports.spoiled[0]
+    assert batch.ports.success[0]
     counters = batch.counters.sum(axis=0)
     assert counters[[first + 1 + WON for first in batch.first_counters]].tolist() == [1, 1, 1]
 
@@ -109,12 +109,12 @@ def test_one_act_that_is_lost_spoils_the_episode() -> None:
     assert own(batch)[0] == 1, "the next is played all the same"
     assert play(batch, WIN)[1] == 1
     assert batch.ports.outcome[0] == WON
-    assert batch.ports.spoiled[0]
+    assert not batch.ports.success[0]
     batch.reset()
     play(batch, WIN)
     assert play(batch, LOSE)[1] == 1
     assert batch.ports.outcome[0] == LOST
-    assert not batch.ports.spoiled[0], "the last act is told by its outcome"
+    assert not batch.ports.success[0]
 
 
 def test_time_ends_the_episode_in_whatever_act() -> None:
@@ -128,7 +128,7 @@ def test_time_ends_the_episode_in_whatever_act() -> None:
     reward, ended = play(batch, WIN)
     assert (reward, ended) == (pytest.approx(0.1 / 3), 1), "no time is left for the other acts"
     assert batch.ports.terminated[0]
-    assert batch.ports.spoiled[0]
+    assert not batch.ports.success[0]
     assert batch.state.registers[0, Register.T] == 2
 
 

@@ -14,7 +14,7 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.engine.machine import Call
-from socialai_dsl.engine.relay import Relay, posts_of
+from socialai_dsl.engine.relay import Relay, order_of
 
 ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
 
@@ -37,9 +37,9 @@ def test_every_call_is_made_once_in_a_thread_of_its_own(pause: float) -> None:
     relay = Relay(2)
     calls = [call_of(lambda number=number: work(number)) for number in range(3)]
     rounds = 30 if pause > 1e-3 else 400
-    posts = posts_of(calls[1:])
+    order = order_of(calls)
     for _ in range(rounds):
-        assert relay.make(calls[0], posts) == 111
+        assert relay.make(order) == 111
         time.sleep(pause)
     relay.close()
     assert [len(threads) for threads in made] == [rounds] * 3
@@ -55,7 +55,7 @@ def test_a_slow_call_is_waited_for() -> None:
         return 7
 
     for own, other in ((call_of(lambda: 1), call_of(slow)), (call_of(slow), call_of(lambda: 1))):
-        assert relay.make(own, posts_of([other])) == 8
+        assert relay.make(order_of([own, other])) == 8
     relay.close()
 
 

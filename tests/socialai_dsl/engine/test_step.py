@@ -89,6 +89,28 @@ def test_a_bad_action_is_refused_and_changes_nothing() -> None:
         np.testing.assert_array_equal(was, now)
 
 
+@pytest.mark.parametrize("threads", [1, 2])
+def test_given_actions_are_copied_and_only_for_that_step(threads: int) -> None:
+    rows = 200
+    own, given_to = (batch_of(Assembly().program(), rows, threads=threads) for _ in range(2))
+    actions = np.tile(np.array(SILENT), (rows, 1))
+    actions[::3, 0] = Body.LEFT
+    own.ports.actions[:] = actions
+    given = actions.copy()
+    assert own.step(Task.STEP_ONLY) == given_to.step(Task.STEP_ONLY, given) == 0
+    np.testing.assert_array_equal(given, actions)
+    np.testing.assert_array_equal(given_to.ports.actions, actions)
+    given[:] = -1
+    for batch in (own, given_to):
+        assert batch.step(Task.STEP_ONLY) == 0, "what the ports hold is done again"
+    for mine, other in zip(own.state, given_to.state, strict=True):
+        np.testing.assert_array_equal(mine, other)
+    before = [array.copy() for array in own.state]
+    assert own.step(Task.STEP_ONLY, given) == BAD_ACTION
+    for was, now in zip(before, own.state, strict=True):
+        np.testing.assert_array_equal(was, now)
+
+
 def test_rules_run_after_the_npcs_and_before_the_end() -> None:
     own = Assembly(at=((1, 1), (2, 2)), npcs=1).own
     frame = FrameSpec(1, ([],), then=({-1: [(Op.ADD, own, own, constant(1))]},))
