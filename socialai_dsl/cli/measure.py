@@ -81,7 +81,7 @@ class Ours:
             envs.num_envs,
             self._repetitions,
             self._seconds,
-            BATCHES,
+            len(heavy.actions),
             lambda: envs.restore(heavy.start),
         )
         envs.close()

@@ -15,6 +15,7 @@ from socialai_dsl.program import Header, Program
 
 _TRIED: Final = 4
 _GATHERING: Final = BATCHES
+_MOST: Final = 256
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,8 @@ class RuleHeavy:
 
     Attributes:
         start: a snapshot, from which they are to be played.
-        actions: int64 (BATCHES, E, 4).
+        actions: int64 (T, E, 4). T is a whole number of horizons, if they are not too long: what is chosen ends no
+            episode but time does, and resets must be as frequent in what is measured as they are in the long run.
         fired: rules of the scenario that fired, per environment and step.
     """
 
@@ -34,19 +36,20 @@ class RuleHeavy:
 
 def rule_heavy_actions(envs: Any, allowed: Allowed, seed: int) -> RuleHeavy:
     """Actions for environments of one scenario after which somebody speaks, wherever that can be had."""
-    generator = np.random.default_rng(seed)
+    generator, horizon = np.random.default_rng(seed), envs.program.header(Header.HORIZON)
     spoken = _what_rules_wait_for(envs.program, allowed)
     envs.reset(seed=seed)
     for _ in range(_GATHERING):
         envs.step(_best(envs, allowed, spoken, generator))
     start, before = envs.snapshot(), envs.counters()
     actions = []
-    for _ in range(BATCHES):
+    steps = min(-(-BATCHES // horizon) * horizon, _MOST)
+    for _ in range(steps):
         actions.append(_best(envs, allowed, spoken, generator))
         envs.step(actions[-1])
     after = envs.counters()
     fired = sum(after["rules"].values()) - sum(before["rules"].values())
-    return RuleHeavy(start, np.stack(actions), fired / (BATCHES * envs.num_envs))
+    return RuleHeavy(start, np.stack(actions), fired / (steps * envs.num_envs))
 
 
 def _what_rules_wait_for(program: Program, allowed: Allowed) -> Actions:
