@@ -142,6 +142,55 @@ def _fetch(context: Any, row: Any, index: Any) -> Any:
 fetch = _fetch_nothing if config.DISABLE_JIT else _fetch
 """`fetch(row, index)`: let the memory there come near while other work goes on; it is about to be written."""
 
+
+_BLOCK: Final = 32
+"""Numbers of 16 bits in a line of the cache."""
+
+
+def _move_one_by_one(row: Any, shift: int, count: int) -> None:
+    for i in range(count):
+        row[i] = row[shift + i]
+
+
+@intrinsic
+def _move_down(context: Any, row: Any, shift: Any, count: Any) -> Any:
+    assert row.dtype == types.int16, "internal: blocks are of int16"
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        row, shift, count = arguments
+        number, size = ir.IntType(16), count.type
+
+        def load(index: Any, kind: Any) -> Any:
+            place = builder.gep(row, [builder.add(index, shift)])
+            value = builder.load(builder.bitcast(place, kind.as_pointer()), typ=kind)
+            value.align = 2
+            return value
+
+        def store(value: Any, index: Any) -> None:
+            place = builder.bitcast(builder.gep(row, [index]), value.type.as_pointer())
+            builder.store(value, place).align = 2
+
+        with builder.if_else(builder.icmp_signed(">=", count, size(_BLOCK))) as (long, short):
+            with long:
+                block = ir.VectorType(number, _BLOCK)
+                last = builder.sub(count, size(_BLOCK))
+                tail = load(last, block)  # before what it holds is overwritten
+                with cgutils.for_range_slice(builder, size(0), last, size(_BLOCK)) as (index, _):
+                    store(load(index, block), index)
+                store(tail, last)
+            with short, cgutils.for_range(builder, count) as loop:
+                store(load(loop.index, number), loop.index)
+        return context.get_dummy_value()
+
+    return signature(types.none, row, types.intp, types.intp), generate
+
+
+move_down = _move_one_by_one if config.DISABLE_JIT else _move_down
+"""`move_down(row, shift, count)`: let the first `count` numbers of int16 be those that lie `shift` behind them.
+
+That is `memmove`, which a loop would become, for rows so short that calling it takes as long as what it does.
+"""
+
 ROW_TYPES: Final = tuple(
     Pointer(kind)
     for kind in (

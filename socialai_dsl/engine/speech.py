@@ -3,6 +3,7 @@
 from socialai_dsl.engine.boards import npcs_are_hidden
 from socialai_dsl.engine.entities import column, distance, is_present
 from socialai_dsl.engine.jit import inline, outline, stay_outline
+from socialai_dsl.engine.pointers import move_down
 from socialai_dsl.engine.rng import fold
 from socialai_dsl.engine.state import AGENT, NOTHING, Key, Row
 from socialai_dsl.program import EntityColumn, Flag, FrameColumn, Header, LineColumn, Register
@@ -15,7 +16,10 @@ def _line(row: Row, line: int, name: int) -> int:
 
 @inline
 def _forget_oldest(row: Row, words: int) -> None:
-    """Drop whole lines, the oldest first, until the log has room for one more line and the tokens for `words` more."""
+    """Drop whole lines, the oldest first, until the log has room for one more line and the tokens for `words` more.
+
+    What lies behind the tokens that are left is not cleared.
+    """
     registers = row.registers
     log = row.program[Header.LOG]
     lines = registers[Register.LOGGED]
@@ -31,27 +35,26 @@ def _forget_oldest(row: Row, words: int) -> None:
         lines -= 1
     left = max(left, 0)
     shift = registers[Register.TOKENS] - left
-    for i in range(left):
-        row.tokens[i] = row.tokens[shift + i]
-    for i in range(left, registers[Register.TOKENS]):
-        row.tokens[i] = 0
+    move_down(row.tokens, shift, left)
     registers[Register.OLDEST] = oldest
     registers[Register.LOGGED] = lines
     registers[Register.TOKENS] = left
 
 
-@outline
+@inline
 def remember(row: Row, line: int) -> None:
     """Add a line to the log, the tokens and the digest; the oldest whole lines make room."""
-    stay_outline()
     registers = row.registers
     words = _line(row, line, LineColumn.TOKENS)
+    before = registers[Register.TOKENS]
     _forget_oldest(row, words)
     start = registers[Register.TOKENS]
     first = row.program[Header.TOKEN_AT] + _line(row, line, LineColumn.FIRST_TOKEN)
     words = min(words, row.program[Header.TOKENS] - start)
     for i in range(words):
         row.tokens[start + i] = row.program[first + i]
+    for i in range(start + words, before):
+        row.tokens[i] = 0
     place = registers[Register.OLDEST] + registers[Register.LOGGED]
     size = row.program[Header.LOG_SIZE]
     registers[row.program[Header.LOG] + (place if place < size else place - size)] = line
@@ -189,10 +192,9 @@ def deliver(row: Row, speaker: int, utterance: int, noun: int) -> None:
         table += FrameColumn.COLUMNS
 
 
-@outline
+@inline
 def speak(row: Row, speaker: int, line: int) -> None:
     """An NPC says a line: the agent hears it if it may and is near, and so do NPCs for whom it means something."""
-    stay_outline()
     if _agent_may_hear(row, speaker) and is_present(row, AGENT) and within_earshot(row, speaker, AGENT):
         hear(row, line)
     utterance = _line(row, line, LineColumn.CLASS)
