@@ -11,8 +11,6 @@ from socialai_dsl.semantics.terms import Const
 
 _SET = 32
 """How many things a set of bits can tell apart."""
-_MOST_IN_A_CONSTANT = 18
-"""Sets of fewer things are constants."""
 
 if TYPE_CHECKING:
     from socialai_dsl.compiler.expressions import Expressions
@@ -64,27 +62,22 @@ def _but_one(term: terms.Quantified) -> terms.Term | None:
             first, last = term.items[0].value, term.items[-1].value
             in_a_row = [item.value for item in term.items] == list(range(first, last + 1))
             among = first <= one.type.low and one.type.high <= last
-            if (
-                name == term.variable
-                and in_a_row
-                and among
-                and 1 < len(term.items) < _MOST_IN_A_CONSTANT
-                and one.type.kind == "entity"
-            ):
+            entity = one.type.kind == "entity"
+            if name == term.variable and in_a_row and among and len(term.items) > 1 and entity:
                 return one
     return None
 
 
 def _any_other(to: Expressions, term: terms.Quantified, one: terms.Term, site: int) -> int:
-    """The set of all of them less the one, without asking of each whether it is that."""
-    first = term.items[0].value
-    left_out = to.value(one)
-    if first != 0:
-        left_out = to.into_temporary(Op.SUB, left_out, constant(first))
-    bit = to.into_temporary(Op.LOAD, constant(0))
-    to.block.emit(Op.SET_BIT, bit, left_out)
-    others = to.into_temporary(Op.SUB, constant((1 << len(term.items)) - 1), bit)
-    return _item(to, term.items, to.into_temporary(Op.PICK_BIT, others, site))
+    """One of all of them less the one, without asking of each whether it is that: from it on they move up by one."""
+    thing = to.into_temporary(Op.DRAW, constant(len(term.items) - 1), site)
+    if (first := term.items[0].value) != 0:
+        to.block.emit(Op.ADD, thing, thing, constant(first))
+    before = Label()
+    to.block.test(Op.IF_LE, to.value(one), thing, before)
+    to.block.emit(Op.ADD, thing, thing, constant(1))
+    to.block.bind(before)
+    return thing
 
 
 def _chosen(to: Expressions, term: terms.Quantified, op: Op, site: int = 0) -> int:
