@@ -6,10 +6,20 @@ from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.cells import NOWHERE
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.lines import Lines
-from socialai_dsl.compiler.mobility import numbers_of
 from socialai_dsl.compiler.registers import entity_register, label
 from socialai_dsl.program import MOST_CHOICES, Body, Field, Op
-from socialai_dsl.semantics.terms import Activity, CellOf, Checked, Const, Measure, ObjectType, Read, Term
+from socialai_dsl.semantics.terms import (
+    BOOL,
+    Activity,
+    CellOf,
+    Checked,
+    Const,
+    FieldOf,
+    Measure,
+    ObjectType,
+    Read,
+    Term,
+)
 
 _BODIES = {"left": Body.LEFT, "right": Body.RIGHT, "forward": Body.FORWARD, "toggle": Body.TOGGLE}
 GOING = ("go_to", "go_next_to", "enter")
@@ -36,7 +46,6 @@ class Activities:
 
     Attributes:
         clock: the register of its frame's clock.
-        absent: the entities that may not be in the room.
         aim: where it is noted what the activity of this turn is about (`has_aim`); None: nowhere.
     """
 
@@ -47,11 +56,10 @@ class Activities:
         lines: Lines,
         entity: int,
         clock: int,
-        absent: frozenset[int],
         aim: int | None = None,
     ) -> None:
         self.to, self.checked, self.lines, self.entity, self.clock = to, checked, lines, entity, clock
-        self.absent, self.aim = absent, aim
+        self.aim = aim
         self.turn = to.sites.row(f"cast.{label(checked.entities[entity])}.turn")
 
     def emit(self, activity: Activity) -> None:
@@ -116,9 +124,10 @@ class Activities:
         """What the activity is about; if it is not in the room, there is nothing to be done."""
         to = self.to
         entity = to.value(goal)
-        if goal.type.kind == "entity" and self.absent.intersection(numbers_of(goal)):
+        if goal.type.kind == "entity":
             assert to.failed is not None, "internal: an activity can always come to nothing"
-            to.block.test(Op.IF_EQ, to.into_temporary(Op.FIELD, entity, Field.GONE), constant(0), to.failed)
+            gone = to.value(FieldOf(BOOL, goal, "gone"))
+            to.block.test(Op.IF_EQ, gone, constant(0), to.failed)
         elif isinstance(goal, CellOf | Read):
             assert to.failed is not None, "internal: an activity can always come to nothing"
             to.block.test(Op.IF_NE, entity, constant(NOWHERE), to.failed)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 from socialai_dsl.compiler.activities import ACTING, ACTS, GOING, NOTHING, Activities, has_aim
 from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Sites, constant
@@ -16,7 +15,6 @@ from socialai_dsl.compiler.expressions import Expressions, chance_word
 from socialai_dsl.compiler.folding import FALSE, SEVERAL, Facts, fold, fold_whole
 from socialai_dsl.compiler.homes import Homes
 from socialai_dsl.compiler.lines import Lines
-from socialai_dsl.compiler.mobility import sometimes_absent
 from socialai_dsl.compiler.probes import NO_PROBES, Asked, Probes
 from socialai_dsl.compiler.registers import Registers, state_names
 from socialai_dsl.program import Op
@@ -58,11 +56,6 @@ class Behaviour:
     rules: list[str]
     inbox_of: dict[str, int]
     probes: Probes = NO_PROBES
-
-    @cached_property
-    def absent(self) -> frozenset[int]:
-        """The entities that may not be in the room."""
-        return sometimes_absent(self.checked)
 
     def frame(self, number: int, frame: FramePlan) -> FrameCode:
         """The code of frame instance `number`."""
@@ -179,7 +172,7 @@ class _FrameCompiler:
 
     def _activities(self, to: Expressions, aim: int | None = None) -> Activities:
         shared = self.shared
-        return Activities(to, shared.checked, shared.lines, self.frame.entity, self.clock, shared.absent, aim)
+        return Activities(to, shared.checked, shared.lines, self.frame.entity, self.clock, aim)
 
     def _idle_row(self) -> list[int]:
         return [0] * (1 + 2 * (self.shared.classes.count + 1))

@@ -110,9 +110,7 @@ class Effects:
         """Where to put something: what has left the room is on no cell any more."""
         assert effect.value is not None, "internal: `put` says where"
         entity = effect.value.type.kind == "entity"
-        if entity and self.to.absent.intersection(numbers_of(effect.value)):
-            return self.to.into_temporary(Op.CELL_OF, value)
-        return value
+        return self.to.into_temporary(Op.CELL_OF, value) if entity else value
 
     def _change(self, effect: Effect, term: Term, entity: int) -> None:
         """Open, close, lock, reveal; unlock only what is locked."""

@@ -10,7 +10,7 @@ from socialai_dsl.compiler.assembler import Block, Label, Sites, constant
 from socialai_dsl.compiler.cells import LoopCell, coordinate, count_cells, one_cell
 from socialai_dsl.compiler.classes import SILENCE, Classes
 from socialai_dsl.compiler.folding import TRUE, Facts, fold, fold_whole, substitute
-from socialai_dsl.compiler.mobility import sometimes_absent
+from socialai_dsl.compiler.mobility import leaving
 from socialai_dsl.compiler.quantifiers import count_things, first_thing, nearest_thing, picked_thing
 from socialai_dsl.compiler.registers import Registers, entity_register, found_path, said_path, state_names
 from socialai_dsl.compiler.selects import among, asks, selected_condition, selected_value
@@ -98,9 +98,9 @@ class Expressions:
         self.has_drawn = False
 
     @cached_property
-    def absent(self) -> frozenset[int]:
-        """The entities that may not be in the room."""
-        return sometimes_absent(self.checked)
+    def leaving(self) -> frozenset[int]:
+        """The entities of which it is still written down where they were when they are out of the room."""
+        return leaving(self.checked)
 
     # --- conditions ---
 
@@ -284,7 +284,7 @@ class Expressions:
             case terms.FieldOf(name="inside"):
                 return self._container(term)
             case terms.FieldOf(entity=Const(value=entity)) if not (
-                term.name in ("x", "y") and entity in self.absent
+                term.name in ("x", "y") and entity in self.leaving
             ):
                 return entity_register(entity, _FIELDS[term.name])
             case terms.FieldOf():

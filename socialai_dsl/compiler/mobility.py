@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from socialai_dsl.semantics.terms import Activity, Checked, Const, Effect, Placing, RulePlan, StepPlan, Term
+from socialai_dsl.semantics.terms import Activity, Checked, Const, Effect, RulePlan, StepPlan, Term
 
 _STILL = ("stay", "toggle", "point", "stop_pointing")
 _TURNING = ("left", "right", "face", "turn_to", "turn")
@@ -56,10 +56,12 @@ class Mobility:
             self.contents |= targets
 
 
-def sometimes_absent(checked: Checked) -> frozenset[int]:
-    """The entities that are not in the room at some time, if only because they are put nowhere at first."""
-    nowhere = {item.entity for item in checked.setup if isinstance(item, Placing) and item.nowhere}
-    return frozenset(Mobility(checked).vanishing | nowhere)
+def leaving(checked: Checked) -> frozenset[int]:
+    """The entities that leave the room at some time.
+
+    Any may be out of it from the beginning, for want of a free cell, say, or as a layout has it.
+    """
+    return frozenset(Mobility(checked).vanishing)
 
 
 def numbers_of(term: Term) -> list[int]:

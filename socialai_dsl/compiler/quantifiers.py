@@ -135,6 +135,8 @@ def _item(to: Expressions, items: tuple[Const, ...], position: int) -> int:
 def nearest_thing(to: Expressions, term: terms.Quantified) -> int:
     """The operand of the nearest thing that the condition holds for."""
     assert term.to is not None
+    if term.condition is None:
+        return _nearest_of_all(to, term, to.value(term.to))
     block = to.block
     result = to.into_temporary(Op.LOAD, constant(term.items[0].value))
     # What is not in the room is as far away as this, and so is everything from it.
@@ -153,4 +155,25 @@ def nearest_thing(to: Expressions, term: terms.Quantified) -> int:
         block.release(mark)
     if to.failed is not None:
         block.test(Op.IF_LT, least, nothing, to.failed)
+    return result
+
+
+def _nearest_of_all(to: Expressions, term: terms.Quantified, goal: int) -> int:
+    """The same where every thing counts."""
+    block, (first, *others) = to.block, term.items
+    result = to.into_temporary(Op.LOAD, constant(first.value))
+    least = to.into_temporary(Op.DISTANCE, constant(first.value), goal)
+    for item in others:
+        following = Label()
+        mark = block.taken
+        distance = to.into_temporary(Op.DISTANCE, constant(item.value), goal)
+        block.test(Op.IF_LT, distance, least, following)
+        block.emit(Op.LOAD, least, distance)
+        block.emit(Op.LOAD, result, constant(item.value))
+        block.bind(following)
+        block.release(mark)
+    if to.failed is not None:
+        # What is not in the room is as far away as this, and so is everything from it.
+        far = to.into_temporary(Op.ADD, Register.WIDTH, Register.HEIGHT)
+        block.test(Op.IF_LT, least, far, to.failed)
     return result

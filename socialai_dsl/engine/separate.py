@@ -15,7 +15,7 @@ from numba.core import cgutils
 from numba.core.typing.templates import signature
 from numba.extending import intrinsic
 
-from socialai_dsl.engine.jit import outline
+from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.pointers import Pointer
 
 _Function = TypeVar("_Function", bound=Callable[..., None])
@@ -56,7 +56,7 @@ class Separate:
         collecting = gc.isenabled()
         gc.disable()
         try:
-            dispatcher: Any = outline(self.function)
+            dispatcher: Any = inline(self.function)  # into its entry
             dispatcher.compile(self._takes)
             compiled = dispatcher.overloads[self._takes]
             return cast(bytes, compiled.library.object_code(self._symbol, self._entry(compiled)))
