@@ -165,7 +165,9 @@ class Batch:
             RoomError: all rows were stepped, but one that was reset found no room as its scenario requires; it
                 is in the last room that was drawn, and play may go on.
         """
-        if actions is None:
+        if actions is not None and len(self._cuts) == 1:
+            self.ports.actions[:] = actions
+        if actions is None or len(self._cuts) == 1:
             return self._step(task)
         # Each thread copies the actions of its rows: from another core's cache they come late.
         replaced = replace_in(self._book, Book.GIVEN, actions)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,22 +140,25 @@ def _entries(program: Program) -> Iterator[int]:
 
 
 def _block(program: Program, start: int) -> Iterator[Instruction]:
-    """The instructions that can be reached from an address."""
+    """The instructions that can be reached from an address, in their order."""
     code = program.code.tolist()
-    waiting, reached = [start], set()
+    waiting: list[int] = [start]
+    reached: set[int] = set()
     while waiting:
         pc = waiting.pop()
         if pc in reached:
             continue
         reached.add(pc)
-        op, a, b, c = code[pc]
-        yield Op(op), (a, b, c)
+        op, _, _, c = code[pc]
         if op == Op.HALT:
             continue
         if op == Op.SKIP or op in TESTS:
             waiting.append(pc + 1 + c)
         if op != Op.SKIP:
             waiting.append(pc + 1)
+    for pc in sorted(reached):
+        op, a, b, c = code[pc]
+        yield Op(op), (a, b, c)
 
 
 def _limits(blocks: list[list[Instruction]]) -> dict[int, int]:
@@ -200,25 +204,39 @@ def _draws_matter(program: Program, block: list[Instruction]) -> bool:
     """Whether chance decides anything there but which line is said, to somebody for whom lines are only words."""
     if any(op in _CHANCY for op, _ in block):
         return True
+    selecting = _selecting(block)
     drawn = {operands[0] for op, operands in block if op in _DRAWS}
     while True:
         more = {
             operands[0]
-            for op, operands in block
-            if op in _VALUES and any(operands[position] in drawn for position in _READ[op])
+            for number, (op, operands) in enumerate(block)
+            if op in _VALUES and _reads(drawn, [block[number], *selecting.get(number, [])])
         } - drawn
         if not more:
             break
         drawn |= more
     if any(0 <= register < TEMPORARY for register in drawn):
         return True
-    for op, operands in block:
-        if op in _VALUES or op in _DRAWS:
+    for number, (op, operands) in enumerate(block):
+        if op in _VALUES or op in _DRAWS or number + 1 in selecting:
             continue
         used = [position for position in _READ.get(op, (0, 1, 2)) if operands[position] in drawn]
         if used and not (op in (Op.SAY, Op.ANSWER) and used == [1] and not _lines_are_triggers(program)):
             return True
     return False
+
+
+def _selecting(block: list[Instruction]) -> dict[int, list[Instruction]]:
+    """Of values that are computed or not as a comparison before them says, that comparison: they follow from it."""
+    return {
+        number + 1: [test]
+        for number, (test, (op, _)) in enumerate(pairwise(block))
+        if test[0] in _COMPARISONS and test[1][2] == 1 and op in _VALUES
+    }
+
+
+def _reads(drawn: set[int], instructions: list[Instruction]) -> bool:
+    return any(operands[position] in drawn for op, operands in instructions for position in _READ[op])
 
 
 def _lines_are_triggers(program: Program) -> bool:

@@ -16,9 +16,10 @@ from socialai_dsl.cli.bench_report import Report, Row
 from socialai_dsl.cli.main import main
 from socialai_dsl.cli.many_programs import different_programs
 from socialai_dsl.cli.measure import Ours
-from socialai_dsl.cli.mixes import BATCHES, Allowed, random_actions, translated, walk_actions
+from socialai_dsl.cli.mixes import Allowed, random_actions, translated, walk_actions
 from socialai_dsl.cli.rule_heavy import rule_heavy_actions
 from socialai_dsl.cli.timing import Speed, speed_of
+from socialai_dsl.program import Header
 
 DATA = Path(__file__).parents[2] / "data"
 
@@ -177,14 +178,15 @@ def test_preparing_is_not_counted(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_rule_heavy_actions_fire_rules_in_most_steps() -> None:
     envs: Any = socialai_dsl.make_vec("talkitout", num_envs=64)
     heavy = rule_heavy_actions(envs, Allowed("talkitout"), 1)
-    assert heavy.actions.shape == (BATCHES, 64, 4)
+    horizon = envs.program.header(Header.HORIZON)
+    assert heavy.actions.shape == (horizon, 64, 4), "every environment is reset once, as in the long run"
     assert heavy.fired > 0.4
     spoken = []
     for _ in range(2):
         envs.restore(heavy.start)
         spoken.append([envs.step(plan) and np.count_nonzero(envs.utterance_ids()) for plan in heavy.actions])
     assert spoken[0] == spoken[1], "from the state they belong to, the same comes of them every time"
-    assert sum(spoken[0]) > 0.4 * BATCHES * 64
+    assert sum(spoken[0]) > 0.4 * horizon * 64
 
 
 def test_programs_of_one_batch_differ() -> None:

@@ -61,6 +61,34 @@ def test_a_lie_drawn_anew_is_only_words() -> None:
     assert not Relevance.of(socialai_dsl.compile(socialai_dsl.load("talkitout"))).chance
 
 
+@pytest.mark.parametrize(
+    ("said", "asked", "chance"),
+    [("See the", "Say", False), ("See the", "See", True)],
+    ids=["words", "a colour that somebody heeds"],
+)
+def test_a_pick_of_all_but_one_is_words_unless_somebody_heeds_them(
+    said: str, asked: str, chance: bool, tmp_path: Path
+) -> None:
+    """It is drawn, and moved up past the one: what is added after the comparison follows from the draw."""
+    text = SCENARIO.format(
+        rule='hears: Say it, say: "SAID <pick(b in balls where b != left_out).color>"',
+        success="t > 7",
+        activity="stay",
+    )
+    text = text.replace("SAID", said).replace("let: {", "let: {left_out: pick(balls), ")
+    text = text.replace("objects: {", "objects: {balls: {type: ball, count: 3}, ")
+    text = text.replace(
+        "cast:\n", "  heed: {states: {heeding: {then: [{hears: ASKED, goto: done}]}, done: {}}}\ncast:\n"
+    )
+    text = text.replace("ASKED", '"See the red"' if asked == "See" else "Say that")
+    text = text.replace("  agent: {at", "  other: {at: [2, 3], frame: heed}\n  agent: {at")
+    file = tmp_path / "small.yaml"
+    file.write_text(text)
+    small = socialai_dsl.compile(socialai_dsl.load(str(file)))
+    assert Relevance.of(small).drawn
+    assert Relevance.of(small).chance is chance
+
+
 def test_time_counts_up_to_the_last_comparison(tmp_path: Path) -> None:
     timed = program(tmp_path, success="t > 7 and agent.at(gate)")
     relevance = Relevance.of(timed)
