@@ -26,6 +26,13 @@ def play(folder: Path, text: str, acts: Sequence[Act]) -> dict[str, Any]:
     return pair.env.describe()
 
 
+def written(folder: Path, text: str) -> Pair:
+    """Both sides of a whole scenario."""
+    file = folder / f"{text.split()[1]}.yaml"
+    file.write_text(text)
+    return Pair.of(load(str(file)))
+
+
 def registers(state: dict[str, Any], owner: str = "ann") -> dict[str, Any]:
     """What somebody's frame holds."""
     return {
@@ -429,3 +436,58 @@ def test_who_comes_back_has_done_nothing_in_between(tmp_path: Path) -> None:
     """The picture, which both sides take, shows no act of her."""
     state = play(tmp_path, BACK, [STILL] * 3)
     assert (state["ann"]["at"], state["ann"]["facing"]) == ([2, 2], "right")
+
+
+def test_nobody_hears_an_agent_that_found_no_cell(tmp_path: Path) -> None:
+    pair = written(
+        tmp_path,
+        """
+scenario: crowded
+horizon: 6
+earshot: room
+grammar: {templates: [Hi <noun>], nouns: [you]}
+room: {size: 5}
+observe: {own_voice: true}
+objects: {balls: {type: ball, count: 8, color: red}}
+frames:
+  listen: {states: {waiting: {then: [{hears: any, say: Who is it, goto: woken}]}, woken: {}}}
+cast:
+  one: {frame: listen}
+  agent: {}
+order: [balls, one, agent]
+outcome: [{failure: agent.did(done)}]
+""",
+    )
+    pair.reset(3)
+    assert pair.env.describe()["agent"]["gone"]
+    for _ in range(3):
+        pair.step((0, 1, 0, 0))
+    assert pair.env.describe()["one"]["state"] == "waiting"
+
+
+def test_a_status_follows_before_things_roll(tmp_path: Path) -> None:
+    """A door is locked while the agent is beside a marble in step 2: a moment is enough to close an open one."""
+    pair = written(
+        tmp_path,
+        """
+scenario: rolling
+horizon: 8
+grammar: body
+room: {size: 8}
+objects:
+  marble: {type: marble, at: [3, 1]}
+  door: {type: door, state: open, at: [0, 4], locked: t == 2 and marble.x - agent.x == 1}
+cast:
+  agent: {at: [2, 1], facing: right}
+outcome: [{failure: agent.did(done)}]
+""",
+    )
+    pair.reset(3)
+    seen = []
+    forward = pair.reference.scenario.actions.index("forward")
+    for _ in range(3):
+        pair.step((forward, 0, 0, 0))
+        state = pair.env.describe()
+        seen.append((state["agent"]["at"][0], state["marble"]["at"][0], state["door"]["state"]))
+    # It pushes the marble, which rolls on at once; then it follows, and the marble rolls on.
+    assert seen == [(2, 4, "open"), (3, 5, "closed"), (4, 6, "closed")]

@@ -27,7 +27,7 @@ from socialai_dsl.engine.state import (
     empty_state,
     no_pins,
 )
-from socialai_dsl.engine.views import view_table
+from socialai_dsl.engine.views import SMALL_CANVAS, view_table
 from socialai_dsl.program import VIEW, EntityColumn, Flag, FrameColumn, Header, LineColumn, Op, TypeColumn
 
 _ROWS_WORTH_A_THREAD: Final = 64
@@ -108,6 +108,7 @@ class Batch:
             )
             for words in headers
         )
+        board = max(board, SMALL_CANVAS + 1)  # so that it can be read in whole vectors
         words, views, self.offsets, self.first_counters = _link(parts)
         starts = np.cumsum([0, *map(len, pools)])
         self.tables = Tables(
@@ -312,7 +313,8 @@ def _link(
 
 def _traits(words: NDArray[np.int32]) -> int:
     """What may happen in a program, as bits of `Trait`."""
-    traits = 0
+    small = words[Header.CANVAS_WIDTH] * words[Header.CANVAS_HEIGHT] <= SMALL_CANVAS
+    traits = int(Trait.SMALL) if small else 0
     if words[Header.TICK_PC] or words[Header.FLAGS] & Flag.ROLLS:
         traits |= Trait.GOES_BY_ITSELF
     first, rows = int(words[Header.ENTITY_AT]), int(words[Header.ENTITIES])

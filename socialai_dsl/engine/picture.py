@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from socialai_dsl.engine import rng
 from socialai_dsl.engine.entities import field, npc_at, step_x, step_y
+from socialai_dsl.engine.gather import PERMUTES, permute
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.pointers import uint16_of
 from socialai_dsl.engine.shadows import lit_cells, look_around
@@ -67,8 +68,11 @@ def take_picture(row: Row, link: int, book: Any, number: int) -> None:
     else:
         pose = (y * row.program[Header.CANVAS_WIDTH] + x) * 4 + field(row, AGENT, Field.DIR)
         view = (row.program[link + Link.VIEWS] + pose) * CELLS
-        for i in range(CELLS):
-            row.image[i] = row.board[row.views[view + i]]
+        if PERMUTES and row.program[Header.FLAGS] & Trait.SMALL:
+            permute(row.image, row.board, row.views, view)
+        else:
+            for i in range(CELLS):
+                row.image[i] = row.board[row.views[view + i]]
         if row.program[Header.FLAGS] & (Flag.EGOCENTRIC | Flag.OCCLUSION):
             if row.program[Header.FLAGS] & Flag.OCCLUSION:
                 _hide_unlit(row, x, y, field(row, AGENT, Field.DIR))

@@ -81,6 +81,7 @@ class Trait(IntEnum):
     GESTURES = 1 << 22  # pictures of the batch have channels 5 and 6
     REWARDS = 1 << 23  # there are rewards besides that of an outcome
     APART = 1 << 24  # some frame has code for what it perceives, or for the rest of a rule of `first`
+    SMALL = 1 << 25  # the canvas has at most `views.SMALL_CANVAS` cells
 
 
 class Book(IntEnum):

@@ -109,9 +109,9 @@ def step_row(row: Row, link: int, book: Any, number: int) -> float:
         changed = follow_links(row)
         if flags & Flag.PICTURE_BEFORE_NPCS:
             take_picture(row, link, book, number)
-        if flags & Trait.GOES_BY_ITSELF:
-            changed |= go_by_itself(row)
         compute_statuses(row, changed)
+        if flags & Trait.GOES_BY_ITSELF:
+            compute_statuses(row, go_by_itself(row))
     else:
         settle(row)
     say_as_agent(row)

@@ -260,7 +260,7 @@ def take_turns(row: Row) -> None:
 def say_as_agent(row: Row) -> None:
     """The agent's utterance reaches the NPCs near it, and the agent itself where it hears its own voice."""
     utterance = row.registers[Register.CLASS]
-    if utterance == 0:
+    if utterance == 0 or field(row, AGENT, Field.X) < 0:  # out of the room nobody hears it
         return
     deliver(row, AGENT, utterance, row.registers[Register.NOUN])
     if row.program[Header.FLAGS] & Flag.OWN_VOICE and row.program[Header.AGENT_SAYS] > 0:

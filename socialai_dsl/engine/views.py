@@ -9,6 +9,9 @@ from socialai_dsl.program import VIEW
 
 CELLS: Final = VIEW * VIEW
 
+SMALL_CANVAS: Final = 64
+"""Cells of the largest canvas that vectors can be gathered from (`gather`); a board has a word more at least."""
+
 
 def view_table(width: int, height: int) -> NDArray[np.uint16]:
     """The cell of the board for each cell of the picture, (height * width * 4, 49) by (y, x, direction).

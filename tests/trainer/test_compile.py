@@ -76,6 +76,9 @@ def test_training_is_the_same_to_rounding(tmp_path: Path, small_config: Any) -> 
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
+@pytest.mark.filterwarnings(
+    "ignore:.*script_method:DeprecationWarning"
+)  # PyTorch's own, when its compiler is loaded
 @pytest.mark.parametrize("threads", [1, 2])
 def test_training_with_the_compiler_is_the_same_to_rounding(
     tmp_path: Path, small_config: Any, threads: int
