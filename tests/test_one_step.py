@@ -259,6 +259,19 @@ def test_1_14_links_take_effect_before_anything_rolls(play: Folder) -> None:
     assert play(text).step().at("marble") == [3, 3]
 
 
+def test_1_15_a_status_that_holds_for_a_moment_has_followed(play: Folder) -> None:
+    run = play("""
+        objects:
+          marble: {type: marble, at: [3, 3]}
+          gate: {type: door, at: [0, 4], state: open, locked: t == 2 and marble.x - agent.x == 1}
+        cast: {agent: {at: [2, 3], facing: right}}
+    """)
+    assert (run.step("forward").at("marble"), run.status("gate")) == ([4, 3], "open")
+    assert (run.step("forward").at("marble"), run.status("gate")) == ([5, 3], "closed"), (
+        "locked before it rolled on"
+    )
+
+
 # -- 2. what counts and rolls by itself ------------------------------------------------------------
 
 

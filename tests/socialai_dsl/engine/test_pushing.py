@@ -257,7 +257,7 @@ def test_who_vanished_comes_back_by_being_placed() -> None:
     assert (entity(batch, 1, Field.GONE), code_at(batch, 3, 2)) == ([0], 11)
 
 
-def test_what_counts_by_itself_comes_after_the_links_and_before_what_is_settled() -> None:
+def test_the_world_is_settled_before_and_after_what_counts_by_itself() -> None:
     own = Assembly(at=((2, 2), (3, 2))).own
 
     def note(digit: int) -> list[Instruction]:
@@ -280,7 +280,7 @@ def test_what_counts_by_itself_comes_after_the_links_and_before_what_is_settled(
         )
         batch.state.registers[0, own] = 0
         step(batch, FORWARD)
-        assert batch.state.registers[0, own] == 1213
+        assert batch.state.registers[0, own] == 13213
         assert entity(batch, 1, Field.STATUS) == [IDLE]
         image = batch.state.image.view(np.uint8).reshape(7, 7, 4)
         assert image[3, 5, 2] == (PRESSED if flags else IDLE)
