@@ -135,15 +135,15 @@ def _item(to: Expressions, items: tuple[Const, ...], position: int) -> int:
 def nearest_thing(to: Expressions, term: terms.Quantified) -> int:
     """The operand of the nearest thing that the condition holds for."""
     assert term.to is not None
-    if term.condition is None:
-        return _nearest_of_all(to, term, to.value(term.to))
-    block = to.block
-    result = to.into_temporary(Op.LOAD, constant(term.items[0].value))
-    # What is not in the room is as far away as this, and so is everything from it.
-    least = to.into_temporary(Op.ADD, Register.WIDTH, Register.HEIGHT)
-    nothing = to.into_temporary(Op.LOAD, least)
+    block, items = to.block, term.items
+    result = to.into_temporary(Op.LOAD, constant(items[0].value))
     goal = to.value(term.to)
-    for item in term.items:
+    if term.condition is None:
+        least = to.into_temporary(Op.DISTANCE, constant(items[0].value), goal)
+        items = items[1:]
+    else:
+        least = _far(to)
+    for item in items:
         following = Label()
         mark = block.taken
         to.condition(to.instance(term, item), following)
@@ -154,26 +154,10 @@ def nearest_thing(to: Expressions, term: terms.Quantified) -> int:
         block.bind(following)
         block.release(mark)
     if to.failed is not None:
-        block.test(Op.IF_LT, least, nothing, to.failed)
+        block.test(Op.IF_LT, least, _far(to), to.failed)
     return result
 
 
-def _nearest_of_all(to: Expressions, term: terms.Quantified, goal: int) -> int:
-    """The same where every thing counts."""
-    block, (first, *others) = to.block, term.items
-    result = to.into_temporary(Op.LOAD, constant(first.value))
-    least = to.into_temporary(Op.DISTANCE, constant(first.value), goal)
-    for item in others:
-        following = Label()
-        mark = block.taken
-        distance = to.into_temporary(Op.DISTANCE, constant(item.value), goal)
-        block.test(Op.IF_LT, distance, least, following)
-        block.emit(Op.LOAD, least, distance)
-        block.emit(Op.LOAD, result, constant(item.value))
-        block.bind(following)
-        block.release(mark)
-    if to.failed is not None:
-        # What is not in the room is as far away as this, and so is everything from it.
-        far = to.into_temporary(Op.ADD, Register.WIDTH, Register.HEIGHT)
-        block.test(Op.IF_LT, least, far, to.failed)
-    return result
+def _far(to: Expressions) -> int:
+    """How far away what is not in the room is from everything."""
+    return to.into_temporary(Op.ADD, Register.WIDTH, Register.HEIGHT)

@@ -155,32 +155,33 @@ class Batch:
             )
         self.tables.weights[start:end] = np.cumsum(given)
 
-    def step(self, task: Task, actions: NDArray[np.int64] | None = None) -> int:
+    def step(self, task: Task, actions: NDArray[np.integer[Any]] | None = None) -> int:
         """Step all rows; how many episodes ended, or BAD_ACTION and nothing happened.
 
         Args:
             task: one of the steps.
-            actions: int64 (E, 4), contiguous; left out, `ports.actions`.
+            actions: integers (E, 4); left out, `ports.actions`.
 
         Raises:
             RoomError: all rows were stepped, but one that was reset found no room as its scenario requires; it
                 is in the last room that was drawn, and play may go on.
         """
-        if actions is not None and len(self._cuts) == 1:
-            self.ports.actions[:] = actions
-        if actions is None or len(self._cuts) == 1:
-            return self._step(task)
-        # Each thread copies the actions of its rows: from another core's cache they come late.
-        replaced = replace_in(self._book, Book.GIVEN, actions)
+        if len(self._cuts) == 1:
+            if actions is not None:
+                self.ports.actions[:] = actions
+            return self._share(self._tasks[task])
+        return self._share(self._checked[task]) if self._take(actions) else BAD_ACTION
+
+    def _take(self, actions: NDArray[np.integer[Any]] | None) -> bool:
+        """Let each thread copy the actions of its rows, which come late from another core's cache; whether all fit."""
+        if actions is None:
+            return self.actions_fit()
+        given = np.ascontiguousarray(actions, np.int64)
+        replaced = replace_in(self._book, Book.GIVEN, given)
         try:
-            return self._step(task)
+            return self.actions_fit()
         finally:
             put_back(self._book, replaced)
-
-    def _step(self, task: Task) -> int:
-        if len(self._cuts) == 1:
-            return self._share(self._tasks[task])
-        return self._share(self._checked[task]) if self.actions_fit() else BAD_ACTION
 
     def actions_fit(self) -> bool:
         """Whether all actions are inside the action space."""

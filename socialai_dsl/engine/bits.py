@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from llvmlite import ir
 from numba import config, types
 from numba.core.typing.templates import signature
 from numba.extending import intrinsic
@@ -35,7 +36,7 @@ if config.DISABLE_JIT:
     _ones, _zeros = int.bit_count, _zeros_below
 else:
     _ones = _instruction(lambda builder, word: builder.ctpop(word))
-    _zeros = _instruction(lambda builder, word: builder.cttz(word, word.type.__class__(1)(1)))
+    _zeros = _instruction(lambda builder, word: builder.cttz(word, ir.IntType(1)(1)))
 
 
 @inline

@@ -92,16 +92,16 @@ def provide(name: str) -> bytes:
 def _load(*names: str) -> int:
     """Load functions in this order, as each may call those before it; the address of the last."""
     with _LOADING:
-        missing = [name for name in names if name not in _addresses and read(name) is None]
+        codes = {name: read(name) for name in names if name not in _addresses}
+        missing = [name for name, code in codes.items() if code is None]
         helpers = {name: Helper(name) for name in missing[1:]}
-        codes = {name: provide(name) for name in missing[:1]}
-        for name in names:
-            if name not in _addresses:
-                if name in helpers:
-                    helpers[name].wait()
-                code = codes.get(name) or provide(name)
-                _addresses[name] = load_object(symbol_of(name), code)
-                assert _addresses[name] != 0, f"internal: no {name} in its own code"
+        for name in missing:
+            if name in helpers:
+                helpers[name].wait()
+            codes[name] = provide(name)
+        for name, code in codes.items():
+            _addresses[name] = load_object(symbol_of(name), cast(bytes, code))
+            assert _addresses[name] != 0, f"internal: no {name} in its own code"
         return _addresses[names[-1]]
 
 

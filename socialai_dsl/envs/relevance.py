@@ -204,13 +204,13 @@ def _draws_matter(program: Program, block: list[Instruction]) -> bool:
     """Whether chance decides anything there but which line is said, to somebody for whom lines are only words."""
     if any(op in _CHANCY for op, _ in block):
         return True
-    selecting = _selecting(block)
+    selected = _selected(block)
     drawn = {operands[0] for op, operands in block if op in _DRAWS}
     while True:
         more = {
             operands[0]
             for number, (op, operands) in enumerate(block)
-            if op in _VALUES and _reads(drawn, [block[number], *selecting.get(number, [])])
+            if op in _VALUES and _reads(drawn, block[number - (number in selected) : number + 1])
         } - drawn
         if not more:
             break
@@ -218,7 +218,7 @@ def _draws_matter(program: Program, block: list[Instruction]) -> bool:
     if any(0 <= register < TEMPORARY for register in drawn):
         return True
     for number, (op, operands) in enumerate(block):
-        if op in _VALUES or op in _DRAWS or number + 1 in selecting:
+        if op in _VALUES or op in _DRAWS or number + 1 in selected:
             continue
         used = [position for position in _READ.get(op, (0, 1, 2)) if operands[position] in drawn]
         if used and not (op in (Op.SAY, Op.ANSWER) and used == [1] and not _lines_are_triggers(program)):
@@ -226,12 +226,12 @@ def _draws_matter(program: Program, block: list[Instruction]) -> bool:
     return False
 
 
-def _selecting(block: list[Instruction]) -> dict[int, list[Instruction]]:
-    """Of values that are computed or not as a comparison before them says, that comparison: they follow from it."""
+def _selected(block: list[Instruction]) -> set[int]:
+    """Numbers of the values that are computed or not as the comparison before them says: they follow from it too."""
     return {
-        number + 1: [test]
-        for number, (test, (op, _)) in enumerate(pairwise(block))
-        if test[0] in _COMPARISONS and test[1][2] == 1 and op in _VALUES
+        number
+        for number, ((test, (_, _, skipped)), (op, _)) in enumerate(pairwise(block), 1)
+        if test in _COMPARISONS and skipped == 1 and op in _VALUES
     }
 
 

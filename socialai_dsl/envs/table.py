@@ -108,7 +108,7 @@ class Table:
             raise ValueError(
                 f"step: got actions of shape {given.shape} and type {given.dtype}; expected integers ({self.rows}, 4)"
             )
-        ended = self.play(task, np.ascontiguousarray(given, np.int64))
+        ended = self.play(task, given)
         if ended == BAD_ACTION:
             space = self.merged.action_space()
             row = next(i for i, action in enumerate(given) if not space.contains(action.astype(space.dtype)))
@@ -117,7 +117,7 @@ class Table:
             )
         return ended
 
-    def play(self, task: Task, actions: NDArray[np.int64] | None = None) -> int:
+    def play(self, task: Task, actions: NDArray[np.integer[Any]] | None = None) -> int:
         """`Batch.step`, after which episodes that begin are where their members begin."""
         if self._starts:
             episodes = self.state.keys[:, Key.EPISODE].copy()

@@ -44,61 +44,23 @@ def _add(lanes: Lanes, into: Any, at: Any, source: Any, a: Any) -> None:
 
 
 @over_lanes
-def _two(lanes: Lanes, into: Any, at: Any, source: Any, a: Any, u: Any, b: Any, v: Any) -> None:
-    lanes.put(into, at, lanes.weighted(lanes.get(source, a), u, lanes.get(source, b), v))
+def _weigh(lanes: Lanes, into: Any, at: Any, source: Any, *terms: Any) -> None:
+    """The sum of what an array holds at some places times numbers, given one after the other."""
+    lanes.put(into, at, _weighted(lanes, source, terms))
 
 
-def _weighted(lanes: Lanes, source: Any, *terms: Any) -> Any:
-    """The sum of what an array holds times numbers."""
+@over_lanes
+def _weigh_and_add(
+    lanes: Lanes, into: Any, at: Any, lowest: Any, more: Any, i: Any, source: Any, *terms: Any
+) -> None:
+    """The same, and what another array holds; a number that is the least that may come of it."""
+    total = lanes.plus(_weighted(lanes, source, terms), lanes.get(more, i))
+    lanes.put(into, at, lanes.at_least(total, lowest))
+
+
+def _weighted(lanes: Lanes, source: Any, terms: tuple[Any, ...]) -> Any:
     held = [lanes.get(source, index) for index in terms[::2]]
     return lanes.weighted(*(part for term in zip(held, terms[1::2], strict=True) for part in term))
-
-
-@over_lanes
-def _three(
-    lanes: Lanes, into: Any, at: Any, source: Any, a: Any, t: Any, b: Any, u: Any, c: Any, v: Any
-) -> None:
-    lanes.put(into, at, _weighted(lanes, source, a, t, b, u, c, v))
-
-
-@over_lanes
-def _four(
-    lanes: Lanes,
-    into: Any,
-    at: Any,
-    source: Any,
-    a: Any,
-    t: Any,
-    b: Any,
-    u: Any,
-    c: Any,
-    v: Any,
-    d: Any,
-    w: Any,
-) -> None:
-    lanes.put(into, at, _weighted(lanes, source, a, t, b, u, c, v, d, w))
-
-
-@over_lanes
-def _four_bounded(
-    lanes: Lanes,
-    into: Any,
-    at: Any,
-    source: Any,
-    a: Any,
-    t: Any,
-    b: Any,
-    u: Any,
-    c: Any,
-    v: Any,
-    d: Any,
-    w: Any,
-    more: Any,
-    i: Any,
-    lowest: Any,
-) -> None:
-    total = lanes.plus(_weighted(lanes, source, a, t, b, u, c, v, d, w), lanes.get(more, i))
-    lanes.put(into, at, lanes.at_least(total, lowest))
 
 
 @over_lanes
@@ -141,12 +103,12 @@ def spread(
                 above, below = rows[p, 0] * width * LANES, rows[p, 1] * width * LANES
                 u, v = row_weights[p, 0], row_weights[p, 1]
                 for x in range(0, width * LANES, LANES):
-                    _two(line, x, image, above + x, u, below + x, v)
+                    _weigh(line, x, image, above + x, u, below + x, v)
                 for q in range(len(columns)):
                     row = first[p, q] * room + n * step[p, q] + place[p, q]
                     left, right = columns[q, 0] * LANES, columns[q, 1] * LANES
                     u, v = column_weights[q, 0], column_weights[q, 1]
-                    _two(target, row * channels + start, line, left, u, right, v)
+                    _weigh(target, row * channels + start, line, left, u, right, v)
     for n in range(count, room):
         for p in range(len(rows)):
             for q in range(len(columns)):
@@ -196,9 +158,9 @@ def gather(
                     a, b = starts[p, columns[x, 0]] + start, starts[p, columns[x, 1]] + start
                     c, d = starts[p, columns[x, 2]] + start, starts[p, columns[x, 3]] + start
                     if w == 0:
-                        _three(column, p * LANES, source, a, t, b, u, c, v)
+                        _weigh(column, p * LANES, source, a, t, b, u, c, v)
                     else:
-                        _four(column, p * LANES, source, a, t, b, u, c, v, d, w)
+                        _weigh(column, p * LANES, source, a, t, b, u, c, v, d, w)
                 for y in range(height):
                     a, b, c, d = (
                         rows[y, 0] * LANES,
@@ -209,9 +171,9 @@ def gather(
                     t, u, v, w = row_weights[y, 0], row_weights[y, 1], row_weights[y, 2], row_weights[y, 3]
                     at = (n * cells + y * width + x) * channels + start
                     if len(added):
-                        _four_bounded(target, at, column, a, t, b, u, c, v, d, w, more, at, lowest)
+                        _weigh_and_add(target, at, lowest, more, at, column, a, t, b, u, c, v, d, w)
                     else:
-                        _four_bounded(target, at, column, a, t, b, u, c, v, d, w, bias, start, lowest)
+                        _weigh_and_add(target, at, lowest, bias, start, column, a, t, b, u, c, v, d, w)
 
 
 @inlined
