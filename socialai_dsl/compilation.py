@@ -23,9 +23,15 @@ def compile_loaded(loaded: Loaded) -> Program | ProgramSuite: ...
 
 
 def compile_loaded(loaded: Loaded) -> Program | ProgramSuite:
-    """The program of a scenario, or the programs of a suite."""
+    """The program of a scenario, or the programs of a suite.
+
+    Raises:
+        ValueError: it was not loaded yet.
+    """
     if isinstance(loaded, LoadedScenario):
         return compile_scenario(loaded.checked)
+    if not isinstance(loaded, LoadedSuite):
+        raise ValueError(f"compile: got {loaded!r}; expected what `load` returns")
     space = loaded.space
     return ProgramSuite(
         loaded.name,

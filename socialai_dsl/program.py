@@ -341,8 +341,8 @@ class Op(IntEnum):
     B_FLOOR = 60  # board a = cells of plain floor
     B_WALL = 61  # board a = cells of wall side b (literal Side), at least c (literal) cells from its corners
     B_RECT = (
-        62  # board a = floor cells with v(b) <= x <= v(b + 1) and v(b + 2) <= y <= v(b + 3); b is a temporary; with
-        # c (literal) 1 what is built counts as floor
+        62  # board a = cells with v(b) <= x <= v(b + 1) and v(b + 2) <= y <= v(b + 3) that count (c, a literal
+        # Counting); b is a temporary
     )
     B_NEXT_TO = 63  # board a = cells with Manhattan distance 1 to e(b)
     B_IN_FRONT_OF = 64  # board a = the cell in front of e(b)
@@ -373,6 +373,14 @@ class Op(IntEnum):
     HEARD_NOUN = 80  # dst a = the noun; -1 if there is none
     # Reset code: the board shows the room with what stands in it so far (a literal 1), or bare again (0).
     DRAW_ROOM = 81
+
+
+class Counting(IntEnum):
+    """Which cells a rectangle is made of."""
+
+    FLOOR = 0  # plain floor
+    BUILT = 1  # floor and what is built on it, inside the walls
+    ALL = 2  # all of the canvas
 
 
 class Side(IntEnum):

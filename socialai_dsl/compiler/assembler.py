@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from socialai_dsl.draws import site as site_number
-from socialai_dsl.program import BOARDS, CONSTANT, TEMPORARIES, TEMPORARY, Op
+from socialai_dsl.program import BOARDS, CONSTANT, TEMPORARIES, TEMPORARY, TESTS, Op
 from socialai_dsl.source import Span
 
 LARGEST = CONSTANT // 2 - 1
@@ -89,6 +89,17 @@ class Block:
         self.instructions[start:-1] = [[int(Op.ANSWER), counter, line, goal]]
         del self.spans[start + 1 : -1]
 
+    def shorten(self) -> None:
+        """Let skips that lead to others go to where these lead, and those that lead to the end be the end."""
+        for at, instruction in reversed(list(enumerate(self.instructions))):
+            if instruction[0] != Op.SKIP and instruction[0] not in TESTS:
+                continue
+            goal = self.instructions[at + 1 + instruction[3]]
+            if goal[0] == Op.SKIP:
+                instruction[3] += 1 + goal[3]
+            elif goal[0] == Op.HALT and instruction[0] == Op.SKIP:
+                instruction[:] = goal
+
     def halt(self) -> None:
         """End of this path."""
         self.emit(Op.HALT)
@@ -142,6 +153,7 @@ class CodeTable:
             return 0
         if block.instructions[-1][0] != Op.HALT:
             block.halt()
+        block.shorten()
         key = tuple(tuple(row) for row in block.instructions)
         if key not in self._known:
             self._known[key] = len(self.instructions)

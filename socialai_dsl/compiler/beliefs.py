@@ -5,7 +5,6 @@ from __future__ import annotations
 from socialai_dsl.compiler.assembler import Label
 from socialai_dsl.compiler.effects import store
 from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.program import Op
 
 
 def perceive(to: Expressions, member: str) -> None:
@@ -19,7 +18,7 @@ def perceive(to: Expressions, member: str) -> None:
         if belief.when is not None:
             to.sited_condition(belief.when, unseen)
         to.failed = unseen
-        value = to.into_temporary(Op.LOAD, to.sited_value(belief.value))
+        value = to.sited_copy(belief.value)
         to.failed = None
         store(to.registers, block.emit, belief.path, value)
         block.bind(unseen)

@@ -12,7 +12,7 @@ from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.mobility import numbers_of
 from socialai_dsl.compiler.registers import Registers, label
 from socialai_dsl.program import TEMPORARY, Field, Op
-from socialai_dsl.semantics.terms import Effect, Entity, RulePlan, Sited, StepPlan, Term
+from socialai_dsl.semantics.terms import Effect, Entity, RulePlan, StepPlan, Term
 
 _TARGETS = {"open": "open", "close": "closed", "lock": "locked", "reveal": "opened"}
 
@@ -51,7 +51,7 @@ class Effects:
         """Compute all values; a pick that finds nothing skips to `failed`."""
         to = self.to
         to.failed = failed
-        sets = tuple(self._kept(sited) for _, sited in what.sets)
+        sets = tuple(to.sited_copy(sited) for _, sited in what.sets)
         targets: list[tuple[int, ...]] = []
         values: list[int | None] = []
         for effect in what.causes:
@@ -78,10 +78,6 @@ class Effects:
                 self._cause(effect, term, entity, value)
         if operands.line is not None and speaker is not None:
             self.lines.speak(self.to, speaker, operands.line)
-
-    def _kept(self, sited: Sited) -> int:
-        """A value in a temporary, so that no later effect of the same rule can change it."""
-        return self.to.into_temporary(Op.LOAD, self.to.sited_value(sited))
 
     def _steady(self, value: int, what: RulePlan | StepPlan) -> int:
         """The operand of a value that nothing the rule sets can change."""

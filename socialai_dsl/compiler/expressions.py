@@ -358,6 +358,11 @@ class Expressions:
         value = self.into_temporary(Op.MAX, value, constant(term.type.low))
         return self.into_temporary(Op.MIN, value, constant(term.type.high))
 
+    def sited_copy(self, sited: terms.Sited) -> int:
+        """The same in a temporary that nothing else changes or reads."""
+        value = self.sited_value(sited)
+        return value if TEMPORARY <= value < CONSTANT // 2 else self.into_temporary(Op.LOAD, value)
+
     def into_temporary(self, op: Op, b: int, c: int = 0) -> int:
         """A fresh temporary with the result of an instruction."""
         result = self.block.temporary()

@@ -77,13 +77,13 @@ def substitute(term: Term, name: str, value: Const) -> Term:
     return rebuild(term, lambda part: substitute(part, name, value))
 
 
-def mentions(term: Any, kind: type) -> bool:
-    """Whether a term of this kind stands anywhere in the tree."""
-    if isinstance(term, kind):
+def mentions(term: Any, kind: type, such: Callable[[Any], bool] = lambda _: True) -> bool:
+    """Whether a term of this kind, and such a one, stands anywhere in the tree."""
+    if isinstance(term, kind) and such(term):
         return True
     if isinstance(term, tuple):
-        return any(mentions(part, kind) for part in term)
-    return is_dataclass(term) and any(mentions(getattr(term, item.name), kind) for item in fields(term))
+        return any(mentions(part, kind, such) for part in term)
+    return is_dataclass(term) and any(mentions(getattr(term, item.name), kind, such) for item in fields(term))
 
 
 def _truth(value: bool) -> Const:

@@ -15,6 +15,7 @@ from socialai_dsl.program import (
     TEMPORARIES,
     TEMPORARY,
     Body,
+    Counting,
     Field,
     Flag,
     FrameColumn,
@@ -318,7 +319,7 @@ class _Instruction:
     def rectangle(self, a: int, b: int, c: int) -> str | None:
         corners = range(b, b + 4)
         problem = next(filter(None, (self.value(t, -_BOUNDS, _BOUNDS) for t in corners)), None)
-        return self.literal(c, 0, 1) or self.temporaries(b, 4) or problem or self.fill(a)
+        return self.literal(c, 0, Counting.ALL) or self.temporaries(b, 4) or problem or self.fill(a)
 
     def near_place(self, a: int, b: int, _c: int) -> str | None:
         return self.place(b) or self.fill(a)

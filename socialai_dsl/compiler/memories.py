@@ -7,7 +7,7 @@ from socialai_dsl.compiler.effects import store
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.registers import found_path, said_path
 from socialai_dsl.program import Op, Register
-from socialai_dsl.semantics.terms import Drawn, MemoryPlan
+from socialai_dsl.semantics.terms import Drawn, MemoryPlan, Sited
 
 
 def remember(to: Expressions) -> None:
@@ -29,12 +29,15 @@ def remember(to: Expressions) -> None:
 def _remember(to: Expressions, item: Drawn) -> None:
     """One value, and whether there is one, unless there always is."""
     block = to.block
-    mark = block.taken
     found, missing = to.registers.by_path.get(found_path(item.path)), Label()
+    if found is None and item.type.kind == "bool":
+        _note_whether(to, item.path, item.value)
+        return
+    mark = block.taken
     if found is not None:
         block.emit(Op.LOAD, found, constant(0))
         to.failed = missing
-    value = to.into_temporary(Op.LOAD, to.sited_value(item.value))
+    value = to.sited_copy(item.value)
     to.failed = None
     store(to.registers, block.emit, item.path, value)
     if found is not None:
@@ -44,15 +47,18 @@ def _remember(to: Expressions, item: Drawn) -> None:
 
 
 def _ask_whether_open(to: Expressions, memory: MemoryPlan) -> None:
-    if memory.open is None:
-        return
-    register = to.registers.by_path[f"{memory.path}.open"]
-    shut = Label()
-    to.block.span = memory.open.span
+    if memory.open is not None:
+        _note_whether(to, f"{memory.path}.open", memory.open)
+
+
+def _note_whether(to: Expressions, path: str, condition: Sited) -> None:
+    """Let a register tell whether a condition holds."""
+    register, not_so = to.registers.by_path[path], Label()
+    to.block.span = condition.span
     to.block.emit(Op.LOAD, register, constant(0))
-    to.sited_condition(memory.open, shut)
+    to.sited_condition(condition, not_so)
     to.block.emit(Op.LOAD, register, constant(1))
-    to.block.bind(shut)
+    to.block.bind(not_so)
 
 
 def push_acts(to: Expressions) -> None:

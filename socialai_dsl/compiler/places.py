@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.cells import keep_each
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import mentions
-from socialai_dsl.program import Field, Op, Register, Side
+from socialai_dsl.compiler.shapes import EVERYWHERE, fill_rectangle, is_about_cell, is_shape, shape
+from socialai_dsl.program import Counting, Field, Op, Register, Side
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.geometry import EXACT
 from socialai_dsl.semantics.terms import Placing, Region, Term
 
 _SIDES = {"top": Side.TOP, "bottom": Side.BOTTOM, "left": Side.LEFT, "right": Side.RIGHT}
-_EVERYWHERE = 31
 
 
 class Places:
@@ -124,14 +126,10 @@ class Places:
         self.to.block.release_boards(floor)
 
     def _rectangle(self, board: int, region: Region, built: bool) -> None:
-        """Halves, rows, columns and rectangles: x from corner to corner + 1, y from corner + 2 to corner + 3.
-
-        With `built` also where something is built.
-        """
+        """Halves, rows, columns and rectangles; with `built` also where something is built."""
         block = self.to.block
         mark = block.taken
-        corner = block.temporary(4)
-        bounds: list[int] = [constant(0), constant(_EVERYWHERE), constant(0), constant(_EVERYWHERE)]
+        bounds = list(EVERYWHERE)
         if region.name in ("column", "row"):
             at = 0 if region.name == "column" else 2
             bounds[at] = bounds[at + 1] = self.to.value(region.args[0])
@@ -140,9 +138,7 @@ class Places:
             bounds = [x0, x1, y0, y1]
         else:
             self._half(region.name, bounds)
-        for i, bound in enumerate(bounds):
-            block.emit(Op.LOAD, corner + i, bound)
-        block.emit(Op.B_RECT, board, corner, int(built))
+        fill_rectangle(block, board, bounds, Counting.BUILT if built else Counting.FLOOR)
         block.release(mark)
 
     def _half(self, name: str, bounds: list[int]) -> None:
@@ -161,6 +157,8 @@ class Places:
         """Take out of `board` the cells for which `where` is false."""
         block = self.to.block
         match where:
+            case _ if not is_about_cell(where):
+                self._keep_all(board, where)
             case terms.Logic(op="and"):
                 for arg in where.args:
                     self._keep(board, arg)
@@ -173,12 +171,24 @@ class Places:
             case terms.Quantified(op="all", cells=False):
                 for item in where.items:
                     self._keep(board, self.to.instance(where, item))
-            case terms.Test(subject=None, name="in_front_of" | "next_to"):
-                near = self._near(where)
-                block.emit(Op.B_AND, board, near)
-                block.release_boards(near)
+            case terms.Compare(op="!=") if is_shape(self.to, equal := replace(where, op="==")):
+                self._keep_not(board, equal)
+            case _ if is_shape(self.to, where):
+                held = shape(self.to, where)
+                block.emit(Op.B_AND, board, held)
+                block.release_boards(held)
             case _:
                 keep_each(self.to, board, where)
+
+    def _keep_all(self, board: int, condition: Term) -> None:
+        """Take out every cell if the condition, which is the same for all, is false."""
+        block = self.to.block
+        drop, done = Label(), Label()
+        self.to.condition(condition, drop)
+        block.skip(done)
+        block.bind(drop)
+        block.emit(Op.B_WITHOUT, board, board)
+        block.bind(done)
 
     def _keep_not(self, board: int, arg: Term) -> None:
         """Take out the cells for which `arg` is true."""
@@ -190,13 +200,12 @@ class Places:
             case terms.Quantified(op="any", cells=False):
                 for item in arg.items:
                     self._keep_not(board, self.to.instance(arg, item))
-            case terms.Test(subject=None, name="in_front_of" | "next_to"):
-                near = self._near(arg)
-                block.emit(Op.B_WITHOUT, board, near)
-                block.release_boards(near)
             case _:
-                held = self._copy(board)
-                self._keep(held, arg)
+                if is_shape(self.to, arg):
+                    held = shape(self.to, arg)
+                else:
+                    held = self._copy(board)
+                    self._keep(held, arg)
                 block.emit(Op.B_WITHOUT, board, held)
                 block.release_boards(held)
 
@@ -214,9 +223,3 @@ class Places:
             self.to.block.release_boards(held)
         self.to.block.emit(Op.B_WITHOUT, board, rest)
         self.to.block.release_boards(rest)
-
-    def _near(self, where: terms.Test) -> int:
-        near = self.to.block.board()
-        op = Op.B_IN_FRONT_OF if where.name == "in_front_of" else Op.B_NEXT_TO
-        self.to.block.emit(op, near, self.to.value(where.object))
-        return near

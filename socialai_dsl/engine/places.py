@@ -11,7 +11,7 @@ from socialai_dsl.engine.sets import add_cell, clear, count_cells, fill_next_to,
 from socialai_dsl.engine.speech import first_heard
 from socialai_dsl.engine.state import NO_CELL, NOTHING, OCCUPIED, ONE, ZERO, Row
 from socialai_dsl.engine.whereabouts import is_somewhere, x_of, y_of
-from socialai_dsl.program import TEMPORARY, Field, Header, Op, Register, Side
+from socialai_dsl.program import TEMPORARY, Counting, Field, Header, Op, Register, Side
 
 
 @outline
@@ -36,13 +36,16 @@ def place(row: Row, op: int, a: int, b: int, c: int) -> None:
             draw_all(row)
     elif op >= Op.HEARD_FROM:
         assign(row, a, first_heard(row, b, c, op - Op.HEARD_FROM + 1))
-    elif op == Op.B_FLOOR or op == Op.B_RECT:
-        if op == Op.B_RECT and c == 1:
+    elif op == Op.B_FLOOR:
+        _fill_floor(row, a)
+    elif op == Op.B_RECT:
+        if c == Counting.ALL:
+            _fill_all(row, a)
+        elif c == Counting.BUILT:
             _fill_inside(row, a)
         else:
             _fill_floor(row, a)
-        if op == Op.B_RECT:
-            _cut(row, a, b - TEMPORARY)
+        _cut(row, a, b - TEMPORARY)
     elif op == Op.B_WALL:
         _fill_wall(row, a, b, c)
     elif op == Op.B_NEXT_TO:
@@ -75,6 +78,12 @@ def _fill_floor(row: Row, a: int) -> None:
     table = room_table(row) + row.program[Header.CANVAS_WIDTH] * height + 1 + height
     for y in range(height):
         set_line(row, a, y, row.program[table + y])
+
+
+@inline
+def _fill_all(row: Row, a: int) -> None:
+    for y in range(row.program[Header.CANVAS_HEIGHT]):
+        set_line(row, a, y, (ONE << row.program[Header.CANVAS_WIDTH]) - 1)
 
 
 @inline

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import socialai_dsl
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import check, check_files, load
 
@@ -190,6 +191,11 @@ def test_mistakes_inside_a_parameters_value_are_shown_where_it_is_used(write):
 
 
 # -- speed ---------------------------------------------------------------------------------------------------------
+
+
+def test_only_what_was_loaded_is_compiled():
+    with pytest.raises(ValueError, match=r"compile: got 'talkitout'; expected what `load` returns"):
+        socialai_dsl.compile("talkitout")
 
 
 def test_checking_needs_none_of_the_heavy_libraries():

@@ -73,6 +73,13 @@ def both(*args: Term) -> Logic:
 
 IN_COLUMN_2 = Compare("==", x_of(HERE), number(2))
 NEXT_TO_AGENT = Relation("next_to", HERE, entity(AGENT))
+NEXT_TO_EITHER = Quantified(
+    BOOL,
+    "any",
+    "e",
+    (entity(AGENT), entity(GUIDE)),
+    Relation("next_to", HERE, Variable(Type("entity", 0, 6), "e")),
+)
 NONE = Compare("==", x_of(HERE), number(20))
 
 VALUES: list[tuple[Term, Any]] = [
@@ -139,13 +146,11 @@ def test_a_pick_takes_every_cell_that_fits_sooner_or_later() -> None:
 
 
 def test_a_variable_of_things_inside_a_set_of_cells() -> None:
-    thing = Variable(Type("entity", 0, 6), "e")
-    condition = Quantified(BOOL, "any", "e", (entity(AGENT), entity(GUIDE)), Relation("next_to", HERE, thing))
-    assert worth(cells("count", condition, NUMBER)) == 7, "one cell is next to both"
+    assert worth(cells("count", NEXT_TO_EITHER, NUMBER)) == 7, "one cell is next to both"
 
 
 def test_sets_of_cells_do_not_nest() -> None:
-    inner = cells("count", IN_COLUMN_2, NUMBER)
+    inner = cells("count", NEXT_TO_EITHER, NUMBER)
     with pytest.raises(AssertionError, match="inside another"):
         compiled(with_let(workbench(), "let.answer", cells("count", Compare("<", inner, number(3)), NUMBER)))
 

@@ -55,7 +55,7 @@ def test_every_instruction_of_a_rule_says_where_it_comes_from() -> None:
 
 def test_cells_sets_and_entries_are_readable() -> None:
     nearest = Quantified(
-        CELL, "nearest", "c", (), Relation("next_to", HERE, entity(BOX)), cell(5, 1), cells=True
+        CELL, "nearest", "c", (), Relation("unobstructed", HERE, entity(BOX)), cell(5, 1), cells=True
     )
     seen = Sees(entity(GUIDE), CellOf(CELL, nearest), Const(DIRECTION, 2))
     # By chance, so that it does not wait for a status to change.
@@ -67,7 +67,7 @@ def test_cells_sets_and_entries_are_readable() -> None:
     assert shown[1:8] == [
         "B_FLOOR 0",
         f"EACH_CELL 0, %1, -> {start + 6}",
-        f"IF_NEXT_TO %3, box, -> {start + 5}",
+        f"IF_UNOBSTRUCTED %3, box, -> {start + 5}",
         f"SKIP -> {start + 6}",
         "DROP_CELL",
         "END_EACH",

@@ -168,5 +168,5 @@ def test_the_history_holds_what_is_performed() -> None:
 def test_a_performance_is_short() -> None:
     listing = listed(compiled(dancing(LEFT, say(0), RIGHT, say(2))), "guide.idle.waiting.do")
     assert [line.split()[1] for line in listing] == [
-        "IF_EQ", "BODY", "SKIP", "IF_EQ", "BODY", "ADD", "SAY", "SKIP", "BODY", "HALT",
+        "IF_EQ", "BODY", "HALT", "IF_EQ", "BODY", "ADD", "SAY", "HALT", "BODY", "HALT",
     ]  # fmt: skip
