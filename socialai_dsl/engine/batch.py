@@ -1,6 +1,6 @@
 """A batch of environments in memory: programs one behind the other, state, ports, and the threads that serve them."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Final, NamedTuple
@@ -27,7 +27,7 @@ from socialai_dsl.engine.state import (
     empty_state,
     no_pins,
 )
-from socialai_dsl.engine.views import SMALL_CANVAS, view_table
+from socialai_dsl.engine.views import MEDIUM_CANVAS, SMALL_CANVAS, view_table
 from socialai_dsl.program import VIEW, EntityColumn, Flag, FrameColumn, Header, LineColumn, Op, TypeColumn
 
 _ROWS_WORTH_A_THREAD: Final = 64
@@ -102,13 +102,7 @@ class Batch:
         rows = self._rows = len(pool_of_row)
         headers = [part.words for part in parts]
         registers = max(int(words[Header.REGISTERS]) for words in headers)
-        board = max(
-            int(
-                words[Header.CANVAS_WIDTH] * words[Header.CANVAS_HEIGHT] + 1 + 2 * words[Header.CANVAS_HEIGHT]
-            )
-            for words in headers
-        )
-        board = max(board, SMALL_CANVAS + 1)  # so that it can be read in whole vectors
+        board = max(_board_words(words) for words in headers)
         words, views, self.offsets, self.first_counters = _link(parts)
         starts = np.cumsum([0, *map(len, pools)])
         self.tables = Tables(
@@ -171,6 +165,14 @@ class Batch:
                 self.ports.actions[:] = actions
             return self._share(self._tasks[task])
         return self._share(self._checked[task]) if self._take(actions) else BAD_ACTION
+
+    def stepper(self, task: Task) -> Callable[[], int]:
+        """What does `step(task)`, for a batch that no threads share, without anything between Python and the engine.
+
+        It may be called until the next `reset`. Below BAD_ACTION means that a room was refused (`refused_room`).
+        """
+        assert len(self._cuts) == 1, "internal: threads share this batch"
+        return self._tasks[task].own
 
     def _take(self, actions: NDArray[np.integer[Any]] | None) -> bool:
         """Let each thread copy the actions of its rows, which come late from another core's cache; whether all fit."""
@@ -240,14 +242,15 @@ class Batch:
         """Let every thread do its rows; how many episodes ended, or BAD_ACTION."""
         ended = self._ask(shares)
         if ended < BAD_ACTION:
-            self._report_refused()
+            raise self.refused_room()
         return ended
 
-    def _report_refused(self) -> None:
+    def refused_room(self) -> RoomError:
+        """Why a call returned less than BAD_ACTION; after it play may go on."""
         row = int(np.flatnonzero(self.ports.refused)[0])
         self.ports.refused[:] = False
         key = self.state.keys[row]
-        raise RoomError(
+        return RoomError(
             f"{self._names[int(self.program_numbers()[row])]}: none of {ATTEMPTS} rooms was as `require` asks, in row "
             f"{row} (seed {key[Key.SEED]}, index {key[Key.INDEX]}, episode {key[Key.EPISODE]})"
         )
@@ -257,6 +260,14 @@ class Batch:
         if self._relay is not None:
             return self._relay.make(shares.order)
         return shares.own() + sum(call() for call in shares.others) if shares.others else shares.own()
+
+
+def _board_words(header: NDArray[np.int32]) -> int:
+    """Words of a program's board, which is read in whole vectors where its canvas is small."""
+    height = int(header[Header.CANVAS_HEIGHT])
+    cells = int(header[Header.CANVAS_WIDTH]) * height
+    read = next((canvas for canvas in (SMALL_CANVAS, MEDIUM_CANVAS) if cells <= canvas), cells)
+    return max(cells + 1 + 2 * height, read + 1)
 
 
 def _cut(rows: int, threads: int) -> list[tuple[int, int]]:
@@ -303,6 +314,7 @@ def _link(
             [*part.actions, *part.templates, *part.nouns, *part.outcomes, *part.successes], np.int32
         )
         own = _with_tokens(part)
+        link[Link.FIRST_ROLLING], link[Link.LAST_ROLLING] = _rolling(own)
         own[Header.FLAGS] |= _traits(own) | (Trait.GESTURES if gestures else 0)
         words += [own, link, tables]
         offsets.append(offset)
@@ -314,17 +326,13 @@ def _link(
 
 def _traits(words: NDArray[np.int32]) -> int:
     """What may happen in a program, as bits of `Trait`."""
-    small = words[Header.CANVAS_WIDTH] * words[Header.CANVAS_HEIGHT] <= SMALL_CANVAS
-    traits = int(Trait.SMALL) if small else 0
+    cells = words[Header.CANVAS_WIDTH] * words[Header.CANVAS_HEIGHT]
+    traits = int(Trait.SMALL if cells <= SMALL_CANVAS else Trait.MEDIUM if cells <= MEDIUM_CANVAS else 0)
     if words[Header.TICK_PC] or words[Header.FLAGS] & Flag.ROLLS:
         traits |= Trait.GOES_BY_ITSELF
-    first, rows = int(words[Header.ENTITY_AT]), int(words[Header.ENTITIES])
-    entities = words[first : first + rows * EntityColumn.COLUMNS].reshape(rows, EntityColumn.COLUMNS)
-    first, rows = int(words[Header.TYPE_AT]), int(words[Header.TYPE_ROWS])
-    types = words[first : first + rows * TypeColumn.COLUMNS].reshape(rows, TypeColumn.COLUMNS)
-    # A type has as many rows as it is far to the next; what has one status only cannot change it.
-    starts = np.unique(entities[:, EntityColumn.TYPE])
-    status = np.arange(rows) - starts[np.searchsorted(starts, np.arange(rows), "right") - 1]
+    types, starts = _types(words)
+    # What has one status only cannot change it.
+    status = np.arange(len(types)) - starts[np.searchsorted(starts, np.arange(len(types)), "right") - 1]
     if (types[:, TypeColumn.PUSHED] != status).any():
         traits |= Trait.PUSHED
     first, rows = int(words[Header.FRAME_AT]), int(words[Header.FRAMES])
@@ -335,6 +343,30 @@ def _traits(words: NDArray[np.int32]) -> int:
     if words[Header.EACH_STEP] or (words[first : first + 4 * rows : 4] == Op.REWARD).any():
         traits |= Trait.REWARDS
     return traits
+
+
+def _entities(words: NDArray[np.int32]) -> NDArray[np.int32]:
+    """The entity table, (entities, columns)."""
+    first, rows = int(words[Header.ENTITY_AT]), int(words[Header.ENTITIES])
+    return words[first : first + rows * EntityColumn.COLUMNS].reshape(rows, EntityColumn.COLUMNS)
+
+
+def _types(words: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """The type table, (rows, columns), and where each type begins: it has as many rows as it is far to the next."""
+    first, rows = int(words[Header.TYPE_AT]), int(words[Header.TYPE_ROWS])
+    types = words[first : first + rows * TypeColumn.COLUMNS].reshape(rows, TypeColumn.COLUMNS)
+    return types, np.unique(_entities(words)[:, EntityColumn.TYPE])
+
+
+def _rolling(words: NDArray[np.int32]) -> tuple[int, int]:
+    """The first and the last entity that may ever roll; 0 and -1 if none may."""
+    types, starts = _types(words)
+    ends = [*starts[1:], len(types)]
+    rolling = [
+        first for first, end in zip(starts, ends, strict=True) if types[first:end, TypeColumn.ROLLS].any()
+    ]
+    found = np.flatnonzero(np.isin(_entities(words)[:, EntityColumn.TYPE], rolling))
+    return (int(found[0]), int(found[-1])) if len(found) else (0, -1)
 
 
 def _with_tokens(part: Part) -> NDArray[np.int32]:

@@ -6,10 +6,13 @@ from socialai_dsl.engine import small_paths
 from socialai_dsl.engine.boards import is_deadly, npcs_are_hidden, solid_line
 from socialai_dsl.engine.entities import field, is_present
 from socialai_dsl.engine.jit import inline, outline, stay_outline
+from socialai_dsl.engine.operands import draw_below
 from socialai_dsl.engine.sets import add_cell, clear, drop_cell, fill_next_to, get_line, has_cell, set_line
 from socialai_dsl.engine.state import AGENT, FREE, FRONT, NO_CELL, NO_PATH, SEEN, STILL, Row
 from socialai_dsl.engine.whereabouts import distance, is_somewhere, x_of, y_of
 from socialai_dsl.program import Body, Field, Header
+
+_SIDES = np.int64(2)
 
 
 @outline
@@ -100,11 +103,11 @@ def _grow(row: Row) -> bool:
 
 
 @inline
-def turn_towards(direction: int, wanted: int, coin: int) -> int:
-    """The quarter turn towards a direction; `coin` decides if it lies behind (0 left, 1 right)."""
+def turn_towards(row: Row, direction: int, wanted: int, site: int) -> int:
+    """The quarter turn towards a direction; what is drawn at a site decides if it lies behind."""
     turn = (wanted - direction) & 3
     if turn == 0:
         return STILL
     if turn == 2:
-        return Body.LEFT + coin
+        return Body.LEFT + draw_below(row, site, _SIDES)
     return np.int64(Body.RIGHT) if turn == 1 else np.int64(Body.LEFT)

@@ -1,18 +1,19 @@
 """The agent's picture: a gather of 49 cells through a table by pose."""
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.engine import rng
 from socialai_dsl.engine.entities import field, npc_at, step_x, step_y
-from socialai_dsl.engine.gather import PERMUTES, permute
+from socialai_dsl.engine.gather import permute_medium, permute_small, spread_out
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.pointers import uint16_of
-from socialai_dsl.engine.shadows import lit_cells, look_around
+from socialai_dsl.engine.shadows import lit_cells
 from socialai_dsl.engine.state import AGENT, NOTHING, Book, Link, Row, Trait
-from socialai_dsl.engine.views import CELLS
+from socialai_dsl.engine.vectors import WIDE
+from socialai_dsl.engine.views import CELLS, OWN_LOOK, OWN_PLACE
 from socialai_dsl.program import (
     CODES_OF_TYPES,
     LAST_ACTS,
@@ -22,15 +23,11 @@ from socialai_dsl.program import (
     Field,
     Flag,
     Header,
-    pack_cell,
 )
 
-OWN_PLACE: Final = (VIEW // 2) * VIEW + VIEW - 1
-"""Where the agent is in the picture: image[3, 6]."""
-
-OWN_LOOK = pack_cell(1)
 _NPC = CODES_OF_TYPES["npc"]
 _HALF = np.int64(VIEW // 2)
+_EVERYWHERE = np.uint64((1 << 64) - 1)
 _WITH_GESTURES = 6
 _WORDS_OF_ACTS = {
     Body.FORWARD: "forward",
@@ -60,82 +57,111 @@ def image_digest(image: NDArray[np.uint32], extra: NDArray[np.uint16], gestures:
 @inline
 def take_picture(row: Row, link: int, book: Any, number: int) -> None:
     """Write what the agent, in row `number` of the book, sees; its own cell reads empty."""
+    flags = row.program[Header.FLAGS]
     x = field(row, AGENT, Field.X)
     y = field(row, AGENT, Field.Y)
     if x < 0:
         for i in range(CELLS):
             row.image[i] = row.program[Header.OUTSIDE]
+        row.image[OWN_PLACE] = OWN_LOOK
     else:
+        lit = _EVERYWHERE
+        if flags & Flag.OCCLUSION:
+            lit = _light_on(row, x, y, field(row, AGENT, Field.DIR))
         pose = (y * row.program[Header.CANVAS_WIDTH] + x) * 4 + field(row, AGENT, Field.DIR)
-        view = (row.program[link + Link.VIEWS] + pose) * CELLS
-        if PERMUTES and row.program[Header.FLAGS] & Trait.SMALL:
-            permute(row.image, row.board, row.views, view)
-        else:
-            for i in range(CELLS):
-                row.image[i] = row.board[row.views[view + i]]
-        if row.program[Header.FLAGS] & (Flag.EGOCENTRIC | Flag.OCCLUSION):
-            if row.program[Header.FLAGS] & Flag.OCCLUSION:
-                _hide_unlit(row, x, y, field(row, AGENT, Field.DIR))
-            if row.program[Header.FLAGS] & Flag.EGOCENTRIC:
-                _turn_npcs(row, field(row, AGENT, Field.DIR))
-    row.image[OWN_PLACE] = OWN_LOOK
-    if row.program[Header.FLAGS] & Trait.GESTURES:
-        _take_gestures(row, uint16_of(book, Book.EXTRA, number), uint16_of(book, Book.PICTURE, number))
-
-
-@outline
-def _hide_unlit(row: Row, x: int, y: int, direction: int) -> None:
-    """Let cells that no light reaches the agent from read 0, which is unseen."""
-    stay_outline()
-    look_around(row)
-    lit = lit_cells(row, x, y, direction)
-    for i in range(CELLS):
-        row.image[i] &= np.int64(-((lit >> np.uint64(i)) & np.uint64(1)))
+        _gather(row, (row.program[link + Link.VIEWS] + pose) * CELLS, lit)
+    if flags & (Flag.EGOCENTRIC | Trait.GESTURES):
+        _show_npcs(row, uint16_of(book, Book.EXTRA, number), uint16_of(book, Book.PICTURE, number))
 
 
 @inline
-def _place_in_picture(row: Row, npc: int) -> int:
-    """Where the picture shows an NPC, -1 if nowhere: it may be out of view, hidden, or behind another in its cell."""
+def _gather(row: Row, view: int, lit: np.uint64) -> None:
+    """Write the cells of the board that the table of views names; what is not lit reads 0, which is unseen."""
+    flags = row.program[Header.FLAGS]
+    if WIDE and flags & Trait.SMALL:
+        permute_small(row.image, row.board, row.views, view, lit)
+    elif WIDE and flags & Trait.MEDIUM:
+        permute_medium(row.image, row.board, row.views, view, lit)
+    else:
+        for i in range(CELLS):
+            row.image[i] = row.board[row.views[view + i]]
+        if lit != _EVERYWHERE:
+            for i in range(CELLS):
+                row.image[i] &= np.int64(-((lit >> np.uint64(i)) & np.uint64(1)))
+        row.image[OWN_PLACE] = OWN_LOOK
+
+
+@outline
+def _light_on(row: Row, x: int, y: int, direction: int) -> np.uint64:
+    """The cells of the picture that light reaches the agent from."""
+    stay_outline()
+    return lit_cells(row, x, y, direction)
+
+
+@inline
+def _place_in_view(row: Row, npc: int) -> int:
+    """Where in the picture an NPC would be seen if nothing was in the way, -1 if it is out of view."""
     direction = field(row, AGENT, Field.DIR)
-    x = field(row, npc, Field.X)
-    y = field(row, npc, Field.Y)
-    dx = x - field(row, AGENT, Field.X)
-    dy = y - field(row, AGENT, Field.Y)
+    dx = field(row, npc, Field.X) - field(row, AGENT, Field.X)
+    dy = field(row, npc, Field.Y) - field(row, AGENT, Field.Y)
     ahead = dx * step_x(direction) + dy * step_y(direction)
     right = dy * step_x(direction) - dx * step_y(direction)
-    if ahead < 0 or ahead >= VIEW or abs(right) > _HALF:
+    # One question and not three, each of which is answered either way: where somebody is is as good as random.
+    if (ahead < 0) | (ahead >= VIEW) | (abs(right) > _HALF):
         return NOTHING
-    place = (right + _HALF) * VIEW + VIEW - 1 - ahead
-    shown = row.image[place] & 0xFF == _NPC and npc_at(row, x, y) == npc
-    return place if shown else NOTHING
+    return (right + _HALF) * VIEW + VIEW - 1 - ahead
 
 
 @outline
-def _turn_npcs(row: Row, direction: int) -> None:
-    """Show the directions of NPCs relative to the agent's: 0 the opposite, 2 the same."""
+def _show_npcs(row: Row, extra: NDArray[np.uint16], picture: NDArray[np.uint16]) -> None:
+    """Show which way NPCs look relative to the agent, where they point and what they did last, as far as shown.
+
+    Then all channels are in `picture`. Whether the picture shows an NPC, which may be in the dark, hidden, or behind
+    another in its cell, is known late, so nothing branches on it.
+    """
     stay_outline()
+    flags = row.program[Header.FLAGS]
+    if flags & Trait.GESTURES:
+        for i in range(CELLS):
+            extra[i] = NO_GESTURE << 8 | NO_GESTURE
+        _put_together(row, picture)
+    own = field(row, AGENT, Field.DIR)
     for npc in range(1, row.program[Header.NPCS] + 1):
-        place = _place_in_picture(row, npc)
-        if place >= 0:
-            look = row.image[place]
-            row.image[place] = (look & 0xFFFFFF) | (((look >> 24) - direction + 2) & 3) << 24
+        place = _place_in_view(row, npc)
+        if place < 0 or npc_at(row, field(row, npc, Field.X), field(row, npc, Field.Y)) != npc:
+            continue
+        look = row.image[place]
+        shown = -np.int64(look & 0xFF == _NPC)
+        if flags & Flag.EGOCENTRIC:
+            turned = (look & 0xFFFFFF) | _relative(look >> 24, own) << 24
+            look ^= (look ^ turned) & shown
+            row.image[place] = look
+        if flags & Trait.GESTURES:
+            gesture = np.int64(NO_GESTURE << 8 | NO_GESTURE)
+            if row.program[Header.CHANNELS] == _WITH_GESTURES:
+                gesture ^= (gesture ^ _gesture(row, npc, own)) & shown
+            extra[place] = gesture
+            picture[3 * place] = look
+            picture[3 * place + 1] = look >> 16
+            picture[3 * place + 2] = gesture
 
 
-@outline
-def _take_gestures(row: Row, extra: NDArray[np.uint16], picture: NDArray[np.uint16]) -> None:
-    """Write where the NPCs in the picture point and what they did last, if the program shows it, then all channels."""
-    stay_outline()
-    for i in range(CELLS):
-        extra[i] = NO_GESTURE << 8 | NO_GESTURE
-    if row.program[Header.CHANNELS] == _WITH_GESTURES:
-        for npc in range(1, row.program[Header.NPCS] + 1):
-            place = _place_in_picture(row, npc)
-            if place >= 0:
-                extra[place] = _gesture(row, npc, field(row, AGENT, Field.DIR))
-    for i in range(CELLS):
-        picture[3 * i] = row.image[i]
-        picture[3 * i + 1] = row.image[i] >> 16
-        picture[3 * i + 2] = extra[i]
+@inline
+def _put_together(row: Row, picture: NDArray[np.uint16]) -> None:
+    """Write the six channels of a picture in which nobody points or did anything."""
+    if WIDE:
+        spread_out(picture, row.image)
+    else:
+        for i in range(CELLS):
+            picture[3 * i] = row.image[i]
+            picture[3 * i + 1] = row.image[i] >> 16
+            picture[3 * i + 2] = NO_GESTURE << 8 | NO_GESTURE
+
+
+@inline
+def _relative(direction: int, own: int) -> int:
+    """A direction as it is seen by one who looks in another: 0 the opposite, 2 the same."""
+    return (direction - own + 2) & 3
 
 
 @inline
@@ -146,7 +172,7 @@ def _gesture(row: Row, npc: int, own: int) -> int:
     if field(row, npc, Field.POINTING) > 0:
         pointing = field(row, npc, Field.POINTING) - 1
         if row.program[Header.FLAGS] & Flag.EGOCENTRIC:
-            pointing = (pointing - own + 2) & 3
+            pointing = _relative(pointing, own)
         if field(row, npc, Field.LAST) == Body.POINT:
             act += pointing
     return act << 8 | pointing

@@ -12,7 +12,7 @@ from socialai_dsl.engine.entities import (
     step_y,
 )
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.state import AGENT, ONE, RESETTING, ZERO, Row
+from socialai_dsl.engine.state import AGENT, ONE, RESETTING, ZERO, Link, Row
 from socialai_dsl.engine.whereabouts import x_of, y_of
 from socialai_dsl.program import EntityColumn, Field, Header, Register, TypeColumn
 
@@ -80,7 +80,8 @@ def push(row: Row, x: int, y: int, direction: int, rolling: int) -> None:
 def roll(row: Row) -> None:
     """What rolls moves one cell, the objects in order. What meets something in its way pushes it, and rolls no more."""
     stay_outline()
-    for entity in range(row.program[Header.NPCS] + 1, row.program[Header.ENTITIES]):
+    link = row.program[Header.SIZE]
+    for entity in range(row.program[link + Link.FIRST_ROLLING], row.program[link + Link.LAST_ROLLING] + 1):
         if is_present(row, entity):
             rolls = row.program[type_row(row, entity) + TypeColumn.ROLLS]
             if rolls > 0:

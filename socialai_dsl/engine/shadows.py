@@ -10,17 +10,20 @@ from numpy.typing import NDArray
 from socialai_dsl.engine.boards import is_opaque, note_opaque, opaque_line
 from socialai_dsl.engine.entities import step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
+from socialai_dsl.engine.masked import opaque_rows
 from socialai_dsl.engine.state import ONE, RESETTING, ZERO, Row
+from socialai_dsl.engine.vectors import WIDE
 from socialai_dsl.program import VIEW, Header, Register
 
 _HALF = VIEW // 2
 _ROW = np.int64((1 << VIEW) - 1)
+_BLOCKED = _ROW << VIEW
 
 
 def _onward() -> NDArray[np.uint8]:
-    """Where light goes on to, (16384,): by the cells of a row that it reaches << 7 | those one can look through."""
-    through = np.arange(1 << 2 * VIEW) & _ROW
-    passed = np.arange(1 << 2 * VIEW) >> VIEW & through
+    """Where light goes on to, (16384,): by the opaque cells of a row << 7 | those that it reaches."""
+    through = ~(np.arange(1 << 2 * VIEW) >> VIEW) & _ROW
+    passed = np.arange(1 << 2 * VIEW) & through
     for _ in range(VIEW):
         passed |= (passed << 1 | passed >> 1) & through
     return ((passed | passed << 1 | passed >> 1) & _ROW).astype(np.uint8)
@@ -125,7 +128,7 @@ def _is_lit_in_picture(row: Row, x: int, y: int, direction: int, ahead: int, rig
 def lit_cells(row: Row, x: int, y: int, direction: int) -> np.uint64:
     """The cells of the agent's picture that light reaches it from: bit 7 i + j for image[i, j].
 
-    The same as `light_next` row by row, with the whole view in one word. `look_around` must have been called.
+    The same as `light_next` row by row, with the whole view in one word. The room must be drawn.
     """
     opaque = _opaque_in_view(row, x, y, direction)
     mirrored = _is_mirrored(direction) << VIEW
@@ -141,8 +144,9 @@ def lit_cells(row: Row, x: int, y: int, direction: int) -> np.uint64:
 @inline
 def _onward_from(opaque: np.uint64, ahead: int, reached: int) -> int:
     """The cells that light goes on to from those that it reaches in a row of the view."""
-    through = ~np.int64(opaque >> np.uint64(8 * ahead)) & _ROW
-    return np.int64(_ONWARD[reached << VIEW | through])
+    # One row waits for the other, so the cells that are reached come last into the index.
+    blocked = np.int64(opaque >> np.uint64(8 * ahead)) << VIEW & _BLOCKED
+    return np.int64(_ONWARD[blocked + reached])
 
 
 @inline
@@ -160,13 +164,23 @@ def _opaque_in_view(row: Row, x: int, y: int, direction: int) -> np.uint64:
     top = y - _HALF * (1 - step_y(direction))
     left = x - _HALF * (1 - step_x(direction))
     beyond = np.int64(-1) << row.program[Header.CANVAS_WIDTH]
-    opaque = np.uint64(0)
-    for r in range(VIEW):
-        inside = np.int64(top + r >= 0) & np.int64(top + r < row.program[Header.CANVAS_HEIGHT])
-        line = row.board[opaque_line(row, (top + r) * inside)] | beyond | (inside - 1)
-        opaque |= np.uint64((((line << VIEW) | _ROW) >> (left + VIEW)) & _ROW) << np.uint64(8 * r)
+    opaque = _opaque_rows(row, top, beyond, left)
     opaque = _chosen(direction & 1, opaque, _transposed(opaque))
     return _chosen(direction >> 1, _swapped(opaque), opaque)  # from rows of the room to rows ahead
+
+
+@inline
+def _opaque_rows(row: Row, top: int, beyond: int, left: int) -> np.uint64:
+    """The rows of the room that such a view has: see `masked.opaque_rows`."""
+    height = row.program[Header.CANVAS_HEIGHT]
+    if WIDE:
+        return opaque_rows(row.board, opaque_line(row, ZERO), height, top, beyond, left)
+    opaque = np.uint64(0)
+    for r in range(VIEW):
+        inside = np.int64(top + r >= 0) & np.int64(top + r < height)
+        line = row.board[opaque_line(row, (top + r) * inside)] | beyond | (inside - 1)
+        opaque |= np.uint64((((line << VIEW) | _ROW) >> (left + VIEW)) & _ROW) << np.uint64(8 * r)
+    return opaque
 
 
 @inline

@@ -70,7 +70,9 @@ class Link(IntEnum):
     ACTIONS = 5  # choices of the batch's action space
     TEMPLATES = 6
     NOUNS = 7
-    END = 8
+    FIRST_ROLLING = 8  # the first and the last entity that may ever roll
+    LAST_ROLLING = 9
+    END = 10
 
 
 class Trait(IntEnum):
@@ -82,6 +84,7 @@ class Trait(IntEnum):
     REWARDS = 1 << 23  # there are rewards besides that of an outcome
     APART = 1 << 24  # some frame has code for what it perceives, or for the rest of a rule of `first`
     SMALL = 1 << 25  # the canvas has at most `views.SMALL_CANVAS` cells
+    MEDIUM = 1 << 26  # it has more, but at most `views.MEDIUM_CANVAS`
 
 
 class Book(IntEnum):
@@ -139,7 +142,7 @@ class State(NamedTuple):
     registers: NDArray[np.int16]  # (E, R)
     boards: NDArray[
         np.uint32
-    ]  # (E, H * W + 1 + 2 * H) cells as seen, the last is off the canvas; then solid rows, then opaque ones
+    ]  # (E, H * W + 1 + 2 * H or more) cells as seen, the last is off the canvas; then solid rows, then opaque ones
     keys: NDArray[np.uint64]  # (E, Key.WORDS)
     tokens: NDArray[np.int16]  # (E, L)
     image: NDArray[

@@ -5,12 +5,19 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.program import VIEW
+from socialai_dsl.program import VIEW, pack_cell
 
 CELLS: Final = VIEW * VIEW
 
+OWN_PLACE: Final = (VIEW // 2) * VIEW + VIEW - 1
+"""Where the agent is in the picture: image[3, 6]."""
+
+OWN_LOOK: Final = pack_cell(1)
+"""What its own cell reads."""
+
 SMALL_CANVAS: Final = 64
-"""Cells of the largest canvas that vectors can be gathered from (`gather`); a board has a word more at least."""
+MEDIUM_CANVAS: Final = 128
+"""Cells of the largest canvases that pictures are gathered from by vectors (`gather`); a board has a word more."""
 
 
 def view_table(width: int, height: int) -> NDArray[np.uint16]:

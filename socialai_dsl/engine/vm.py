@@ -24,7 +24,6 @@ from socialai_dsl.engine.whereabouts import attribute, cell_beside, cell_of, is_
 from socialai_dsl.program import CELL, Body, Field, FrameColumn, Header, Op, Register
 
 _NO_CELL = -1
-_SIDES = np.int64(2)
 
 
 @inline
@@ -178,13 +177,13 @@ def _choose(row: Row, op: int, a: int, b: int, c: int) -> int:
         return np.int64(Body.POINT)
     direction = field(row, mover, Field.DIR)
     if op == Op.TURN_TO:
-        return paths.turn_towards(direction, target, draw_below(row, c, _SIDES))
+        return paths.turn_towards(row, direction, target, c)
     way = paths.find_way(row, mover, target, op == Op.GO_NEXT_TO)
     if way == NO_PATH:
         return STILL
     if way == direction:
         return np.int64(Body.FORWARD)
-    return paths.turn_towards(direction, way, draw_below(row, c, _SIDES))
+    return paths.turn_towards(row, direction, way, c)
 
 
 def _run(

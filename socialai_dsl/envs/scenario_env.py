@@ -23,6 +23,7 @@ Observation = dict[str, NDArray[Any]]
 
 SILENCE = "NA"
 _HEARD = int(Register.HEARD)  # members of an enumeration are slow indices
+_INT64 = np.dtype(np.int64)
 
 
 class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
@@ -51,12 +52,14 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self.action_space = self._table.merged.action_space()
         self._suite = isinstance(program, ProgramSuite)
         self._acts = isinstance(program, ProgramSuite) and program.in_sequence
-        # One row of each array, so that a step makes no views.
-        self._image, self._tokens = self._table.image[0], self._table.tokens[0]
+        # What a step needs of one row, looked up once: asking an array takes longer than the engine takes for a step.
+        ports = self._table.batch.ports
+        self._copy_image, self._copy_tokens = self._table.image[0].copy, self._table.tokens[0].copy
         self._registers = self._table.state.registers[0]
-        self._action = self._table.batch.ports.actions[0]
-        self._reward = self._table.batch.ports.reward
-        self._success = self._table.batch.ports.success
+        self._numbers = self._registers.data
+        self._action = ports.actions[0].data.cast("B")
+        self._reward, self._success = ports.reward.data, ports.success.data
+        self._play = self._table.stepper(Task.STEP_ONLY)
         self._history = ""
         self._ended = True
         self._playing = self._table.program(0)
@@ -75,6 +78,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         """
         super().reset(seed=seed)
         self._table.reset(seed, options)
+        self._play = self._table.stepper(Task.STEP_ONLY)
         self._ended = False
         self._history = "\n".join(self._table.history(0))
         if self.render_mode == "human":
@@ -90,34 +94,36 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         if self._ended:
             raise ValueError("step: got a call outside of an episode; expected reset() first")
         given = action if isinstance(action, np.ndarray) else np.asarray(action)
-        if given.shape != (4,) or given.dtype.kind not in "iu":
-            raise self._refusal(action)
-        self._action[:] = given
-        ended = self._table.play(Task.STEP_ONLY)
-        if ended == BAD_ACTION:
-            raise self._refusal(action)
-        self._recording.actions.append(self._action.tobytes())
+        if given.shape != (4,) or given.dtype is not _INT64:
+            given = self._converted(action, given)
+        self._action[:] = words = given.tobytes()
+        ended = self._play()
+        if ended < 0:
+            raise self._table.batch.refused_room() if ended != BAD_ACTION else self._refusal(action)
+        self._recording.actions.append(words)
         if self._acts:  # another one may have begun
             self._turn_over()
             self._look_up()
             self._history = "\n".join(self._table.history(0))
-        info: dict[str, Any] = {"utterance": SILENCE, "history": self._history, **self._always}
-        if self._registers.item(_HEARD):
+        info: dict[str, Any] = {"utterance": SILENCE, "history": self._history}
+        if self._always:
+            info |= self._always
+        if self._numbers[_HEARD]:
             self._history = "\n".join(self._table.history(0))
             info |= {"utterance": "\n".join(self._table.heard(0)), "history": self._history}
         terminated = truncated = False
         if ended:
             self._ended = True
-            truncated = self._registers.item(Register.ENDED) == TRUNCATED
+            truncated = self._numbers[Register.ENDED] == TRUNCATED
             terminated = not truncated
-            outcome = self._registers.item(Register.OUTCOME)
+            outcome = self._numbers[Register.OUTCOME]
             info |= {
-                "success": self._success.item(0),
+                "success": self._success[0],
                 "outcome": self._playing.outcomes[outcome],
             }
         if self.render_mode == "human":
             self.render()
-        return self._observation(), self._reward.item(), terminated, truncated, info
+        return self._observation(), self._reward[0], terminated, truncated, info
 
     def _record(self) -> None:
         """Remember from here on what is done."""
@@ -135,11 +141,17 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._playing = self._table.program(0)
         self._always = {"member": self._table.member(0)} if self._suite else {}
 
+    def _converted(self, action: Any, given: NDArray[Any]) -> NDArray[np.int64]:
+        """Four whole numbers of another type. Raises ValueError for anything else."""
+        if given.shape != (4,) or given.dtype.kind not in "iu":
+            raise self._refusal(action)
+        return given.astype(np.int64)
+
     def _refusal(self, action: Any) -> ValueError:
         return ValueError(f"step: got the action {action!r}; expected one of {self.action_space}")
 
     def _observation(self) -> Observation:
-        return {"image": self._image.copy(), "tokens": self._tokens.copy()}
+        return {"image": self._copy_image(), "tokens": self._copy_tokens()}
 
     def encode_action(self, action: Sequence[Any]) -> NDArray[np.int64]:
         """The action of the space for the paper's notation or words: see `actions.encode_action`."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -116,6 +117,10 @@ class Table:
                 f"step: got the action {given[row].tolist()} in row {row}; expected one of {space}"
             )
         return ended
+
+    def stepper(self, task: Task) -> Callable[[], int]:
+        """What does a step of all rows with the actions in the ports: see `Batch.stepper`."""
+        return partial(self.play, task) if self._starts else self.batch.stepper(task)
 
     def play(self, task: Task, actions: NDArray[np.integer[Any]] | None = None) -> int:
         """`Batch.step`, after which episodes that begin are where their members begin."""

@@ -27,6 +27,33 @@ def test_every_cell_of_every_pose(width: int, height: int) -> None:
         assert table[y, x, direction, i, j] == (seen[1] * width + seen[0] if inside else width * height)
 
 
+@pytest.mark.parametrize("canvas", [(5, 9), (8, 8), (9, 9), (10, 10), (16, 8), (13, 10), (30, 30)])
+@pytest.mark.parametrize("occlusion", [False, True], ids=["clear", "in the dark"])
+def test_the_picture_is_that_part_of_the_board(canvas: tuple[int, int], occlusion: bool) -> None:
+    """In every pose, for boards that are gathered by vectors and for larger ones."""
+    width, height = canvas
+    room = Assembly(size=canvas, canvas=canvas, flags=int(Flag.OCCLUSION) if occlusion else 0)
+    poses = [
+        (x, y, direction) for y in range(1, height - 1) for x in range(1, width - 1) for direction in range(4)
+    ]
+    batch = batch_of(room.program(), len(poses))
+    rng = np.random.default_rng(0)
+    cells = width * height + 1
+    batch.state.boards[:, :cells] = rng.integers(0, 1 << 32, (len(poses), cells))
+    own = [entity_register(0, name) for name in (Field.X, Field.Y, Field.DIR)]
+    batch.state.registers[:, own] = poses
+    step(batch)
+    views = view_table(width, height).reshape(height, width, 4, 49)
+    x, y, direction = np.array(poses).T
+    expected = np.take_along_axis(
+        batch.state.boards[:, :cells], views[y, x, direction].astype(np.intp), axis=1
+    )
+    if occlusion:  # of a bare room what is beyond the walls is dark
+        expected[views[y, x, direction] == cells - 1] = 0
+    expected[:, 3 * 7 + 6] = pack_cell(1)
+    np.testing.assert_array_equal(batch.state.image, expected)
+
+
 def test_what_is_seen() -> None:
     # The agent looks right from (1, 2); a door of colour 2 ahead in the right wall, an NPC to its left.
     colour = [

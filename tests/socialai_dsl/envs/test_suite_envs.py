@@ -90,7 +90,7 @@ def test_a_member_plays_as_it_does_alone(variant: str) -> None:
                 singles[i].reset(seed=1, options={"index": i})
                 for _ in range(episode[i]):
                     singles[i].reset()
-                assert np.array_equal(observation["image"][i], singles[i]._image)
+                assert np.array_equal(observation["image"][i], singles[i]._observation()["image"])
         before = envs.members()
         observation, reward, terminated, truncated, infos = envs.step(step)
         for i, env in enumerate(singles):

@@ -1,0 +1,55 @@
+"""As many numbers as there are, read or written in one vector whose other lanes are left alone."""
+
+from typing import Any, Final
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.typing.templates import signature
+from numba.extending import intrinsic
+
+from socialai_dsl.engine.vectors import WORD, counted, in_all, place
+from socialai_dsl.program import VIEW
+
+_ROW: Final = (1 << VIEW) - 1
+
+
+def _load(builder: Any, pointer: Any, index: Any, chosen: Any, otherwise: Any) -> Any:
+    """Some numbers of a row; in lanes that are not chosen other ones, and no memory is read there."""
+    kind = otherwise.type
+    name = f"llvm.masked.load.v{kind.count}i{kind.element.width}.p0"
+    function = ir.FunctionType(kind, [kind.as_pointer(), WORD, chosen.type, kind])
+    load = cgutils.get_or_insert_function(builder.module, function, name)
+    at = place(builder, pointer, index, kind)
+    return builder.call(load, [at, WORD(kind.element.width // 8), chosen, otherwise])
+
+
+@intrinsic
+def opaque_rows(context: Any, board: Any, first: Any, height: Any, top: Any, beyond: Any, left: Any) -> Any:
+    """The cells of the rows of a square as large as a view that one cannot look through, a byte for each row.
+
+    Row 0 of the room is number `first` of the board, bit x of a row is column x, and (left, top) is the corner of the
+    square. What is off the canvas is opaque: rows from `height` on, columns whose bit in `beyond` is set, and whatever
+    is above or to the left.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        board, first, height, top, beyond, left = arguments
+        wide = ir.IntType(64)
+        rows, narrow = ir.VectorType(wide, VIEW + 1), ir.VectorType(WORD, VIEW + 1)
+
+        def each(number: Any) -> Any:
+            return in_all(builder, number, rows)
+
+        numbers = builder.add(each(top), counted(rows))
+        inside = builder.icmp_unsigned("<", numbers, each(height))
+        inside = builder.and_(inside, ir.Constant(inside.type, [1] * VIEW + [0]))
+        opaque = ir.Constant(narrow, [-1] * (VIEW + 1))
+        lines = builder.zext(_load(builder, board, builder.add(first, top), inside, opaque), rows)
+        lines = builder.shl(builder.or_(lines, each(beyond)), each(wide(VIEW)))
+        lines = builder.or_(lines, each(wide(_ROW)))
+        lines = builder.lshr(lines, each(builder.add(left, wide(VIEW))))
+        lines = builder.and_(lines, ir.Constant(rows, [_ROW] * VIEW + [0]))
+        return builder.bitcast(builder.trunc(lines, ir.VectorType(ir.IntType(8), VIEW + 1)), wide)
+
+    return signature(types.uint64, board, *(types.intp,) * 5), generate
