@@ -98,7 +98,8 @@ class Table:
         layout = given.get("layout")
         for row in np.flatnonzero(chosen & (rows != 0)).tolist():
             self.state.keys[row, Key.SPOILED] = self._is_spoiled(layout, row)
-        self._begin(chosen & (rows == 0))
+        if self._starts:
+            self._begin(chosen & (rows == 0))
 
     def step(self, task: Task, actions: Any) -> int:
         """Step all rows, int64 (E, 4); how many episodes ended. Raises ValueError for a bad action."""
