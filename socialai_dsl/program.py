@@ -89,7 +89,7 @@ class Header(IntEnum):
     CLASS_AT = 28  # (TEMPLATES, NOUNS) -> utterance class, never 0
     ENTITY_AT = 29  # (ENTITIES, ENTITY_COLUMNS), see EntityColumn
     TYPE_AT = 30  # (rows, TYPE_COLUMNS): one row for each (type, status), see TypeColumn
-    ROOM_AT = 31  # (templates, room_words): packed cells (the last is OUTSIDE), solid, floor and opaque rows
+    ROOM_AT = 31  # (templates, room_words): packed cells (the last is OUTSIDE), rows of bits, columns of bits
     FRAME_AT = 32  # (FRAMES, FRAME_COLUMNS), see FrameColumn
     STATE_AT = 33  # (states, 1 + 2 * (C + 1)): activity pc, `first` pc by class, `then` pc by class
     OUTCOME_AT = 34  # (C, 8) pc by utterance class and Body
@@ -247,8 +247,11 @@ MOST_CHOICES = 7
 
 
 def room_words(width: int, height: int) -> int:
-    """Words of one room template on a canvas: its cells, one cell off the canvas, and three rows of bits a line."""
-    return width * height + 1 + 3 * height
+    """Words of one room template on a canvas: its cells, one cell off the canvas, rows and columns of bits.
+
+    For each line which cells are solid, then which are floor, then which are opaque; for each column which are opaque.
+    """
+    return width * height + 1 + 3 * height + width
 
 
 class LineColumn(IntEnum):

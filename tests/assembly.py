@@ -307,7 +307,8 @@ class Assembly:
                     solid[y] |= 1 << x
                 else:
                     floor[y] |= 1 << x
-        return [*cells, pack_cell(WALL, 5), *solid, *floor, *opaque]
+        columns = [sum((line >> x & 1) << y for y, line in enumerate(opaque)) for x in range(width)]
+        return [*cells, pack_cell(WALL, 5), *solid, *floor, *opaque, *columns]
 
     def _frames(self, registers: int, inbox: int) -> list[int]:
         rows: list[int] = []

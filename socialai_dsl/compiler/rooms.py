@@ -39,7 +39,8 @@ def _template(room: RoomPlan, width: int, height: int) -> list[int]:
     for kind, region, _span in room.build:
         for x, y in interior_cells(region, (width, height)):
             _build(kind, x, y, cells, solid, floor, opaque)
-    return [*(cell for row in cells for cell in row), WALL, *solid, *floor, *opaque]
+    columns_too = [sum((row >> x & 1) << y for y, row in enumerate(opaque)) for x in range(columns)]
+    return [*(cell for row in cells for cell in row), WALL, *solid, *floor, *opaque, *columns_too]
 
 
 def _build(

@@ -264,10 +264,10 @@ class Batch:
 
 def _board_words(header: NDArray[np.int32]) -> int:
     """Words of a program's board, which is read in whole vectors where its canvas is small."""
-    height = int(header[Header.CANVAS_HEIGHT])
-    cells = int(header[Header.CANVAS_WIDTH]) * height
+    width, height = int(header[Header.CANVAS_WIDTH]), int(header[Header.CANVAS_HEIGHT])
+    cells = width * height
     read = next((canvas for canvas in (SMALL_CANVAS, MEDIUM_CANVAS) if cells <= canvas), cells)
-    return max(cells + 1 + 2 * height, read + 1)
+    return max(cells + 1 + 2 * height + width, read + 1)
 
 
 def _cut(rows: int, threads: int) -> list[tuple[int, int]]:

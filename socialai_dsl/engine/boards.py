@@ -4,7 +4,7 @@ import numpy as np
 
 from socialai_dsl.engine.entities import column, field, is_at, is_present
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.state import Row
+from socialai_dsl.engine.state import ZERO, Row
 from socialai_dsl.program import (
     EntityColumn,
     Field,
@@ -28,6 +28,12 @@ def opaque_line(row: Row, y: int) -> int:
 
 
 @inline
+def opaque_column(row: Row, x: int) -> int:
+    """Where the cells of a column of the room that one cannot look through are in the board."""
+    return opaque_line(row, row.program[Header.CANVAS_HEIGHT]) + x
+
+
+@inline
 def _set_bit(row: Row, line: int, x: int, value: bool) -> None:
     """Write one bit of a word of the board."""
     bit = np.int64(1) << x
@@ -35,6 +41,13 @@ def _set_bit(row: Row, line: int, x: int, value: bool) -> None:
         row.board[line] = row.board[line] | bit
     else:
         row.board[line] = row.board[line] & ~bit
+
+
+@inline
+def _set_opaque(row: Row, x: int, y: int, value: bool) -> None:
+    """Note whether one cannot look through a cell."""
+    _set_bit(row, opaque_line(row, y), x, value)
+    _set_bit(row, opaque_column(row, x), y, value)
 
 
 @inline
@@ -75,14 +88,16 @@ def room_table(row: Row) -> int:
     """Offset of the template of this room."""
     width = row.program[Header.CANVAS_WIDTH]
     height = row.program[Header.CANVAS_HEIGHT]
-    return row.program[Header.ROOM_AT] + row.registers[Register.ROOM] * (width * height + 1 + 3 * height)
+    return row.program[Header.ROOM_AT] + row.registers[Register.ROOM] * (
+        width * height + 1 + 3 * height + width
+    )
 
 
 @inline
-def _built_opaque_line(row: Row, y: int) -> int:
-    """The cells of a line of the bare room that one cannot look through, bit x for column x."""
+def _built_opaque(row: Row) -> int:
+    """Where the cells of the bare room that one cannot look through are: a word for each line, then for each column."""
     height = row.program[Header.CANVAS_HEIGHT]
-    return row.program[room_table(row) + row.program[Header.CANVAS_WIDTH] * height + 1 + 2 * height + y]
+    return room_table(row) + row.program[Header.CANVAS_WIDTH] * height + 1 + 2 * height
 
 
 @inline
@@ -137,17 +152,17 @@ def _hides(row: Row, entity: int) -> bool:
 @inline
 def note_opaque(row: Row) -> None:
     """Note where one cannot look through in the whole room."""
-    for y in range(row.program[Header.CANVAS_HEIGHT]):
-        row.board[opaque_line(row, y)] = _built_opaque_line(row, y)
+    built = _built_opaque(row)
+    lines = opaque_line(row, ZERO)
+    for i in range(row.program[Header.CANVAS_HEIGHT] + row.program[Header.CANVAS_WIDTH]):
+        row.board[lines + i] = row.program[built + i]
     first = row.program[Header.NPCS] + 1
     for entity in range(first, row.program[Header.ENTITIES]):  # what is furnished is not as it was built
         if is_present(row, entity):
-            line = opaque_line(row, field(row, entity, Field.Y))
-            _set_bit(row, line, field(row, entity, Field.X), np.bool_(False))
+            _set_opaque(row, field(row, entity, Field.X), field(row, entity, Field.Y), np.bool_(False))
     for entity in range(first, row.program[Header.ENTITIES]):
         if is_present(row, entity) and _hides(row, entity):
-            line = opaque_line(row, field(row, entity, Field.Y))
-            _set_bit(row, line, field(row, entity, Field.X), np.bool_(True))
+            _set_opaque(row, field(row, entity, Field.X), field(row, entity, Field.Y), np.bool_(True))
 
 
 @outline
@@ -166,7 +181,7 @@ def draw_cell(row: Row, x: int, y: int) -> None:
     row.board[cell] = row.program[table + cell]
     npcs = row.program[Header.NPCS]
     solid = (row.program[table + width * height + 1 + y] >> x) & 1
-    opaque = (_built_opaque_line(row, y) >> x) & 1
+    opaque = (row.program[_built_opaque(row) + y] >> x) & 1
     furnished = 0
     for entity in range(npcs + 1, row.program[Header.ENTITIES]):
         if is_at(row, entity, x, y):
@@ -175,7 +190,7 @@ def draw_cell(row: Row, x: int, y: int) -> None:
             opaque = (opaque & furnished) | np.int64(_hides(row, entity))
             furnished = 1
     _set_bit(row, solid_line(row, y), x, solid == 1)
-    _set_bit(row, opaque_line(row, y), x, opaque == 1)
+    _set_opaque(row, x, y, opaque == 1)
     if npcs_are_hidden(row):
         return
     for entity in range(1, npcs + 1):

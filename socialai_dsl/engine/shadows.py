@@ -42,10 +42,6 @@ def _spread() -> NDArray[np.uint64]:
 
 _ONWARD = _onward()
 _SPREAD = _spread()
-# Masks of the three rounds in which a matrix of 8 x 8 bits is transposed: blocks of 1, 2 and 4 bits change places.
-_ONES = np.uint64(0x00AA00AA00AA00AA)
-_TWOS = np.uint64(0x0000CCCC0000CCCC)
-_FOURS = np.uint64(0x00000000F0F0F0F0)
 _BYTES = np.uint64(0x00FF00FF00FF00FF)
 _PAIRS = np.uint64(0x0000FFFF0000FFFF)
 
@@ -161,24 +157,28 @@ def _opaque_in_view(row: Row, x: int, y: int, direction: int) -> np.uint64:
 
     Nothing branches: where somebody stands and looks is as good as random. Off the canvas is opaque.
     """
+    height = row.program[Header.CANVAS_HEIGHT]
     top = y - _HALF * (1 - step_y(direction))
     left = x - _HALF * (1 - step_x(direction))
-    beyond = np.int64(-1) << row.program[Header.CANVAS_WIDTH]
-    opaque = _opaque_rows(row, top, beyond, left)
-    opaque = _chosen(direction & 1, opaque, _transposed(opaque))
-    return _chosen(direction >> 1, _swapped(opaque), opaque)  # from rows of the room to rows ahead
+    # Rows of the view are rows of the room for who looks down or up, else its columns, which lie behind its rows.
+    along = ~(direction & 1) & 1
+    turned = (top ^ left) & -along
+    wider = (row.program[Header.CANVAS_WIDTH] ^ height) & -along
+    first = opaque_line(row, ZERO) + along * height
+    beyond = np.int64(-1) << (row.program[Header.CANVAS_WIDTH] ^ wider)
+    opaque = _opaque_lines(row, first, height ^ wider, top ^ turned, beyond, left ^ turned)
+    return _chosen(direction >> 1, _swapped(opaque), opaque)  # from lines of the room to rows ahead
 
 
 @inline
-def _opaque_rows(row: Row, top: int, beyond: int, left: int) -> np.uint64:
-    """The rows of the room that such a view has: see `masked.opaque_rows`."""
-    height = row.program[Header.CANVAS_HEIGHT]
+def _opaque_lines(row: Row, first: int, lines: int, top: int, beyond: int, left: int) -> np.uint64:
+    """The lines of the room that such a view has: see `masked.opaque_rows`."""
     if WIDE:
-        return opaque_rows(row.board, opaque_line(row, ZERO), height, top, beyond, left)
+        return opaque_rows(row.board, first, lines, top, beyond, left)
     opaque = np.uint64(0)
     for r in range(VIEW):
-        inside = np.int64(top + r >= 0) & np.int64(top + r < height)
-        line = row.board[opaque_line(row, (top + r) * inside)] | beyond | (inside - 1)
+        inside = np.int64(top + r >= 0) & np.int64(top + r < lines)
+        line = row.board[first + (top + r) * inside] | beyond | (inside - 1)
         opaque |= np.uint64((((line << VIEW) | _ROW) >> (left + VIEW)) & _ROW) << np.uint64(8 * r)
     return opaque
 
@@ -187,17 +187,6 @@ def _opaque_rows(row: Row, top: int, beyond: int, left: int) -> np.uint64:
 def _chosen(which: int, if_one: np.uint64, if_zero: np.uint64) -> np.uint64:
     """One of two words by a bit, without a branch."""
     return if_zero ^ ((if_zero ^ if_one) & (np.uint64(0) - np.uint64(which)))
-
-
-@inline
-def _transposed(bits: np.uint64) -> np.uint64:
-    """A matrix of 8 x 8 bits, a byte for each row, with rows and columns exchanged."""
-    change = (bits ^ (bits >> np.uint64(7))) & _ONES
-    bits = bits ^ change ^ (change << np.uint64(7))
-    change = (bits ^ (bits >> np.uint64(14))) & _TWOS
-    bits = bits ^ change ^ (change << np.uint64(14))
-    change = (bits ^ (bits >> np.uint64(28))) & _FOURS
-    return bits ^ change ^ (change << np.uint64(28))
 
 
 @inline

@@ -142,7 +142,7 @@ class State(NamedTuple):
     registers: NDArray[np.int16]  # (E, R)
     boards: NDArray[
         np.uint32
-    ]  # (E, H * W + 1 + 2 * H or more) cells as seen, the last is off the canvas; then solid rows, then opaque ones
+    ]  # (E, H * W + 1 + 2 * H + W or more) cells as seen, the last off the canvas; solid, opaque rows; opaque columns
     keys: NDArray[np.uint64]  # (E, Key.WORDS)
     tokens: NDArray[np.int16]  # (E, L)
     image: NDArray[

@@ -35,3 +35,4 @@ def test_what_is_solid_and_what_is_opaque(tmp_path: Path) -> None:
     assert solid == rows("###### #.#.## #...## #.#.## ###### ######")
     assert floor == rows("...... .#.#.. ...... .#.#.. ...... ......")
     assert opaque == rows("#####. #.#.#. #...#. #.#.#. #####. ......")
+    assert smallest[-width:] == opaque, "by columns this room is the same"

@@ -124,7 +124,9 @@ def test_what_is_built_is_looked_through_where_its_template_says_so(opaque: bool
     rules = [(Op.IF_UNOBSTRUCTED, constant(0), constant(1), 1), (Op.LOAD, own, constant(1))]
     program = Assembly(at=((1, 2), (3, 2)), npcs=1, rules=rules).program()
     width, height = program.header(Header.CANVAS_WIDTH), program.header(Header.CANVAS_HEIGHT)
-    program.words[program.header(Header.ROOM_AT) + room_words(width, height) - height + 2] |= opaque << 2
+    program.words[program.header(Header.ROOM_AT) + room_words(width, height) - width - height + 2] |= (
+        opaque << 2
+    )
     batch = batch_of(program)
     step(batch)
     assert batch.state.registers[0, own] == (not opaque)
