@@ -11,7 +11,7 @@ from numba.extending import intrinsic
 from socialai_dsl.engine.vectors import WORD, counted, in_all, place
 from socialai_dsl.program import VIEW
 
-_ROW: Final = (1 << VIEW) - 1
+_LINE: Final = (1 << VIEW) - 1
 
 
 def _load(builder: Any, pointer: Any, index: Any, chosen: Any, otherwise: Any) -> Any:
@@ -25,31 +25,31 @@ def _load(builder: Any, pointer: Any, index: Any, chosen: Any, otherwise: Any) -
 
 
 @intrinsic
-def opaque_rows(context: Any, board: Any, first: Any, height: Any, top: Any, beyond: Any, left: Any) -> Any:
-    """The cells of the rows of a square as large as a view that one cannot look through, a byte for each row.
+def opaque_lines(context: Any, board: Any, first: Any, lines: Any, top: Any, beyond: Any, left: Any) -> Any:
+    """The cells of a square as large as a view that one cannot look through, a byte for each of its lines.
 
-    Row 0 of the room is number `first` of the board, bit x of a row is column x, and (left, top) is the corner of the
-    square. What is off the canvas is opaque: rows from `height` on, columns whose bit in `beyond` is set, and whatever
-    is above or to the left.
+    Line 0 of the room is number `first` of the board, bit k of a line its cell k, and the square begins at cell `left`
+    of line `top`. What is off the canvas is opaque: lines from `lines` on, cells whose bit in `beyond` is set, and
+    whatever comes before.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        board, first, height, top, beyond, left = arguments
+        board, first, lines, top, beyond, left = arguments
         wide = ir.IntType(64)
-        rows, narrow = ir.VectorType(wide, VIEW + 1), ir.VectorType(WORD, VIEW + 1)
+        bits, words = ir.VectorType(wide, VIEW + 1), ir.VectorType(WORD, VIEW + 1)
 
         def each(number: Any) -> Any:
-            return in_all(builder, number, rows)
+            return in_all(builder, number, bits)
 
-        numbers = builder.add(each(top), counted(rows))
-        inside = builder.icmp_unsigned("<", numbers, each(height))
+        numbers = builder.add(each(top), counted(bits))
+        inside = builder.icmp_unsigned("<", numbers, each(lines))
         inside = builder.and_(inside, ir.Constant(inside.type, [1] * VIEW + [0]))
-        opaque = ir.Constant(narrow, [-1] * (VIEW + 1))
-        lines = builder.zext(_load(builder, board, builder.add(first, top), inside, opaque), rows)
-        lines = builder.shl(builder.or_(lines, each(beyond)), each(wide(VIEW)))
-        lines = builder.or_(lines, each(wide(_ROW)))
-        lines = builder.lshr(lines, each(builder.add(left, wide(VIEW))))
-        lines = builder.and_(lines, ir.Constant(rows, [_ROW] * VIEW + [0]))
-        return builder.bitcast(builder.trunc(lines, ir.VectorType(ir.IntType(8), VIEW + 1)), wide)
+        opaque = ir.Constant(words, [-1] * (VIEW + 1))
+        cells = builder.zext(_load(builder, board, builder.add(first, top), inside, opaque), bits)
+        cells = builder.shl(builder.or_(cells, each(beyond)), each(wide(VIEW)))
+        cells = builder.or_(cells, each(wide(_LINE)))
+        cells = builder.lshr(cells, each(builder.add(left, wide(VIEW))))
+        cells = builder.and_(cells, ir.Constant(bits, [_LINE] * VIEW + [0]))
+        return builder.bitcast(builder.trunc(cells, ir.VectorType(ir.IntType(8), VIEW + 1)), wide)
 
     return signature(types.uint64, board, *(types.intp,) * 5), generate

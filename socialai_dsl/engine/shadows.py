@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from socialai_dsl.engine.boards import is_opaque, note_opaque, opaque_line
 from socialai_dsl.engine.entities import step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.masked import opaque_rows
+from socialai_dsl.engine.masked import opaque_lines
 from socialai_dsl.engine.state import ONE, RESETTING, ZERO, Row
 from socialai_dsl.engine.vectors import WIDE
 from socialai_dsl.program import VIEW, Header, Register
@@ -172,9 +172,9 @@ def _opaque_in_view(row: Row, x: int, y: int, direction: int) -> np.uint64:
 
 @inline
 def _opaque_lines(row: Row, first: int, lines: int, top: int, beyond: int, left: int) -> np.uint64:
-    """The lines of the room that such a view has: see `masked.opaque_rows`."""
+    """The lines of the room that such a view has: see `masked.opaque_lines`."""
     if WIDE:
-        return opaque_rows(row.board, first, lines, top, beyond, left)
+        return opaque_lines(row.board, first, lines, top, beyond, left)
     opaque = np.uint64(0)
     for r in range(VIEW):
         inside = np.int64(top + r >= 0) & np.int64(top + r < lines)

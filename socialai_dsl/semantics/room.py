@@ -20,8 +20,9 @@ from socialai_dsl.source import Span
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
 
-SMALLEST, LARGEST = 3, 64
-MAX_CELLS = 1024
+SMALLEST, LARGEST = 3, 30
+"""Cells each way: a line of a room and its neighbours are one word of 32 bits."""
+
 _ASSUMED = (5, 8)
 """Sizes to go on with after a mistake in them."""
 
@@ -82,9 +83,9 @@ def room_plan(resolver: Resolver) -> RoomPlan:
     if canvas[0] < width or canvas[1] < height:
         message = f"the canvas of {canvas[0]}x{canvas[1]} is smaller than the largest room, {width}x{height}"
         findings.error("S106", message, findings.at(("room", "canvas")))
-    if canvas[0] * canvas[1] > MAX_CELLS:
-        message = f"a canvas has at most {MAX_CELLS} cells, this one {canvas[0] * canvas[1]}"
-        findings.error("S106", message, findings.places.key_span(("room",)))
+    if max(canvas) > LARGEST:
+        message = f"a canvas has at most {LARGEST} cells each way, this one {canvas[0]}x{canvas[1]}"
+        findings.error("S106", message, findings.at(("room", "canvas")))
     return RoomPlan(symbols.width, symbols.height, canvas, tuple(_built(resolver)), room.occlusion)
 
 

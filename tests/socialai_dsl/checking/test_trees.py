@@ -115,7 +115,7 @@ def test_variants_are_passed_on_to_leaves() -> None:
         ),
         (
             "tree: {scenario: lesson, size: {small: {set: {room.size: 2}}}}",
-            ["2:58: S106 a room has 3 to 64 cells each way, walls included; 2..2 given"],
+            ["2:58: S106 a room has 3 to 30 cells each way, walls included; 2..2 given"],
         ),
         (
             "tree: {a: {x: {scenario: lesson}}, b: {y: {scenario: errands}}}",

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import socialai_dsl as sd
-from socialai_dsl.program import Header, room_words
+from socialai_dsl.program import MAX_SIDE, Header, room_words
+from socialai_dsl.semantics.room import LARGEST
 
 BUILT = """
 scenario: built
@@ -35,4 +36,10 @@ def test_what_is_solid_and_what_is_opaque(tmp_path: Path) -> None:
     assert solid == rows("###### #.#.## #...## #.#.## ###### ######")
     assert floor == rows("...... .#.#.. ...... .#.#.. ...... ......")
     assert opaque == rows("#####. #.#.#. #...#. #.#.#. #####. ......")
-    assert smallest[-width:] == opaque, "by columns this room is the same"
+    assert smallest[-width:] == rows("#####. #...#. ##.##. #...#. #####. ......"), "by columns"
+
+
+def test_the_largest_room_that_is_accepted_can_be_compiled(tmp_path: Path) -> None:
+    path = tmp_path / "built.yaml"
+    path.write_text(BUILT.replace("size: 5..6", f"size: {LARGEST}"), encoding="utf-8")
+    assert sd.compile(sd.load(path)).header(Header.CANVAS_WIDTH) == LARGEST == MAX_SIDE
