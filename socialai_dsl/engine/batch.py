@@ -169,7 +169,7 @@ class Batch:
     def stepper(self, task: Task) -> Callable[[], int]:
         """What does `step(task)`, for a batch that no threads share, without anything between Python and the engine.
 
-        It may be called until the next `reset`. Below BAD_ACTION means that a room was refused (`refused_room`).
+        Below BAD_ACTION means that a room was refused (`refused_room`).
         """
         assert len(self._cuts) == 1, "internal: threads share this batch"
         return self._tasks[task].own
@@ -198,7 +198,7 @@ class Batch:
         if pins is not None or len(self.ports.pins) > 1:
             registers = self.state.registers.shape[1]
             self.ports = self.ports._replace(pins=no_pins(registers) if pins is None else pins)
-            self._open_book()
+            replace_in(self._book, Book.PINS, self.ports.pins)  # so that prepared calls stay valid
         self._share(self._tasks[Task.RESET])
 
     def script(self) -> None:

@@ -22,7 +22,8 @@ def make_book(arrays: Sequence[NDArray[Any]]) -> Any:
 
 
 def replace_in(book: Any, which: int, array: NDArray[Any]) -> Any:
-    """Put an array where one of the same type and shape was; what `put_back` takes to undo it."""
+    """Put an array where one of the same type and width was; what `put_back` takes to undo it."""
+    assert array.flags.c_contiguous, "internal: arrays of a book are contiguous"
     place, entry = (which, array) if isinstance(book, list) else (2 * which, array.ctypes.data)
     before, book[place] = book[place], entry
     return place, before

@@ -96,12 +96,13 @@ def _quadrants() -> NDArray[np.uint8]:
 
 
 _QUADRANTS = _quadrants()
+_NEITHER = 13
 
 
 @inline
-def _sign(number: int) -> int:
-    """0, 1 or 2: negative, nothing, positive."""
-    return np.int64(number > 0) - np.int64(number < 0) + 1
+def sign(number: int) -> int:
+    """-1, 0 or 1."""
+    return np.int64(number > 0) - np.int64(number < 0)
 
 
 @inline
@@ -110,7 +111,7 @@ def quadrant(dx: int, dy: int) -> int:
 
     Looked up, because branches that go one way as often as the other cost most.
     """
-    return np.int64(_QUADRANTS[9 * _sign(dx) + 3 * _sign(dy) + _sign(abs(dx) - abs(dy))])
+    return np.int64(_QUADRANTS[9 * sign(dx) + 3 * sign(dy) + sign(abs(dx) - abs(dy)) + _NEITHER])
 
 
 @inline

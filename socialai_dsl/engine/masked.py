@@ -1,4 +1,4 @@
-"""As many numbers as there are, read or written in one vector whose other lanes are left alone."""
+"""As many numbers as there are, read in one vector whose other lanes are left alone."""
 
 from typing import Any, Final
 

@@ -67,7 +67,7 @@ def take_picture(row: Row, link: int, book: Any, number: int) -> None:
     else:
         lit = _EVERYWHERE
         if flags & Flag.OCCLUSION:
-            lit = _light_on(row, x, y, field(row, AGENT, Field.DIR))
+            lit = lit_cells(row, x, y, field(row, AGENT, Field.DIR))
         pose = (y * row.program[Header.CANVAS_WIDTH] + x) * 4 + field(row, AGENT, Field.DIR)
         _gather(row, (row.program[link + Link.VIEWS] + pose) * CELLS, lit)
     if flags & (Flag.EGOCENTRIC | Trait.GESTURES):
@@ -89,13 +89,6 @@ def _gather(row: Row, view: int, lit: np.uint64) -> None:
             for i in range(CELLS):
                 row.image[i] &= np.int64(-((lit >> np.uint64(i)) & np.uint64(1)))
         row.image[OWN_PLACE] = OWN_LOOK
-
-
-@outline
-def _light_on(row: Row, x: int, y: int, direction: int) -> np.uint64:
-    """The cells of the picture that light reaches the agent from."""
-    stay_outline()
-    return lit_cells(row, x, y, direction)
 
 
 @inline

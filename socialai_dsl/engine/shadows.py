@@ -120,12 +120,13 @@ def _is_lit_in_picture(row: Row, x: int, y: int, direction: int, ahead: int, rig
     return (reached >> place) & 1 == 1
 
 
-@inline
+@outline
 def lit_cells(row: Row, x: int, y: int, direction: int) -> np.uint64:
     """The cells of the agent's picture that light reaches it from: bit 7 i + j for image[i, j].
 
     The same as `light_next` row by row, with the whole view in one word. The room must be drawn.
     """
+    stay_outline()
     opaque = _opaque_in_view(row, x, y, direction)
     mirrored = _is_mirrored(direction) << VIEW
     reached = ONE << _HALF
@@ -161,10 +162,10 @@ def _opaque_in_view(row: Row, x: int, y: int, direction: int) -> np.uint64:
     top = y - _HALF * (1 - step_y(direction))
     left = x - _HALF * (1 - step_x(direction))
     # Rows of the view are rows of the room for who looks down or up, else its columns, which lie behind its rows.
-    along = ~(direction & 1) & 1
+    along = 1 - (direction & 1)
     turned = (top ^ left) & -along
     wider = (row.program[Header.CANVAS_WIDTH] ^ height) & -along
-    first = opaque_line(row, ZERO) + along * height
+    first = opaque_line(row, along * height)
     beyond = np.int64(-1) << (row.program[Header.CANVAS_WIDTH] ^ wider)
     opaque = _opaque_lines(row, first, height ^ wider, top ^ turned, beyond, left ^ turned)
     return _chosen(direction >> 1, _swapped(opaque), opaque)  # from lines of the room to rows ahead

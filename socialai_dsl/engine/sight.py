@@ -3,7 +3,7 @@
 import numpy as np
 
 from socialai_dsl.engine.boards import is_opaque
-from socialai_dsl.engine.entities import column, step_x, step_y
+from socialai_dsl.engine.entities import column, sign, step_x, step_y
 from socialai_dsl.engine.jit import outline, stay_outline
 from socialai_dsl.engine.shadows import is_lit, look_around
 from socialai_dsl.engine.state import NO_CELL, Row
@@ -40,8 +40,8 @@ def is_unobstructed(row: Row, x: int, y: int, dx: int, dy: int) -> bool:
     """Whether nothing opaque lies strictly between (x, y) and the cell dx, dy away in its row or column."""
     stay_outline()
     look_around(row)
-    step_right = np.int64(dx > 0) - np.int64(dx < 0)
-    step_down = np.int64(dy > 0) - np.int64(dy < 0)
+    step_right = sign(dx)
+    step_down = sign(dy)
     for _ in range(abs(dx) + abs(dy) - 1):
         x += step_right
         y += step_down

@@ -78,7 +78,6 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         """
         super().reset(seed=seed)
         self._table.reset(seed, options)
-        self._play = self._table.stepper(Task.STEP_ONLY)
         self._ended = False
         self._history = "\n".join(self._table.history(0))
         if self.render_mode == "human":

@@ -8,6 +8,7 @@ import pytest
 from socialai_dsl import draws
 from socialai_dsl.engine.batch import Batch, Part
 from socialai_dsl.engine.calls import Task
+from socialai_dsl.engine.errors import RoomError
 from socialai_dsl.engine.state import ATTEMPTS, PIN_NONE, Key
 from socialai_dsl.program import Body, Field, Op, Program, Register
 from tests.assembly import Assembly, FrameSpec, batch_of, constant, entity_register, temporary
@@ -210,3 +211,28 @@ def test_a_moment_of_an_episode_is_not_asked_for_its_room() -> None:
     pins[1, Register.T] = 0
     with pytest.raises(RuntimeError, match="program 0"):
         batch.reset(pins)
+
+
+def test_prepared_calls_outlive_layouts_also_those_that_are_refused() -> None:
+    """A single environment keeps the call of its step; a new table of pins takes nothing away from it."""
+    batch = batch_of(drawn(10, 3), 1)
+    step = batch.stepper(Task.STEP_ONLY)
+    for number, fits in ((9, True), (1, False), (8, True), (0, False)):
+        pins = np.full((2, batch.state.registers.shape[1] + 1), PIN_NONE, np.int16)
+        pins[1, OWN] = number
+        batch.ports.layout[:] = 1
+        batch.ports.chosen[:] = True
+        if fits:
+            batch.reset(pins)
+        else:
+            with pytest.raises(RoomError):
+                batch.reset(pins)
+        del pins
+        assert batch.state.registers[0, OWN] == number
+        batch.ports.actions[:] = (int(Body.NONE), 0, 0, 0)
+        assert step() == 0
+        assert batch.state.registers[0, Register.T] == 1
+    batch.ports.layout[:] = 0
+    batch.reset()
+    assert batch.state.registers[0, OWN] >= 3
+    assert step() == 0
