@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.folding import TRUE
-from socialai_dsl.compiler.shapes import is_shape, shape
+from socialai_dsl.compiler.shapes import conjuncts, keep_shape
 from socialai_dsl.program import CELL, Field, Op
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.terms import Const, Term
@@ -101,45 +100,18 @@ def _cells_of(to: Expressions, term: terms.Quantified, opposite: bool = False) -
     condition = term.condition or TRUE
     if opposite:
         condition = terms.Not(condition)
-    _keep(to, board, condition, term.variable)
+    if condition != TRUE:
+        _keep(to, board, condition, term.variable)
     return board
 
 
 def _keep(to: Expressions, board: int, condition: Term, variable: str) -> None:
     """Take out of `board` the cells for which `condition` is false: first what makes a shape, then one by one."""
-    rest = []
-    for part in _conjuncts(to, condition):
-        positive = part.arg if isinstance(part, terms.Not) else part
-        if is_shape(to, positive, variable):
-            held = shape(to, positive, variable)
-            to.block.emit(Op.B_AND if positive is part else Op.B_WITHOUT, board, held)
-            to.block.release_boards(held)
-        elif part != TRUE:
-            rest.append(part)
-    if rest:
-        keep_each(to, board, rest[0] if len(rest) == 1 else terms.Logic("and", tuple(rest)), variable)
-
-
-def _conjuncts(to: Expressions, condition: Term) -> Iterator[Term]:
-    """Conditions that all have to hold where one does."""
-    parts: Iterable[Term]
-    match condition:
-        case terms.Logic(op="and"):
-            parts = condition.args
-        case terms.Quantified(op="all", cells=False):
-            parts = (to.instance(condition, item) for item in condition.items)
-        case terms.Not(arg=terms.Logic(op="or", args=args)):
-            parts = map(terms.Not, args)
-        case terms.Not(arg=terms.Quantified(op="any", cells=False) as every):
-            parts = (terms.Not(to.instance(every, item)) for item in every.items)
-        case terms.Compare(op="!="):
-            yield terms.Not(replace(condition, op="=="))
-            return
-        case _:
-            yield condition
-            return
-    for part in parts:
-        yield from _conjuncts(to, part)
+    rest = [part for part in conjuncts(to, condition) if not keep_shape(to, board, part, variable)]
+    if len(rest) == 1:
+        keep_each(to, board, rest[0], variable)
+    elif rest:
+        keep_each(to, board, terms.Logic("and", tuple(rest)), variable)
 
 
 def coordinate(to: Expressions, term: terms.FieldOf) -> int:

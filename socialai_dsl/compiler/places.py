@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.cells import keep_each
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import mentions
-from socialai_dsl.compiler.shapes import EVERYWHERE, fill_rectangle, is_about_cell, is_shape, shape
+from socialai_dsl.compiler.shapes import EVERYWHERE, conjuncts, fill_rectangle, is_about_cell, keep_shape
 from socialai_dsl.program import Counting, Field, Op, Register, Side
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.geometry import EXACT
@@ -155,28 +153,23 @@ class Places:
 
     def _keep(self, board: int, where: Term) -> None:
         """Take out of `board` the cells for which `where` is false."""
-        block = self.to.block
+        for part in conjuncts(self.to, where):
+            if not is_about_cell(part):
+                self._keep_all(board, part)
+            elif not keep_shape(self.to, board, part):
+                self._keep_other(board, part)
+
+    def _keep_other(self, board: int, where: Term) -> None:
         match where:
-            case _ if not is_about_cell(where):
-                self._keep_all(board, where)
-            case terms.Logic(op="and"):
-                for arg in where.args:
-                    self._keep(board, arg)
             case terms.Not():
-                self._keep_not(board, where.arg)
+                held = self._copy(board)
+                self._keep(held, where.arg)
+                self.to.block.emit(Op.B_WITHOUT, board, held)
+                self.to.block.release_boards(held)
             case terms.Logic():
                 self._keep_either(board, where.args)
             case terms.Quantified(op="any", cells=False):
                 self._keep_either(board, tuple(self.to.instance(where, item) for item in where.items))
-            case terms.Quantified(op="all", cells=False):
-                for item in where.items:
-                    self._keep(board, self.to.instance(where, item))
-            case terms.Compare(op="!=") if is_shape(self.to, equal := replace(where, op="==")):
-                self._keep_not(board, equal)
-            case _ if is_shape(self.to, where):
-                held = shape(self.to, where)
-                block.emit(Op.B_AND, board, held)
-                block.release_boards(held)
             case _:
                 keep_each(self.to, board, where)
 
@@ -189,25 +182,6 @@ class Places:
         block.bind(drop)
         block.emit(Op.B_WITHOUT, board, board)
         block.bind(done)
-
-    def _keep_not(self, board: int, arg: Term) -> None:
-        """Take out the cells for which `arg` is true."""
-        block = self.to.block
-        match arg:
-            case terms.Logic(op="or"):
-                for part in arg.args:
-                    self._keep_not(board, part)
-            case terms.Quantified(op="any", cells=False):
-                for item in arg.items:
-                    self._keep_not(board, self.to.instance(arg, item))
-            case _:
-                if is_shape(self.to, arg):
-                    held = shape(self.to, arg)
-                else:
-                    held = self._copy(board)
-                    self._keep(held, arg)
-                block.emit(Op.B_WITHOUT, board, held)
-                block.release_boards(held)
 
     def _copy(self, board: int) -> int:
         copy = self.to.block.board()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.compiler.assembler import Block, constant
@@ -28,7 +29,40 @@ def is_about_cell(where: Term) -> bool:
     return mentions(where, terms.Here) or mentions(where, terms.Test, lambda test: test.subject is None)
 
 
-def is_shape(to: Expressions, where: Term, variable: str = "") -> bool:
+def conjuncts(to: Expressions, condition: Term) -> Iterator[Term]:
+    """Conditions that all have to hold where one does."""
+    parts: Iterable[Term]
+    match condition:
+        case terms.Logic(op="and"):
+            parts = condition.args
+        case terms.Quantified(op="all", cells=False):
+            parts = (to.instance(condition, item) for item in condition.items)
+        case terms.Not(arg=terms.Logic(op="or", args=args)):
+            parts = map(terms.Not, args)
+        case terms.Not(arg=terms.Quantified(op="any", cells=False) as every):
+            parts = (terms.Not(to.instance(every, item)) for item in every.items)
+        case terms.Compare(op="!="):
+            yield terms.Not(replace(condition, op="=="))
+            return
+        case _:
+            yield condition
+            return
+    for part in parts:
+        yield from conjuncts(to, part)
+
+
+def keep_shape(to: Expressions, board: int, condition: Term, variable: str = "") -> bool:
+    """Take out of `board` the cells for which a condition is false, if it or its opposite is a shape; whether it is."""
+    positive = condition.arg if isinstance(condition, terms.Not) else condition
+    if not _is_shape(to, positive, variable):
+        return False
+    held = _shape(to, positive, variable)
+    to.block.emit(Op.B_AND if positive is condition else Op.B_WITHOUT, board, held)
+    to.block.release_boards(held)
+    return True
+
+
+def _is_shape(to: Expressions, where: Term, variable: str) -> bool:
     """Whether the cells that a condition holds for are those near a thing, or rows and columns.
 
     The candidate is `here`, or the variable of a quantifier.
@@ -45,7 +79,7 @@ def is_shape(to: Expressions, where: Term, variable: str = "") -> bool:
     return about_it and known and to.block.boards_taken + _MOST_BOARDS <= BOARDS
 
 
-def shape(to: Expressions, where: Term, variable: str = "") -> int:
+def _shape(to: Expressions, where: Term, variable: str) -> int:
     """A fresh board with the cells that such a condition holds for, whatever is there."""
     block = to.block
     mark, board = block.taken, block.board()

@@ -42,6 +42,7 @@ from tests.socialai_dsl.compiler.workbench import (
     STATUE,
     activity,
     cell,
+    cells,
     code,
     compiled,
     entity,
@@ -61,10 +62,6 @@ from tests.socialai_dsl.compiler.workbench import (
 
 def at(x: int, y: int) -> int:
     return CELL + 32 * y + x
-
-
-def cells(op: Any, condition: Term | None, type_: Type = ANY_CELL, to: Term | None = None) -> Quantified:
-    return Quantified(type_, op, "c", (), condition, to, cells=True)
 
 
 def both(*args: Term) -> Logic:

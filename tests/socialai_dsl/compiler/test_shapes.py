@@ -10,8 +10,7 @@ import pytest
 import socialai_dsl
 from socialai_dsl.listing import listing
 from socialai_dsl.program import CELL
-from socialai_dsl.semantics.terms import CELL as ANY_CELL
-from socialai_dsl.semantics.terms import Compare, Logic, Not, Quantified, Term
+from socialai_dsl.semantics.terms import Compare, Logic, Not, Term
 from socialai_dsl.semantics.terms import Test as Relation
 from tests.socialai_dsl.compiler.workbench import (
     AGENT,
@@ -21,6 +20,7 @@ from tests.socialai_dsl.compiler.workbench import (
     HERE,
     NUMBER,
     cell,
+    cells,
     compiled,
     entity,
     number,
@@ -44,10 +44,6 @@ SHAPES = {
 }
 
 
-def cells(op: str, condition: Term) -> Quantified:
-    return Quantified(NUMBER if op == "count" else ANY_CELL, op, "c", (), condition, cells=True)  # type: ignore[arg-type]
-
-
 def asked_one_by_one(condition: Term) -> Term:
     """The same in a form that is no shape."""
     return Logic("or", (condition, Not(Not(condition))))
@@ -60,18 +56,18 @@ def loops(term: Term) -> bool:
 @pytest.mark.parametrize("condition", SHAPES.values(), ids=SHAPES)
 def test_a_shape_has_the_cells_that_a_loop_finds(condition: Term) -> None:
     each = asked_one_by_one(condition)
-    assert not loops(cells("count", condition))
-    assert loops(cells("count", each))
+    assert not loops(cells("count", condition, NUMBER))
+    assert loops(cells("count", each, NUMBER))
     for wanted in (condition, Not(condition)):
         other = each if wanted is condition else Not(each)
-        assert worth(cells("count", wanted)) == worth(cells("count", other))
+        assert worth(cells("count", wanted, NUMBER)) == worth(cells("count", other, NUMBER))
         assert worth(cells("first", wanted)) == worth(cells("first", other))
 
 
 def test_shapes_of_a_conjunction_come_first_and_the_rest_is_asked_of_what_is_left() -> None:
     odd = asked_one_by_one(Relation("next_to", HERE, entity(AGENT)))
     both = Logic("and", (odd, Compare("==", x_of(HERE), number(2))))
-    assert worth(cells("count", both)) == 2, "above and below the agent"
+    assert worth(cells("count", both, NUMBER)) == 2, "above and below the agent"
     assert worth(cells("first", both)) == CELL + 32 * 2 + 2
 
 
@@ -140,5 +136,5 @@ def test_what_all_have_to_be_is_taken_apart() -> None:
     at_either = Logic("or", (Relation("at", HERE, entity(AGENT)), Relation("at", HERE, entity(GUIDE))))
     nested = Logic("and", (Compare("!=", x_of(HERE), number(1)), Not(at_either)))
     whole = Logic("and", (Relation("in_line", HERE, entity(AGENT)), nested))
-    assert not loops(cells("count", whole))
-    assert worth(cells("count", whole)) == worth(cells("count", asked_one_by_one(whole))) == 6
+    assert not loops(cells("count", whole, NUMBER))
+    assert worth(cells("count", whole, NUMBER)) == worth(cells("count", asked_one_by_one(whole), NUMBER)) == 6

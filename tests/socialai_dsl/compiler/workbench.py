@@ -27,6 +27,7 @@ from socialai_dsl.semantics.terms import (
     Const,
     Drawn,
     FieldOf,
+    Quantified,
     Read,
     RulePlan,
     Sited,
@@ -104,6 +105,11 @@ def y_of(term: Term) -> FieldOf:
 
 
 HERE = Variable(ANY_CELL, "c")
+
+
+def cells(op: Any, condition: Term | None, type_: Type = ANY_CELL, to: Term | None = None) -> Quantified:
+    """A quantifier over cells, each of which is HERE."""
+    return Quantified(type_, op, "c", (), condition, to, cells=True)
 
 
 def sited(term: Term, site: str = "let.answer") -> Sited:
