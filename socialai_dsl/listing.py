@@ -18,7 +18,7 @@ from socialai_dsl.program import (
     Register,
 )
 
-_ENTITIES = frozenset({*range(Op.IF_SAME_CELL, Op.IF_UNOBSTRUCTED + 1), Op.GO_TO, Op.GO_NEXT_TO})
+_ENTITIES = frozenset({*range(Op.IF_SAME_CELL, Op.IF_UNOBSTRUCTED + 1), Op.GO_TO, Op.GO_NEXT_TO, Op.FACE})
 _FIRST_IS_ENTITY = _ENTITIES | {
     Op.PUT,
     Op.SAY,
@@ -59,6 +59,7 @@ _LITERALS: dict[Op, tuple[int, ...]] = {
     Op.TURN_TO: (2,),
     Op.GO_TO: (2,),
     Op.GO_NEXT_TO: (2,),
+    Op.FACE: (2,),
     Op.PICK_CELL: (1, 2),
     **dict.fromkeys((Op.FIRST_CELL, Op.NEAREST_CELL, Op.B_COUNT), (1,)),
     **dict.fromkeys(map(Op, range(Op.B_FLOOR, Op.B_FREE + 1)), (0,)),

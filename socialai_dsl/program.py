@@ -119,7 +119,11 @@ class Header(IntEnum):
     CLASS_SETS = 54
     CLASS_SET_WORDS = 55
     CHANNELS = 56  # of the picture: 4, or 6 with pointing and last act
-    END = 57
+    # Registers that are not 0 when the code at BEFORE_PC or RULES_PC is due: else, and unless Register.CHANGED is set,
+    # it would do nothing. 0: it is always due.
+    BEFORE_DUE = 57
+    RULES_DUE = 58
+    END = 59
 
 
 class Flag(IntEnum):
@@ -339,6 +343,8 @@ class Op(IntEnum):
     POINT = 55  # e(a) points in direction v(b)
     # One of b (literal) actions, drawn at site c: action k is in the bits 4 k to 4 k + 3 of a (literal).
     CHOOSE = 56
+    # e(a) makes one quarter turn towards e(b), as TURN_TO towards its QUADRANT; none if it is not in the room.
+    FACE = 57
     # Boards: sets of cells, numbered 0 to BOARDS - 1 (literals). They carry nothing from run to run; B_FREE and PUT
     # belong to reset code.
     B_FLOOR = 60  # board a = cells of plain floor

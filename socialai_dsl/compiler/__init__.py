@@ -77,7 +77,7 @@ def _compiled(checked: Checked, probes: Probes, numbered: Lines | None) -> tuple
     code = CodeTable()
     tables = Tables(checked, registers, classes, sites, lines, code)
     computed = ComputedStatuses(checked)
-    waiting = Waiting(checked, registers)
+    waiting = Waiting(checked, registers, computed)
 
     def entry(label: str, *emitters: Callable[[Expressions], None]) -> int:
         to = Expressions(Block(), checked, registers, classes, sites)
@@ -91,7 +91,7 @@ def _compiled(checked: Checked, probes: Probes, numbered: Lines | None) -> tuple
     frames = [behaviour.frame(number, frame) for number, frame in enumerate(checked.frames)]
     entries |= {
         Header.REQUIRE_PC: entry("require", require),
-        Header.BEFORE_PC: entry("before", remember),
+        Header.BEFORE_PC: entry("before", waiting.begin_remembering, remember),
         Header.LINKS_PC: entry("links", links, waiting.note_change),
         Header.SETTLE_PC: entry("settle", computed.settle),
         Header.RULES_PC: entry(
@@ -101,6 +101,8 @@ def _compiled(checked: Checked, probes: Probes, numbered: Lines | None) -> tuple
         ),
         Header.TICK_PC: entry("tick", tick),
     }
+    due = {Header.BEFORE_DUE: waiting.before, Header.RULES_DUE: None if probes.recording else waiting.rules}
+    entries |= {word: register for word, register in due.items() if register is not None}
     outcomes = outcome_table(checked, registers, classes, sites, code, probes)
     if isinstance(probes, Recorder):
         probes.declare(registers)

@@ -87,7 +87,7 @@ class Activities:
             case "left" | "right" | "forward" | "toggle":
                 block.emit(Op.BODY, constant(_BODIES[activity.name]))
             case "face":
-                self._turn_towards(self._present(activity.args[0]))
+                self._face(to.value(activity.args[0]))
             case "turn_to":
                 block.emit(Op.TURN_TO, own, self._aimed_at(activity), self.turn)
             case "turn":
@@ -140,11 +140,8 @@ class Activities:
             self.to.block.emit(Op.LOAD, self.aim, goal)
         return goal
 
-    def _turn_towards(self, goal: int) -> None:
-        block = self.to.block
-        direction = block.temporary()
-        block.emit(Op.QUADRANT, direction, constant(self.entity), goal)
-        block.emit(Op.TURN_TO, constant(self.entity), direction, self.turn)
+    def _face(self, goal: int) -> None:
+        self.to.block.emit(Op.FACE, constant(self.entity), goal, self.turn)
 
     def _turn(self, way: Term) -> None:
         """`turn(left)` and `turn(right)`: -1 is left, 1 is right, 0 is no turn."""
@@ -172,7 +169,7 @@ class Activities:
         block.emit(Op.BODY, constant(Body.TOGGLE))
         block.skip(done)
         block.bind(aside)
-        self._turn_towards(goal)
+        self._face(goal)
         block.skip(done)
         block.bind(away)
         block.emit(Op.GO_NEXT_TO, own, goal, self.turn)

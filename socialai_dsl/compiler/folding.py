@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 from socialai_dsl.compiler.classes import SILENCE, Classes
+from socialai_dsl.program import Body
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.build import may_find_nothing
 from socialai_dsl.semantics.terms import BOOL, Const, Term
@@ -41,7 +42,14 @@ def fold(term: Term, facts: Facts, classes: Classes) -> Term:
         return _truth(any(facts.heard in classes.matching(pattern) for pattern in term.patterns))
     if isinstance(term, terms.World) and term.name == "action" and facts.action is not None:
         return Const(term.type, facts.action)
+    if isinstance(term, terms.PokedNow) and _toggles_nothing(facts) and not may_find_nothing(term.entity):
+        return FALSE
     return _decide(rebuild(term, lambda part: fold(part, facts, classes)))
+
+
+def _toggles_nothing(facts: Facts) -> bool:
+    """Whether the agent's action is known to be another one."""
+    return facts.action not in (None, Body.TOGGLE)
 
 
 def fold_whole(term: Term, facts: Facts, classes: Classes) -> Term:

@@ -402,6 +402,7 @@ _CHECKS: dict[Op, Callable[[_Instruction, int, int, int], str | None]] = {
     Op.POINT: _Instruction.point,
     Op.BODY: _Instruction.body,
     Op.CHOOSE: _Instruction.choose,
+    Op.FACE: _Instruction.go,
     Op.TURN_TO: _Instruction.turn_to,
     **dict.fromkeys((Op.GO_TO, Op.GO_NEXT_TO), _Instruction.go),
     Op.B_FLOOR: _Instruction.fill,

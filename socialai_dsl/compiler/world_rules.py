@@ -9,7 +9,7 @@ from socialai_dsl.compiler.folding import FALSE, fold
 from socialai_dsl.compiler.homes import Homes
 from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.probes import NO_PROBES, Probes
-from socialai_dsl.compiler.waiting import Waiting, begin_run
+from socialai_dsl.compiler.waiting import Waiting
 from socialai_dsl.program import Op
 from socialai_dsl.semantics.terms import BOOL, RulePlan
 
@@ -27,7 +27,7 @@ def world_rules(
         after = Label()
         if due is not None:
             # To be told why a rule does not fire is to ask it.
-            begin_run(to, due, after, always=probes.recording)
+            waiting.begin_run(to, due, after, always=probes.recording)
         for rule in rules:
             counted.append(rule.name)
             if rule.when is not None and fold(rule.when.term, to.facts, to.classes) == FALSE:

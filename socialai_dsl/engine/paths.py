@@ -4,11 +4,11 @@ import numpy as np
 
 from socialai_dsl.engine import small_paths
 from socialai_dsl.engine.boards import is_deadly, npcs_are_hidden, solid_line
-from socialai_dsl.engine.entities import field, is_present
+from socialai_dsl.engine.entities import field, is_present, quadrant
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.operands import draw_below
 from socialai_dsl.engine.sets import add_cell, clear, drop_cell, fill_next_to, get_line, has_cell, set_line
-from socialai_dsl.engine.state import AGENT, FREE, FRONT, NO_CELL, NO_PATH, SEEN, STILL, Row
+from socialai_dsl.engine.state import AGENT, FREE, FRONT, NO_CELL, NO_PATH, ONE, SEEN, STILL, Row
 from socialai_dsl.engine.whereabouts import distance, is_somewhere, x_of, y_of
 from socialai_dsl.program import Body, Field, Header
 
@@ -100,6 +100,17 @@ def _grow(row: Row) -> bool:
         above = here
         any_grown |= grown
     return any_grown != 0
+
+
+@inline
+def face(row: Row, mover: int, thing: int, site: int) -> int:
+    """The quarter turn towards a thing, none if that is not in the room; from out of the room it is down."""
+    if not is_somewhere(row, thing):
+        return STILL
+    x = field(row, mover, Field.X)
+    y = field(row, mover, Field.Y)
+    wanted = quadrant(x_of(row, thing) - x, y_of(row, thing) - y) if is_present(row, mover) else ONE
+    return turn_towards(row, field(row, mover, Field.DIR), wanted, site)
 
 
 @inline

@@ -32,10 +32,16 @@ _LINE_OF_CACHE = 32
 
 
 @inline
+def _is_due(row: Row, register: int) -> bool:
+    """Whether code has to be run, if this register says so; 0: it always has."""
+    return register == 0 or row.registers[register] + row.registers[Register.CHANGED] != 0
+
+
+@inline
 def begin(row: Row) -> None:
     """What asks how things were is answered; then time goes on, and nothing is heard, used or said yet."""
     registers = row.registers
-    if row.program[Header.BEFORE_PC] != 0:
+    if row.program[Header.BEFORE_PC] != 0 and _is_due(row, row.program[Header.BEFORE_DUE]):
         run(row, row.program[Header.BEFORE_PC])
     registers[Register.T] += 1
     registers[Register.HEARD] = 0
@@ -121,7 +127,7 @@ def step_row(row: Row, link: int, book: Any, number: int) -> float:
         registers[Register.SAID_LINE] = 0
 
     take_turns(row)
-    if program[Header.RULES_PC] != 0:
+    if program[Header.RULES_PC] != 0 and _is_due(row, program[Header.RULES_DUE]):
         run(row, program[Header.RULES_PC])
     settle(row)
     reward = _judge(row, link)

@@ -11,7 +11,8 @@ from socialai_dsl.engine.entities import (
     step_y,
 )
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.operands import draw_action
+from socialai_dsl.engine.operands import draw_action, value
+from socialai_dsl.engine.paths import face
 from socialai_dsl.engine.pushing import is_free, push, roll
 from socialai_dsl.engine.speech import deliver, empty_inbox, hear, inbox_class, speak
 from socialai_dsl.engine.state import AGENT, NOTHING, ONE, STILL, ZERO, Row, Trait
@@ -184,9 +185,15 @@ def act(row: Row, frame: int) -> int:
     pc = row.program[_state_table(row, frame)]
     if pc != 0:
         code = row.program[Header.CODE_AT] + 4 * pc
-        if row.program[code] == Op.CHOOSE and row.program[code + 4] == Op.HALT:
-            # Of all activities this one is seen most often, and it is shorter than calling the interpreter for it.
-            return draw_action(row, row.program[code + 1], row.program[code + 2], row.program[code + 3])
+        if row.program[code + 4] == Op.HALT:
+            # Of all activities these two are seen most often, and they are shorter than calling the interpreter.
+            a = row.program[code + 1]
+            b = row.program[code + 2]
+            site = row.program[code + 3]
+            if row.program[code] == Op.CHOOSE:
+                return draw_action(row, a, b, site)
+            if row.program[code] == Op.FACE:
+                return face(row, value(row, a), value(row, b), site)
         run(row, pc)
     chosen = row.registers[Register.LAST_TURN]
     return chosen if chosen >= 0 else STILL

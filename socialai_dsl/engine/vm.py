@@ -172,6 +172,8 @@ def _choose(row: Row, op: int, a: int, b: int, c: int) -> int:
         return draw_action(row, a, b, c)
     mover = value(row, a)
     target = value(row, b)
+    if op == Op.FACE:
+        return paths.face(row, mover, target, c)
     if op == Op.POINT:
         set_field(row, mover, Field.POINTING, 1 + (target & 3))
         return np.int64(Body.POINT)

@@ -66,7 +66,9 @@ _READ: dict[Op, tuple[int, ...]] = {
     Op.SET_BIT: (0, 1),
     Op.SEES: (0, 1, 2),
     Op.SET_FIELD: (0, 2),
-    **dict.fromkeys((Op.BECOME, Op.SAY, Op.TURN_TO, Op.GO_TO, Op.GO_NEXT_TO, Op.POINT, Op.PLACE), (0, 1)),
+    **dict.fromkeys(
+        (Op.BECOME, Op.SAY, Op.TURN_TO, Op.FACE, Op.GO_TO, Op.GO_NEXT_TO, Op.POINT, Op.PLACE), (0, 1)
+    ),
     **dict.fromkeys((Op.VANISH, Op.BODY, Op.REWARD), (0,)),
 }
 """Positions of the operands that are read; of other instructions all may be."""
@@ -74,7 +76,7 @@ _READ: dict[Op, tuple[int, ...]] = {
 _LAST_TURN = (Field.LAST, Field.TOGGLED)
 _COMPARISONS = (Op.IF_EQ, Op.IF_NE, Op.IF_LT, Op.IF_LE)
 _DRAWS = (Op.DRAW, Op.PICK_BIT, Op.PICK_CELL)
-_CHANCY = (Op.IF_CHANCE, Op.CHOOSE, Op.TURN_TO, Op.GO_TO, Op.GO_NEXT_TO)
+_CHANCY = (Op.IF_CHANCE, Op.CHOOSE, Op.TURN_TO, Op.FACE, Op.GO_TO, Op.GO_NEXT_TO)
 _VALUES = (*map(Op, range(Op.LOAD, Op.ABS + 1)), Op.FIELD, Op.DISTANCE, Op.QUADRANT, Op.SET_BIT, Op.COUNT_BITS,
            Op.LOWEST_BIT, Op.SEES, Op.CELL_OF, Op.CELL_BESIDE)  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Rules of the world that wait for an object fire when they would if they were asked in every step."""
+"""Rules and what is remembered wait for an object, and that makes no difference to what happens."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 
 from socialai_dsl.compiler import compile_probed, compile_scenario
 from socialai_dsl.frontend import load
-from socialai_dsl.program import Program
+from socialai_dsl.program import Header, Program
 from tests.agreement import Pair
 from tests.tiny import Folder
 
@@ -75,8 +75,58 @@ def test_rules_that_wait_fire_as_if_they_did_not(
         assert both.env.describe()["state"]["seen"] == seen
 
 
-def test_what_costs_little_to_ask_does_not_wait(tmp_path: Path) -> None:
-    assert gates(pair(tmp_path, "rules: [{when: near.opened, set: {seen: seen + 1}}]").env.program) == 0
+SHORT = "{when: near.opened, set: {seen: seen + 1}}"
+LONG = "{when: any(b in near | far where b.opened), set: {seen: seen + 1}}"
+TIMELY = "{when: t == 3, set: {seen: seen + 1}}"
+
+
+@pytest.mark.parametrize(
+    ("rules", "waiting", "all_wait"),
+    [
+        pytest.param([SHORT], 1, True, id="nothing else"),
+        pytest.param([SHORT, LONG], 1, True, id="all of them"),
+        pytest.param([SHORT, TIMELY], 0, False, id="not what costs little beside others"),
+        pytest.param([LONG, TIMELY, LONG], 2, False, id="run by run"),
+    ],
+)
+def test_rules_are_not_looked_at_if_all_of_them_wait(
+    tmp_path: Path, rules: list[str], waiting: int, all_wait: bool
+) -> None:
+    program = pair(tmp_path, f"rules: [{', '.join(rules)}]").env.program
+    assert gates(program) == waiting
+    assert (program.header(Header.RULES_DUE) != 0) is all_wait
+
+
+LATE = "{when: t == 4, cause: [far.reveal]}"
+"""A box that is opened at the end of a step, after which other statuses are computed."""
+
+
+@pytest.mark.parametrize(
+    ("noted", "waits", "changes"),
+    [
+        pytest.param("near.opened", True, 1, id="a status"),
+        pytest.param("far.opened", True, 1, id="a status changed by a rule"),
+        pytest.param(
+            "gate.locked", True, 0, id="a status computed at the end of a step, before the next begins"
+        ),
+        pytest.param("count(b in near | far where b.opened)", True, 2, id="a number"),
+        pytest.param("agent.facing", False, 1, id="not what the agent decides"),
+        pytest.param("near.opened and t > 2", False, 1, id="not what time decides"),
+    ],
+)
+def test_what_is_remembered_is_the_same_whether_it_waits_or_not(
+    tmp_path: Path, noted: str, waits: bool, changes: int
+) -> None:
+    again = f"{{when: prev({noted}) != ({noted}), set: {{seen: seen + 1}}}}"
+    gate = "gate: {type: door, at: [6, 3], locked: far.opened}"
+    boxes = BOXES.replace("objects:", f"objects:\n  {gate}")
+    path = Folder(tmp_path).write("tiny", f"{boxes}rules: [{LATE}, {again}]")
+    both = Pair.of(load(str(path)), number_words=False)
+    assert (both.env.program.header(Header.BEFORE_DUE) != 0) is waits
+    both.reset(seed=0)
+    for word in (None, "toggle", None, None, None, "left", None, None):
+        both.step(tuple(map(int, both.env.encode_action((word, None)))))  # type: ignore[arg-type]
+    assert both.env.describe()["state"]["seen"] == changes
 
 
 def test_a_step_is_explained_whether_rules_wait_or_not(tmp_path: Path) -> None:
@@ -87,11 +137,17 @@ def test_a_step_is_explained_whether_rules_wait_or_not(tmp_path: Path) -> None:
         env.explain()  # which plays the step again, and fails if it went another way
 
 
-def test_a_program_that_says_why_rules_do_not_fire_asks_them_all(tmp_path: Path) -> None:
-    path = str(Folder(tmp_path).write("tiny", BOXES + AGAIN))
+@pytest.mark.parametrize("among_others", [False, True])
+def test_a_program_that_says_why_rules_do_not_fire_asks_them_all(tmp_path: Path, among_others: bool) -> None:
+    rules = [LONG, TIMELY] if among_others else [LONG]
+    path = str(Folder(tmp_path).write("tiny", f"{BOXES}rules: [{', '.join(rules)}]"))
     checked = load(path).checked
     plain, probed = compile_scenario(checked), compile_probed(checked).program
     assert [n.path for n in plain.registers if n.path.startswith("world.due")] == ["world.due[0]"]
     due = next(n.register for n in plain.registers if n.path == "world.due[0]")
     read = [sum(due in row[2:] for row in program.code.tolist()) for program in (plain, probed)]
-    assert read == [1, 0]
+    assert read == ([1, 0] if among_others else [0, 0])
+    assert [program.header(Header.RULES_DUE) for program in (plain, probed)] == [
+        0 if among_others else due,
+        0,
+    ]

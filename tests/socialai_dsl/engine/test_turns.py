@@ -474,6 +474,28 @@ def test_an_action_is_drawn_among_those_in_a_word(before: int) -> None:
     assert {*expected} == {Body.RIGHT, Body.FORWARD, Body.NONE}
 
 
+@pytest.mark.parametrize("before", [0, 1], ids=["as the whole activity", "behind another instruction"])
+@pytest.mark.parametrize(
+    ("place", "turned"),
+    [((4, 3), {Body.NONE}), ((2, 5), {Body.RIGHT}), ((2, 1), {Body.LEFT}), ((1, 3), {Body.LEFT, Body.RIGHT})],
+    ids=["ahead", "to the right", "to the left", "behind"],
+)
+def test_one_who_faces_somebody_makes_a_quarter_turn(
+    before: int, place: tuple[int, int], turned: set[Body]
+) -> None:
+    activity = [(Op.LOAD, temporary(0), constant(0))] * before + [(Op.FACE, constant(1), constant(0), 0)]
+    room = Assembly(
+        at=(place, (2, 3)), npcs=1, frames=(FrameSpec(1, (activity,)),), sites=((draws.site("b"), 3),)
+    )
+    batch = batch_of(room.program(), rows=50)
+    last = batch.state.registers[:, entity_register(1, Field.LAST)]
+    play(batch, body(Body.NONE))
+    assert {*last.tolist()} == turned
+    batch.state.registers[:, entity_register(0, Field.GONE)] = 1
+    play(batch, body(Body.NONE))
+    assert {*last.tolist()} == {Body.NONE}, "there is nobody to face"
+
+
 def test_a_turn_shows_the_lowest_npc_of_its_cell() -> None:
     turning = FrameSpec(2, ([(Op.BODY, constant(Body.LEFT))],))
     batch = batch_of(Assembly(at=((1, 1), (2, 3), (2, 3)), npcs=2, frames=(turning,)).program())
