@@ -25,11 +25,12 @@ def holds(row: Row, op: int, a: int, b: int) -> bool:
         return rng.holds_with_chance(draw_at(row, b), a)
     left = value(row, a)
     right = value(row, b)
-    return _compares(op, left, right) if op <= Op.IF_BIT else _relates(row, op, left, right)
+    return compares(op, left, right) if op <= Op.IF_BIT else _relates(row, op, left, right)
 
 
 @inline
-def _compares(op: int, left: int, right: int) -> bool:
+def compares(op: int, left: int, right: int) -> bool:
+    """Whether a test of two numbers holds."""
     if op == Op.IF_EQ:
         return left == right
     if op == Op.IF_NE:

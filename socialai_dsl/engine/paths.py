@@ -102,9 +102,10 @@ def _grow(row: Row) -> bool:
     return any_grown != 0
 
 
-@inline
+@outline
 def face(row: Row, mover: int, thing: int, site: int) -> int:
     """The quarter turn towards a thing, none if that is not in the room; from out of the room it is down."""
+    stay_outline()
     if not is_somewhere(row, thing):
         return STILL
     x = field(row, mover, Field.X)

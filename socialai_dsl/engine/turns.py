@@ -1,6 +1,7 @@
 """Turns: the body actions of agent and NPCs, and how an NPC follows its frames."""
 
 from socialai_dsl.engine.boards import draw_cell, draw_npc, is_solid, npcs_are_hidden, type_row
+from socialai_dsl.engine.direct import past_tests
 from socialai_dsl.engine.entities import (
     field,
     is_present,
@@ -175,6 +176,8 @@ def notice(row: Row, frame: int, heard: int, flags: int) -> bool:
     row.registers[Register.LAST_TURN] = -1
     pc = row.program[_state_table(row, frame) + 1 + heard]
     if pc != 0:
+        pc = past_tests(row, pc)
+    if pc != 0:
         run(row, pc)
     return row.registers[Register.LAST_TURN] >= 0
 
@@ -205,6 +208,8 @@ def conclude(row: Row, frame: int, heard: int, chosen: bool, flags: int) -> None
     row.registers[row.program[frame + FrameColumn.CLOCK]] += 1
     if not chosen:
         pc = row.program[_state_table(row, frame) + 2 + row.program[Header.CLASSES] + heard]
+        if pc != 0:
+            pc = past_tests(row, pc)
         if pc != 0:
             code = row.program[Header.CODE_AT] + 4 * pc
             if row.program[code] == Op.ANSWER and row.program[code + 4] == Op.HALT:
