@@ -509,9 +509,13 @@ ANSWER_AND_GO = (Op.ANSWER, 2, constant(1), 0 << 8 | 2)
 """Counter 2, line 1, the frame's second state."""
 
 
-@pytest.mark.parametrize("through", [[], [(Op.IF_LE, constant(0), Register.T, 0)]], ids=["alone", "in code"])
+@pytest.mark.parametrize(
+    "through",
+    [[], [(Op.IF_LE, constant(0), Register.T, 0)], [(Op.LOAD, temporary(0), constant(0))]],
+    ids=["alone", "behind a comparison", "in code"],
+)
 def test_an_answer_counts_says_and_goes_on(through: list[tuple[int, ...]]) -> None:
-    """As its first instruction `conclude` takes the answer itself; behind another the interpreter does."""
+    """What is an answer but for comparisons `conclude` takes itself; behind anything else the interpreter does."""
     frame = FrameSpec(1, ([], []), then=({-1: [*through, ANSWER_AND_GO]}, {}))
     lines = (("hello", (2,), 1), ("bye", (3,), 1))
     batch = batch_of(Assembly(at=((1, 1), (2, 1)), npcs=1, frames=(frame,), lines=lines).program())
