@@ -57,11 +57,13 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._copy_image, self._copy_tokens = self._table.image[0].copy, self._table.tokens[0].copy
         self._registers = self._table.state.registers[0]
         self._numbers = self._registers.data
+        self._key = self._table.state.keys[0].data
         self._action = ports.actions[0].data.cast("B")
         self._reward, self._success = ports.reward.data, ports.success.data
         self._play = self._table.stepper(Task.STEP_ONLY)
         self._history = ""
         self._ended = True
+        self._act = 0
         self._playing = self._table.program(0)
         self._always: dict[str, Any] = {}
         self._recording = Recording.of(self._table, 0)
@@ -100,10 +102,8 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         if ended < 0:
             raise self._table.batch.refused_room() if ended != BAD_ACTION else self._refusal(action)
         self._recording.actions.append(words)
-        if self._acts:  # another one may have begun
+        if self._acts:
             self._turn_over()
-            self._look_up()
-            self._history = "\n".join(self._table.history(0))
         info: dict[str, Any] = {"utterance": SILENCE, "history": self._history}
         if self._always:
             info |= self._always
@@ -130,13 +130,16 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
 
     def _turn_over(self) -> None:
         """Begin anew where another act has begun."""
-        if self._table.state.keys[0, Key.ACT] == self._recording.start.key[Key.ACT]:
+        if self._key[Key.ACT] == self._act:
             self._last_act = None
         else:
             self._last_act, self._recording = self._recording, Recording.of(self._table, 0)
+            self._look_up()
+            self._history = "\n".join(self._table.history(0))
 
     def _look_up(self) -> None:
         """Look up which program this episode plays."""
+        self._act = self._key[Key.ACT]
         self._playing = self._table.program(0)
         self._always = {"member": self._table.member(0)} if self._suite else {}
 
