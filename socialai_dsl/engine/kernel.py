@@ -118,6 +118,8 @@ def _report_nothing(book: Any, row: int) -> None:
     int16_of(book, Book.OUTCOME, ZERO)[row] = -1
     bytes_of(book, Book.TERMINATED, ZERO)[row] = 0
     bytes_of(book, Book.TRUNCATED, ZERO)[row] = 0
+    bytes_of(book, Book.SUCCESS, ZERO)[row] = 0
+    bytes_of(book, Book.ENDED, ZERO)[row] = 0
 
 
 @inline
@@ -125,6 +127,7 @@ def _report_end(book: Any, row: int, opened: Row) -> None:
     int16_of(book, Book.OUTCOME, ZERO)[row] = opened.program[_how_it_ended(opened)]
     success = _is_success(opened) and opened.key[Key.SPOILED] == np.uint64(0)
     bytes_of(book, Book.SUCCESS, ZERO)[row] = np.int64(success)
+    bytes_of(book, Book.ENDED, ZERO)[row] = 1
     if opened.registers[Register.ENDED] == TERMINATED:
         bytes_of(book, Book.TERMINATED, ZERO)[row] = 1
     else:

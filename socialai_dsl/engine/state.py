@@ -112,17 +112,18 @@ class Book(IntEnum):
     FINAL_TOKENS = 19
     FINAL_EXTRA = 20
     SUCCESS = 21
-    COUNTERS = 22
-    SCRATCH = 23
-    SETS = 24
-    SPARE_REGISTERS = 25
-    SPARE_BOARDS = 26
-    SPARE_COUNTERS = 27
-    IMAGE_IDS = 28
-    REFUSED = 29
-    PICTURE = 30
-    SIZES = 31
-    GIVEN = 32  # int64 (E, 4), the actions as the caller has them; those in the ports, unless a step is given others
+    ENDED = 22
+    COUNTERS = 23
+    SCRATCH = 24
+    SETS = 25
+    SPARE_REGISTERS = 26
+    SPARE_BOARDS = 27
+    SPARE_COUNTERS = 28
+    IMAGE_IDS = 29
+    REFUSED = 30
+    PICTURE = 31
+    SIZES = 32
+    GIVEN = 33  # int64 (E, 4), the actions as the caller has them; those in the ports, unless a step is given others
 
 
 class Size(IntEnum):
@@ -180,7 +181,10 @@ class Ports(NamedTuple):
     final_image: NDArray[np.uint32]  # (E, 49) last picture of an episode that was reset in the same step
     final_tokens: NDArray[np.int16]  # (E, L)
     final_extra: NDArray[np.uint16]  # (E, 49) or (E, 0)
-    success: NDArray[np.bool_]  # (E,) where an episode has ended: whether it was a success, in all its acts
+    success: NDArray[
+        np.bool_
+    ]  # (E,) whether an episode ended in this step, and was a success in all its acts
+    ended: NDArray[np.bool_]  # (E,) terminated or truncated
     counters: NDArray[
         np.int64
     ]  # (threads, counters of all programs, then a line of the cache that is nobody's)
@@ -242,6 +246,7 @@ def empty_ports(state: State, counters: int, threads: int) -> Ports:
         final_tokens=np.zeros_like(state.tokens),
         final_extra=np.zeros_like(state.extra),
         success=np.zeros(rows, np.bool_),
+        ended=np.zeros(rows, np.bool_),
         counters=np.zeros((threads, apart), np.int64),
         scratch=np.zeros((threads, TEMPORARIES), np.int64),
         sets=np.zeros((threads, SCRATCH_BOARDS * MAX_SIDE), np.uint32),

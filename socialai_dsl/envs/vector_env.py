@@ -40,7 +40,8 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
         num_envs: E.
         num_threads: threads that share a step; results do not depend on it.
         autoreset_mode: NextStep, SameStep or Disabled (`reset(options={"reset_mask": ...})` restarts some).
-        copy: False gives the engine's own buffers, valid until the next call; only what changed is written to them.
+        copy: False gives the engine's own buffers, also in infos, valid until the next call; only what changed is
+            written to them.
         render_mode: rgb_array or ansi: `render()` gives one picture for each environment.
     """
 
@@ -136,9 +137,9 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
 
     def _infos(self) -> dict[str, Any]:
         ports = self._table.batch.ports
-        ended = ports.terminated | ports.truncated
-        outcome = ports.outcome.copy()
-        success = ended & ports.success
+        ended, outcome, success = ports.ended, ports.outcome, ports.success
+        if self._copy:
+            ended, outcome, success = ended.copy(), outcome.copy(), success.copy()
         infos: dict[str, Any] = {
             "success": success,
             "_success": ended,
