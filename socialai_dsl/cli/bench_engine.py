@@ -10,8 +10,9 @@ from socialai_dsl.cli.machine import load, machine, on_cores
 from socialai_dsl.cli.many_programs import different_programs
 from socialai_dsl.cli.measure import PROGRAMS, Ours
 from socialai_dsl.cli.reference_loop import reference_speed
+from socialai_dsl.cli.start_up import waits
 
-OWN_PARTS: Final = ("ours", "rules", "programs", "threads")
+OWN_PARTS: Final = ("ours", "rules", "programs", "threads", "start")
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,9 @@ def measure_engine(plan: Plan, note: Callable[[str], None]) -> Report:
         report.rows += rows
         if not rows:
             report.missing["threads"] = "there is one core"
+    if plan.holds("start"):
+        note("start")
+        report.waits += waits(plan.scenarios[0], plan.repetitions)
     return report
 
 

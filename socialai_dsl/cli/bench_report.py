@@ -47,6 +47,21 @@ class Memory:
     call: int
 
 
+@dataclass(frozen=True)
+class Wait:
+    """Seconds on the clock that somebody waits for something.
+
+    Attributes:
+        what: for what.
+        seconds, low, high: the median of some repetitions, the shortest and the longest.
+    """
+
+    what: str
+    seconds: float
+    low: float
+    high: float
+
+
 @dataclass
 class Report:
     """Everything measured in one run.
@@ -64,6 +79,7 @@ class Report:
     reference: float
     rows: list[Row] = field(default_factory=list)
     memory: list[Memory] = field(default_factory=list)
+    waits: list[Wait] = field(default_factory=list)
     versions: dict[str, str] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
 
@@ -96,6 +112,7 @@ class Report:
             "reference_iterations_per_second": self.reference,
             "rows": rows,
             "memory": [asdict(memory) for memory in self.memory],
+            "waits": [asdict(wait) for wait in self.waits],
             "versions": self.versions,
             "missing": self.missing,
         }
@@ -130,6 +147,11 @@ class Report:
                     f"{touched:>8}"
                 )
             yield "touched: the most that a step reads or writes, all of it together"
+        if self.waits:
+            yield ""
+            yield f"{'seconds on the clock, any core':<60} {'median':>8} {'shortest':>9} {'longest':>8}"
+            for wait in self.waits:
+                yield f"{wait.what[:60]:<60} {wait.seconds:>8.3f} {wait.low:>9.3f} {wait.high:>8.3f}"
         if self.missing:
             yield ""
             yield from (f"not measured: {name} ({why})" for name, why in self.missing.items())

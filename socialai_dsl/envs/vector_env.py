@@ -215,7 +215,10 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
         arrays = {
             "state": (state.registers, state.boards, state.keys),
             "observation": (self._table.image, self._table.tokens),
-            "call": (ports.actions, ports.reward, ports.terminated, ports.truncated, ports.outcome),
+            "call": (
+                *(ports.actions, ports.reward, ports.terminated, ports.truncated),
+                *(ports.ended, ports.outcome, ports.success),
+            ),
         }
         return {name: sum(a.nbytes for a in parts) // self.num_envs for name, parts in arrays.items()}
 
