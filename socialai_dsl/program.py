@@ -444,8 +444,8 @@ class RegisterName:
         low, high: range of its values.
         kind: what its values are: int, bool, color, direction, action, entity (by number), text, noun, status,
             utterance (0 silence, else 1 + template * nouns + noun), cell (CELL + 32 * y + x).
-        fleeting: whether it tells nothing between steps: it is written in every step before it is read, or only
-            saves work.
+        fleeting: whether it tells nothing between steps: it is written in every step before it is read, follows
+            from the others, or only saves work.
     """
 
     path: str

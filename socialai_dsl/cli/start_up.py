@@ -11,7 +11,6 @@ from typing import Any, Final
 
 import socialai_dsl
 from socialai_dsl.cli.bench_report import Wait
-from socialai_dsl.cli.errors import UsageError
 
 _FIRST_STEP: Final = """
 import sys, socialai_dsl
@@ -25,7 +24,7 @@ def waits(scenario: str, repetitions: int) -> Iterator[Wait]:
     """How long it takes on the clock until something is there, each begun anew so often.
 
     Raises:
-        UsageError: a process that was started for it failed; what it said.
+        RuntimeError: a process that was started for it failed; what it said.
     """
     step, check = ["-c", _FIRST_STEP, scenario], ["-m", "socialai_dsl", "validate", scenario]
     # What is measured first leaves the engine's machine code for what comes next.
@@ -60,6 +59,4 @@ def _run(arguments: list[str], cache: str) -> None:
     }
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     if done.returncode:
-        raise UsageError(
-            f"start: {' '.join(arguments[-2:])} failed: {(done.stderr or done.stdout).strip()[-500:]}"
-        )
+        raise RuntimeError(f"a process failed: {(done.stderr or done.stdout).strip()[-500:]}")
