@@ -47,6 +47,7 @@ _LITERALS: dict[Op, tuple[int, ...]] = {
     Op.IF_HEARD: (1,),
     Op.FIELD: (2,),
     Op.DRAW: (2,),
+    Op.DRAW_OTHER: (2,),
     Op.PICK_BIT: (2,),
     Op.SET_FIELD: (1,),
     Op.GOTO: (0, 1),
@@ -185,6 +186,8 @@ class _Names:
             return self.program.rules[word] if position == 0 else "0"
         if op == Op.ANSWER and position != 1:
             return self.program.rules[word] if position == 0 else _goal(word)
+        if op == Op.DRAW_OTHER and position == 2:
+            return f"{word >> 16 & 255}..{(word >> 16 & 255) + (word >> 24) - 1}, {word & 65535}"
         if op in (Op.END, Op.END_GRADED) and position == 0:
             return self.program.outcomes[word]
         if op == Op.CHOOSE and position == 0:
@@ -221,6 +224,7 @@ def _least_operands(op: Op) -> int:
         Op.DISTANCE,
         Op.QUADRANT,
         Op.DRAW,
+        Op.DRAW_OTHER,
         Op.PICK_BIT,
         Op.SEES,
         Op.NEAREST_CELL,

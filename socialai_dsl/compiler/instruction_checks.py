@@ -170,6 +170,11 @@ class _Instruction:
         problem = self.value(b, 1, 1 << 30) or self.site(c)
         return problem or self.write(a, (0, self._interval(b)[1] - 1))
 
+    def draw_other(self, a: int, b: int, c: int) -> str | None:
+        first, count = c >> 16 & 255, c >> 24
+        problem = self.value(b) or self.site(c & 65535) or self.literal(count, 2, 127)
+        return problem or self.write(a, (first, first + count - 1))
+
     def set_bit(self, a: int, b: int, _c: int) -> str | None:
         if problem := self.value(b, 0, 62) or self.value(a, 0):
             return problem
@@ -379,6 +384,7 @@ _CHECKS: dict[Op, Callable[[_Instruction, int, int, int], str | None]] = {
     Op.DISTANCE: _Instruction.distance,
     Op.QUADRANT: _Instruction.quadrant,
     Op.DRAW: _Instruction.draw,
+    Op.DRAW_OTHER: _Instruction.draw_other,
     Op.SET_BIT: _Instruction.set_bit,
     Op.COUNT_BITS: _Instruction.count_bits,
     Op.LOWEST_BIT: _Instruction.lowest_bit,

@@ -12,6 +12,10 @@ from socialai_dsl.semantics.terms import Const
 _SET = 32
 """How many things a set of bits can tell apart."""
 
+_LAST_OTHER = 255
+_MOST_OTHERS = 127
+"""What `Op.DRAW_OTHER` has room for."""
+
 if TYPE_CHECKING:
     from socialai_dsl.compiler.expressions import Expressions
 
@@ -45,11 +49,11 @@ def _mask(to: Expressions, term: terms.Quantified) -> int:
 def picked_thing(to: Expressions, term: terms.Quantified) -> int:
     """The operand of a drawn thing among those that the condition holds for."""
     site = to.sites.row(term.site or to.site, term.ordinal)
+    if (other := _but_one(term)) is not None:
+        return _any_other(to, term, other, site)
     if term.condition is not None and len(term.items) > _SET:
         choices = to.into_temporary(Op.MAX, _count_one_by_one(to, term), constant(1))
         return _nth(to, term, to.into_temporary(Op.DRAW, choices, site))
-    if (other := _but_one(term)) is not None:
-        return _any_other(to, term, other, site)
     if term.condition is not None:
         return _chosen(to, term, Op.PICK_BIT, site)
     return _item(to, term.items, to.into_temporary(Op.DRAW, constant(len(term.items)), site))
@@ -58,26 +62,24 @@ def picked_thing(to: Expressions, term: terms.Quantified) -> int:
 def _but_one(term: terms.Quantified) -> terms.Term | None:
     """The one of its things that `pick(x in group where x != one)` leaves out, if that is what the term is."""
     match term.condition:
-        case terms.Compare("!=", terms.Variable(name=name), terms.Const() | terms.Read() as one):
+        case terms.Compare(
+            "!=",
+            terms.Variable(name=name),
+            (terms.Const() | terms.Read() | terms.FieldOf(entity=Const())) as one,
+        ):
             first, last = term.items[0].value, term.items[-1].value
             in_a_row = [item.value for item in term.items] == list(range(first, last + 1))
             among = first <= one.type.low and one.type.high <= last
-            entity = one.type.kind == "entity"
-            if name == term.variable and in_a_row and among and len(term.items) > 1 and entity:
+            fits = first >= 0 and last <= _LAST_OTHER and 1 < len(term.items) <= _MOST_OTHERS
+            if name == term.variable and in_a_row and among and fits:
                 return one
     return None
 
 
 def _any_other(to: Expressions, term: terms.Quantified, one: terms.Term, site: int) -> int:
-    """One of all of them less the one, without asking of each whether it is that: from it on they move up by one."""
-    thing = to.into_temporary(Op.DRAW, constant(len(term.items) - 1), site)
-    if (first := term.items[0].value) != 0:
-        to.block.emit(Op.ADD, thing, thing, constant(first))
-    before = Label()
-    to.block.test(Op.IF_LE, to.value(one), thing, before)
-    to.block.emit(Op.ADD, thing, thing, constant(1))
-    to.block.bind(before)
-    return thing
+    """One of all of them less the one, without asking of each whether it is that."""
+    packed = site | term.items[0].value << 16 | len(term.items) << 24
+    return to.into_temporary(Op.DRAW_OTHER, to.value(one), packed)
 
 
 def _chosen(to: Expressions, term: terms.Quantified, op: Op, site: int = 0) -> int:

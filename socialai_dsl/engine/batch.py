@@ -164,7 +164,12 @@ class Batch:
             if actions is not None:
                 self.ports.actions[:] = actions
             return self._share(self._tasks[task])
-        return self._share(self._checked[task]) if self._take(actions) else BAD_ACTION
+        ended = self._check_and_step(task, actions)
+        if ended is None:
+            return BAD_ACTION
+        if ended < BAD_ACTION:
+            raise self.refused_room()
+        return ended
 
     def stepper(self, task: Task) -> Callable[[], int]:
         """What does `step(task)`, for a batch that no threads share, without anything between Python and the engine.
@@ -174,20 +179,20 @@ class Batch:
         assert len(self._cuts) == 1, "internal: threads share this batch"
         return self._tasks[task].own
 
-    def _take(self, actions: NDArray[np.integer[Any]] | None) -> bool:
-        """Let each thread copy the actions of its rows, which come late from another core's cache; whether all fit."""
-        if actions is None:
-            return self.actions_fit()
-        given = np.ascontiguousarray(actions, np.int64)
-        replaced = replace_in(self._book, Book.GIVEN, given)
+    def _check_and_step(self, task: Task, actions: NDArray[np.integer[Any]] | None) -> int | None:
+        """Let each thread copy the actions of its rows, which come late from another core's cache, and step if all fit.
+
+        What the calls return in all, or None if an action does not fit.
+        """
+        first, second = self._checks, self._checked[task]
+        given = self.ports.actions if actions is None else np.ascontiguousarray(actions, np.int64)
+        replaced = replace_in(self._book, Book.GIVEN, given.reshape(-1))
         try:
-            return self.actions_fit()
+            if self._relay is not None:
+                return self._relay.make_both(first.order, second.order)
+            return self._ask(second) if self._ask(first) == 0 else None
         finally:
             put_back(self._book, replaced)
-
-    def actions_fit(self) -> bool:
-        """Whether all actions are inside the action space."""
-        return self._ask(self._checks) == 0
 
     def reset(self, pins: NDArray[np.int16] | None = None) -> None:
         """Start the episodes that the keys of the rows `ports.chosen` name, from their layouts (`ports.layout`).
@@ -219,7 +224,7 @@ class Batch:
     def _open_book(self) -> None:
         tables = self.tables._replace(views=self.tables.views.reshape(-1))
         ports = self.ports._replace(counters=self.ports.counters.reshape(-1))
-        self._book = make_book((*tables, *self.state, *ports, ports.actions))
+        self._book = make_book((*tables, *self.state, *ports, *[ports.actions.reshape(-1)] * 2))
         self._tasks = [self._prepare("serve", task) for task in Task]
         self._checked = [self._prepare("serve", task + CHECKED) for task in Task if task < Task.CHECK]
         self._checks = self._tasks[Task.CHECK]

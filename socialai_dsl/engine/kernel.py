@@ -12,6 +12,7 @@ from socialai_dsl.engine.machine import symbol_of
 from socialai_dsl.engine.picture import take_picture
 from socialai_dsl.engine.pointers import (
     bytes_of,
+    copy_many,
     float64_of,
     int16_of,
     int32_of,
@@ -135,25 +136,26 @@ def _report_end(book: Any, row: int, opened: Row) -> None:
 
 
 @inline
-def _take_actions(book: Any, first: int, last: int) -> bool:
-    """Copy the given actions to those of the step; whether all are inside the action space."""
+def _take_actions(book: Any, first: int, last: int) -> None:
+    """Copy the given actions to those of the step, because another thread of the caller's may be writing there."""
+    taken, given = uint64_of(book, Book.TAKEN, 4 * first), uint64_of(book, Book.GIVEN, 4 * first)
+    copy_many(taken, given, 4 * (last - first))
+
+
+@inline
+def _actions_fit(book: Any, first: int, last: int) -> bool:
+    """Whether all actions are inside the action space."""
     program = int32_of(book, Book.WORDS, np.int64(uint64_of(book, Book.KEYS, first)[Key.PROGRAM]))
     link = program[Header.SIZE]
     primitives = np.uint64(program[link + Link.ACTIONS])
     templates = np.uint64(program[link + Link.TEMPLATES])
     nouns = np.uint64(program[link + Link.NOUNS])
+    actions = uint64_of(book, Book.TAKEN, 4 * first)
     wrong = False
-    for row in range(first, last):
-        given = uint64_of(book, Book.GIVEN, row)
-        # Read once, because another thread of the caller's may be writing there. What is negative is large unsigned.
-        primitive, speak, template, noun = given[0], given[1], given[2], given[3]
-        wrong |= (primitive >= primitives) | (speak >= np.uint64(2))
-        wrong |= (template >= templates) | (noun >= nouns)
-        action = uint64_of(book, Book.ACTIONS, row)
-        action[0] = primitive
-        action[1] = speak
-        action[2] = template
-        action[3] = noun
+    for i in range(0, 4 * (last - first), 4):
+        # What is negative is large unsigned.
+        wrong |= (actions[i] >= primitives) | (actions[i + 1] >= np.uint64(2))
+        wrong |= (actions[i + 2] >= templates) | (actions[i + 3] >= nouns)
     return not wrong
 
 
@@ -174,8 +176,11 @@ def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
     ended = 0
     if task >= CHECKED:
         task -= CHECKED
-    elif task <= Task.CHECK and not _take_actions(book, first, last):
-        return BAD_ACTION
+    elif task <= Task.CHECK:
+        if task == Task.CHECK:
+            _take_actions(book, first, last)
+        if not _actions_fit(book, first, last):
+            return BAD_ACTION
     if task == Task.CHECK:
         return 0
     for row in range(first, last):

@@ -8,7 +8,7 @@ from numba.core import cgutils
 from numba.core.typing.templates import signature
 from numba.extending import intrinsic
 
-from socialai_dsl.engine.vectors import WORD, counted, in_all, place
+from socialai_dsl.engine.vectors import HALF, LANES, WORD, WORDS, counted, in_all, place
 from socialai_dsl.program import VIEW
 
 _LINE: Final = (1 << VIEW) - 1
@@ -22,6 +22,16 @@ def _load(builder: Any, pointer: Any, index: Any, chosen: Any, otherwise: Any) -
     load = cgutils.get_or_insert_function(builder.module, function, name)
     at = place(builder, pointer, index, kind)
     return builder.call(load, [at, WORD(kind.element.width // 8), chosen, otherwise])
+
+
+def _store(builder: Any, value: Any, pointer: Any, index: Any, chosen: Any) -> None:
+    """Write those numbers that are chosen, and leave the others alone."""
+    kind = value.type
+    name = f"llvm.masked.store.v{kind.count}i{kind.element.width}.p0"
+    function = ir.FunctionType(ir.VoidType(), [kind, kind.as_pointer(), WORD, chosen.type])
+    store = cgutils.get_or_insert_function(builder.module, function, name)
+    at = place(builder, pointer, index, kind)
+    builder.call(store, [value, at, WORD(kind.element.width // 8), chosen])
 
 
 @intrinsic
@@ -53,3 +63,27 @@ def opaque_lines(context: Any, board: Any, first: Any, lines: Any, top: Any, bey
         return builder.bitcast(builder.trunc(cells, ir.VectorType(ir.IntType(8), VIEW + 1)), wide)
 
     return signature(types.uint64, board, *(types.intp,) * 5), generate
+
+
+@intrinsic
+def put_short(context: Any, tokens: Any, start: Any, room: Any, program: Any, first: Any, count: Any) -> Any:
+    """Let the numbers of a row from `start` on be `count` of the program's from `first` on and then zeros, 16 in all.
+
+    What lies `room` numbers behind the start, or further, is left alone.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        tokens, start, room, program, first, count = arguments
+        halves = ir.VectorType(HALF, LANES)
+
+        def lanes_below(number: Any) -> Any:
+            return builder.icmp_signed(
+                "<", counted(WORDS), in_all(builder, builder.trunc(number, WORD), WORDS)
+            )
+
+        nothing = ir.Constant(WORDS, [0] * LANES)
+        line = builder.trunc(_load(builder, program, first, lanes_below(count), nothing), halves)
+        _store(builder, line, tokens, start, lanes_below(room))
+        return context.get_dummy_value()
+
+    return signature(types.none, tokens, types.intp, types.intp, program, types.intp, types.intp), generate

@@ -41,6 +41,13 @@ def draw_below(row: Row, site: int, n: int) -> int:
 
 
 @inline
+def draw_other(row: Row, packed: int, one: int) -> int:
+    """A uniform number of some in a row, but not this one; see `Op.DRAW_OTHER`."""
+    number = (packed >> 16 & 255) + draw_below(row, packed & 65535, (packed >> 24) - 1)
+    return number + np.int64(number >= one)
+
+
+@inline
 def draw_action(row: Row, packed: int, count: int, site: int) -> int:
     """One of the actions packed into a word, four bits each; see `Op.CHOOSE`."""
     return np.int64((packed >> (4 * draw_below(row, site, count))) & 15)

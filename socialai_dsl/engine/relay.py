@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from enum import IntEnum
 from functools import cache
 from itertools import chain
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import llvmlite.binding as llvm
 
@@ -48,11 +48,16 @@ class _Order(IntEnum):
 
 
 class _Progress(IntEnum):
-    """How far the calls are: made; not all of them are; or some thread has to be woken."""
+    """How far the calls are: made; not all of them are; or some thread has to be woken.
+
+    Of calls that depend on others SECOND is added to it, or it is REFUSED: the others returned what forbids them.
+    """
 
     DONE = 0
     LATE = 1
     ASLEEP = 2
+    REFUSED = 3
+    SECOND = 4
 
 
 _CODE: Final = f"""
@@ -92,6 +97,24 @@ wake:
   ret i64 {_Progress.ASLEEP.value}
 go:
   %progress = tail call i64 @socialai_dsl_finish(ptr %order, ptr %desks, i64 %count, i64 %spins)
+  ret i64 %progress
+}}
+
+define i64 @socialai_dsl_share_both(ptr %first, ptr %second, ptr %desks, i64 %count, i64 %spins) {{
+  %early = call i64 @socialai_dsl_share(ptr %first, ptr %desks, i64 %count, i64 %spins)
+  %made = icmp eq i64 %early, {_Progress.DONE.value}
+  br i1 %made, label %ask, label %not_yet
+not_yet:
+  ret i64 %early
+ask:
+  %sum = load i64, ptr %first
+  %fine = icmp eq i64 %sum, 0
+  br i1 %fine, label %go, label %refused
+refused:
+  ret i64 {_Progress.REFUSED.value}
+go:
+  %late = call i64 @socialai_dsl_share(ptr %second, ptr %desks, i64 %count, i64 %spins)
+  %progress = add i64 %late, {_Progress.SECOND.value}
   ret i64 %progress
 }}
 
@@ -189,15 +212,30 @@ sleep:
 """
 
 
+class _Functions(NamedTuple):
+    """The machine code, which lets other threads run meanwhile."""
+
+    share: Any
+    share_both: Any
+    finish: Any
+    wait: Any
+    stand_by: Any
+
+
 @cache
-def _functions() -> tuple[Any, ...]:
-    """`share`, `finish`, `wait` and `stand_by`, which let other threads run meanwhile."""
+def _functions() -> _Functions:
     pause = "x86.sse2.pause" if llvm.get_process_triple().startswith("x86_64") else "donothing"
-    names = [f"socialai_dsl_{name}" for name in ("share", "finish", "wait", "stand_by")]
-    *makes, stand_by = load_assembly(_CODE.replace("llvm.PAUSE", f"llvm.{pause}"), names)
+    names = [f"socialai_dsl_{name}" for name in _Functions._fields]
+    code = load_assembly(_CODE.replace("llvm.PAUSE", f"llvm.{pause}"), names)
     word, pointer = ctypes.c_int64, ctypes.c_void_p
-    make = ctypes.CFUNCTYPE(word, pointer, pointer, word, word)
-    return *map(make, makes), ctypes.CFUNCTYPE(word, pointer, word)(stand_by)
+    takes = {"share_both": (pointer, pointer, pointer, word, word), "stand_by": (pointer, word)}
+    usual = (pointer, pointer, word, word)
+    return _Functions(
+        *(
+            ctypes.CFUNCTYPE(word, *takes.get(name, usual))(address)
+            for name, address in zip(_Functions._fields, code, strict=True)
+        )
+    )
 
 
 def order_of(calls: Sequence[Call]) -> Any:
@@ -220,7 +258,7 @@ class _Desk:
 
     def serve(self) -> None:
         """Make the calls that are posted, until the desk is closed."""
-        *_, stand_by = _functions()
+        stand_by = _functions().stand_by
         while not self.closed:
             stand_by(self.words, _SPINS)
             self.wake.wait()
@@ -241,23 +279,34 @@ class Relay:
             thread.start()
         self._finish = weakref.finalize(self, _close, self._desks, self._threads)
         self._words = (ctypes.c_int64 * threads)(*(desk.words for desk in self._desks))
+        self._to = ctypes.addressof(self._words), threads, _SPINS
 
     def make(self, order: Any) -> int:
         """Make a call, and let each thread make one (`order_of`); the sum of what they return."""
-        share, finish, wait, _ = _functions()
-        given = order, self._words, len(self._desks), _SPINS
-        progress = share(*given)
+        return self._made(order, _functions().share(order, *self._to))
+
+    def make_both(self, first: Any, second: Any) -> int | None:
+        """Make calls as `make` does, then others if the first returned 0; None if they did not."""
+        progress = _functions().share_both(first, second, *self._to)
+        if progress >= _Progress.SECOND:
+            return self._made(second, progress - _Progress.SECOND)
+        if progress == _Progress.REFUSED or self._made(first, progress) != 0:
+            return None
+        return self.make(second)
+
+    def _made(self, order: Any, progress: int) -> int:
+        """See to it that calls which have come so far are made; the sum of what they return."""
         if progress == _Progress.ASLEEP:
             for desk in self._desks:
                 desk.wake.set()
-            progress = finish(*given)
+            progress = _functions().finish(order, *self._to)
         while progress != _Progress.DONE:
             if not all(
                 thread.is_alive() for thread in self._threads
             ):  # they are in the process that forked this one
                 raise RuntimeError(_FORKED)
             time.sleep(_NAP)
-            progress = wait(*given)
+            progress = _functions().wait(order, *self._to)
         return int(order[_Order.SUM])
 
     def close(self) -> None:

@@ -1,12 +1,16 @@
 """What is said reaches who is near: the agent's log and tokens, the inboxes of those who follow a frame."""
 
+import numpy as np
+
 from socialai_dsl.engine.boards import npcs_are_hidden
-from socialai_dsl.engine.entities import column, distance, is_present
+from socialai_dsl.engine.entities import column, distance, field, is_present
 from socialai_dsl.engine.jit import inline, outline, stay_outline
+from socialai_dsl.engine.masked import put_short
 from socialai_dsl.engine.pointers import move_down
 from socialai_dsl.engine.rng import fold
 from socialai_dsl.engine.state import AGENT, NOTHING, Key, Row
-from socialai_dsl.program import EntityColumn, Flag, FrameColumn, Header, LineColumn, Register
+from socialai_dsl.engine.vectors import LANES, WIDE
+from socialai_dsl.program import EntityColumn, Field, Flag, FrameColumn, Header, LineColumn, Register
 
 
 @inline
@@ -50,10 +54,16 @@ def remember(row: Row, line: int) -> None:
     _forget_oldest(row, words)
     start = registers[Register.TOKENS]
     first = row.program[Header.TOKEN_AT] + _line(row, line, LineColumn.FIRST_TOKEN)
-    words = min(words, row.program[Header.TOKENS] - start)
-    for i in range(words):
-        row.tokens[start + i] = row.program[first + i]
-    for i in range(start + words, before):
+    room = row.program[Header.TOKENS] - start
+    words = min(words, room)
+    written = words
+    if WIDE and words <= LANES:
+        put_short(row.tokens, start, room, row.program, first, words)
+        written = np.int64(LANES)
+    else:
+        for i in range(words):
+            row.tokens[start + i] = row.program[first + i]
+    for i in range(start + written, before):
         row.tokens[i] = 0
     place = registers[Register.OLDEST] + registers[Register.LOGGED]
     size = row.program[Header.LOG_SIZE]
@@ -178,13 +188,19 @@ def _agent_may_hear(row: Row, speaker: int) -> bool:
 def deliver(row: Row, speaker: int, utterance: int, noun: int) -> None:
     """Put what was said into the inbox of everybody else with a frame who is within earshot."""
     table = row.program[Header.FRAME_AT]
+    x = field(row, speaker, Field.X)
+    y = field(row, speaker, Field.Y)
+    near = column(row, speaker, EntityColumn.NEAR)
+    far = column(row, speaker, EntityColumn.FAR)
     last = NOTHING
     for _ in range(row.program[Header.FRAMES]):
         entity = row.program[table + FrameColumn.ENTITY]
+        away = abs(field(row, entity, Field.X) - x) + abs(field(row, entity, Field.Y) - y)
         if (
-            entity not in (last, speaker)
+            away <= far  # most are not, so this comes first
+            and entity not in (last, speaker)
+            and away >= near
             and is_present(row, entity)
-            and within_earshot(row, speaker, entity)
             and (entity != AGENT or _agent_may_hear(row, speaker))
         ):
             put_into_inbox(row, row.program[table + FrameColumn.INBOX], utterance, speaker, noun)

@@ -123,7 +123,8 @@ class Book(IntEnum):
     REFUSED = 30
     PICTURE = 31
     SIZES = 32
-    GIVEN = 33  # int64 (E, 4), the actions as the caller has them; those in the ports, unless a step is given others
+    TAKEN = 33  # int64 (4 E), the rows of ACTIONS one behind the other
+    GIVEN = 34  # int64 (4 E), the actions as the caller has them; those taken, unless a step is given others
 
 
 class Size(IntEnum):
@@ -189,7 +190,9 @@ class Ports(NamedTuple):
         np.int64
     ]  # (threads, counters of all programs, then a line of the cache that is nobody's)
     scratch: NDArray[np.int64]  # (threads, TEMPORARIES)
-    sets: NDArray[np.uint32]  # (threads, SCRATCH_BOARDS * MAX_SIDE)
+    sets: NDArray[
+        np.uint32
+    ]  # (threads, SCRATCH_BOARDS * MAX_SIDE, then a line of the cache that is nobody's)
     spare_registers: NDArray[np.int16]  # (threads, R) of a row that is played on for a look
     spare_boards: NDArray[np.uint32]  # (threads, board)
     spare_counters: NDArray[np.int64]  # (threads, counters of all programs)
@@ -231,7 +234,7 @@ def empty_state(rows: int, registers: int, board: int, tokens: int, view: int, g
 def empty_ports(state: State, counters: int, threads: int) -> Ports:
     """Ports that fit a state, with nothing pinned and no outcome."""
     rows, registers = state.registers.shape
-    # Threads that write to one line of the cache take it from each other: a line lies between their counters.
+    # Threads that write to one line of the cache take it from each other: a line lies between what they count or mark.
     apart = -(-counters // 8) * 8 + 8
     return Ports(
         actions=np.zeros((rows, 4), np.int64),
@@ -249,7 +252,7 @@ def empty_ports(state: State, counters: int, threads: int) -> Ports:
         ended=np.zeros(rows, np.bool_),
         counters=np.zeros((threads, apart), np.int64),
         scratch=np.zeros((threads, TEMPORARIES), np.int64),
-        sets=np.zeros((threads, SCRATCH_BOARDS * MAX_SIDE), np.uint32),
+        sets=np.zeros((threads, SCRATCH_BOARDS * MAX_SIDE + 16), np.uint32),
         spare_registers=np.zeros((threads, registers), np.int16),
         spare_boards=np.zeros((threads, state.boards.shape[1]), np.uint32),
         spare_counters=np.zeros((threads, counters), np.int64),

@@ -12,7 +12,7 @@ from socialai_dsl.engine.conditions import holds
 from socialai_dsl.engine.entities import field, quadrant, set_field
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.machine import symbol_of
-from socialai_dsl.engine.operands import assign, draw_action, draw_below, value
+from socialai_dsl.engine.operands import assign, draw_action, draw_below, draw_other, value
 from socialai_dsl.engine.places import next_cell, place
 from socialai_dsl.engine.pointers import ROW_TYPES
 from socialai_dsl.engine.pushing import put_on
@@ -40,6 +40,8 @@ def _compute(row: Row, op: int, a: int, b: int, c: int) -> None:
         result = attribute(row, result, c)
     elif op == Op.DRAW:
         result = draw_below(row, c, result)
+    elif op == Op.DRAW_OTHER:
+        result = draw_other(row, c, result)
     elif op == Op.SEES:
         result = np.int64(is_in_view(row, result, value(row, c), value(row, a)))
     elif op == Op.CELL_OF:

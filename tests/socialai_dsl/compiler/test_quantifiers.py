@@ -21,6 +21,8 @@ from socialai_dsl.semantics.terms import (
 from tests.socialai_dsl.compiler.workbench import (
     NUMBER,
     SPAN,
+    code,
+    compiled,
     number,
     sited,
     start,
@@ -59,6 +61,35 @@ def test_a_pick_takes_every_one_that_fits_and_no_other(size: int) -> None:
     few = Logic("or", tuple(Compare("==", ITEM, number(n)) for n in (10, 12, 9 + size)))
     pick = Quantified(NUMBER, "pick", "n", group(size), few)
     assert {worth(pick, seed=seed) for seed in range(30)} == {10, 12, 9 + size}
+
+
+@pytest.mark.parametrize(
+    ("first", "size", "instruction"),
+    [
+        (0, 2, "DRAW_OTHER"),
+        (4, 5, "DRAW_OTHER"),
+        (129, 127, "DRAW_OTHER"),
+        (5, 1, "PICK_BIT"),
+        (-1, 5, "PICK_BIT"),
+        (252, 5, "PICK_BIT"),
+        (1, 128, "DRAW"),
+    ],
+)
+def test_a_pick_of_all_but_one_draws_what_any_pick_does(first: int, size: int, instruction: str) -> None:
+    """One instruction where the numbers fit into it, and the same number as where the others are named."""
+    numbers = range(first, first + size)
+    items = tuple(Const(NUMBER, n) for n in numbers)
+    for one in {first, first + size // 2, first + size - 1}:
+        but_one = Compare("!=", ITEM, Const(Type("int", one, one), one))
+        pick = Quantified(NUMBER, "pick", "n", items, but_one)
+        program = compiled(with_let(workbench(), "let.answer", pick))
+        assert instruction in code(program, "reset")
+        named = Logic("or", tuple(Compare("==", ITEM, number(n)) for n in numbers if n != one))
+        if size > 1:
+            same = Quantified(NUMBER, "pick", "n", items, named)
+            drawn = [worth(pick, seed=seed) for seed in range(12)]
+            assert drawn == [worth(same, seed=seed) for seed in range(12)]
+            assert one not in drawn
 
 
 @pytest.mark.parametrize("size", SIZES)

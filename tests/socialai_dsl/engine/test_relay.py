@@ -47,6 +47,44 @@ def test_every_call_is_made_once_in_a_thread_of_its_own(pause: float) -> None:
     assert len({threads[0] for threads in made}) == 3
 
 
+@pytest.mark.parametrize("pause", [0.0, 2e-4, 3e-3], ids=["awake", "falling asleep", "asleep"])
+def test_calls_that_depend_on_others_are_made_if_these_return_0(pause: float) -> None:
+    answers = [0, 0, 0]
+    made = [0, 0, 0]
+
+    def work(number: int) -> int:
+        made[number] += 1
+        return 10**number
+
+    relay = Relay(2)
+    first = [call_of(lambda number=number: answers[number]) for number in range(3)]
+    second = [call_of(lambda number=number: work(number)) for number in range(3)]
+    orders = order_of(first), order_of(second)
+    for round_number in range(60):
+        answers[:] = [0, 0, 0]
+        assert relay.make_both(*orders) == 111
+        time.sleep(pause)
+        answers[round_number % 3] = -1
+        assert relay.make_both(*orders) is None
+        time.sleep(pause)
+    relay.close()
+    assert made == [60] * 3
+
+
+def test_what_others_depend_on_is_waited_for() -> None:
+    relay = Relay(1)
+
+    def slow(answer: int) -> int:
+        time.sleep(0.03)
+        return answer
+
+    quick = call_of(lambda: 0)
+    for answer, found in ((0, 5), (-1, None)):
+        late = order_of([quick, call_of(lambda answer=answer: slow(answer))])
+        assert relay.make_both(late, order_of([call_of(lambda: slow(2)), call_of(lambda: 3)])) == found
+    relay.close()
+
+
 def test_a_slow_call_is_waited_for() -> None:
     relay = Relay(1)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import cycle
+
 import numpy as np
 import pytest
 
@@ -178,6 +180,37 @@ def test_the_oldest_whole_lines_make_room() -> None:
         ([1, 0], [5, 6, 7, 8, 2, 3, 4, 0]),
         ([0, 0], [2, 3, 4, 2, 3, 4, 0, 0]),
     ]
+
+
+@pytest.mark.parametrize("limit", [3, 10, 16, 17, 31, 64])
+@pytest.mark.parametrize("lengths", [(0, 1, 2, 5), (15, 16, 17), (4, 16, 1, 40), (1, 2, 30, 3)], ids=str)
+def test_lines_of_all_lengths_in_histories_of_all_lengths(lengths: tuple[int, ...], limit: int) -> None:
+    """Against lists, with other environments on either side."""
+    steps = 30
+    spoken = [
+        tuple(2 + (7 * t + i) % 20 for i in range(length))
+        for t, length in zip(range(steps + 1), cycle(lengths), strict=False)
+    ]
+    said = [(Op.SAY, constant(1), Register.T)]
+    room = Assembly(
+        at=((1, 1), (2, 1)),
+        npcs=1,
+        frames=(FrameSpec(1, ([],), then=({-1: said},)),),
+        lines=tuple((f"line {t}", words, 1) for t, words in enumerate(spoken)),
+        tokens=limit,
+        log=steps + 1,
+        horizon=steps + 1,
+    )
+    batch = batch_of(room.program(), rows=3)
+    kept: list[tuple[int, ...]] = []
+    for t in range(1, steps + 1):
+        while kept and sum(map(len, kept)) + len(spoken[t]) > limit:
+            kept.pop(0)
+        kept.append(spoken[t][:limit])
+        play(batch, SILENT)
+        expected = [word for line in kept for word in line]
+        assert batch.state.registers[:, Register.TOKENS].tolist() == [len(expected)] * 3
+        assert batch.state.tokens.tolist() == [expected + [0] * (limit - len(expected))] * 3, f"step {t}"
 
 
 def test_the_log_is_bounded_by_lines_too() -> None:
