@@ -32,6 +32,7 @@ _FIRST_IS_ENTITY = _ENTITIES | {
 _SECOND_IS_ENTITY = _ENTITIES | {
     Op.FIELD,
     Op.DISTANCE,
+    Op.NEAREST,
     Op.QUADRANT,
     Op.SEES,
     Op.CELL_OF,
@@ -46,6 +47,7 @@ _LITERALS: dict[Op, tuple[int, ...]] = {
     Op.IF_CHANCE: (0, 1),
     Op.IF_HEARD: (1,),
     Op.FIELD: (2,),
+    Op.NEAREST: (2,),
     Op.DRAW: (2,),
     Op.DRAW_OTHER: (2,),
     Op.PICK_BIT: (2,),
@@ -186,6 +188,8 @@ class _Names:
             return self.program.rules[word] if position == 0 else "0"
         if op == Op.ANSWER and position != 1:
             return self.program.rules[word] if position == 0 else _goal(word)
+        if op == Op.NEAREST and position == 2:
+            return f"{self._place(word >> 8)}..{self._place(word & 255)}"
         if op == Op.DRAW_OTHER and position == 2:
             return f"{word >> 16 & 255}..{(word >> 16 & 255) + (word >> 24) - 1}, {word & 65535}"
         if op in (Op.END, Op.END_GRADED) and position == 0:
@@ -222,6 +226,7 @@ def _least_operands(op: Op) -> int:
         *range(Op.ADD, Op.ABS),
         Op.FIELD,
         Op.DISTANCE,
+        Op.NEAREST,
         Op.QUADRANT,
         Op.DRAW,
         Op.DRAW_OTHER,

@@ -310,43 +310,46 @@ class Op(IntEnum):
     ABS = 28  # dst a = |v(b)|
     FIELD = 29  # dst a = field c (literal Field) of e(b)
     DISTANCE = 30  # dst a = Manhattan distance of e(b) and e(c)
-    QUADRANT = 31  # dst a = direction of e(c) seen from e(b); |dx| == |dy|: SE right, NE up, NW left, SW down
-    DRAW = 32  # dst a = uniform number below v(b), drawn at site c (literal)
+    # dst a = the entity nearest to e(b) of those from c >> 8 to c & 255 (a literal), ties: the first; -1 if none is in
+    # the room, or e(b) is not
+    NEAREST = 31
+    QUADRANT = 32  # dst a = direction of e(c) seen from e(b); |dx| == |dy|: SE right, NE up, NW left, SW down
+    DRAW = 33  # dst a = uniform number below v(b), drawn at site c (literal)
     # dst a = a uniform number other than v(b), drawn at site c & 65535, of the c >> 24 numbers from (c >> 16 & 255) on
-    DRAW_OTHER = 33
-    SET_BIT = 34  # dst a |= 1 << v(b)
-    COUNT_BITS = 35  # dst a = number of set bits of v(b)
-    LOWEST_BIT = 36  # dst a = position of the lowest set bit of v(b); 0 if none
-    PICK_BIT = 37  # dst a = position of a uniformly drawn set bit of v(b), site c (literal); 0 if none
-    SEES = 38  # dst a = 1 if e(c) would be in the view square of e(b) if that faced direction v(a), else 0
-    CELL_OF = 39  # dst a = the cell of e(b); CELL - 1 if it is not in the room
-    CELL_BESIDE = 40  # dst a = the cell beside e(b) in direction v(c); CELL - 1 if that is off the canvas
+    DRAW_OTHER = 34
+    SET_BIT = 35  # dst a |= 1 << v(b)
+    COUNT_BITS = 36  # dst a = number of set bits of v(b)
+    LOWEST_BIT = 37  # dst a = position of the lowest set bit of v(b); 0 if none
+    PICK_BIT = 38  # dst a = position of a uniformly drawn set bit of v(b), site c (literal); 0 if none
+    SEES = 39  # dst a = 1 if e(c) would be in the view square of e(b) if that faced direction v(a), else 0
+    CELL_OF = 40  # dst a = the cell of e(b); CELL - 1 if it is not in the room
+    CELL_BESIDE = 41  # dst a = the cell beside e(b) in direction v(c); CELL - 1 if that is off the canvas
     # Effects.
-    SET_FIELD = 41  # field b (literal) of e(a) = v(c); X, Y, STATUS, GONE have ops of their own
-    BECOME = 42  # status of e(a) = v(b); the cell is drawn anew
-    VANISH = 43  # e(a) leaves the room
-    SAY = 44  # e(a) says line v(b) at the end of its turn, unless it says something already
-    GOTO = 45  # frame a (literal) enters state b (literal), clock 0
-    COUNT = 46  # counter a (literal) += 1
-    END = 47  # the episode ends: outcome a (literal), b (literal) per cent of the reward
-    PLACE = 48  # e(a) is put on the cell of e(b), in the room; it may share the cell
-    REWARD = 49  # Register.BONUS += v(a)
-    END_GRADED = 50  # the episode ends: outcome a (literal), v(b) per cent of the reward, cut to 0..100
+    SET_FIELD = 42  # field b (literal) of e(a) = v(c); X, Y, STATUS, GONE have ops of their own
+    BECOME = 43  # status of e(a) = v(b); the cell is drawn anew
+    VANISH = 44  # e(a) leaves the room
+    SAY = 45  # e(a) says line v(b) at the end of its turn, unless it says something already
+    GOTO = 46  # frame a (literal) enters state b (literal), clock 0
+    COUNT = 47  # counter a (literal) += 1
+    END = 48  # the episode ends: outcome a (literal), b (literal) per cent of the reward
+    PLACE = 49  # e(a) is put on the cell of e(b), in the room; it may share the cell
+    REWARD = 50  # Register.BONUS += v(a)
+    END_GRADED = 51  # the episode ends: outcome a (literal), v(b) per cent of the reward, cut to 0..100
     # A rule that answers, in one instruction: counter a (literal) += 1, line v(b) is said as by SAY, and, unless c
     # (literal) is 0, frame c >> 8 enters state (c & 255) - 1, as by GOTO.
-    ANSWER = 51
+    ANSWER = 52
     # Activities: choose the body action of the entity on turn.
-    BODY = 52  # action v(a)
+    BODY = 53  # action v(a)
     TURN_TO = (
-        53  # e(a) makes one quarter turn towards direction v(b), none if it faces it; behind: site c decides
+        54  # e(a) makes one quarter turn towards direction v(b), none if it faces it; behind: site c decides
     )
-    GO_TO = 54  # e(a) takes one step of a shortest path to the cell of e(b); site c for turning round
-    GO_NEXT_TO = 55  # e(a) takes one step of a shortest path to a free cell next to e(b); site c
-    POINT = 56  # e(a) points in direction v(b)
+    GO_TO = 55  # e(a) takes one step of a shortest path to the cell of e(b); site c for turning round
+    GO_NEXT_TO = 56  # e(a) takes one step of a shortest path to a free cell next to e(b); site c
+    POINT = 57  # e(a) points in direction v(b)
     # One of b (literal) actions, drawn at site c: action k is in the bits 4 k to 4 k + 3 of a (literal).
-    CHOOSE = 57
+    CHOOSE = 58
     # e(a) makes one quarter turn towards e(b), as TURN_TO towards its QUADRANT; none if it is not in the room.
-    FACE = 58
+    FACE = 59
     # Boards: sets of cells, numbered 0 to BOARDS - 1 (literals). They carry nothing from run to run; B_FREE and PUT
     # belong to reset code.
     B_FLOOR = 60  # board a = cells of plain floor

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.cells import NOWHERE
 from socialai_dsl.compiler.expressions import Expressions
@@ -64,19 +66,47 @@ class Activities:
 
     def emit(self, activity: Activity) -> None:
         """Choose the body action; `stay` chooses none, and so does an activity whose argument finds nothing."""
+        self._or_nothing(activity, self._emit, lambda: self.to.block.emit(Op.BODY, constant(Body.NONE)))
+
+    def note(self, activity: Activity) -> None:
+        """Only note what `emit` would: what the activity of this turn is about."""
+        self._or_nothing(activity, self._emit_note, lambda: None)
+
+    def _or_nothing(
+        self, activity: Activity, emit: Callable[[Activity], None], otherwise: Callable[[], None]
+    ) -> None:
+        """What is to be done in this turn, or something else if the argument of the activity finds nothing."""
         to, block = self.to, self.to.block
         to.site, block.span = activity.site, activity.span
         nothing, done = Label(), Label()
         to.failed = nothing
-        self._emit(activity)
+        emit(activity)
         to.failed = None
         if nothing.uses:
             block.skip(done)
             block.bind(nothing)
             if self.aim is not None:
                 block.emit(Op.LOAD, self.aim, constant(NOTHING))
-            block.emit(Op.BODY, constant(Body.NONE))
+            otherwise()
             block.bind(done)
+
+    def _emit_note(self, activity: Activity) -> None:
+        to, block = self.to, self.to.block
+        own, done = constant(self.entity), Label()
+        if activity.name not in ACTS:
+            self._aimed_at(activity)
+            return
+        self._note(GETTING_THERE)
+        if activity.name == "use":
+            goal = to.value(activity.args[0])
+            block.test(Op.IF_NEXT_TO, own, goal, done)
+            block.test(Op.IF_FACES, own, goal, done)
+        else:
+            thing, way = (to.value(arg) for arg in activity.args)
+            block.test(Op.IF_SAME_CELL, own, self._behind(thing, way), done)
+            block.test(Op.IF_EQ, entity_register(self.entity, Field.DIR), way, done)
+        self._note(ACTING)
+        block.bind(done)
 
     def _emit(self, activity: Activity) -> None:
         to, block = self.to, self.to.block
@@ -206,7 +236,7 @@ class Activities:
         to, block = self.to, self.to.block
         thing, way = (to.value(arg) for arg in activity.args)
         self._note(GETTING_THERE)
-        behind = to.into_temporary(Op.CELL_BESIDE, thing, self._turned_round(way))
+        behind = self._behind(thing, way)
         elsewhere, done = Label(), Label()
         block.test(Op.IF_SAME_CELL, constant(self.entity), behind, elsewhere)
         self._walk(way, pushing=True)
@@ -214,6 +244,10 @@ class Activities:
         block.bind(elsewhere)
         block.emit(Op.GO_TO, constant(self.entity), behind, self.turn)
         block.bind(done)
+
+    def _behind(self, thing: int, way: int) -> int:
+        """The cell from which a thing is pushed."""
+        return self.to.into_temporary(Op.CELL_BESIDE, thing, self._turned_round(way))
 
     def _turned_round(self, way: int) -> int:
         to = self.to

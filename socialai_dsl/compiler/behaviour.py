@@ -22,6 +22,7 @@ from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.terms import BOOL, Checked, FramePlan, RulePlan, StepPlan, Type
 
 FOR_EVER = -1
+AGENT = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +86,7 @@ class _FrameCompiler:
             if has_aim(step.activity) and step.until is None and step.duration is None
         }
         self.speaker = shared.checked.entities[frame.entity]
+        self._is_agents = frame.entity == AGENT
         self.later = Deferred(frame, self.speaker, shared.registers, shared.lines)
 
     def _range_of_aim(self, activity: terms.Activity) -> Type:
@@ -139,7 +141,7 @@ class _FrameCompiler:
     ) -> list[int]:
         where = f"{self.frame.member}.{self.frame.frame}.{self.states[k]}"
         return [
-            self._activity(activity, where, self.aims.get(k)),
+            self._activity(activity, where, None if self._is_agents else self.aims.get(k)),
             *self._by_class(first, f"{where}.first"),
             *self._by_class(then, f"{where}.then"),
         ]
@@ -292,19 +294,31 @@ class _FrameCompiler:
         block = to.block
         entry = k
         while entry < len(self.frame.steps) and self._skippable(self.frame.steps[entry]):
-            stop = Label()
-            self._activities(to).unless_finished(self.frame.steps[entry].activity, stop, stop)
-            leave = Label()
+            stop, leave = Label(), Label()
+            activities = self._noting_of_agent(to, entry)
+            activities.unless_finished(self.frame.steps[entry].activity, stop, stop)
             block.skip(leave)
             block.bind(stop)
-            if entry != k:
-                block.emit(Op.GOTO, self.number, entry)
-            block.halt()
+            self._stay_in(to, k, entry)
             block.bind(leave)
             entry = self._next(entry)
+        if entry < len(self.frame.steps):
+            self._noting_of_agent(to, entry)
+        self._stay_in(to, k, entry)
+
+    def _noting_of_agent(self, to: Expressions, entry: int) -> Activities:
+        """Whoever plays a scripted agent may not do what its entry says, so what that notes is noted before it acts."""
+        aim = self.aims.get(entry) if self._is_agents else None
+        activities = self._activities(to, aim)
+        if aim is not None:
+            activities.note(self.frame.steps[entry].activity)
+        return activities
+
+    def _stay_in(self, to: Expressions, k: int, entry: int) -> None:
+        """Take this turn in an entry, where the frame was in entry k."""
         if entry != k:
-            block.emit(Op.GOTO, self.number, entry)
-        block.halt()
+            to.block.emit(Op.GOTO, self.number, entry)
+        to.block.halt()
 
     @staticmethod
     def _skippable(step: StepPlan) -> bool:

@@ -136,6 +136,11 @@ class _Instruction:
     def distance(self, a: int, b: int, c: int) -> str | None:
         return self.place(b) or self.place(c) or self.write(a, (0, 128))
 
+    def nearest(self, a: int, b: int, c: int) -> str | None:
+        first, last = c >> 8, c & 255
+        problem = self.place(b) or self.literal(last, 0, self.entities - 1) or self.literal(first, 0, last)
+        return problem or self.write(a, (-1, last))
+
     def quadrant(self, a: int, b: int, c: int) -> str | None:
         return self.place(b) or self.place(c) or self.write(a, (0, 3))
 
@@ -382,6 +387,7 @@ _CHECKS: dict[Op, Callable[[_Instruction, int, int, int], str | None]] = {
     Op.ABS: _Instruction.absolute,
     Op.FIELD: _Instruction.field,
     Op.DISTANCE: _Instruction.distance,
+    Op.NEAREST: _Instruction.nearest,
     Op.QUADRANT: _Instruction.quadrant,
     Op.DRAW: _Instruction.draw,
     Op.DRAW_OTHER: _Instruction.draw_other,

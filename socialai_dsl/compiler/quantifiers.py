@@ -16,6 +16,9 @@ _LAST_OTHER = 255
 _MOST_OTHERS = 127
 """What `Op.DRAW_OTHER` has room for."""
 
+_LAST_NEAREST = 255
+"""What `Op.NEAREST` has room for."""
+
 if TYPE_CHECKING:
     from socialai_dsl.compiler.expressions import Expressions
 
@@ -138,6 +141,14 @@ def nearest_thing(to: Expressions, term: terms.Quantified) -> int:
     """The operand of the nearest thing that the condition holds for."""
     assert term.to is not None
     block, items = to.block, term.items
+    first, last = items[0].value, items[-1].value
+    in_a_row = [item.value for item in items] == list(range(first, last + 1))
+    if term.condition is None and in_a_row and last <= _LAST_NEAREST:
+        found = to.into_temporary(Op.NEAREST, to.value(term.to), first << 8 | last)
+        if to.failed is not None:
+            block.test(Op.IF_LE, constant(0), found, to.failed)
+        block.emit(Op.MAX, found, found, constant(first))
+        return found
     result = to.into_temporary(Op.LOAD, constant(items[0].value))
     goal = to.value(term.to)
     if term.condition is None:

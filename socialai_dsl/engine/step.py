@@ -13,7 +13,6 @@ from socialai_dsl.engine.pointers import fetch
 from socialai_dsl.engine.speech import empty_inbox, inbox_class
 from socialai_dsl.engine.state import AGENT, Link, Row, Trait
 from socialai_dsl.engine.turns import (
-    act,
     compute_statuses,
     conclude,
     follow_links,
@@ -107,9 +106,7 @@ def step_row(row: Row, link: int, book: Any, number: int) -> float:
     chosen = False
     if flags & Flag.AGENT_FRAME:
         heard = inbox_class(row, program[frame + FrameColumn.INBOX])
-        chosen = notice(row, frame, heard, flags)
-        if not chosen:
-            act(row, frame)  # for what it notes; the caller decides what the agent does
+        chosen = notice(row, frame, heard, flags)  # the caller decides what the agent does
     move_agent(row, registers[Register.ACTION])
     if flags & (Flag.PICTURE_BEFORE_NPCS | Trait.GOES_BY_ITSELF):
         changed = follow_links(row)

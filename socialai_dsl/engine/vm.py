@@ -20,7 +20,7 @@ from socialai_dsl.engine.separate import Separate
 from socialai_dsl.engine.sets import drop_cell
 from socialai_dsl.engine.sight import is_in_view
 from socialai_dsl.engine.state import NO_PATH, NOTHING, ONE, RESETTING, STILL, ZERO, Row
-from socialai_dsl.engine.whereabouts import attribute, cell_beside, cell_of, is_somewhere, x_of, y_of
+from socialai_dsl.engine.whereabouts import attribute, cell_beside, cell_of, is_somewhere, nearest, x_of, y_of
 from socialai_dsl.program import CELL, Body, Field, FrameColumn, Header, Op, Register
 
 _NO_CELL = -1
@@ -36,6 +36,8 @@ def _compute(row: Row, op: int, a: int, b: int, c: int) -> None:
         result = _combine(op, result, value(row, c))
     elif op == Op.DISTANCE or op == Op.QUADRANT:
         result = _measure(row, op, result, value(row, c))
+    elif op == Op.NEAREST:
+        result = nearest(row, result, c >> 8, c & 255)
     elif op == Op.FIELD:
         result = attribute(row, result, c)
     elif op == Op.DRAW:

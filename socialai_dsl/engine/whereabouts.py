@@ -8,6 +8,7 @@ from socialai_dsl.engine.state import NO_CELL, NOTHING, Row
 from socialai_dsl.program import CELL, Field, Header
 
 _FIRST_CELL = np.int64(CELL)
+_FAR = 1 << 30
 
 
 @inline
@@ -66,6 +67,23 @@ def cell_beside(row: Row, thing: int, direction: int) -> int:
     if not (on_canvas and is_somewhere(row, thing)):
         return NO_CELL
     return _FIRST_CELL + 32 * y + x
+
+
+@outline
+def nearest(row: Row, thing: int, first: int, last: int) -> int:
+    """Which of some entities in a row is nearest to a thing, ties: the first; see `Op.NEAREST`."""
+    stay_outline()
+    found = np.int64(NOTHING)
+    if is_somewhere(row, thing):
+        x = x_of(row, thing)
+        y = y_of(row, thing)
+        least = np.int64(_FAR)
+        for entity in range(first, last + 1):
+            away = abs(field(row, entity, Field.X) - x) + abs(field(row, entity, Field.Y) - y)
+            if away < least and is_present(row, entity):
+                least = away
+                found = entity
+    return found
 
 
 @inline

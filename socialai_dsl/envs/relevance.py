@@ -58,7 +58,7 @@ _READ: dict[Op, tuple[int, ...]] = {
     **dict.fromkeys((Op.IF_EQ, Op.IF_NE, Op.IF_LT, Op.IF_LE, Op.IF_BIT), (0, 1)),
     Op.IF_HEARD: (0,),
     **dict.fromkeys(map(Op, range(Op.IF_SAME_CELL, Op.IF_UNOBSTRUCTED + 1)), (0, 1)),
-    **dict.fromkeys((Op.LOAD, Op.ABS, Op.FIELD, Op.DRAW, Op.DRAW_OTHER, Op.CELL_OF), (1,)),
+    **dict.fromkeys((Op.LOAD, Op.ABS, Op.FIELD, Op.NEAREST, Op.DRAW, Op.DRAW_OTHER, Op.CELL_OF), (1,)),
     **dict.fromkeys((Op.COUNT_BITS, Op.LOWEST_BIT, Op.PICK_BIT), (1,)),
     **dict.fromkeys((Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.MOD, Op.MIN, Op.MAX), (1, 2)),
     **dict.fromkeys((Op.DISTANCE, Op.QUADRANT, Op.CELL_BESIDE), (1, 2)),
@@ -77,8 +77,8 @@ _LAST_TURN = (Field.LAST, Field.TOGGLED)
 _COMPARISONS = (Op.IF_EQ, Op.IF_NE, Op.IF_LT, Op.IF_LE)
 _DRAWS = (Op.DRAW, Op.DRAW_OTHER, Op.PICK_BIT, Op.PICK_CELL)
 _CHANCY = (Op.IF_CHANCE, Op.CHOOSE, Op.TURN_TO, Op.FACE, Op.GO_TO, Op.GO_NEXT_TO)
-_VALUES = (*map(Op, range(Op.LOAD, Op.ABS + 1)), Op.FIELD, Op.DISTANCE, Op.QUADRANT, Op.SET_BIT, Op.COUNT_BITS,
-           Op.LOWEST_BIT, Op.SEES, Op.CELL_OF, Op.CELL_BESIDE)  # fmt: skip
+_VALUES = (*map(Op, range(Op.LOAD, Op.ABS + 1)), Op.FIELD, Op.DISTANCE, Op.NEAREST, Op.QUADRANT, Op.SET_BIT,
+           Op.COUNT_BITS, Op.LOWEST_BIT, Op.SEES, Op.CELL_OF, Op.CELL_BESIDE)  # fmt: skip
 
 Instruction = tuple[Op, tuple[int, int, int]]
 

@@ -176,6 +176,33 @@ def test_quadrant_and_distance(to: tuple[int, int], direction: int) -> None:
     assert result_of([(Op.DISTANCE, own, constant(0), constant(1))], own, **room) == away
 
 
+@pytest.mark.parametrize(
+    ("to", "nearest"),
+    [
+        (constant(0), 2),
+        (constant(1), 1),
+        (constant(3), 3),
+        (constant(CELL + 32 * 1 + 4), 1),
+        (constant(CELL - 1), -1),
+    ],
+    ids=["a tie", "itself", "the last", "a cell", "no cell"],
+)
+def test_the_nearest_of_some_entities(to: int, nearest: int) -> None:
+    """Of entities 1 to 3; 0 is as far from 2 as from 3, and entity 4, the nearest to it, is not among them."""
+    room = {"at": ((3, 3), (5, 1), (3, 5), (1, 3), (3, 4)), "npcs": 4}
+    own = Assembly(**room).own
+    assert result_of([(Op.NEAREST, own, to, 1 << 8 | 3)], own, **room) == nearest
+
+
+def test_what_has_left_the_room_is_not_the_nearest() -> None:
+    room = {"at": ((3, 3), (5, 1), (3, 5), (1, 3)), "npcs": 3}
+    own = Assembly(**room).own
+    nearest = (Op.NEAREST, own, constant(0), 1 << 8 | 3)
+    left = [(Op.VANISH, constant(2)), (Op.VANISH, constant(3)), (Op.VANISH, constant(1))]
+    assert [result_of([*left[:gone], nearest], own, **room) for gone in range(4)] == [2, 3, 1, -1]
+    assert result_of([(Op.VANISH, constant(0)), nearest], own, **room) == -1
+
+
 def test_effects_on_a_thing_are_seen_at_once() -> None:
     room = {"at": ((1, 2), (0, 2)), "objects": ("door",), "facing": (2,)}
     shut = batch_of(Assembly(**room).program())
