@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.engine.book import make_book, put_back, replace_in
+from socialai_dsl.engine.book import make_book, replace_in
 from socialai_dsl.engine.calls import BAD_ACTION, CHECKED, Task
 from socialai_dsl.engine.errors import RoomError
 from socialai_dsl.engine.machine import Call, prepare_call
@@ -167,7 +167,7 @@ class Batch:
         ended = self._check_and_step(task, actions)
         if ended is None:
             return BAD_ACTION
-        if ended < BAD_ACTION:
+        if ended < 0:
             raise self.refused_room()
         return ended
 
@@ -186,13 +186,12 @@ class Batch:
         """
         first, second = self._checks, self._checked[task]
         given = self.ports.actions if actions is None else np.ascontiguousarray(actions, np.int64)
-        replaced = replace_in(self._book, Book.GIVEN, given.reshape(-1))
-        try:
-            if self._relay is not None:
-                return self._relay.make_both(first.order, second.order)
-            return self._ask(second) if self._ask(first) == 0 else None
-        finally:
-            put_back(self._book, replaced)
+        replace_in(
+            self._book, Book.GIVEN, given.reshape(-1)
+        )  # which is read by the check only, so never later
+        if self._relay is not None:
+            return self._relay.make_both(first.order, second.order)
+        return self._ask(second) if self._ask(first) == 0 else None
 
     def reset(self, pins: NDArray[np.int16] | None = None) -> None:
         """Start the episodes that the keys of the rows `ports.chosen` name, from their layouts (`ports.layout`).

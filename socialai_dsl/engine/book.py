@@ -21,20 +21,15 @@ def make_book(arrays: Sequence[NDArray[Any]]) -> Any:
     return (ctypes.c_int64 * len(numbers))(*numbers)
 
 
-def replace_in(book: Any, which: int, array: NDArray[Any]) -> Any:
-    """Put an array where one of the same type and width was; what `put_back` takes to undo it."""
+def replace_in(book: Any, which: int, array: NDArray[Any]) -> None:
+    """Put an array where one of the same type and width was."""
     assert array.flags.c_contiguous, "internal: arrays of a book are contiguous"
-    place, entry = (which, array) if isinstance(book, list) else (2 * which, _address_of(array))
-    before, book[place] = book[place], entry
-    return place, before
+    if isinstance(book, list):
+        book[which] = array
+    else:
+        book[2 * which] = _address_of(array)
 
 
 def _address_of(array: NDArray[Any]) -> int:
     # What NumPy gives takes four times as long, and this happens in every step.
     return ctypes.addressof(ctypes.c_byte.from_buffer(array)) if array.flags.writeable else array.ctypes.data
-
-
-def put_back(book: Any, replaced: Any) -> None:
-    """Undo a `replace_in`."""
-    place, before = replaced
-    book[place] = before

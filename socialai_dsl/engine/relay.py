@@ -60,6 +60,9 @@ class _Progress(IntEnum):
     SECOND = 4
 
 
+_BOTH: Final = int(_Progress.SECOND + _Progress.DONE)
+_SUM: Final = int(_Order.SUM)
+
 _CODE: Final = f"""
 declare void @llvm.PAUSE()
 
@@ -280,14 +283,17 @@ class Relay:
         self._finish = weakref.finalize(self, _close, self._desks, self._threads)
         self._words = (ctypes.c_int64 * threads)(*(desk.words for desk in self._desks))
         self._to = ctypes.addressof(self._words), threads, _SPINS
+        self._functions = _functions()
 
     def make(self, order: Any) -> int:
         """Make a call, and let each thread make one (`order_of`); the sum of what they return."""
-        return self._made(order, _functions().share(order, *self._to))
+        return self._made(order, self._functions.share(order, *self._to))
 
     def make_both(self, first: Any, second: Any) -> int | None:
         """Make calls as `make` does, then others if the first returned 0; None if they did not."""
-        progress = _functions().share_both(first, second, *self._to)
+        progress = self._functions.share_both(first, second, *self._to)
+        if progress == _BOTH:  # the usual case, asked for first
+            return int(second[_SUM])
         if progress >= _Progress.SECOND:
             return self._made(second, progress - _Progress.SECOND)
         if progress == _Progress.REFUSED or self._made(first, progress) != 0:
@@ -299,15 +305,15 @@ class Relay:
         if progress == _Progress.ASLEEP:
             for desk in self._desks:
                 desk.wake.set()
-            progress = _functions().finish(order, *self._to)
+            progress = self._functions.finish(order, *self._to)
         while progress != _Progress.DONE:
             if not all(
                 thread.is_alive() for thread in self._threads
             ):  # they are in the process that forked this one
                 raise RuntimeError(_FORKED)
             time.sleep(_NAP)
-            progress = _functions().wait(order, *self._to)
-        return int(order[_Order.SUM])
+            progress = self._functions.wait(order, *self._to)
+        return int(order[_SUM])
 
     def close(self) -> None:
         """Let the threads go."""

@@ -124,7 +124,7 @@ class Book(IntEnum):
     PICTURE = 31
     SIZES = 32
     TAKEN = 33  # int64 (4 E), the rows of ACTIONS one behind the other
-    GIVEN = 34  # int64 (4 E), the actions as the caller has them; those taken, unless a step is given others
+    GIVEN = 34  # int64 (4 E), the actions as the caller of a step has them; a check takes them over
 
 
 class Size(IntEnum):
