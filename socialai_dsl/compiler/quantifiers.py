@@ -12,6 +12,7 @@ from socialai_dsl.semantics.terms import Const
 _SET = 32
 """How many things a set of bits can tell apart."""
 
+_LAST_SITE = 65535
 _LAST_OTHER = 255
 _MOST_OTHERS = 127
 """What `Op.DRAW_OTHER` has room for."""
@@ -81,6 +82,7 @@ def _but_one(term: terms.Quantified) -> terms.Term | None:
 
 def _any_other(to: Expressions, term: terms.Quantified, one: terms.Term, site: int) -> int:
     """One of all of them less the one, without asking of each whether it is that."""
+    assert site <= _LAST_SITE, "internal: more draw sites than an instruction can name"
     packed = site | term.items[0].value << 16 | len(term.items) << 24
     return to.into_temporary(Op.DRAW_OTHER, to.value(one), packed)
 
