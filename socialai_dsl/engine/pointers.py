@@ -16,6 +16,7 @@ from numba.core import cgutils
 from numba.core.imputils import lower_builtin
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, models, register_model
+from numba.np.numpy_support import as_dtype
 from numpy.typing import NDArray
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
@@ -73,9 +74,14 @@ def _pointers_to(dtype: Any) -> Any:
     return pointer
 
 
-def _guarded(book: Any, which: int, row: int) -> Guarded[Any]:
-    array = book[which]
-    return Guarded(array[int(row) :] if array.ndim == 1 else array[int(row)])
+def _guarded(dtype: Any) -> Any:
+    """The same in plain Python, where numbers are also read as what the caller takes them for."""
+
+    def pointer(book: Any, which: int, row: int) -> Guarded[Any]:
+        array = book[which].view(as_dtype(dtype))
+        return Guarded(array[int(row) :] if array.ndim == 1 else array[int(row)])
+
+    return pointer
 
 
 _TYPES: Final = (
@@ -83,7 +89,7 @@ _TYPES: Final = (
     *(types.uint32, types.int64, types.uint64, types.float64),
 )
 bytes_of, int16_of, uint16_of, int32_of, uint32_of, int64_of, uint64_of, float64_of = (
-    _guarded if config.DISABLE_JIT else _pointers_to(kind) for kind in _TYPES
+    _guarded(kind) if config.DISABLE_JIT else _pointers_to(kind) for kind in _TYPES
 )
 """`int16_of(book, which, row)` and so on: a pointer to a row of an array of two dimensions, or into one of one."""
 

@@ -79,9 +79,10 @@ def test_what_others_depend_on_is_waited_for() -> None:
         return answer
 
     quick = call_of(lambda: 0)
+    second = [call_of(lambda: slow(2)), call_of(lambda: 3)]
     for answer, found in ((0, 5), (-1, None)):
-        late = order_of([quick, call_of(lambda answer=answer: slow(answer))])
-        assert relay.make_both(late, order_of([call_of(lambda: slow(2)), call_of(lambda: 3)])) == found
+        late = call_of(lambda answer=answer: slow(answer))
+        assert relay.make_both(order_of([quick, late]), order_of(second)) == found
     relay.close()
 
 
