@@ -8,8 +8,8 @@ import pytest
 
 import socialai_dsl
 from socialai_dsl.cli.evaluation import Player, evaluate_agent
-from trainer.config import TrainConfig
-from trainer.train import train
+from trainer.config import RunConfig
+from trainer.ppo import train
 
 PAGE = Path(__file__).parents[1] / "docs" / "metrics.md"
 
@@ -27,7 +27,7 @@ def tables() -> list[list[str]]:
 
 def test_every_field_of_a_row_is_named_in_its_order(tmp_path: Path) -> None:
     envs = socialai_dsl.make_vec("help", num_envs=16, copy=False, autoreset_mode="SameStep")
-    train(TrainConfig(frames=512, num_envs=16, tensorboard=False, threads=1), envs, tmp_path)
+    train(RunConfig(frames=512, envs=16, tensorboard=False, threads=1), envs, tmp_path)
     row = json.loads((tmp_path / "metrics.jsonl").read_text(encoding="utf-8").splitlines()[-1])
     assert list(row) == tables()[0]
 

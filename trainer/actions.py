@@ -1,4 +1,4 @@
-"""This module turns the four heads' logits into actions, log-probabilities and entropies."""
+"""Actions of four heads: samples, log-probabilities and entropies from logits (..., A)."""
 
 from __future__ import annotations
 
@@ -43,3 +43,18 @@ def log_probs_and_entropies(logits: Tensor, actions: Tensor, sizes: tuple[int, .
         chosen.append(logs.gather(-1, actions[..., head : head + 1]))
         entropies.append(-(logs.exp() * logs).sum(-1))
     return torch.cat(chosen, -1), torch.stack(entropies, -1)
+
+
+def joint_entropy(logits: Tensor, entropies: Tensor, sizes: tuple[int, ...]) -> Tensor:
+    """Entropy of the whole action in nats, (N,): H(primitive) + H(speak) + p(speak) (H(template) + H(noun)).
+
+    The heads are independent, and silence is one action whatever template and noun would have been.
+
+    Args:
+        logits: (N, A).
+        entropies: (N, 4), of each head.
+        sizes: choices of each head.
+    """
+    first = sum(sizes[:SPEAK])
+    speaks = torch.softmax(logits[:, first : first + sizes[SPEAK]], -1)[:, 1]  # (N,)
+    return entropies[:, :TEMPLATE].sum(-1) + speaks * entropies[:, TEMPLATE:].sum(-1)

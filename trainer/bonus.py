@@ -1,20 +1,43 @@
-"""This module pays episodic count-based exploration bonuses for what is heard or seen for the first time."""
+"""Exploration bonuses: rewards of the trainer's own for what an episode has not heard or seen before."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trainer.config import TrainConfig
-from trainer.distinct import Int64
+from trainer.config import RunConfig
+from trainer.extensions import load_class
+from trainer.features import Int64
+
+SHIPPED = ("none", "lang", "cell")
 
 _CODED_FRAMES = 40
 _SILENCE = 0  # what the environments' `utterance_ids` say when nothing was heard
 
 
-class Bonus:
+class Bonus(Protocol):
+    """Pays a bonus on top of the scenario's reward; `--bonus mine:Bonus` is built as `Bonus(config, num_envs)`."""
+
+    def step(self, envs: Any, image: NDArray[np.uint8], ended: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """Bonus of the step just made, float64 (E,).
+
+        Args:
+            envs: the vector environment, asked for the ids of what was heard.
+            image: uint8 (E, H, W, C) observed after the step.
+            ended: bool (E,), where the step ended the episode (so that the observation is already the next one's).
+        """
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        """All it remembers, as arrays by name."""
+
+    def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from `state()` of an equal one. Raises ValueError for any other."""
+
+
+class EpisodicBonus:
     """A bonus for keys k that were visited N_k times before in the running episode.
 
     `lang`: the one key of a step is all that was heard in it; several lines together are a key of their own.
@@ -35,27 +58,19 @@ class Bonus:
         keys: the key of each column: an utterance's id, or a kind of cell's code.
     """
 
-    def __init__(self, config: TrainConfig, num_envs: int) -> None:
-        if config.explo == "none":
-            raise ValueError("explo: got 'none', expected 'lang' or 'cell'")
-        self._kind = config.explo
-        self._power = config.explo_m
-        self._as_coded = config.explo_formula == "as_coded"
+    def __init__(self, config: RunConfig, num_envs: int) -> None:
+        self._kind = config.bonus
+        self._power = config.bonus_m
+        self._as_coded = config.bonus_formula == "as_coded"
         if self._as_coded:
-            self._unit, self._scale = config.explo_c / _CODED_FRAMES, config.explo_t
+            self._unit, self._scale = config.bonus_c / _CODED_FRAMES, config.bonus_t
         else:
-            self._unit, self._scale = config.explo_c / config.explo_t, 1.0
+            self._unit, self._scale = config.bonus_c / config.bonus_t, 1.0
         self.counts = np.zeros((num_envs, 0), np.int32)
         self.keys: dict[int, int] = {}
 
     def step(self, envs: Any, image: NDArray[np.uint8], ended: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Bonus of the step just made, float64 (E,).
-
-        Args:
-            envs: the vector environment, asked for the ids of what was heard.
-            image: uint8 (E, H, W, C) observed after the step.
-            ended: bool (E,), where the step ended the episode (so that the observation is already the next one's).
-        """
+        """See `Bonus.step`."""
         if self._kind == "lang":
             keys = np.asarray(envs.utterance_ids())[:, None]
             new = np.full(keys.shape, True) if self._as_coded else keys != _SILENCE
@@ -83,11 +98,11 @@ class Bonus:
         return columns[inverse].reshape(keys.shape)
 
     def state(self) -> dict[str, NDArray[np.generic]]:
-        """Counts and keys, to be saved with a run."""
+        """See `Bonus.state`."""
         return {"counts": self.counts.copy(), "keys": np.array(list(self.keys), np.int64)}
 
-    def load_state(self, state: dict[str, NDArray[Any]]) -> None:
-        """Continue from `state()` of an equal bonus.
+    def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """See `Bonus.load_state`.
 
         Raises:
             ValueError: the counts are of another number of environments.
@@ -108,3 +123,18 @@ def cell_codes(image: NDArray[np.uint8]) -> Int64:
     for channel in range(1, image.shape[-1]):
         codes = codes << 8 | cells[..., channel]
     return codes
+
+
+def build_bonus(config: RunConfig, num_envs: int) -> Bonus | None:
+    """The bonus that a configuration names, None for `none`.
+
+    Raises:
+        ValueError: there is no such bonus, or it lacks a method.
+    """
+    if config.bonus == "none":
+        return None
+    if config.bonus in SHIPPED:
+        return EpisodicBonus(config, num_envs)
+    methods = ("step", "state", "load_state")
+    bonus: Bonus = load_class(config.bonus, "bonus", SHIPPED, methods, config.code_folder)(config, num_envs)
+    return bonus

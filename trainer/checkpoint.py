@@ -1,4 +1,4 @@
-"""This module writes and reads checkpoints: safetensors with JSON metadata and a digest, replaced atomically."""
+"""Checkpoints: safetensors with JSON metadata and a digest, replaced atomically."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from safetensors import SafetensorError
 from torch import Tensor
 
-from trainer.config import TrainConfig
+from trainer.config import RunConfig
 from trainer.errors import CheckpointError
 from trainer.nets import ActorCritic, NetSpec, build_net
 
 FOLDER = "checkpoints"
 """Where a run keeps its checkpoints, in its own folder."""
 
-KEPT = 2
+FORMAT = 2
 _HEADER_LIMIT = 1_000_000
 _FILE_LIMIT = 8_000_000_000
 _NO_DIGEST = "0" * 64
@@ -35,20 +35,19 @@ class CheckpointMeta(BaseModel):
 
     Attributes:
         format: version of this layout.
-        config: hyper-parameters of the run, its network's name among them.
+        config: the run's options, its network's name among them.
         action_sizes, image_shape: what the weights were made for.
         vocabulary: words by token id.
         program_sha256: digest of the compiled scenario.
         scenario: its name. actions, templates, nouns: what the choices of the agent's action mean in it.
         frames, update: how far the run had come.
-        processes: how many trained together; what only one of them knows lies under `rank1.` and so on.
         torch_version: version that wrote it.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    format: Literal[1] = 1
-    config: TrainConfig
+    format: Literal[2] = 2
+    config: RunConfig
     action_sizes: tuple[int, int, int, int]
     image_shape: tuple[int, int, int]
     vocabulary: list[str] = Field(max_length=100_000)
@@ -59,7 +58,6 @@ class CheckpointMeta(BaseModel):
     nouns: list[str] = Field(default_factory=list, max_length=10_000)
     frames: int = Field(ge=0)
     update: int = Field(ge=0)
-    processes: int = Field(1, ge=1)
     torch_version: str = Field(max_length=100)
 
 
@@ -67,8 +65,7 @@ class CheckpointMeta(BaseModel):
 class Checkpoint:
     """A checkpoint in memory: metadata, and tensors by dotted name.
 
-    Names: `net.*`, `adam.*`, `rng`, `curriculum`, and for each process `state.*`, `bonus.*`, `envs`, which those of
-    process r > 0 have under `rank<r>.`.
+    Names: `net.*`, `adam.*`, `rng`, `state.*`, `envs`, and where there is one `curriculum`, `guide`, `bonus.*`.
     """
 
     meta: CheckpointMeta
@@ -82,17 +79,6 @@ class Checkpoint:
         }
 
 
-def pack(tensors: dict[str, Tensor]) -> bytes:
-    """Tensors as bytes, for sending."""
-    return safetensors.torch.save({name: _plain(value) for name, value in tensors.items()})
-
-
-def unpack(data: bytes) -> dict[str, Tensor]:
-    """The tensors of `pack`."""
-    tensors: dict[str, Tensor] = safetensors.torch.load(data)
-    return tensors
-
-
 def _plain(value: Tensor) -> Tensor:
     return value.detach().cpu().contiguous()
 
@@ -102,8 +88,8 @@ def path_of(directory: Path, meta: CheckpointMeta) -> Path:
     return directory / f"{meta.frames:015d}.safetensors"
 
 
-def write(directory: Path, checkpoint: Checkpoint) -> Path:
-    """Write `directory/<frames>.safetensors`, keep the `KEPT` newest, and sweep leftovers of writes that were killed.
+def write(directory: Path, checkpoint: Checkpoint, keep: int = 2) -> Path:
+    """Write `directory/<frames>.safetensors`, keep the `keep` newest, and sweep leftovers of writes that were killed.
 
     The file appears under its name only when all of it is on the disk.
 
@@ -113,7 +99,7 @@ def write(directory: Path, checkpoint: Checkpoint) -> Path:
     directory.mkdir(parents=True, exist_ok=True)
     path = path_of(directory, checkpoint.meta)
     write_file(path, checkpoint)
-    for old in [*sorted(directory.glob("*.safetensors"))[:-KEPT], *directory.glob("*.tmp")]:
+    for old in [*sorted(directory.glob("*.safetensors"))[:-keep], *directory.glob("*.tmp")]:
         old.unlink(missing_ok=True)
     return path
 
@@ -204,6 +190,12 @@ def _read_file(path: Path) -> Checkpoint:
         blank = _with_digest(data, _NO_DIGEST)
         if hashlib.sha256(blank).hexdigest() != digest or _with_digest(blank, digest) != data:
             raise CheckpointError(f"{path}: damaged (its SHA-256 digest does not match)")
+        made_by = json.loads(described).get("format")
+        if made_by != FORMAT:
+            raise CheckpointError(
+                f"{path}: made by another version (format {made_by}, this version reads {FORMAT}); train again, or use "
+                "the version that made it"
+            )
         meta = CheckpointMeta.model_validate_json(described)
         return Checkpoint(meta, safetensors.torch.load(data))
     except CheckpointError:
@@ -217,7 +209,11 @@ def _read_file(path: Path) -> Checkpoint:
 
 
 def restore_net(
-    checkpoint: Checkpoint, spec: NetSpec, vocabulary: list[str], net: str | None = None
+    checkpoint: Checkpoint,
+    spec: NetSpec,
+    vocabulary: list[str],
+    net: str | None = None,
+    folder: Path = Path(),
 ) -> ActorCritic:
     """Build the checkpoint's network for environments described by `spec` and `vocabulary`.
 
@@ -229,6 +225,7 @@ def restore_net(
         spec: spaces of the environments it is to play.
         vocabulary: their words by token id.
         net: name of the network, needed if it is not a shipped one, because a file must not choose what is imported.
+        folder: where the file of such a network is looked for first.
 
     Raises:
         CheckpointError: actions or images have another shape, or the weights are not those of the network.
@@ -247,7 +244,7 @@ def restore_net(
         raise CheckpointError(
             f"checkpoint was made with the network {name}; name it (--net {name}) to load that code"
         )
-    model = build_net(name, spec, meta.config.seed, meta.config.precision)
+    model = build_net(name, spec, meta.config.seed, meta.config.precision, folder)
     weights = checkpoint.part("net")
     if vocabulary != meta.vocabulary:
         _warn_of_words(meta.vocabulary, vocabulary)

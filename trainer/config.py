@@ -1,113 +1,179 @@
-"""This module holds every hyper-parameter of the trainer, with its meaning, unit and the source of its default."""
+"""Every option of a run: its meaning, default, bounds and source, declared once.
+
+The command line, the schema of experiments, `config.json` and the model card are made from `RunConfig`.
+This module imports neither PyTorch nor Gymnasium, so that checking an experiment file stays quick.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any, Literal, Self
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+Role = Literal["flag", "hyper", "kept"]
+"""Where an option is given: by a flag of its own, by `--hyper NAME=VALUE`, or nowhere (it follows from others)."""
 
-class TrainConfig(BaseModel):
-    """What a training run depends on besides the environments and the code.
 
-    Defaults marked "measured" are the settings that learned to ask and to heed on small rooms within two
-    million frames; `paper_preset` gives the published ones (SocialAI 1.0, appendix on the baselines).
+def _option(default: Any, about: str, *, role: Role = "hyper", result: bool = True, **bounds: Any) -> Any:
+    """Declare an option.
+
+    Args:
+        default: its default.
+        about: its help text.
+        role: see `Role`.
+        result: whether it decides what a run computes; False for options that say where, how long or how it is kept.
+        bounds: pydantic's (`ge`, `gt`, `le`, `lt`, `min_length`).
+    """
+    extra: dict[str, Any] = {"role": role, "result": result}
+    return Field(default, description=about, json_schema_extra=extra, **bounds)
+
+
+class RunConfig(BaseModel):
+    """What a run depends on besides the code and the machine. Every value is resolved: there is no `auto`.
+
+    Defaults marked "measured" learned to ask and to heed in small rooms within two million frames. Those marked
+    "paper" are in the appendix of the SocialAI 1.0 paper on its baselines, or in the code released with it.
 
     Raises:
-        pydantic.ValidationError: (a ValueError) a value is out of range or two values contradict each other.
+        pydantic.ValidationError: (a ValueError) a value is out of bounds, or two values contradict each other.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    frames: int = Field(
-        1_000_000, ge=1, description="frames (environment steps, all environments together) to train for"
+    scenario: str = _option("", "path or name of what is played, with +variants and ?parameters", role="kept")
+    agent: str = _option(
+        "ppo",
+        "ppo, random, oracle, human, or a checkpoint or run folder; only ppo is trained",
+        role="flag",
+        min_length=1,
     )
-    seed: int = Field(
-        0, ge=0, lt=2**63, description="seeds weights, sampling, shuffling and environment episodes"
+    frames: int = _option(
+        600_000, "frames (steps of all environments together) to train for", role="flag", result=False, ge=0
     )
-    num_envs: int = Field(256, ge=1, description="environments stepped together (measured)")
-    horizon: int = Field(32, ge=1, description="steps per environment in one rollout (measured)")
-    bptt: int = Field(
-        0, ge=0, description="steps back-propagation goes back through the memory; 0 = the whole rollout"
+    seed: int = _option(0, "seeds weights, sampling, shuffling and episodes", role="flag", ge=0, lt=2**63)
+    envs: int = _option(256, "environments stepped together (measured)", role="flag", ge=1)
+    net: str = _option(
+        "fast",
+        "fast, paper or mine:Net; paper-reference and paper-reference-tuned are presets: the paper's network, update "
+        "and numbers",
+        role="flag",
+        min_length=1,
     )
-    update: Literal["environments", "chunks"] = Field(
+    precision: Literal["float32", "bfloat16"] = _option(
+        "float32", "numbers that the convolutions of `paper` compute with", role="flag"
+    )
+    bonus: str = _option(
+        "none",
+        "exploration bonus: none, lang (new utterances), cell (new kinds of cells) or mine:Bonus; the command line "
+        "takes auto as well, the paper's choice for the scenario",
+        role="flag",
+        min_length=1,
+    )
+    curriculum: str = _option(
+        "none",
+        "which members of a suite are played: none, expert, progress, reverse, a .yaml file of phases or "
+        "mine:Curriculum",
+        role="flag",
+        min_length=1,
+    )
+    guide: str = _option(
+        "none",
+        "who shows the agent what to do: none, script (the scenario's own script plays, the agent imitates it) or "
+        "mine:Guide",
+        role="flag",
+        min_length=1,
+    )
+    guide_share: float = _option(
+        0.4, "share of the frames, from the first on, in which the guide leads (measured)", ge=0, le=1
+    )
+    imitation_coef: float = _option(
+        1.0, "weight of the cross-entropy to the guide's actions (measured)", ge=0
+    )
+
+    horizon: int = _option(32, "steps of each environment in one rollout (measured)", ge=1)
+    bptt: int = _option(0, "steps that back-propagation through time goes back; 0: the whole rollout", ge=0)
+    update: Literal["environments", "chunks"] = _option(
         "environments",
-        description="environments: minibatches of whole environments, each distinct frame computed once; chunks: of "
+        "what a minibatch is made of. environments: whole environments, each distinct frame computed once; chunks: "
         "stretches of `bptt` steps, one step of all of them at a time (paper)",
     )
-    epochs: int = Field(4, ge=1, description="passes over each rollout (paper)")
-    minibatches: int = Field(
-        4, ge=1, description="parts a rollout is cut into, of whole environments or of chunks (measured)"
+    epochs: int = _option(4, "passes over each rollout (paper)", ge=1)
+    minibatches: int = _option(4, "parts a rollout is cut into (measured)", ge=1)
+    lr: float = _option(7e-4, "Adam's learning rate at the start (measured; paper 1e-4)", gt=0)
+    lr_end: float | None = _option(
+        None, "learning rate at the end, reached linearly; null: it stays as it is", gt=0
     )
-    lr: float = Field(7e-4, gt=0, description="Adam's learning rate (measured; paper 1e-4)")
-    adam_eps: float = Field(1e-5, gt=0, description="Adam's epsilon (paper)")
-    gamma: float = Field(0.99, ge=0, le=1, description="discount per step (paper)")
-    gae_lambda: float = Field(
-        0.95, ge=0, le=1, description="lambda of generalised advantage estimation (measured; paper .99)"
+    adam_eps: float = _option(1e-5, "Adam's epsilon (paper)", gt=0)
+    gamma: float = _option(0.99, "discount per step (paper)", ge=0, le=1)
+    gae_lambda: float = _option(
+        0.95, "lambda of generalised advantage estimation (measured; paper .99)", ge=0, le=1
     )
-    clip: float = Field(0.2, gt=0, description="PPO's clipping range of the probability ratio (paper)")
-    clip_value: bool = Field(
-        False, description="clip the value's change by `clip` as well (paper: yes; measured: no)"
+    clip: float = _option(0.2, "PPO's clipping range of the probability ratio (paper)", gt=0)
+    clip_value: bool = _option(False, "clip the value's change by `clip` as well (paper: yes; measured: no)")
+    value_coef: float = _option(0.5, "weight of the squared value error (paper)", ge=0)
+    entropy_coef: float = _option(
+        0.01, "weight of the entropy, nats, at the start (paper; .03 was worse)", ge=0
     )
-    value_coef: float = Field(0.5, ge=0, description="weight of the squared value error (paper)")
-    entropy_coef: float = Field(
-        0.01, ge=0, description="weight of each head's entropy, nats (paper; .03 was worse)"
+    entropy_coef_end: float | None = _option(
+        None, "weight of the entropy at the end, reached linearly; null: it stays as it is", ge=0
     )
-    max_grad_norm: float = Field(0.5, gt=0, description="global L2 norm gradients are clipped to (paper)")
-    normalize_advantages: bool = Field(
-        True, description="scale a rollout's advantages to mean 0, deviation 1 (paper: no)"
+    max_grad_norm: float = _option(0.5, "global L2 norm that gradients are clipped to (paper)", gt=0)
+    target_kl: float | None = _option(
+        None, "divergence from the acting policy that ends an update's epochs; null: they all run", gt=0
     )
-    loss: Literal["joint", "per_head"] = Field(
+    normalize_advantages: bool = _option(
+        True, "scale a rollout's advantages to mean 0, deviation 1 (paper: no)"
+    )
+    loss: Literal["joint", "per_head"] = _option(
         "joint",
-        description="joint: one ratio of the whole action; per_head: a ratio, clip, entropy and value term per "
-        "head, averaged over the four heads (paper)",
+        "joint: one ratio of the whole action; per_head: a ratio, clip, entropy and value term for each head, "
+        "averaged over the four (paper)",
     )
-    bootstrap_timeouts: bool = Field(
-        False, description="continue the value through a time-out; False: a time-out is terminal (paper)"
+    bootstrap_timeouts: bool = _option(
+        True, "continue the value through a time-out; false: a time-out is terminal (paper)"
     )
-    explo: Literal["none", "lang", "cell"] = Field(
-        "none", description="episodic count-based bonus: on what is heard, or on kinds of cells seen"
+    bonus_c: float = _option(
+        7.0, "C of the bonus (default: the paper's for the scenario, else 7 for lang and 3 for cell)", ge=0
     )
-    explo_c: float = Field(7.0, ge=0, description="C of the bonus; the paper sets it per scenario")
-    explo_m: float = Field(50.0, ge=0, description="M of the bonus: 50 pays first visits only (paper)")
-    explo_t: float = Field(0.6, gt=0, description="T of the bonus, as coded its upper bound per step (paper)")
-    explo_formula: Literal["as_coded", "as_printed"] = Field(
-        "as_coded", description="the bonus of the code the paper's figures come from, or that of its text"
+    bonus_m: float = _option(50.0, "M of the bonus: 50 pays first visits only (paper)", ge=0)
+    bonus_t: float = _option(0.6, "T of the bonus, as coded its upper bound per step (paper)", gt=0)
+    bonus_formula: Literal["as_coded", "as_printed"] = _option(
+        "as_coded", "the bonus of the code that the paper's figures come from, or that of its text"
     )
-    net: str = Field(
-        "fast", min_length=1, description="fast, paper, paper-reference, or my.module:MyNet of the user's"
+    recipe: Literal["plain", "guided", "paper"] = _option(
+        "plain",
+        "plain: PPO with the numbers above; guided: the script shows, then PPO; paper: PPO from the reward alone, as "
+        "in the paper's experiments",
+        role="kept",
     )
-    precision: Literal["float32", "bfloat16"] = Field(
-        "float32",
-        description="number type of the network's bulk of arithmetic; bfloat16 only for networks that can (paper). "
-        "What is stored stays float32",
+
+    device: str = _option("cpu", "where the network runs: cpu or cuda", role="flag", min_length=1)
+    threads: int = _option(
+        1,
+        "CPU threads that share each minibatch; runs equal to the bit need equally many",
+        role="flag",
+        ge=1,
+        le=64,
     )
-    curriculum: str = Field(
-        "none",
-        min_length=1,
-        description="who chooses members of a suite: none, expert, progress, reverse, a .yaml file of phases, or "
-        "my.module:MyCurriculum",
-    )
-    compile: bool = Field(
-        False, description="let torch.compile make the part of the network that reads images and dialogue"
-    )
-    device: str = Field("cpu", min_length=1, description="torch device the network runs on")
-    threads: int = Field(
-        0,
-        ge=0,
-        description="CPU threads that share each minibatch; 0 = one per core, at most 4. Part of what makes two runs "
-        "equal to the bit",
-    )
-    checkpoint_every: int = Field(50, ge=1, description="updates between checkpoints")
-    tensorboard: bool = Field(True, description="also write TensorBoard events")
+    checkpoint_every: int = _option(50, "updates between checkpoints", role="flag", result=False, ge=1)
+    keep_checkpoints: int = _option(2, "checkpoints kept, the newest ones", role="flag", result=False, ge=1)
+    eval_episodes: int = _option(500, "episodes of the test set", role="flag", ge=1)
+    tensorboard: bool = _option(True, "also write TensorBoard events", result=False)
+    wandb: str | None = _option(
+        None, "also send the figures to this project of Weights & Biases (needs the extra `wandb`)",
+        role="flag", result=False, min_length=1,
+    )  # fmt: skip
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        if self.minibatches > self.num_envs:
+        if self.minibatches > self.envs:
             raise ValueError(
-                f"minibatches: got {self.minibatches}, expected at most num_envs = {self.num_envs}, because a "
-                "minibatch holds whole environments"
+                f"minibatches: got {self.minibatches}, expected at most envs = {self.envs}, because a minibatch "
+                "holds whole environments"
             )
         if self.bptt and self.horizon % self.bptt:
             raise ValueError(f"bptt: got {self.bptt}, expected a divisor of horizon = {self.horizon}, or 0")
@@ -116,36 +182,71 @@ class TrainConfig(BaseModel):
                 f"bptt: got {self.bptt}, expected less than horizon = {self.horizon} and not 0, because the update "
                 "shifts chunks of so many steps"
             )
+        if self.update == "chunks" and self.guide != "none":
+            raise ValueError("guide: the update `chunks` is the paper's and learns from the reward alone")
         return self
+
+    @property
+    def trains(self) -> bool:
+        """Whether the agent is trained by this run."""
+        return self.agent == "ppo"
 
     @property
     def frames_per_update(self) -> int:
         """Frames collected before each update."""
-        return self.num_envs * self.horizon
+        return self.envs * self.horizon
 
     @property
     def updates(self) -> int:
         """Updates needed to reach `frames`, the last one rounded up."""
         return -(-self.frames // self.frames_per_update)
 
+    @property
+    def depends_on_frames(self) -> bool:
+        """Whether an update depends on how many frames the run will have, so that more of them are another run."""
+        return self.guide != "none" or self.lr_end is not None or self.entropy_coef_end is not None
 
-# Fields that may change when a run is resumed, because they change where or how long it runs but not what is learnt.
-RESUMABLE_FIELDS = frozenset({"frames", "device", "threads", "checkpoint_every", "tensorboard"})
+    @property
+    def code_folder(self) -> Path:
+        """Where `mine:Net` is looked for first: the folder of the scenario's file."""
+        file = Path(self.scenario.partition("?")[0].partition("+")[0])
+        return file.parent if file.suffix in (".yaml", ".yml") else Path()
 
 
-def paper_preset(**overrides: Any) -> TrainConfig:
-    """Return what the paper's agents learn with (16 environments, recurrence 10, batches of 1280 frames).
+FLAGS: Final = tuple(n for n, f in RunConfig.model_fields.items() if f.json_schema_extra["role"] == "flag")  # type: ignore[index]
+"""Options with a flag of their own, under its name with `_` for `-`."""
 
-    Network, reading of the dialogue and update are those of the released code, the numbers those of the paper's table.
+HYPER: Final = tuple(n for n, f in RunConfig.model_fields.items() if f.json_schema_extra["role"] == "hyper")  # type: ignore[index]
+"""Options given by `--hyper`."""
 
-    One rollout of 640 frames is one minibatch, as it was with the released code, whose batch of 1280 exceeds the
-    640 frames it collects.
+WITHOUT_EFFECT: Final = frozenset(
+    n
+    for n, f in RunConfig.model_fields.items()
+    if not f.json_schema_extra["result"]  # type: ignore[index]
+)
+"""Options that do not change what is computed in an update; a resumed run may have others."""
+
+
+@dataclass(frozen=True)
+class Preset:
+    """Values of several options under one name.
+
+    Attributes:
+        values: option -> value.
+        source: where they come from.
     """
-    values: dict[str, Any] = {
+
+    values: Mapping[str, Any]
+    source: str
+
+
+_PAPER: Final[Mapping[str, Any]] = MappingProxyType(
+    {
         "frames": 30_000_000,
-        "num_envs": 16,
+        "envs": 16,
         "horizon": 40,
         "bptt": 10,
+        # One rollout of 640 frames is one minibatch: the released code's batch of 1280 exceeds what it collects.
         "minibatches": 1,
         "lr": 1e-4,
         "adam_eps": 1e-5,
@@ -154,27 +255,48 @@ def paper_preset(**overrides: Any) -> TrainConfig:
         "normalize_advantages": False,
         "update": "chunks",
         "loss": "per_head",
-        "net": "paper-reference",
+        "bootstrap_timeouts": False,
     }
-    return TrainConfig(**(values | overrides))
+)
 
-
-def paper_tuned_preset(**overrides: Any) -> TrainConfig:
-    """Return the released run scripts' tuned variant of `paper_preset`: recurrence 5, Adam epsilon 1e-8."""
-    return paper_preset(**({"bptt": 5, "adam_eps": 1e-8} | overrides))
-
-
-PRESETS: Mapping[str, Callable[..., TrainConfig]] = {
-    "paper-reference": paper_preset,
-    "paper-reference-tuned": paper_tuned_preset,
+NET_PRESETS: Final[Mapping[str, Preset]] = {
+    "paper-reference": Preset(_PAPER, "SocialAI 1.0, table of hyper-parameters; update of the released code"),
+    "paper-reference-tuned": Preset(
+        {**_PAPER, "bptt": 5, "adam_eps": 1e-8}, "SocialAI 1.0, the released run scripts' tuned variant"
+    ),
 }
-"""Agents that are more than a network: named where a network can be, they bring all of their numbers with them."""
+"""Networks that bring numbers of their own."""
+
+RECIPES: Final[Mapping[str, Preset]] = {
+    "plain": Preset({}, "the defaults"),
+    "paper": Preset({}, "PPO from the reward alone, which is what the paper's experiments compare"),
+    "guided": Preset(
+        {
+            "guide": "script",
+            "minibatches": 16,
+            "lr_end": 1e-4,
+            "entropy_coef_end": 0.002,
+        },
+        "docs/mastery.md: behaviour cloning of the scenario's script (Pomerleau 1991), then PPO",
+    ),
+}
+"""Ways of training: which numbers `--recipe` stands for."""
 
 
-def configure(net: str, **overrides: Any) -> TrainConfig:
-    """The configuration of a preset by its name, or that of a network with the default numbers.
+def configure(recipe: str = "plain", **given: Any) -> RunConfig:
+    """A configuration from a recipe, the presets of a network, and the options given, the later the stronger.
+
+    Where fewer environments are given than a preset has minibatches, there are as many minibatches as environments.
 
     Raises:
-        pydantic.ValidationError: see `TrainConfig`.
+        pydantic.ValidationError: see `RunConfig`.
+        ValueError: there is no such recipe.
     """
-    return PRESETS[net](**overrides) if net in PRESETS else TrainConfig(net=net, **overrides)
+    if recipe not in RECIPES:
+        raise ValueError(f"recipe: got {recipe!r}, expected one of {', '.join(RECIPES)}")
+    preset = NET_PRESETS.get(given.get("net", ""), Preset({}, ""))
+    values = {"recipe": recipe, **RECIPES[recipe].values, **preset.values, **given}
+    if "minibatches" not in given and isinstance(values.get("envs"), int):
+        usual = values.get("minibatches", RunConfig.model_fields["minibatches"].default)
+        values["minibatches"] = max(1, min(usual, values["envs"]))
+    return RunConfig(**values)

@@ -1,24 +1,38 @@
-"""This module is proximal policy optimisation: advantages, losses and the update of a rollout."""
+"""Proximal policy optimisation, top to bottom: advantages, loss, update of a rollout, training loop.
+
+Sources: Schulman et al. 2017 (PPO), Schulman et al. 2016 (GAE). Axes: T steps of a rollout, E environments, N frames of
+a minibatch, A choices of all heads side by side.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+import math
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from trainer import actions as heads
-from trainer.actor import Actor
-from trainer.config import TrainConfig
-from trainer.crew import Crew
-from trainer.errors import TrainingStopped
-from trainer.minibatch import Batch, Minibatch, make_minibatch
+from trainer import checkpoint as checkpoints
+from trainer.config import RunConfig
+from trainer.errors import CheckpointError, ObservationError, TrainingStopped
+from trainer.features import Batch, Minibatch, make_minibatch
+from trainer.logging import MetricsLog, Tracker, episode_metrics, record_start
 from trainer.nets import ActorCritic
-from trainer.rollout import Rollout
-from trainer.team import ALONE, Team
+from trainer.rollout import Rollout, collect
+from trainer.session import Session
+
+Mapper = Callable[[Callable[[Minibatch], Any], Iterable[Minibatch]], Iterable[Any]]
+"""`map`, or that of a pool of threads."""
+
+
+# -- advantages ---------------------------------------------------------------------------------------------------
 
 
 def compute_gae(
@@ -43,149 +57,26 @@ def compute_gae(
         gamma: discount per step.
         gae_lambda: weight of longer estimates.
     """
-    goes_on = (~(terminated | truncated)).to(values.dtype)
-    after_cut = bootstrap * (truncated & ~terminated).to(values.dtype)
-    following = torch.cat((values[1:], next_value[None]))
-    deltas = rewards + gamma * (following * goes_on + after_cut) - values
+    goes_on = (~(terminated | truncated)).to(values.dtype)  # (T, E)
+    after_cut = bootstrap * (truncated & ~terminated).to(values.dtype)  # (T, E)
+    following = torch.cat((values[1:], next_value[None]))  # (T, E)
+    deltas = rewards + gamma * (following * goes_on + after_cut) - values  # (T, E)
     advantages = torch.empty_like(deltas)
-    running = torch.zeros_like(next_value)
+    running = torch.zeros_like(next_value)  # (E,)
     for t in range(len(deltas) - 1, -1, -1):
         running = deltas[t] + gamma * gae_lambda * goes_on[t] * running
         advantages[t] = running
     return advantages
 
 
-@dataclass(frozen=True)
-class LossParts:
-    """Parts of the loss, scalars.
+def estimate_advantages(session: Session, rollout: Rollout) -> tuple[Tensor, Tensor]:
+    """Advantages as the loss takes them, and returns (the value's targets), (T, E) both, on the network's device."""
+    config, device = session.config, session.actor.device
 
-    Attributes:
-        total: what is minimised; only this one carries gradients.
-        policy, value, entropy: its terms before their coefficients; entropy in nats, summed over the heads taking part.
-        approx_kl: estimated divergence of the new policy from the one that acted (Schulman 2020, k3).
-        clip_fraction: share of ratios outside the clipping range.
-    """
+    def move(array: Any) -> Tensor:
+        return torch.from_numpy(array).to(device)
 
-    total: Tensor
-    policy: Tensor
-    value: Tensor
-    entropy: Tensor
-    approx_kl: Tensor
-    clip_fraction: Tensor
-
-    def row(self) -> Tensor:
-        """The first six of `STATISTICS`, without gradients."""
-        parts = (self.total, self.policy, self.value, self.entropy, self.approx_kl, self.clip_fraction)
-        return torch.stack([part.detach() for part in parts])
-
-
-def ppo_loss(
-    batch: Batch, logits: Tensor, values: Tensor, sizes: tuple[int, ...], config: TrainConfig
-) -> LossParts:
-    """PPO's clipped loss (Schulman et al. 2017, equations 7 and 9) for an action of four heads.
-
-    Template and noun count, in ratio and entropy, only where something was said. With `loss="joint"` the ratio is
-    that of the whole action. With `"per_head"` each head has its own ratio, clip, entropy and value term, masked,
-    and the four are averaged, as in the released SocialAI code.
-
-    Args:
-        batch: the frames and what the acting policy thought of them.
-        logits: (N, sum of sizes) of the present policy.
-        values: (N,) of the present critic.
-        sizes: choices of each head.
-        config: coefficients.
-    """
-    log_probs, entropies = heads.log_probs_and_entropies(logits, batch.actions, sizes)
-    mask = heads.spoken_mask(batch.actions)
-    change = (log_probs - batch.log_probs) * mask
-    log_ratio = change.sum(-1, keepdim=True) if config.loss == "joint" else change
-    ratio = log_ratio.exp()
-    advantage = batch.advantages[:, None]
-    clipped = ratio.clamp(1 - config.clip, 1 + config.clip)
-    policy = -torch.minimum(ratio * advantage, clipped * advantage)
-    value = (values - batch.returns).square()
-    if config.clip_value:
-        near = batch.values + (values - batch.values).clamp(-config.clip, config.clip)
-        value = torch.maximum(value, (near - batch.returns).square())
-    entropy = entropies * mask
-    if config.loss == "joint":
-        policy_term, value_term, entropy_term = policy.mean(), value.mean(), entropy.sum(-1).mean()
-    else:
-        policy_term = (policy * mask).mean()
-        value_term = (value[:, None] * mask).mean()
-        entropy_term = entropy.mean()
-    total = policy_term + config.value_coef * value_term - config.entropy_coef * entropy_term
-    with torch.no_grad():
-        return LossParts(
-            total,
-            policy_term.detach(),
-            value_term.detach(),
-            entropy.sum(-1).mean(),
-            (ratio - 1 - log_ratio).mean(),
-            ((ratio - 1).abs() > config.clip).float().mean(),
-        )
-
-
-STATISTICS = ("loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "grad_norm")
-
-
-def update(
-    actor: Actor,
-    optimizer: torch.optim.Optimizer,
-    rollout: Rollout,
-    config: TrainConfig,
-    generator: torch.Generator,
-    crew: Crew,
-    team: Team = ALONE,
-) -> dict[str, float]:
-    """Improve the network on one rollout: `epochs` passes over `minibatches` groups of whole environments.
-
-    The groups are drawn anew for each rollout and visited in a new order in each epoch. A group's environments are
-    shared by the processes of the team, which hold some of them each, and there by the threads of the crew; their
-    gradients are added up, so that every process makes the same step.
-
-    Returns:
-        Means over the minibatches of `LossParts` and of the gradient's norm before clipping, by name, and the
-        share of the value's variance that the critic explained.
-
-    Raises:
-        TrainingStopped: a loss or a gradient is not finite; the weights are as the last good step left them.
-    """
-    raw = estimate_advantages(actor, rollout, config)
-    returns = raw + rollout.values
-    whole, acting = team.gather(raw, 1), team.gather(rollout.values, 1)
-    advantages = team.mine(scale_advantages(whole, config), 1)
-    stretch = config.bptt or config.horizon
-
-    def prepare(envs: Tensor) -> Minibatch:
-        return make_minibatch(actor, rollout, advantages, returns, envs, stretch)
-
-    order = torch.randperm(config.num_envs, generator=generator)
-    chosen = [team.own(group, config.num_envs) for group in order.tensor_split(config.minibatches)]
-    groups = [crew.map(prepare, crew.shares(envs)) for envs in chosen]
-    frames = team.sum(torch.tensor([sum(len(share.batch.returns) for share in group) for group in groups]))
-    steps = [
-        _step(actor.net, optimizer, groups[index], int(frames[index]), config, crew, team)
-        for _ in range(config.epochs)
-        for index in torch.randperm(len(groups), generator=generator).tolist()
-    ]
-    return summarize(steps, acting, whole + acting)
-
-
-def summarize(steps: list[Tensor], values: Tensor, returns: Tensor) -> dict[str, float]:
-    """Means of the gradient steps' `STATISTICS` by name, and the share of the value's variance that was explained."""
-    means = torch.stack(steps).mean(0).tolist()
-    unexplained = (returns - values).var(correction=0) / (returns.var(correction=0) + 1e-8)
-    return dict(zip(STATISTICS, means, strict=True)) | {"explained_variance": 1 - float(unexplained)}
-
-
-def estimate_advantages(actor: Actor, rollout: Rollout, config: TrainConfig) -> Tensor:
-    """`compute_gae` of a rollout, on the network's device."""
-
-    def move(array: NDArray[Any]) -> Tensor:
-        return torch.from_numpy(array).to(actor.device)
-
-    return compute_gae(
+    raw = compute_gae(
         move(rollout.rewards).float(),
         rollout.values,
         rollout.next_value,
@@ -195,59 +86,187 @@ def estimate_advantages(actor: Actor, rollout: Rollout, config: TrainConfig) -> 
         config.gamma,
         config.gae_lambda,
     )
+    returns = raw + rollout.values
+    if not config.normalize_advantages:
+        return raw, returns
+    own = raw if rollout.lead is None else raw[~rollout.lead.led]
+    if len(own) == 0:  # a guide made every step
+        return raw, returns
+    return (raw - own.mean()) / (own.std(correction=0) + 1e-8), returns
 
 
-def scale_advantages(raw: Tensor, config: TrainConfig) -> Tensor:
-    """Advantages as the loss takes them: scaled to mean 0 and deviation 1 if the configuration says so."""
-    return (raw - raw.mean()) / (raw.std(correction=0) + 1e-8) if config.normalize_advantages else raw
+# -- loss ---------------------------------------------------------------------------------------------------------
+
+STATISTICS = (
+    "loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "imitation_loss", "grad_norm",
+)  # fmt: skip
 
 
-def _step(
-    net: ActorCritic,
-    optimizer: torch.optim.Optimizer,
-    shares: list[Minibatch],
-    total: int,
-    config: TrainConfig,
-    crew: Crew,
-    team: Team,
-) -> Tensor:
-    """One gradient step on a group of environments with `total` frames, given in shares; returns `STATISTICS`."""
+@dataclass(frozen=True)
+class LossParts:
+    """Parts of the loss, scalars.
+
+    Attributes:
+        total: what is minimised; only this one carries gradients.
+        policy, value, entropy: its terms before their coefficients; entropy in nats.
+        approx_kl: estimated divergence of the new policy from the one that acted (Schulman 2020, k3).
+        clip_fraction: share of ratios outside the clipping range.
+        imitation: cross-entropy between the policy and a guide's actions.
+    """
+
+    total: Tensor
+    policy: Tensor
+    value: Tensor
+    entropy: Tensor
+    approx_kl: Tensor
+    clip_fraction: Tensor
+    imitation: Tensor
+
+    def row(self) -> Tensor:
+        """`STATISTICS` but the last, (7,), without gradients."""
+        return torch.stack([part.detach() for part in vars(self).values()])
+
+
+def ppo_loss(
+    batch: Batch,
+    logits: Tensor,
+    values: Tensor,
+    sizes: tuple[int, ...],
+    config: RunConfig,
+    entropy_coef: float,
+) -> LossParts:
+    """PPO's clipped loss (Schulman et al. 2017, equations 7 and 9) for an action of four heads.
+
+    Template and noun count in the ratio only where something was said. With `loss="joint"` the ratio is that of the
+    whole action and the entropy that of the joint distribution. With `"per_head"` each head has its own ratio, clip,
+    entropy and value term, masked, and the four are averaged, as in the released SocialAI code.
+
+    Frames that a guide led have no policy and no entropy term: PPO's ratio means nothing where another policy acted.
+
+    Args:
+        batch: the frames and what the acting policy thought of them.
+        logits: (N, A) of the present policy.
+        values: (N,) of the present critic.
+        sizes: choices of each head.
+        config: coefficients.
+        entropy_coef: the entropy's weight at this time of the run.
+    """
+    log_probs, entropies = heads.log_probs_and_entropies(logits, batch.actions, sizes)  # (N, 4) each
+    mask = heads.spoken_mask(batch.actions)  # (N, 4)
+    change = (log_probs - batch.log_probs) * mask  # (N, 4)
+    log_ratio = change.sum(-1, keepdim=True) if config.loss == "joint" else change  # (N, 1) or (N, 4)
+    ratio = log_ratio.exp()
+    advantage = batch.advantages[:, None]  # (N, 1)
+    clipped = ratio.clamp(1 - config.clip, 1 + config.clip)
+    policy = -torch.minimum(ratio * advantage, clipped * advantage)  # (N, 1) or (N, 4)
+    value = (values - batch.returns).square()  # (N,)
+    if config.clip_value:
+        near = batch.values + (values - batch.values).clamp(-config.clip, config.clip)
+        value = torch.maximum(value, (near - batch.returns).square())
+    if config.loss == "joint":
+        entropy = heads.joint_entropy(logits, entropies, sizes)  # (N,)
+    else:
+        entropy = (entropies * mask).sum(-1)  # (N,), of the heads that took part
+    imitation = torch.zeros((), device=logits.device)
+    if batch.lead is not None:
+        own = (~batch.lead.led).to(logits.dtype)  # (N,)
+        policy, log_ratio, ratio = (
+            policy * own[:, None],
+            log_ratio * own[:, None],
+            ratio.where(own[:, None] > 0, 1.0),
+        )
+        entropy = entropy * own
+        imitation = imitation_loss(logits, batch.lead.actions, batch.lead.weights, sizes)
+    if config.loss == "joint":
+        policy_term, value_term, entropy_term = policy.mean(), value.mean(), entropy.mean()
+    else:
+        policy_term = (policy * mask).mean()
+        value_term = (value[:, None] * mask).mean()
+        entropy_term = entropy.mean() / len(sizes)
+    total = policy_term + config.value_coef * value_term - entropy_coef * entropy_term
+    if batch.lead is not None:
+        total = total + config.imitation_coef * imitation
+    with torch.no_grad():
+        return LossParts(
+            total,
+            policy_term.detach(),
+            value_term.detach(),
+            entropy.mean(),
+            (ratio - 1 - log_ratio).mean(),
+            ((ratio - 1).abs() > config.clip).float().mean(),
+            imitation.detach(),
+        )
+
+
+def imitation_loss(logits: Tensor, actions: Tensor, weights: Tensor, sizes: tuple[int, ...]) -> Tensor:
+    """Weighted mean cross-entropy between the policy and given actions: behaviour cloning (Pomerleau 1991).
+
+    Args:
+        logits: (N, A) of the policy.
+        actions: int64 (N, 4); template and noun count only where they speak.
+        weights: (N,) of the frames.
+        sizes: choices of each head.
+    """
+    log_probs = heads.log_probs(logits, actions, sizes) * heads.spoken_mask(actions)  # (N, 4)
+    return -(log_probs.sum(-1) * weights).mean()
+
+
+# -- update -------------------------------------------------------------------------------------------------------
+
+
+def update(session: Session, rollout: Rollout, mapper: Mapper = map, threads: int = 1) -> dict[str, float]:
+    """Improve the network on one rollout: `epochs` passes over `minibatches` groups of whole environments.
+
+    The groups are drawn anew for each rollout and visited in a new order in each epoch. A group's environments are
+    shared by the threads; their gradients are added up.
+
+    Returns:
+        Means over the minibatches of `STATISTICS` by name, and the share of the value's variance that the critic
+        explained.
+
+    Raises:
+        TrainingStopped: a loss or a gradient is not finite; the weights are as the last good step left them.
+    """
+    config, generator = session.config, session.generator
+    advantages, returns = estimate_advantages(session, rollout)
+    stretch = config.bptt or config.horizon
+    order = torch.randperm(config.envs, generator=generator)
+    groups = [
+        [
+            make_minibatch(session.actor, rollout, advantages, returns, share, stretch)
+            for share in envs.tensor_split(min(threads, len(envs)))
+        ]
+        for envs in order.tensor_split(config.minibatches)
+    ]
+    steps: list[Tensor] = []
+    for _ in range(config.epochs):
+        for index in torch.randperm(len(groups), generator=generator).tolist():
+            steps.append(_step(session, groups[index], mapper))
+        if (
+            config.target_kl is not None
+            and float(steps[-1][STATISTICS.index("approx_kl")]) > config.target_kl
+        ):
+            break
+    return summarize(steps, rollout.values, returns)
+
+
+def _step(session: Session, shares: Sequence[Minibatch], mapper: Mapper) -> Tensor:
+    """One gradient step on a group of environments, given in shares; returns `STATISTICS`."""
+    net, config = session.actor.net, session.config
     parameters = list(net.parameters())
+    total = sum(len(share.batch.returns) for share in shares)
+    entropy_coef = session.entropy_coef
 
     def differentiate(share: Minibatch) -> tuple[Tensor, Sequence[Tensor | None]]:
         logits, values = share.evaluate(net)
-        loss = ppo_loss(share.batch, logits, values, net.spec.action_sizes, config)
+        loss = ppo_loss(share.batch, logits, values, net.spec.action_sizes, config, entropy_coef)
         weight = len(share.batch.returns) / total
-        gradients = torch.autograd.grad(loss.total * weight, parameters, allow_unused=True)
-        return loss.row() * weight, gradients
+        return loss.row() * weight, torch.autograd.grad(loss.total * weight, parameters, allow_unused=True)
 
-    results = crew.map(differentiate, shares)
-    statistics = torch.zeros(len(STATISTICS) - 1, device=parameters[0].device)
-    for share_statistics, _ in results:
-        statistics += share_statistics
-    for parameter, *gradients in zip(parameters, *(share[1] for share in results), strict=True):
+    results = list(mapper(differentiate, shares))
+    for parameter, *gradients in zip(parameters, *(gradients for _, gradients in results), strict=True):
         _add_up(parameter, gradients)
-    return descend(net, optimizer, _add_up_team(parameters, statistics, team), config)
-
-
-def descend(
-    net: ActorCritic, optimizer: torch.optim.Optimizer, statistics: Tensor, config: TrainConfig
-) -> Tensor:
-    """Clip the gradients that lie in the parameters and make the optimiser's step.
-
-    Returns:
-        `STATISTICS`: the given ones, those of the loss, and the gradient's norm before clipping.
-
-    Raises:
-        TrainingStopped: the loss or the gradient is not finite; the weights are as they were.
-    """
-    if not bool(torch.isfinite(statistics[0])):
-        raise TrainingStopped("the loss is not a finite number")
-    norm = nn.utils.clip_grad_norm_(net.parameters(), config.max_grad_norm)
-    if not bool(torch.isfinite(norm)):
-        raise TrainingStopped("a gradient is not a finite number")
-    optimizer.step()
-    return torch.cat((statistics, norm[None]))
+    return descend(net, session.optimizer, torch.stack([row for row, _ in results]).sum(0), config)
 
 
 def _add_up(parameter: Tensor, gradients: Sequence[Tensor | None]) -> None:
@@ -267,21 +286,210 @@ def _add_up(parameter: Tensor, gradients: Sequence[Tensor | None]) -> None:
         parameter.grad.add_(gradient)
 
 
-def _add_up_team(parameters: Sequence[Tensor], statistics: Tensor, team: Team) -> Tensor:
-    """Replace the gradients by their sums over the team, in one message with the statistics, whose sum is returned."""
-    if team.size == 1:
-        return statistics
-    present = torch.tensor([float(parameter.grad is not None) for parameter in parameters])
-    flat = [_gradient(parameter).reshape(-1) for parameter in parameters]
-    sums = team.sum(torch.cat([*flat, statistics, present.to(statistics.device)]))
-    sizes = [parameter.numel() for parameter in parameters]
-    *gradients, statistics, used = torch.split(sums, [*sizes, len(statistics), len(present)])
-    for parameter, gradient, is_used in zip(parameters, gradients, used.tolist(), strict=True):
-        # Adam passes over parameters without a gradient, which a zero would not be.
-        _add_up(parameter, [gradient.view(parameter.shape)] if is_used else [])
-    return statistics
+def descend(
+    net: ActorCritic, optimizer: torch.optim.Optimizer, statistics: Tensor, config: RunConfig
+) -> Tensor:
+    """Clip the gradients that lie in the parameters and make the optimiser's step.
+
+    Returns:
+        `STATISTICS`: the given ones, those of the loss, and the gradient's norm before clipping.
+
+    Raises:
+        TrainingStopped: the loss or the gradient is not finite; the weights are as they were.
+    """
+    if not bool(torch.isfinite(statistics[0])):
+        raise TrainingStopped("the loss is not a finite number")
+    norm = nn.utils.clip_grad_norm_(net.parameters(), config.max_grad_norm)
+    if not bool(torch.isfinite(norm)):
+        raise TrainingStopped("a gradient is not a finite number")
+    optimizer.step()
+    return torch.cat((statistics, norm[None]))
 
 
-def _gradient(parameter: Tensor) -> Tensor:
-    """The gradient of a parameter, zeros where it has none."""
-    return torch.zeros_like(parameter) if parameter.grad is None else parameter.grad
+def summarize(steps: list[Tensor], values: Tensor, returns: Tensor) -> dict[str, float]:
+    """Means of the gradient steps' `STATISTICS` by name, and the share of the value's variance that was explained."""
+    means = torch.stack(steps).mean(0).tolist()
+    unexplained = (returns - values).var(correction=0) / (returns.var(correction=0) + 1e-8)
+    return dict(zip(STATISTICS, means, strict=True)) | {"explained_variance": 1 - float(unexplained)}
+
+
+# -- training loop ------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run has come, reported after every update.
+
+    Attributes:
+        frames, total_frames: environment steps made and to be made.
+        frames_per_second: of the last update, collection and learning together.
+        success_rate: of the agent's own episodes that ended in the last update; None if none did.
+        remaining_seconds: estimate from this call's speed so far.
+        update: updates made.
+        row: all figures of the update, as `metrics.jsonl` has them.
+    """
+
+    frames: int
+    total_frames: int
+    frames_per_second: float
+    success_rate: float | None
+    remaining_seconds: float
+    update: int
+    row: Mapping[str, Any]
+
+
+def train(
+    config: RunConfig,
+    envs: Any,
+    run_dir: Path,
+    progress: Callable[[Progress], None] | None = None,
+    resume: bool = False,
+    tracker: Tracker | None = None,
+    program: Any = None,
+) -> Path:
+    """Train a network and return the path of its final checkpoint.
+
+    Writes `starts.jsonl`, `metrics.jsonl`, TensorBoard events and `checkpoints/` into `run_dir`. A resumed run
+    continues from the newest intact checkpoint as if it had never stopped: the same weights to the bit on the same
+    CPU with the same number of threads.
+
+    Args:
+        config: every number.
+        envs: vector environment with same-step auto-reset, as `socialai_dsl.make_vec` gives; fresh, not yet reset.
+        run_dir: directory of the run, made if missing.
+        progress: called after every update.
+        resume: continue the run in `run_dir`.
+        tracker: takes the figures elsewhere as well.
+        program: of the scenario that the agent is for, where a guide plays a variant of it; default the environments'.
+
+    Raises:
+        ValueError: configuration and environments do not fit, or the tracker cannot begin.
+        CheckpointError: there is nothing to resume, or it is damaged or of another run.
+        TrainingStopped: something is not finite or out of bounds, or the disk is full; the last good checkpoint is
+            intact.
+    """
+    session = Session.start(config, envs, program)
+    folder = run_dir / checkpoints.FOLDER
+    if resume:
+        if not folder.is_dir():
+            raise CheckpointError(f"{run_dir}: nothing to resume, there are no checkpoints")
+        session.load(checkpoints.read(folder))
+    with _explained(session, folder):
+        run_dir.mkdir(parents=True, exist_ok=True)
+        with MetricsLog(run_dir, session.update, config.tensorboard, session.frames, tracker) as log:
+            if not resume:
+                _save(session, folder)
+            record_start(run_dir, session.update, session.frames, config)
+            with threads_of(session) as mapper:
+                _loop(session, folder, log, mapper, progress)
+            return _save(session, folder)
+
+
+def _loop(
+    session: Session,
+    folder: Path,
+    log: MetricsLog,
+    mapper: Mapper,
+    progress: Callable[[Progress], None] | None,
+) -> None:
+    """Collect, learn, record, save, until all updates are made."""
+    from trainer.chunks import update_chunks
+
+    config, envs = session.config, session.envs
+    began, first = time.perf_counter(), session.update
+    session.actor.net.train()
+    counted, then = envs.counters(), began
+    while session.update < config.updates:
+        for group in session.optimizer.param_groups:
+            group["lr"] = session.learning_rate
+        rollout = collect(session)
+        if config.update == "chunks":
+            losses = update_chunks(session, rollout)
+        else:
+            losses = update(session, rollout, mapper, config.threads)
+        _check(session, losses)
+        session.update += 1
+        before, counted = counted, envs.counters()
+        before_time, then = then, time.perf_counter()
+        speed = config.frames_per_update / (then - before_time)
+        row: dict[str, Any] = {
+            "frames": session.frames,
+            "frames_per_second": round(speed, 1),
+            **losses,
+            "bonus": rollout.bonus,
+        }
+        row |= episode_metrics(rollout.tally, before, counted)
+        if config.guide == "none":
+            del row["imitation_loss"]
+        else:
+            row.update(_guidance(rollout))
+        log.write(session.update, row)
+        if session.update % config.checkpoint_every == 0 and session.update < config.updates:
+            log.sync()
+            _save(session, folder)
+        if progress is not None:
+            left = (config.updates - session.update) * (then - began) / (session.update - first)
+            total = config.updates * config.frames_per_update
+            progress(Progress(session.frames, total, speed, row["success"], left, session.update, row))
+
+
+def _guidance(rollout: Rollout) -> dict[str, float | None]:
+    """Share of the steps that a guide made, and of those in which the policy would have done the same."""
+    tally = rollout.tally
+    agreement = tally.agreed_steps / tally.led_steps if tally.led_steps else None
+    return {"led": tally.led_steps / rollout.values.numel(), "agreement": agreement}
+
+
+@contextlib.contextmanager
+def threads_of(session: Session) -> Iterator[Mapper]:
+    """Threads that each differentiate a share of a minibatch.
+
+    A recurrent network is thousands of small operations. Split inside each operation, as PyTorch does, threads spend
+    their time meeting at barriers; whole shares meet once a step. So each thread runs PyTorch on one core. Networks
+    whose frames depend on the rest of their batch, and GPUs, are left to PyTorch.
+    """
+    threads, before = session.config.threads, torch.get_num_threads()
+    shared = session.actor.net.distinct and session.actor.device.type == "cpu"
+    torch.set_num_threads(1 if shared else threads)
+    try:
+        if not shared or threads == 1:
+            yield map
+            return
+        with ThreadPoolExecutor(threads, initializer=torch.set_num_threads, initargs=(1,)) as pool:
+            yield pool.map
+    finally:
+        torch.set_num_threads(before)
+
+
+def _save(session: Session, folder: Path) -> Path:
+    """Write a checkpoint and return its path."""
+    return checkpoints.write(folder, session.checkpoint(), session.config.keep_checkpoints)
+
+
+def _check(session: Session, losses: Mapping[str, float]) -> None:
+    """Refuse figures of the update, weights, and statistics of the network that no checkpoint may hold."""
+    for name, figure in losses.items():
+        if not math.isfinite(figure):
+            raise TrainingStopped(f"{name} of the update is not a finite number")
+    numbers = {
+        name: value for name, value in session.actor.net.state_dict().items() if value.is_floating_point()
+    }
+    finite = torch.stack([torch.isfinite(value).all() for value in numbers.values()]).tolist()
+    for name, is_finite in zip(numbers, finite, strict=True):
+        if not is_finite:
+            raise TrainingStopped(f"the network's {name} holds numbers that are not finite")
+
+
+@contextlib.contextmanager
+def _explained(session: Session, folder: Path) -> Iterator[None]:
+    """Say where a run stopped, why, and what is left of it."""
+    try:
+        yield
+    except BrokenPipeError:  # of the terminal that progress is shown on, not of a file
+        raise
+    except (TrainingStopped, ObservationError, OSError) as error:
+        saved = sorted(folder.glob("*.safetensors"))
+        kept = f"the last good checkpoint is {saved[-1]}" if saved else "there is no checkpoint yet"
+        reason = f"cannot write: {error}" if isinstance(error, OSError) else str(error)
+        where = f"training stopped after {session.frames} frames (update {session.update})"
+        raise TrainingStopped(f"{where}: {reason}; {kept}") from error

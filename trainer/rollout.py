@@ -1,33 +1,37 @@
-"""This module plays the environments with the current policy and keeps what an update needs."""
+"""Rollouts: the environments are played with the current policy, and what an update needs is kept."""
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
+from torch import Tensor, nn
 
 from trainer import actions as heads
-from trainer.actor import Actor
-from trainer.bonus import Bonus
-from trainer.config import TrainConfig
-from trainer.crew import SOLO, Crew
-from trainer.curricula import Tutor
-from trainer.distinct import Int64
 from trainer.errors import TrainingStopped
-from trainer.team import ALONE, Team
+from trainer.features import Actor, Int64
+from trainer.guides import Lead, StepLead
+from trainer.nets.memory import emptied
+
+if TYPE_CHECKING:
+    from trainer.session import Session
 
 
 @dataclass
 class EpisodeTally:
-    """Sums over the episodes that ended in a rollout.
+    """Sums over the agent's own episodes that ended in a rollout; those that a guide took part in are left out.
 
     Attributes:
         episodes, successes, timeouts: counts.
         total_return, total_length: sums of undiscounted returns (without bonus) and of lengths in steps.
+        all_episodes: own and led ones.
+        led_steps, agreed_steps: steps that a guide made, and those of them in which the policy's own sample was the
+            same.
     """
 
     episodes: int = 0
@@ -35,6 +39,9 @@ class EpisodeTally:
     timeouts: int = 0
     total_return: float = 0.0
     total_length: int = 0
+    all_episodes: int = 0
+    led_steps: int = 0
+    agreed_steps: int = 0
 
 
 @dataclass
@@ -44,8 +51,9 @@ class RolloutState:
     Attributes:
         image: uint8 (E, H, W, C), tokens: int16 (E, L): the current observation.
         starts: bool (E,), whether the current observation begins an episode.
-        memory: float32 (2, E, M).
+        memory: float32 (E, *shape), before the current observation.
         returns: float64 (E,), lengths: int64 (E,) of the running episodes.
+        led: bool (E,), whether a guide took part in the running episode.
     """
 
     image: NDArray[np.uint8]
@@ -53,7 +61,8 @@ class RolloutState:
     starts: NDArray[np.bool_]
     memory: Tensor
     returns: NDArray[np.float64]
-    lengths: NDArray[np.int64]
+    lengths: Int64
+    led: NDArray[np.bool_]
 
     @classmethod
     def initial(cls, observation: dict[str, NDArray[Any]], memory: Tensor) -> RolloutState:
@@ -66,6 +75,7 @@ class RolloutState:
             memory,
             np.zeros(count),
             np.zeros(count, np.int64),
+            np.zeros(count, np.bool_),
         )
 
 
@@ -74,13 +84,15 @@ class Rollout:
     """T steps of E environments, time first.
 
     Attributes:
-        actions: int64 (T, E, 4). log_probs: float32 (T, E, 4), before masking. values: float32 (T, E).
+        actions: int64 (T, E, 4), as played. log_probs: float32 (T, E, 4) of the policy, before masking.
+        values: float32 (T, E).
         rewards: float64 (T, E), bonus included.
         terminated, truncated, starts: bool (T, E); starts: the episode begins with this step.
         bootstrap: float64 (T, E), value of the state a truncated episode ended in; 0 elsewhere.
         next_value: float32 (E,), value of the state after the last step.
         pair_rows: int64 (T, E), row of the actor's `pairs`.
-        memories: float32 (T / bptt, 2, E, M), memory before each stretch of back-propagation.
+        memories: float32 (T / bptt, E, *shape), memory before each stretch of back-propagation.
+        lead: what a guide did, as tensors (T, E, ...); None where none took part.
         tally: the episodes that ended.
         bonus: mean exploration bonus per frame.
     """
@@ -96,8 +108,113 @@ class Rollout:
     next_value: Tensor
     pair_rows: Int64
     memories: Tensor
+    lead: Lead[Tensor, Tensor, Tensor] | None = None
     tally: EpisodeTally = field(default_factory=EpisodeTally)
     bonus: float = 0.0
+
+
+def collect(session: Session) -> Rollout:
+    """Play `horizon` steps in every environment; `session.state` is advanced in place.
+
+    Raises:
+        ObservationError: an observation is outside its bounds.
+        TrainingStopped: a reward or an output of the network is not finite.
+    """
+    actor, envs, state, config = session.actor, session.envs, session.state, session.config
+    net, sizes = actor.net, actor.net.spec.action_sizes
+    stretch = config.bptt or config.horizon
+    rollout = _allocate(session)
+    shape = (config.horizon, config.envs, sum(sizes))
+    noise = heads.gumbel_noise(shape, session.generator).to(actor.device)  # (T, E, A)
+    logits = torch.empty_like(noise)  # (T, E, A)
+    leads: list[StepLead] = []
+    actor.begin()
+    with torch.no_grad():
+        rows, features = actor.see(state.image, state.tokens, _ids(envs))  # (E,), (E, F)
+        for t in range(config.horizon):
+            rollout.pair_rows[t], rollout.starts[t] = rows, state.starts
+            state.memory = emptied(state.memory, torch.from_numpy(state.starts).to(actor.device))
+            if t % stretch == 0:
+                rollout.memories[t // stretch] = state.memory
+            output, state.memory = net.memory.step(features, state.memory)
+            logits[t], rollout.values[t] = net.heads(output)
+            rollout.actions[t] = heads.choose(logits[t] + noise[t], sizes)
+            if session.guide is not None:
+                leads.append(_follow(session, rollout, t))
+            observation = _step(session, rollout, t)
+            if t + 1 < config.horizon:
+                rows, features = actor.see(observation["image"], observation["tokens"], _ids(envs))
+        state.image, state.tokens = observation["image"].copy(), observation["tokens"].copy()
+        rollout.next_value.copy_(_value_ahead(session))
+        rollout.log_probs.copy_(heads.log_probs(logits, rollout.actions, sizes))
+    if any(lead.led.any() or lead.weights.any() for lead in leads):
+        rollout.lead = Lead(
+            *(torch.from_numpy(np.stack(part)).to(actor.device) for part in zip(*leads, strict=True))
+        )
+    _check(rollout)
+    return rollout
+
+
+def _allocate(session: Session) -> Rollout:
+    """An empty rollout; what the environments write is on the CPU, what the network writes on its device."""
+    config, device = session.config, session.actor.device
+    steps, count = config.horizon, config.envs
+    shape = session.actor.net.memory.shape
+    return Rollout(
+        actions=torch.empty(steps, count, 4, dtype=torch.int64, device=device),
+        log_probs=torch.empty(steps, count, 4, device=device),
+        values=torch.empty(steps, count, device=device),
+        rewards=np.zeros((steps, count)),
+        terminated=np.zeros((steps, count), np.bool_),
+        truncated=np.zeros((steps, count), np.bool_),
+        starts=np.zeros((steps, count), np.bool_),
+        bootstrap=np.zeros((steps, count)),
+        next_value=torch.empty(count, device=device),
+        pair_rows=np.zeros((steps, count), np.int64),
+        memories=torch.empty(steps // (config.bptt or steps), count, *shape, device=device),
+    )
+
+
+def _follow(session: Session, rollout: Rollout, t: int) -> StepLead:
+    """Ask the guide, and let it act where it leads."""
+    state, guide = session.state, session.guide
+    assert guide is not None, "internal: there is a guide"
+    lead = guide.lead(session.envs, state.starts, min(session.frames / session.config.frames, 1.0))
+    if lead.led.any():
+        led, actions = torch.from_numpy(lead.led), torch.from_numpy(lead.actions)
+        own = rollout.actions[t].cpu()
+        agrees = ((own == actions) | (heads.spoken_mask(actions) == 0)).all(1)
+        rollout.tally.led_steps += int(led.sum())
+        rollout.tally.agreed_steps += int((agrees & led).sum())
+        rollout.actions[t] = torch.where(led[:, None], actions, own).to(rollout.actions.device)
+    state.led |= lead.led
+    return lead
+
+
+def _step(session: Session, rollout: Rollout, t: int) -> dict[str, NDArray[Any]]:
+    """Step the environments with the actions of step t, record what came of it, and return the observation."""
+    observation: dict[str, NDArray[Any]]
+    envs, state, config = session.envs, session.state, session.config
+    observation, reward, terminated, truncated, infos = envs.step(rollout.actions[t].cpu().numpy())
+    rollout.rewards[t], rollout.terminated[t], rollout.truncated[t] = reward, terminated, truncated
+    ended = rollout.terminated[t] | rollout.truncated[t]  # (E,)
+    cut = rollout.truncated[t] & ~rollout.terminated[t]  # (E,)
+    state.returns += reward
+    state.lengths += 1
+    if config.bootstrap_timeouts and cut.any():
+        which = np.flatnonzero(cut)
+        rollout.bootstrap[t, which] = _value_of(session, final_observation(infos, which), which)
+    success = ended_info(infos, "success", ended & False).astype(np.bool_)
+    if ended.any():
+        _count(rollout.tally, state, ended, cut, success)
+    if session.tutor is not None:
+        session.tutor.step(ended, success)
+    if session.bonus is not None:
+        paid = session.bonus.step(envs, observation["image"], ended)
+        rollout.rewards[t] += paid
+        rollout.bonus += float(paid.sum()) / rollout.rewards.size
+    state.starts = ended
+    return observation
 
 
 def ended_info(infos: dict[str, Any], key: str, default: NDArray[Any]) -> NDArray[Any]:
@@ -115,120 +232,45 @@ def final_observation(infos: dict[str, Any], ended: Int64) -> dict[str, NDArray[
     return {key: np.stack([final[e][key] for e in ended]) for key in ("image", "tokens")}
 
 
-def collect(
-    actor: Actor,
-    envs: Any,
-    state: RolloutState,
-    config: TrainConfig,
-    generator: torch.Generator,
-    bonus: Bonus | None,
-    tutor: Tutor | None = None,
-    team: Team = ALONE,
-    crew: Crew = SOLO,
-) -> Rollout:
-    """Play `config.horizon` steps in every environment of this process; `state` is advanced in place.
-
-    Raises:
-        ObservationError: an observation is outside its bounds.
-        TrainingStopped: a reward or an output of the network is not finite.
-    """
-    net, sizes = actor.net, actor.net.spec.action_sizes
-    stretch = config.bptt or config.horizon
-    rollout = _allocate(actor, config, len(state.starts))
-    # Every process draws the noise of all environments, so that what each samples does not depend on their number.
-    drawn = heads.gumbel_noise((config.horizon, team.size * len(state.starts), sum(sizes)), generator)
-    noise = team.mine(drawn, 1).to(actor.device)
-    logits = torch.empty_like(noise)
-    actor.begin()
-    with torch.no_grad():
-        rows, features = actor.see(state.image, state.tokens, _ids(envs), crew)
-        for t in range(config.horizon):
-            rollout.pair_rows[t] = rows
-            _note_starts(rollout, state, t)
-            if t % stretch == 0:
-                rollout.memories[t // stretch] = state.memory
-            state.memory = net.memory.step(features, state.memory)
-            logits[t], rollout.values[t] = net.heads(state.memory[0])
-            rollout.actions[t] = heads.choose(logits[t] + noise[t], sizes)
-            observation = _step(actor, envs, state, config, bonus, tutor, rollout, t)
-            rows, features = actor.see(observation["image"], observation["tokens"], _ids(envs), crew)
-        state.image, state.tokens = observation["image"].copy(), observation["tokens"].copy()
-        kept = torch.from_numpy(~state.starts).to(actor.device)[:, None]
-        rollout.next_value.copy_(net.heads(net.memory.step(features, state.memory * kept)[0])[1])
-        rollout.log_probs.copy_(heads.log_probs(logits, rollout.actions, sizes))
-    _check(rollout)
-    return rollout
-
-
-def _allocate(actor: Actor, config: TrainConfig, count: int) -> Rollout:
-    """An empty rollout; what the environments write is on the CPU, what the network writes on its device."""
-    steps, device = config.horizon, actor.device
-    memories = torch.empty(steps // (config.bptt or steps), 2, count, actor.net.memory.size, device=device)
-    return Rollout(
-        actions=torch.empty(steps, count, 4, dtype=torch.int64, device=device),
-        log_probs=torch.empty(steps, count, 4, device=device),
-        values=torch.empty(steps, count, device=device),
-        rewards=np.zeros((steps, count)),
-        terminated=np.zeros((steps, count), np.bool_),
-        truncated=np.zeros((steps, count), np.bool_),
-        starts=np.zeros((steps, count), np.bool_),
-        bootstrap=np.zeros((steps, count)),
-        next_value=torch.empty(count, device=device),
-        pair_rows=np.zeros((steps, count), np.int64),
-        memories=memories,
-    )
-
-
-def _note_starts(rollout: Rollout, state: RolloutState, t: int) -> None:
-    """Record where episodes begin and empty the memory there."""
-    rollout.starts[t] = state.starts
-    if state.starts.any():
-        state.memory[:, torch.from_numpy(state.starts).to(state.memory.device)] = 0
-
-
-def _step(
-    actor: Actor,
-    envs: Any,
-    state: RolloutState,
-    config: TrainConfig,
-    bonus: Bonus | None,
-    tutor: Tutor | None,
-    rollout: Rollout,
-    t: int,
-) -> dict[str, NDArray[Any]]:
-    """Step the environments with the actions of step t, record what came of it, and return the observation."""
-    observation: dict[str, NDArray[Any]]
-    observation, reward, terminated, truncated, infos = envs.step(rollout.actions[t].cpu().numpy())
-    rollout.rewards[t], rollout.terminated[t], rollout.truncated[t] = reward, terminated, truncated
-    ended = rollout.terminated[t] | rollout.truncated[t]
-    cut = rollout.truncated[t] & ~rollout.terminated[t]
-    state.returns += reward
-    state.lengths += 1
-    if config.bootstrap_timeouts and cut.any():
-        which = np.flatnonzero(cut)
-        rollout.bootstrap[t, which] = _value(actor, final_observation(infos, which), state.memory[:, which])
-    if ended.any():
-        _count(rollout.tally, state, ended, cut, infos)
-    if tutor is not None:
-        tutor.step(ended, ended_info(infos, "success", ended & False).astype(np.bool_))
-    if bonus is not None:
-        paid = bonus.step(envs, observation["image"], ended)
-        rollout.rewards[t] += paid
-        rollout.bonus += float(paid.sum()) / rollout.rewards.size
-    state.starts = ended
-    return observation
-
-
 def _ids(envs: Any) -> tuple[Int64, Int64]:
     return envs.image_ids(), envs.history_ids()
 
 
-def _value(actor: Actor, observation: dict[str, NDArray[Any]], memory: Tensor) -> NDArray[np.float32]:
-    """Value of a few observations that are not part of the rollout, given the memory before them."""
-    probe = Actor(actor.net, observation["tokens"].shape[1])
-    _, features = probe.see(observation["image"], observation["tokens"])
-    value: NDArray[np.float32] = actor.net.heads(actor.net.memory.step(features, memory)[0])[1].cpu().numpy()
+def _value_ahead(session: Session) -> Tensor:
+    """Value of the states after the rollout, (E,); the next rollout begins with them and counts them then."""
+    state, actor = session.state, session.actor
+    memory = emptied(state.memory, torch.from_numpy(state.starts).to(actor.device))
+    with _frozen_statistics(actor.net):
+        _, features = actor.see(state.image, state.tokens, _ids(session.envs))
+        value: Tensor = actor.net.heads(actor.net.memory.step(features, memory)[0])[1]
     return value
+
+
+def _value_of(session: Session, observation: dict[str, NDArray[Any]], which: Int64) -> NDArray[np.float32]:
+    """Value of last observations (K, ...) of the environments `which`, int64 (K,), given the memory before them."""
+    net = session.actor.net
+    probe = Actor(net, observation["tokens"].shape[1])
+    with _frozen_statistics(net):
+        _, features = probe.see(observation["image"], observation["tokens"])
+    output, _ = net.memory.step(features, session.state.memory[torch.from_numpy(which)])
+    value: NDArray[np.float32] = net.heads(output)[1].cpu().numpy()
+    return value
+
+
+@contextlib.contextmanager
+def _frozen_statistics(net: nn.Module) -> Iterator[None]:
+    """Leave the running statistics of batch normalisation as they are, so that each observation counts once."""
+    norms = [
+        part for part in net.modules() if isinstance(part, nn.BatchNorm1d | nn.BatchNorm2d | nn.BatchNorm3d)
+    ]
+    tracking = [norm.track_running_stats for norm in norms]
+    for norm in norms:
+        norm.track_running_stats = False
+    try:
+        yield
+    finally:
+        for norm, before in zip(norms, tracking, strict=True):
+            norm.track_running_stats = before
 
 
 def _count(
@@ -236,17 +278,17 @@ def _count(
     state: RolloutState,
     ended: NDArray[np.bool_],
     timed_out: NDArray[np.bool_],
-    infos: dict[str, Any],
+    success: NDArray[np.bool_],
 ) -> None:
     """Add the episodes that ended to the tally and start new ones."""
-    success = ended_info(infos, "success", np.zeros(len(ended), np.bool_))
-    tally.episodes += int(ended.sum())
-    tally.successes += int(success[ended].astype(np.bool_).sum())
-    tally.timeouts += int(timed_out.sum())
-    tally.total_return += float(state.returns[ended].sum())
-    tally.total_length += int(state.lengths[ended].sum())
-    state.returns[ended] = 0
-    state.lengths[ended] = 0
+    own = ended & ~state.led
+    tally.all_episodes += int(ended.sum())
+    tally.episodes += int(own.sum())
+    tally.successes += int(success[own].sum())
+    tally.timeouts += int(timed_out[own].sum())
+    tally.total_return += float(state.returns[own].sum())
+    tally.total_length += int(state.lengths[own].sum())
+    state.returns[ended], state.lengths[ended], state.led[ended] = 0, 0, False
 
 
 def _check(rollout: Rollout) -> None:

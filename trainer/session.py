@@ -1,7 +1,8 @@
-"""This module is everything a training run has to remember, and how that goes into a checkpoint and comes back."""
+"""Everything a training run has to remember, and how that goes into a checkpoint and comes back."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,16 +11,15 @@ import torch
 from torch import Tensor
 
 from trainer import checkpoint as checkpoints
-from trainer.actor import Actor
-from trainer.bonus import Bonus
+from trainer.bonus import Bonus, build_bonus
 from trainer.checkpoint import Checkpoint, CheckpointMeta
-from trainer.config import RESUMABLE_FIELDS, TrainConfig
-from trainer.crew import Crew
+from trainer.config import WITHOUT_EFFECT, RunConfig
 from trainer.curricula import Leaves, Tutor, build_curriculum
 from trainer.errors import CheckpointError
+from trainer.features import Actor
+from trainer.guides import Guide, build_guide
 from trainer.nets import NetSpec, build_net
-from trainer.rollout import Rollout, RolloutState, collect
-from trainer.team import ALONE, Team
+from trainer.rollout import RolloutState
 
 _ADAM = ("step", "exp_avg", "exp_avg_sq")
 
@@ -29,20 +29,21 @@ class Session:
     """A run between two updates; equal sessions have equal futures on the same CPU with the same number of threads.
 
     Attributes:
-        update: updates made. frames: environment steps made.
-        generator: the one source of the trainer's randomness, the same in every process.
-        team: the processes that train together; environments, memory and bonus are this process's share.
+        program: of the scenario that the agent is for.
+        update: updates made.
+        generator: the one source of the trainer's randomness.
     """
 
-    config: TrainConfig
+    config: RunConfig
     envs: Any
+    program: Any
     actor: Actor
     optimizer: torch.optim.Adam
     state: RolloutState
     generator: torch.Generator
-    bonus: Bonus | None
+    bonus: Bonus | None = None
     tutor: Tutor | None = None
-    team: Team = ALONE
+    guide: Guide | None = None
     update: int = 0
 
     @property
@@ -50,69 +51,54 @@ class Session:
         """Environment steps made, all environments together."""
         return self.update * self.config.frames_per_update
 
-    def play(self, crew: Crew) -> Rollout:
-        """`collect` the next rollout; see there for errors."""
-        return collect(
-            self.actor,
-            self.envs,
-            self.state,
-            self.config,
-            self.generator,
-            self.bonus,
-            self.tutor,
-            self.team,
-            crew,
-        )
+    @property
+    def learning_rate(self) -> float:
+        """Adam's, now."""
+        return self._scheduled(self.config.lr, self.config.lr_end)
+
+    @property
+    def entropy_coef(self) -> float:
+        """Weight of the entropy, now."""
+        return self._scheduled(self.config.entropy_coef, self.config.entropy_coef_end)
+
+    def _scheduled(self, start: float, end: float | None) -> float:
+        """Linear over the run's updates, from `start` before the first to `end` after the last."""
+        return start if end is None else start + (end - start) * self.update / self.config.updates
 
     @classmethod
-    def start(cls, config: TrainConfig, envs: Any, team: Team = ALONE) -> Session:
+    def start(cls, config: RunConfig, envs: Any, program: Any = None) -> Session:
         """Begin a run: fresh weights, environments reset with the run's seed.
 
         Raises:
             ValueError: the environments do not fit the configuration, or are not of the form the trainer learns.
         """
-        share = team.share(config.num_envs)
-        if envs.num_envs != share:
-            part = "" if team.size == 1 else f" / {team.size} processes = {share}"
-            raise ValueError(
-                f"envs: got {envs.num_envs} environments, expected num_envs = {config.num_envs}{part}"
-            )
-        spec = net_spec(envs)
-        net = build_net(config.net, spec, config.seed, config.precision).to(config.device)
-        if config.compile:
-            net.compile_perception()
-        if team.size > 1 and not net.distinct:
-            raise ValueError(
-                f"net: {config.net} normalises over the batch, which {team.size} processes do not share; "
-                "train it with one"
-            )
-        if team.size > 1 and config.update == "chunks":
-            raise ValueError(f"update: chunks are not shared by {team.size} processes; train with one")
+        if envs.num_envs != config.envs:
+            raise ValueError(f"envs: got {envs.num_envs} environments, expected envs = {config.envs}")
+        folder = config.code_folder
+        net = build_net(config.net, net_spec(envs), config.seed, config.precision, folder).to(config.device)
         tutor = None
         if config.curriculum != "none":
-            tutor = Tutor(build_curriculum(config.curriculum, Leaves.of(envs)), envs, team)
-        seats = range(team.rank * share, (team.rank + 1) * share)
-        observation, _ = envs.reset(seed=config.seed, options={"index": list(seats)})
+            tutor = Tutor(build_curriculum(config.curriculum, Leaves.of(envs), folder), envs)
+        bonus = build_bonus(config, config.envs)
+        observation, _ = envs.reset(seed=config.seed, options={"index": list(range(config.envs))})
+        guide = build_guide(config, envs)
         if tutor is not None:
             tutor.begin()
         return cls(
             config,
             envs,
+            envs.program if program is None else program,
             Actor(net, observation["tokens"].shape[1]),
             torch.optim.Adam(net.parameters(), lr=config.lr, eps=config.adam_eps, fused=True),
-            RolloutState.initial(observation, net.memory.initial(share)),
+            RolloutState.initial(observation, net.memory.initial(config.envs)),
             torch.Generator().manual_seed(config.seed),
-            Bonus(config, share) if config.explo != "none" else None,
+            bonus,
             tutor,
-            team,
+            guide,
         )
 
     def checkpoint(self) -> Checkpoint:
-        """Everything needed to continue exactly; of a team, complete on the process that writes.
-
-        Raises:
-            TrainingStopped: the processes of the team have come apart, or one is gone.
-        """
+        """Everything needed to continue exactly."""
         net = self.actor.net
         tensors: dict[str, Tensor] = {f"net.{name}": value for name, value in net.state_dict().items()}
         for name, parameter in net.named_parameters():
@@ -120,27 +106,20 @@ class Session:
                 tensors[f"adam.{key}.{name}"] = value
         if self.tutor is not None:
             tensors["curriculum"] = torch.from_numpy(self.tutor.state())
-        tensors["rng"] = self.generator.get_state()
-        if self.team.size == 1:
-            return Checkpoint(self._meta(), tensors | self._share())
-        self.team.agree("weights, optimiser and random numbers are", checkpoints.pack(tensors))
-        for rank, share in enumerate(self.team.gather_bytes(checkpoints.pack(self._share()))):
-            tensors |= {_of_rank(rank) + name: value for name, value in checkpoints.unpack(share).items()}
-        return Checkpoint(self._meta(), tensors)
-
-    def _share(self) -> dict[str, Tensor]:
-        """What this process alone remembers: its environments, and what goes with them."""
-        tensors = {"state.memory": self.state.memory}
-        for name in ("image", "tokens", "starts", "returns", "lengths"):
-            tensors[f"state.{name}"] = torch.from_numpy(getattr(self.state, name))
+        if self.guide is not None:
+            tensors["guide"] = _as_tensor(json.dumps(self.guide.state()).encode())
         if self.bonus is not None:
             for name, array in self.bonus.state().items():
-                tensors[f"bonus.{name}"] = torch.from_numpy(array)
-        tensors["envs"] = torch.frombuffer(bytearray(self.envs.snapshot()), dtype=torch.uint8)
-        return tensors
+                tensors[f"bonus.{name}"] = torch.from_numpy(np.asarray(array))
+        tensors["rng"] = self.generator.get_state()
+        tensors["state.memory"] = self.state.memory
+        for name in _STATE:
+            tensors[f"state.{name}"] = torch.from_numpy(getattr(self.state, name))
+        tensors["envs"] = _as_tensor(self.envs.snapshot())
+        return Checkpoint(self._meta(), tensors)
 
     def _meta(self) -> CheckpointMeta:
-        spec, program = self.actor.net.spec, self.envs.program
+        spec, program = self.actor.net.spec, self.program
         return CheckpointMeta(
             config=self.config,
             action_sizes=spec.action_sizes,
@@ -153,7 +132,6 @@ class Session:
             nouns=list(program.nouns),
             frames=self.frames,
             update=self.update,
-            processes=self.team.size,
             torch_version=str(torch.__version__),
         )
 
@@ -161,44 +139,49 @@ class Session:
         """Continue from a checkpoint of this very run, in a session begun with the same configuration.
 
         Raises:
-            CheckpointError: it is of another scenario, of other hyper-parameters, or incomplete.
+            CheckpointError: it is of another scenario, of other options, or incomplete.
         """
         self._check_same_run(checkpoint.meta)
         net = checkpoints.restore_net(
-            checkpoint, self.actor.net.spec, list(self.envs.program.vocabulary), self.config.net
+            checkpoint,
+            self.actor.net.spec,
+            list(self.program.vocabulary),
+            self.config.net,
+            self.config.code_folder,
         )
         try:
             self.actor.net.load_state_dict(net.state_dict())
             self._load_adam(checkpoint)
-            mine = _of_rank(self.team.rank)
-            self._load_state(checkpoint.part(mine + "state"))
-            if self.bonus is not None:
-                self.bonus.load_state(
-                    {name: value.numpy() for name, value in checkpoint.part(mine + "bonus").items()}
-                )
+            self._load_state(checkpoint.part("state"))
             self.generator.set_state(checkpoint.tensors["rng"])
-            self.envs.restore(checkpoint.tensors[mine + "envs"].numpy().tobytes())
+            if self.bonus is not None:
+                self.bonus.load_state({k: v.numpy() for k, v in checkpoint.part("bonus").items()})
+            self.envs.restore(checkpoint.tensors["envs"].numpy().tobytes())
             if self.tutor is not None:
                 self.tutor.load_state(checkpoint.tensors["curriculum"].numpy())
-        except (KeyError, ValueError, TypeError, RuntimeError) as error:
+            if self.guide is not None:
+                self.guide.load_state(json.loads(checkpoint.tensors["guide"].numpy().tobytes()))
+        except (KeyError, ValueError, RuntimeError, TypeError) as error:
             raise CheckpointError(f"checkpoint cannot continue this run: {error}") from error
         self.update = checkpoint.meta.update
 
     def _check_same_run(self, meta: CheckpointMeta) -> None:
-        if meta.program_sha256 != self.envs.program.sha256:
+        if meta.program_sha256 != self.program.sha256:
             raise CheckpointError(
                 "the scenario has changed since this checkpoint; a run resumes only on the same one"
             )
-        if meta.processes != self.team.size:
-            raise CheckpointError(
-                f"the run was made by {meta.processes} processes and resumes only with as many, got "
-                f"{self.team.size}: torchrun --nproc-per-node {meta.processes}"
-            )
         old, new = meta.config.model_dump(), self.config.model_dump()
-        changed = [name for name in new if name not in RESUMABLE_FIELDS and old[name] != new[name]]
+        free = WITHOUT_EFFECT - {"frames"} if self.config.depends_on_frames else WITHOUT_EFFECT
+        free = free | {"device", "threads", "eval_episodes"}
+        changed = [name for name in new if name not in free and old[name] != new[name]]
         if changed:
             detail = ", ".join(f"{name}: {old[name]} -> {new[name]}" for name in changed)
-            raise CheckpointError(f"a run resumes only with the same settings; changed: {detail}")
+            why = (
+                " (guide and schedules reach from the first frame to the last)"
+                if changed == ["frames"]
+                else ""
+            )
+            raise CheckpointError(f"a run resumes only with the same settings; changed: {detail}{why}")
 
     @torch.no_grad()
     def _load_adam(self, checkpoint: Checkpoint) -> None:
@@ -221,7 +204,7 @@ class Session:
 
     def _load_state(self, stored: dict[str, Tensor]) -> None:
         state = self.state
-        for name in ("image", "tokens", "starts", "returns", "lengths"):
+        for name in _STATE:
             present, value = getattr(state, name), stored[name].numpy()
             if value.shape != present.shape or value.dtype != present.dtype:
                 raise ValueError(
@@ -235,9 +218,11 @@ class Session:
         state.memory = stored["memory"].to(state.memory)
 
 
-def _of_rank(rank: int) -> str:
-    """What the names of a process's own tensors begin with in a checkpoint."""
-    return f"rank{rank}." if rank else ""
+_STATE = ("image", "tokens", "starts", "returns", "lengths", "led")
+
+
+def _as_tensor(data: bytes) -> Tensor:
+    return torch.frombuffer(bytearray(data), dtype=torch.uint8)
 
 
 def net_spec(envs: Any) -> NetSpec:

@@ -1,24 +1,41 @@
-"""This module trains agents for the commands, by way of the trainer."""
+"""From what is typed to a run's configuration, and from that to a trained agent."""
 
-import contextlib
+import argparse
 import json
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+import os
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Final, Literal
+from typing import IO, TYPE_CHECKING, Any, Final, get_args
+
+from pydantic import ValidationError
 
 from socialai_dsl.cli.errors import RunFailed, UsageError
+from socialai_dsl.cli.run_folder import SETTINGS, base_name, read_json
 from socialai_dsl.diagnostics import did_you_mean
+from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, RunConfig, configure
 
 if TYPE_CHECKING:
-    from socialai_dsl.cli.settings import Settings
-    from trainer.config import TrainConfig
-    from trainer.metrics import Tracker
-    from trainer.nets import Precision
-    from trainer.team import Team
+    from socialai_dsl.program_suite import Playable
+    from trainer.logging import Tracker
 
-_DEFAULT_EXPLO_C: Final = {"lang": 7.0, "cell": 3.0}
+_AUTOMATIC: Final = {
+    "device": "a graphics card where there is one",
+    "threads": "one per core, at most 4",
+    "envs": "256, or the preset's number",
+    "frames": "what the recipe needs for this scenario, or the preset's number",
+    "guide": "the recipe's",
+}
+"""Options without one default: what stands in its place in the help."""
+
+_OF_ANY_AGENT: Final = ("agent", "seed", "device", "eval_episodes", "net")
+"""Options that matter to agents that are not trained."""
+
+_BONUS_C: Final = {"lang": 7.0, "cell": 3.0}
+_MOST_THREADS: Final = 4
+"""More threads than this wait for Python's interpreter lock rather than compute."""
+
+PLAIN_FRAMES: Final = 600_000
 
 
 def require_trainer() -> None:
@@ -29,6 +46,137 @@ def require_trainer() -> None:
     """
     if find_spec("torch") is None:
         raise UsageError("training and evaluating need PyTorch: pip install 'socialai-dsl[train]'")
+
+
+# -- options ------------------------------------------------------------------------------------------------------
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Declare a flag for each option of `RunConfig` that has one, `--recipe` and `--hyper`."""
+    for name in FLAGS:
+        field = RunConfig.model_fields[name]
+        words = [f"--{name.replace('_', '-')}"] + (["--explo"] if name == "bonus" else [])
+        default = _AUTOMATIC.get(name, field.default)
+        about = (
+            field.description if default in (None, "none") else f"{field.description} (default: {default})"
+        )
+        choices = ("auto", "cpu", "cuda") if name == "device" else _choices(field.annotation)
+        number = field.annotation is int
+        metavar = None if choices else "N" if number else "NAME"
+        kind: Any = _whole_number if number else str
+        parser.add_argument(
+            *words, dest=name, type=kind, choices=choices, metavar=metavar, help=_escaped(about)
+        )
+    parser.add_argument(
+        "--recipe",
+        choices=tuple(RECIPES),
+        help="how the agent learns; guided: the scenario's script shows it first; plain and paper: from the reward "
+        "alone (default: guided where the scenario has a script)",
+    )
+    parser.add_argument(
+        "--hyper",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="any other option of the trainer, such as lr=1e-4 or entropy_coef=0.02; may be given again",
+    )
+
+
+def _choices(annotation: Any) -> tuple[str, ...] | None:
+    words = tuple(word for word in get_args(annotation) if isinstance(word, str))
+    return words or None
+
+
+def _escaped(text: str | None) -> str:
+    return (text or "").replace("%", "%%")
+
+
+def _whole_number(text: str) -> int:
+    """`1_000` and `1,000` are 1000; the bounds are `RunConfig`'s."""
+    try:
+        return int(text.replace("_", "").replace(",", ""))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a whole number, got {text!r}") from None
+
+
+def new_config(arguments: argparse.Namespace) -> RunConfig:
+    """The configuration of a new run, with everything resolved.
+
+    Raises:
+        UsageError: an option is unknown or out of bounds, or options contradict each other.
+    """
+    given = {name: getattr(arguments, name) for name in FLAGS if getattr(arguments, name) is not None}
+    hyper = _read_hyper(arguments.hyper)
+    trains = given.get("agent", "ppo") == "ppo"
+    if not trains:
+        _refuse_training_options(given, arguments)
+    given["device"] = resolve_device(given.get("device", "auto"))
+    given["scenario"] = arguments.scenario
+    if not trains:
+        return checked_config("plain", given | {"frames": 0})
+    given.setdefault("threads", automatic_threads())
+    given |= _resolved_bonus(given.get("bonus", "none"), arguments.scenario)
+    recipe = arguments.recipe or _usual_recipe(given | hyper, arguments.scenario)
+    if "frames" not in given and given.get("net") not in NET_PRESETS:
+        given["frames"] = frames_for(recipe, arguments.scenario)
+    return checked_config(recipe, given | hyper)
+
+
+def checked_config(recipe: str, given: dict[str, Any]) -> RunConfig:
+    """`trainer.config.configure`, with what is wrong said as the option was typed.
+
+    Raises:
+        UsageError: a value is out of bounds.
+    """
+    try:
+        return configure(recipe, **given)
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = str(first["loc"][0]) if first["loc"] else ""
+        typed = f"--{name.replace('_', '-')}" if name in FLAGS else f"--hyper {name}" if name else "options"
+        got = f", got {first['input']!r}" if name else ""
+        raise UsageError(f"{typed}: {first['msg'].removeprefix('Value error, ')}{got}") from None
+
+
+def _refuse_training_options(given: dict[str, Any], arguments: argparse.Namespace) -> None:
+    asked = [name for name in given if name not in _OF_ANY_AGENT]
+    asked += ["hyper"] * bool(arguments.hyper) + ["recipe"] * bool(arguments.recipe)
+    if asked:
+        option = asked[0].replace("_", "-")
+        raise UsageError(f"--{option}: the agent {given['agent']!r} is not trained")
+
+
+def _read_hyper(given: Sequence[str]) -> dict[str, Any]:
+    """Options given as NAME=VALUE, by name; whether their values are possible is `RunConfig`'s to say."""
+    found: dict[str, Any] = {}
+    for text in given:
+        name, equals, written = text.partition("=")
+        if not equals or not written:
+            raise UsageError(f"--hyper: got {text!r}, expected NAME=VALUE, such as lr=1e-4")
+        if name in FLAGS:
+            raise UsageError(f"--hyper: {name} has an option of its own, --{name.replace('_', '-')}")
+        if name not in HYPER:
+            near = did_you_mean(name, HYPER)
+            hint = f"did you mean {near}?" if near else f"expected one of {', '.join(HYPER)}"
+            raise UsageError(f"--hyper: got {name!r}; {hint}")
+        if name in found:
+            raise UsageError(f"--hyper: {name} is given twice")
+        found[name] = _plain_value(name, written)
+    return found
+
+
+def _plain_value(name: str, written: str) -> bool | int | float | str | None:
+    """A number, true, false or null as JSON writes them; else the word itself."""
+    try:
+        value = json.loads(written)
+    except ValueError:
+        return written
+    if not isinstance(value, bool | int | float | str | None):
+        raise UsageError(f"--hyper: got {name}={written}, expected a number, a word, true, false or null")
+    return value
+
+
+# -- what is not typed --------------------------------------------------------------------------------------------
 
 
 def resolve_device(device: str) -> str:
@@ -45,160 +193,119 @@ def resolve_device(device: str) -> str:
     return "cuda" if device == "cuda" or (device == "auto" and available) else "cpu"
 
 
-def resolve_precision(choice: str, net: str, device: str) -> "Precision":
-    """`auto` is the type in which the device computes this network fastest.
-
-    Raises:
-        UsageError: there is no such network.
-    """
-    from trainer.config import configure
-    from trainer.nets import best_precision
-
-    if choice == "bfloat16":
-        return "bfloat16"
-    if choice == "float32":
-        return "float32"
-    try:
-        return best_precision(configure(net).net, device)
-    except ValueError as error:
-        raise UsageError(str(error)) from None
+def automatic_threads() -> int:
+    """Threads where nobody says how many."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, min(cores, _MOST_THREADS))
 
 
-def resolve_exploration(kind: str, scenario: str) -> tuple[Literal["none", "lang", "cell"], float]:
+def _resolved_bonus(kind: str, scenario: str) -> dict[str, Any]:
     """Kind and scale of the exploration bonus; `auto` looks the scenario up in the paper's table."""
     import yaml
 
     import trainer
-    from socialai_dsl.cli.run_folder import base_name
 
     table_file = Path(trainer.__file__).with_name("exploration.yaml")
     table = yaml.safe_load(table_file.read_text(encoding="utf-8"))
     listed = table.get(base_name(scenario), {"kind": "none"})
     if kind == "auto":
         kind = listed["kind"]
-    scale = listed["c"] if kind == listed["kind"] and kind != "none" else _DEFAULT_EXPLO_C.get(kind, 0.0)
-    if kind == "lang":
-        return "lang", float(scale)
-    return ("cell" if kind == "cell" else "none"), float(scale)
+    if kind not in _BONUS_C:
+        return {"bonus": kind}
+    scale = listed["c"] if kind == listed["kind"] else _BONUS_C[kind]
+    return {"bonus": kind, "bonus_c": float(scale)}
 
 
-_BY_OPTION: Final = {
-    "frames": "frames",
-    "seed": "seed",
-    "num_envs": "envs",
-    "net": "net",
-    "explo": "explo",
-    "precision": "precision",
-    "compile": "compile",
-    "curriculum": "curriculum",
-    "device": "device",
-    "threads": "threads",
-    "checkpoint_every": "checkpoint_every",
-}
-"""Fields of the trainer's configuration that have an option of their own, and its name."""
+def _usual_recipe(given: dict[str, Any], scenario: str) -> str:
+    """`guided` where the scenario has a script and nothing is asked for that excludes a guide, else `plain`."""
+    if given.get("net") in NET_PRESETS or given.get("update") == "chunks":
+        return "paper"
+    if given.get("guide", "script") != "script" or given.get("curriculum", "none") != "none":
+        return "plain"
+    return "guided" if scripted_name(scenario) is not None else "plain"
 
 
-def resolve_hyper(given: Sequence[str]) -> dict[str, bool | int | float | str]:
-    """Hyper-parameters given as NAME=VALUE, by name; whether their values are possible is the trainer's to say.
-
-    Raises:
-        UsageError: something else is given, or there is no such hyper-parameter.
-    """
-    from trainer.config import TrainConfig
-
-    found: dict[str, bool | int | float | str] = {}
-    free = [name for name in TrainConfig.model_fields if name not in (*_BY_OPTION, "tensorboard")]
-    for text in given:
-        name, equals, written = text.partition("=")
-        if not equals or not written:
-            raise UsageError(f"--hyper: got {text!r}, expected NAME=VALUE, such as lr=1e-4")
-        if name in _BY_OPTION:
-            raise UsageError(
-                f"--hyper: {name} has an option of its own, --{_BY_OPTION[name].replace('_', '-')}"
-            )
-        if name not in free:
-            near = did_you_mean(name, free)
-            hint = f"did you mean {near}?" if near else f"expected one of {', '.join(free)}"
-            raise UsageError(f"--hyper: got {name!r}; {hint}")
-        if name in found:
-            raise UsageError(f"--hyper: {name} is given twice")
-        found[name] = _plain_value(name, written)
-    return found
+GUIDED_FRAMES: Final = 2_000_000
+GUIDED_FRAMES_OF_A_SUITE: Final = 6_000_000
 
 
-def _plain_value(name: str, written: str) -> bool | int | float | str:
-    """A number, true or false as JSON writes them; else the word itself."""
-    try:
-        value = json.loads(written)
-    except ValueError:
-        return written
-    if not isinstance(value, bool | int | float | str):
-        raise UsageError(f"--hyper: got {name}={written}, expected a number, a word, true or false")
-    return value
+def frames_for(recipe: str, scenario: str) -> int:
+    """Frames where nobody says how many: measured to be enough for every scenario of the paper (docs/mastery.md)."""
+    import socialai_dsl
+    from socialai_dsl.program_suite import ProgramSuite
+
+    if recipe != "guided":
+        return PLAIN_FRAMES
+    is_suite = isinstance(socialai_dsl.compile(socialai_dsl.load(scenario)), ProgramSuite)
+    return GUIDED_FRAMES_OF_A_SUITE if is_suite else GUIDED_FRAMES
 
 
-def default_envs(net: str) -> int:
-    """How many environments an agent trains on unless told otherwise."""
-    from trainer.config import configure
-
-    return configure(net).num_envs
+# -- scripts ------------------------------------------------------------------------------------------------------
 
 
-def train_config(settings: "Settings") -> "TrainConfig":
-    """The trainer's configuration of a run.
+def scripted_name(scenario: str) -> str | None:
+    """The scenario itself if it scripts the agent, else its variant `oracle`; None if there is no script.
 
     Raises:
-        UsageError: a value is out of range.
+        ScenarioError: the scenario, or its variant, has mistakes.
     """
-    from pydantic import ValidationError
+    import socialai_dsl
+    from socialai_dsl.program_suite import is_scripted
 
-    from trainer.config import PRESETS, configure
-
-    given = {name: getattr(settings, option) for name, option in _BY_OPTION.items() if name != "net"}
-    # A small batch of environments cannot be cut into as many parts as the default has; a preset's number is its own.
-    parts = {} if settings.net in PRESETS else {"minibatches": min(4, settings.envs)}
+    if is_scripted(socialai_dsl.compile(socialai_dsl.load(scenario))):
+        return scenario
+    name, mark, parameters = scenario.partition("?")
+    scripted = f"{name}+oracle{mark}{parameters}"
     try:
-        return configure(
-            settings.net, **(parts | given | {"explo_c": settings.explo_c} | dict(settings.hyper))
-        )
+        socialai_dsl.load(scripted)
+    except socialai_dsl.ScenarioError as error:
+        if all(diagnostic.code == "S503" for diagnostic in error.diagnostics):
+            return None
+        raise
+    return scripted
+
+
+def with_script(scenario: str) -> str:
+    """`scripted_name`, which there must be.
+
+    Raises:
+        UsageError: there is no script.
+    """
+    scripted = scripted_name(scenario)
+    if scripted is None:
+        raise UsageError(f"{scenario}: the agent has no frame, and there is no variant `oracle`")
+    return scripted
+
+
+# -- training -----------------------------------------------------------------------------------------------------
+
+
+def read_config(folder: Path) -> RunConfig:
+    """The configuration of a run's folder.
+
+    Raises:
+        UsageError: it is not a run's folder, or its configuration is damaged.
+    """
+    if not (folder / SETTINGS).is_file():
+        raise UsageError(f"{folder} is not a run's folder, it has no {SETTINGS}")
+    try:
+        # As JSON, because strict validation takes no lists for tuples from Python.
+        return RunConfig.model_validate_json(json.dumps(read_json(folder / SETTINGS)))
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
-        raise UsageError(f"{place}: {first['msg']}, got {first['input']!r}") from None
+        raise UsageError(f"{folder / SETTINGS}: {place}: {first['msg']}") from None
 
 
-@contextlib.contextmanager
-def joined_team(settings: "Settings") -> Iterator["Team"]:
-    """The processes that torchrun started to train together, or this one alone.
-
-    Raises:
-        UsageError: there are several, but nothing to train.
-        RunFailed: another process is gone.
-    """
-    from trainer.errors import TrainingStopped
-    from trainer.team import joined, started_together
-
-    if started_together()[0] > 1 and settings.agent != "ppo":
-        raise UsageError(f"the agent {settings.agent!r} is not trained, so torchrun can do nothing for it")
-    try:
-        with joined(settings.device) as team:
-            yield team
-    except TrainingStopped as error:
-        raise RunFailed(str(error)) from error
-
-
-def resolve_threads(threads: int) -> int:
-    """So many CPU threads, or for 0 as many as the cores of this process's share of the machine, at most 4."""
-    from trainer.crew import automatic_threads
-    from trainer.team import started_together
-
-    return threads or automatic_threads(started_together()[1])
-
-
-def train_agent(settings: "Settings", folder: Path, resume: bool, stream: IO[str], team: "Team") -> Path:
+def train_agent(config: RunConfig, program: "Playable", folder: Path, resume: bool, stream: IO[str]) -> Path:
     """Train, show the progress on `stream`, and return the path of the final checkpoint.
 
-    All processes of the team call it; the one that writes shows the progress.
+    Args:
+        config: of the run.
+        program: of its scenario.
+        folder: of the run.
+        resume: go on where the run was stopped.
+        stream: where the progress is shown.
 
     Raises:
         UsageError: the run cannot start, or its folder cannot be written.
@@ -208,49 +315,36 @@ def train_agent(settings: "Settings", folder: Path, resume: bool, stream: IO[str
     import socialai_dsl
     from socialai_dsl.cli.progress import TrainingProgress
     from trainer.errors import TrainingStopped
-    from trainer.train import Progress, train
+    from trainer.ppo import Progress, train
 
-    config = train_config(settings)
-    try:
-        share = team.share(settings.envs)
-    except ValueError as error:
-        raise UsageError(f"--envs: {error}") from None
-    envs = socialai_dsl.make_vec(settings.scenario, num_envs=share, copy=False, autoreset_mode="SameStep")
+    played = with_script(config.scenario) if config.guide == "script" else config.scenario
+    envs = socialai_dsl.make_vec(played, num_envs=config.envs, copy=False, autoreset_mode="SameStep")
     total = config.updates * config.frames_per_update
     try:
-        if not team.writes:
-            return train(config, envs, folder, resume=resume, team=team)
         with TrainingProgress(total, stream) as shown:
 
             def report(progress: Progress) -> None:
                 shown.update(progress.frames, progress.success_rate, progress.frames_per_second)
 
-            tracker = _tracker(settings, config, folder)
-            return train(config, envs, folder, progress=report, resume=resume, team=team, tracker=tracker)
+            return train(config, envs, folder, report, resume, _tracker(config, folder), program)
     except TrainingStopped as error:
         if isinstance(error.__cause__, OSError):
             raise UsageError(str(error)) from error
         raise RunFailed(str(error)) from error
-    except (
-        ValueError
-    ) as error:  # what the trainer says about a configuration or a checkpoint that does not fit
+    except ValueError as error:  # what the trainer says about options or a checkpoint that do not fit
         raise UsageError(str(error)) from error
     except KeyboardInterrupt:
-        command = f"socialai-run --resume {folder}"
-        if team.size > 1:
-            command = f"torchrun --nproc-per-node {team.here} --no-python {command}"
-        raise KeyboardInterrupt(f"interrupted; go on with: {command}") from None
+        raise KeyboardInterrupt(f"interrupted; go on with: socialai-run --resume {folder}") from None
     finally:
         envs.close()
 
 
-def _tracker(settings: "Settings", config: "TrainConfig", folder: Path) -> "Tracker | None":
+def _tracker(config: RunConfig, folder: Path) -> "Tracker | None":
     """Where the figures go besides the folder, if anywhere."""
-    if settings.wandb is None:
+    if config.wandb is None:
         return None
     from socialai_dsl.cli.run_folder import scenario_folder_name
-    from trainer.tracking import WandbTracker
+    from trainer.logging import WandbTracker
 
-    asked = asdict(settings) | {"trainer": config.model_dump()}
-    name = f"{scenario_folder_name(settings.scenario)} {folder.name}"
-    return WandbTracker(settings.wandb, folder, asked, name)
+    name = f"{scenario_folder_name(config.scenario)} {folder.name}"
+    return WandbTracker(config.wandb, folder, config.model_dump(), name)

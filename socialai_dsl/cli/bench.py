@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Any, Final
@@ -113,11 +114,10 @@ def _training(arguments: argparse.Namespace) -> tuple[dict[str, Any], str]:
         from socialai_dsl.cli.training_entries import entries
         from socialai_dsl.cli.training_report import training_table
         from socialai_dsl.cli.training_speed import measure_training
-        from trainer.crew import available_cores
     except ImportError as error:
         raise UsageError(f"--train: {error}; install the extra [train]") from error
 
-    threads, cores = 1 if arguments.threads is None else arguments.threads, available_cores()
+    threads, cores = 1 if arguments.threads is None else arguments.threads, len(os.sched_getaffinity(0))
     if not 1 <= threads <= cores:
         raise UsageError(f"--threads: got {threads}, expected 1 to {cores}, the cores of this machine")
     known = entries()

@@ -86,11 +86,10 @@ def _scripted(name: str, loaded: "Loaded", required: bool) -> str | None:
     Raises:
         UsageError: there is none, and it is required.
     """
-    from socialai_dsl.cli.evaluation import with_script
-    from socialai_dsl.compilation import compile_loaded
+    from socialai_dsl.cli.agents import with_script
 
     try:
-        return with_script(name, compile_loaded(loaded))
+        return with_script(name)
     except UsageError:
         if required:
             raise

@@ -14,9 +14,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from socialai_dsl.cli.episode import Episode
+    from socialai_dsl.evaluation import EvalResult, Policy
     from socialai_dsl.program_suite import Playable
-    from trainer.evaluate import EvalResult
-    from trainer.policies import Policy
 
 # Test episodes played together: enough to be fast, and no result depends on it.
 _TOGETHER: Final = 125
@@ -32,6 +31,7 @@ class Player:
         greedy: whether a network takes its most probable action instead of sampling.
         seed: of what a network or `random` draws; rooms do not depend on it.
         net: name of a network that does not ship, whose code is imported if a checkpoint asks for it.
+        folder: where the file of such a network is looked for first.
     """
 
     agent: str
@@ -39,6 +39,7 @@ class Player:
     greedy: bool = False
     seed: int = 0
     net: str | None = None
+    folder: Path = Path()
 
     @property
     def manner(self) -> str:
@@ -144,10 +145,11 @@ def evaluate_agent(player: Player, scenario: str, episodes: int) -> Evaluation:
         result, played = _let_a_person_play(scenario, program, episodes)
         return Evaluation(scenario, program, player, result, endings, played)
 
-    from trainer.evaluate import evaluate
+    from socialai_dsl.cli.agents import with_script
+    from socialai_dsl.evaluation import evaluate
 
     envs = socialai_dsl.make_vec(
-        with_script(scenario, program) if player.agent == "oracle" else scenario,
+        with_script(scenario) if player.agent == "oracle" else scenario,
         num_envs=min(_TOGETHER, episodes),
         copy=False,
         autoreset_mode="Disabled",
@@ -164,46 +166,24 @@ def evaluate_agent(player: Player, scenario: str, episodes: int) -> Evaluation:
     return Evaluation(scenario, program, player, result, endings, actions, told)
 
 
-def with_script(scenario: str, program: "Playable") -> str:
-    """The scenario itself if it scripts the agent, else its variant `oracle`, in which everything else is the same.
-
-    Raises:
-        UsageError: there is no script.
-    """
-    import socialai_dsl
-    from socialai_dsl.program_suite import is_scripted
-
-    if is_scripted(program):
-        return scenario
-    name, mark, parameters = scenario.partition("?")
-    scripted = f"{name}+oracle{mark}{parameters}"
-    try:
-        socialai_dsl.load(scripted)
-    except socialai_dsl.ScenarioError as error:
-        if all(diagnostic.code == "S503" for diagnostic in error.diagnostics):
-            raise UsageError(
-                f"{scenario}: the agent has no frame, and there is no variant `oracle`"
-            ) from None
-        raise
-    return scripted
-
-
 def make_policy(player: Player, envs: Any) -> "tuple[Policy, list[str]]":
     """What plays, and what is to be known about it, such as that it was trained on something else.
 
     Raises:
         ValueError: the checkpoint does not fit the environments.
     """
-    from trainer.policies import CheckpointPolicy, RandomPolicy, ScriptedPolicy
+    from socialai_dsl.evaluation import RandomPolicy, ScriptedPolicy
 
     if player.agent == "random":
         return RandomPolicy(tuple(int(n) for n in envs.single_action_space.nvec), player.seed), []
     if player.agent == "oracle":
         return ScriptedPolicy(envs), []
+    from trainer.play import CheckpointPolicy
+
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         policy = CheckpointPolicy.load(
-            Path(player.agent), envs, player.greedy, player.seed, player.device, player.net
+            Path(player.agent), envs, player.greedy, player.seed, player.device, player.net, player.folder
         )
     return policy, [str(warning.message) for warning in caught]
 
@@ -241,7 +221,7 @@ def _let_a_person_play(
     import numpy as np
 
     from socialai_dsl.cli.play import play
-    from trainer.evaluate import EvalResult
+    from socialai_dsl.evaluation import EvalResult
 
     def episode(number: int) -> tuple[str, dict[str, Any]] | None:
         title = f"{scenario}, test episode {number}"

@@ -1,11 +1,10 @@
 """This module is `socialai export`: a trained agent as a folder that can be given to others."""
 
 import argparse
-import json
 import shutil
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -18,11 +17,11 @@ from socialai_dsl.cli.run_folder import (
     write_json,
     write_text,
 )
-from socialai_dsl.cli.settings import Settings, read_settings
 
 if TYPE_CHECKING:
     from socialai_dsl.checking import Loaded
     from trainer.checkpoint import Checkpoint
+    from trainer.config import RunConfig
 
 SUMMARY: Final = "make a folder of a trained agent that can be given to others"
 WEIGHTS: Final = "model.safetensors"
@@ -46,33 +45,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(arguments: argparse.Namespace) -> Exit:
     """Write the folder."""
     import socialai_dsl
-    from socialai_dsl.cli.agents import require_trainer
+    from socialai_dsl.cli.agents import read_config, require_trainer
     from trainer import checkpoint as checkpoints
     from trainer.errors import CheckpointError
 
     require_trainer()
     run: Path = arguments.run
-    settings = read_settings(run)
-    if settings.agent != "ppo":
-        raise UsageError(f"{run}: the agent {settings.agent!r} is not trained, there is nothing to export")
+    config = read_config(run)
+    if not config.trains:
+        raise UsageError(f"{run}: the agent {config.agent!r} is not trained, there is nothing to export")
     if not (run / RESULT).is_file():
         raise UsageError(f"{run}: expected a finished run, it has no {RESULT}")
-    loaded = socialai_dsl.load(settings.scenario)
+    loaded = socialai_dsl.load(config.scenario)
     try:
         checkpoint = checkpoints.weights_only(checkpoints.read(run / checkpoints.FOLDER))
     except CheckpointError as error:
         raise UsageError(str(error)) from error
     if socialai_dsl.compile(loaded).sha256 != checkpoint.meta.program_sha256:
         print("warning: the scenario has changed since the agent was trained on it", file=sys.stderr)
-    out = _new_folder(arguments.out or Path("exports") / _name(settings))
-    _write(run, out, settings, loaded, checkpoint)
+    out = _new_folder(arguments.out or Path("exports") / _name(config))
+    _write(run, out, config, loaded, checkpoint)
     print(f"written to {out}; try it: socialai evaluate {out}")
     return Exit.GOOD
 
 
-def _name(settings: Settings) -> str:
-    net = settings.net.replace(":", ".")
-    return f"{scenario_folder_name(settings.scenario)}-{net}-s{settings.seed}"
+def _name(config: "RunConfig") -> str:
+    net = config.net.replace(":", ".")
+    return f"{scenario_folder_name(config.scenario)}-{net}-s{config.seed}"
 
 
 def _new_folder(out: Path) -> Path:
@@ -82,14 +81,14 @@ def _new_folder(out: Path) -> Path:
     return out
 
 
-def _write(run: Path, out: Path, settings: Settings, loaded: "Loaded", checkpoint: "Checkpoint") -> None:
+def _write(run: Path, out: Path, config: "RunConfig", loaded: "Loaded", checkpoint: "Checkpoint") -> None:
     from trainer import checkpoint as checkpoints
 
-    moved = Moved.of(loaded, settings.scenario)
+    moved = Moved.of(loaded, config.scenario)
     moved.copy(out)
-    curriculum = _without_place(settings.curriculum)
-    config = checkpoint.meta.config.model_copy(update={"curriculum": curriculum})
-    told = replace(settings, scenario=moved.scenario, curriculum=curriculum, wandb=None)
+    # Paths of this machine stay here.
+    kept = {"scenario": moved.scenario, "curriculum": _without_place(config.curriculum), "wandb": None}
+    config = config.model_copy(update=kept)
     meta = checkpoint.meta.model_copy(update={"config": config})
     checkpoints.write_file(out / WEIGHTS, checkpoints.Checkpoint(meta, checkpoint.tensors))
     words = {name: getattr(meta, name) for name in ("vocabulary", "actions", "templates", "nouns")}
@@ -97,17 +96,17 @@ def _write(run: Path, out: Path, settings: Settings, loaded: "Loaded", checkpoin
     result = moved.told(read_json(run / RESULT) | {"scenario": moved.scenario})
     if (run / _FILM).is_file():
         shutil.copyfile(run / _FILM, out / _FILM)
-    write_text(out / CARD, _card(told, config.model_dump(), result, loaded))
-    write_json(out / SETTINGS, json.loads(json.dumps(vars(told))) | {"trainer": config.model_dump()})
+    write_text(out / CARD, _card(config, result, loaded))
+    write_json(out / SETTINGS, config.model_dump())
     write_json(out / RESULT, result)  # last, so that its presence means a complete folder
 
 
-def _card(settings: Settings, hyper: Mapping[str, Any], result: Mapping[str, Any], loaded: "Loaded") -> str:
+def _card(config: "RunConfig", result: Mapping[str, Any], loaded: "Loaded") -> str:
     from socialai_dsl.cli.model_card import model_card
 
     data = loaded.resolved.data
     about = str(data.get("about", "")) if isinstance(data, dict) else ""
-    return model_card(settings, hyper, result, about, Path(), Path(WEIGHTS))
+    return model_card(config, result, about, Path(), Path(WEIGHTS))
 
 
 def _without_place(text: str) -> str:

@@ -1,29 +1,25 @@
-"""This module writes a model card: what an agent is, how well it does, and how to load it, beside its weights."""
+"""Model cards: what an agent is, how well it does, and how to load it, beside its weights."""
 
-import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
 import yaml
 
-from socialai_dsl.cli import run
 from socialai_dsl.cli.evaluation_report import ending_rows, summary_rows
 from socialai_dsl.cli.run_folder import scenario_folder_name
-from socialai_dsl.cli.settings import Settings
 from socialai_dsl.experiments.arguments import typed
+from trainer.config import FLAGS, WITHOUT_EFFECT, RunConfig, configure
 
 FILE: Final = "model_card.md"
-# Options that do not change what is learnt.
-_NOT_REPEATED: Final = ("scenario", "agent", "device", "eval_episodes", "wandb")
-# Settings that have a row of their own in the card, or say nothing about the agent.
-_NOT_HYPER: Final = ("frames", "seed", "device", "threads", "checkpoint_every", "tensorboard")
+# Options that change where and how a run is made, not what it learns.
+_NOT_REPEATED: Final = ("agent", "device", "eval_episodes", "wandb", "checkpoint_every", "keep_checkpoints")
+# Options with a row of their own in the card, or that say nothing about the agent.
+_NOT_HYPER: Final = {"scenario", "agent", "seed", "device", "threads", "eval_episodes", *WITHOUT_EFFECT}
 
 
 def model_card(
-    settings: Settings,
-    hyper: Mapping[str, Any],
+    config: RunConfig,
     result: Mapping[str, Any],
     about: str,
     folder: Path,
@@ -32,30 +28,33 @@ def model_card(
     """The card of a trained agent, as Markdown with the front matter of the Hugging Face Hub.
 
     Args:
-        settings: what the run was asked for.
-        hyper: every number of the trainer.
+        config: of the run.
         result: content of the run's `result.json`.
         about: what the scenario says about itself.
         folder: of the run.
         weights: the checkpoint in it.
     """
-    name = f"{scenario_folder_name(settings.scenario)}-{settings.net}-s{settings.seed}"
+    name = f"{scenario_folder_name(config.scenario)}-{config.net}-s{config.seed}"
     parts = [
-        f"---\n{yaml.safe_dump(_front_matter(name, settings, result), sort_keys=False, allow_unicode=True)}---",
+        f"---\n{yaml.safe_dump(_front_matter(name, config, result), sort_keys=False, allow_unicode=True)}---",
         f"# {name}",
-        f"A recurrent PPO agent for the social grid-world `{settings.scenario}`: {about.strip()} "
-        f"It was trained for {result['frames']:,} frames with the network `{settings.net}`.",
+        f"A recurrent PPO agent for the social grid-world `{config.scenario}`: {about.strip()} "
+        f"It was trained for {result['frames']:,} frames with the network `{config.net}`.",
         "## Evaluation",
         _evaluation(result["eval"]),
         "## How to load it",
         f"{_place(folder)}, with `pip install 'socialai-dsl[train]'`:",
-        f"```python\n{_snippet(settings, folder)}```",
+        f"```python\n{_snippet(config, folder)}```",
         "## Training",
-        _table(("", ""), _facts(settings, result, weights.relative_to(folder))),
-        f"Trained again by `{_command(settings)}`. The hyper-parameters:",
+        _table(("", ""), _facts(config, result, weights.relative_to(folder))),
+        f"Trained again by `{_command(config)}`. The hyper-parameters:",
         _table(
             ("name", "value"),
-            [(f"`{key}`", f"`{value}`") for key, value in hyper.items() if key not in _NOT_HYPER],
+            [
+                (f"`{key}`", f"`{value}`")
+                for key, value in config.model_dump().items()
+                if key not in _NOT_HYPER
+            ],
         ),
         "## Limits",
         _LIMITS,
@@ -71,7 +70,7 @@ _LIMITS: Final = """\
 * Its figures hold for the way of choosing actions that is named above."""
 
 
-def _front_matter(name: str, settings: Settings, result: Mapping[str, Any]) -> dict[str, Any]:
+def _front_matter(name: str, config: RunConfig, result: Mapping[str, Any]) -> dict[str, Any]:
     evaluation = result["eval"]
     low, high = evaluation["success_interval"]
     metrics = [
@@ -82,7 +81,7 @@ def _front_matter(name: str, settings: Settings, result: Mapping[str, Any]) -> d
         },
         {"type": "mean_return", "value": round(evaluation["mean_return"], 4), "name": "mean return"},
     ]
-    scenario = scenario_folder_name(settings.scenario)
+    scenario = scenario_folder_name(config.scenario)
     return {
         "library_name": "socialai-dsl",
         "pipeline_tag": "reinforcement-learning",
@@ -112,15 +111,15 @@ def _evaluation(figures: Mapping[str, Any]) -> str:
     )
 
 
-def _facts(settings: Settings, result: Mapping[str, Any], weights: Path) -> list[tuple[str, str]]:
+def _facts(config: RunConfig, result: Mapping[str, Any], weights: Path) -> list[tuple[str, str]]:
     versions = ", ".join(f"{package} {version}" for package, version in result["versions"].items())
     return [
-        ("scenario", f"`{settings.scenario}`"),
+        ("scenario", f"`{config.scenario}`"),
         ("program (SHA-256)", f"`{result['program_sha256']}`"),
         ("weights", f"`{weights.as_posix()}`"),
         ("frames", f"{result['frames']:,}"),
-        ("seed", str(settings.seed)),
-        ("time", f"{result['train_seconds']:.0f} s on `{settings.device}`"),
+        ("seed", str(config.seed)),
+        ("time", f"{result['train_seconds']:.0f} s on `{config.device}`"),
         ("versions", versions),
     ]
 
@@ -129,14 +128,14 @@ def _place(folder: Path) -> str:
     return "From this folder" if folder == Path() else "From the folder in which it was trained"
 
 
-def _snippet(settings: Settings, folder: Path) -> str:
+def _snippet(config: RunConfig, folder: Path) -> str:
     """Code that plays one episode; a test runs it."""
-    net = f", net={settings.net!r}" if ":" in settings.net else ""
+    net = f", net={config.net!r}" if ":" in config.net else ""
     return f"""\
 import socialai_dsl as sd
-from trainer.policies import CheckpointPolicy
+from trainer.play import CheckpointPolicy
 
-env = sd.make({settings.scenario!r})
+env = sd.make({config.scenario!r})
 agent = CheckpointPolicy.load({folder.as_posix()!r}, env{net})
 observation, info = env.reset(seed=0)
 agent.reset()
@@ -148,14 +147,22 @@ print(info["outcome"])
 """
 
 
-def _command(settings: Settings) -> str:
-    """The command that trains the same agent: what was asked for beyond the defaults."""
-    parser = argparse.ArgumentParser()
-    run.add_arguments(parser)
-    usual, asked = vars(parser.parse_args([])), asdict(settings)
-    names = [name for name in asked if name in usual and name not in _NOT_REPEATED]
-    words = [word for name in names if asked[name] != usual[name] for word in typed(name, asked[name])]
-    return " ".join(["socialai-run", settings.scenario, *words])
+def _command(config: RunConfig) -> str:
+    """The command that trains the same agent."""
+    usual = configure(config.recipe, net=config.net, scenario=config.scenario).model_dump()
+    asked = {name: value for name, value in config.model_dump().items() if value != usual[name]}
+    flags = {name: asked[name] for name in FLAGS if name in asked and name not in _NOT_REPEATED}
+    if config.net != "fast":
+        flags["net"] = config.net
+    hyper = {
+        name: value
+        for name, value in asked.items()
+        if name not in FLAGS and name not in ("scenario", "recipe")
+    }
+    given = {"recipe": config.recipe, **flags, "hyper": hyper}
+    return " ".join(
+        ["socialai-run", config.scenario, *(w for name, value in given.items() for w in typed(name, value))]
+    )
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

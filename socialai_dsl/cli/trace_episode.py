@@ -118,13 +118,13 @@ class Traced:
 
     def __init__(self, scenario: str, agent: str | None, lines: list[str] | None, seed: int) -> None:
         import socialai_dsl
-        from socialai_dsl.cli.evaluation import with_script
+        from socialai_dsl.cli.agents import with_script
 
         self.agent = agent or "typed"
         self._lines, self._seed = lines, seed
         if lines is None and agent in (None, "oracle"):
             try:
-                scenario = with_script(scenario, socialai_dsl.compile(socialai_dsl.load(scenario)))
+                scenario = with_script(scenario)
                 self.agent = "oracle"
             except UsageError:
                 if agent is not None:

@@ -1,4 +1,4 @@
-"""This module prints what `socialai bench --train` measured."""
+"""What `socialai bench --train` measured, as text."""
 
 from __future__ import annotations
 
@@ -13,13 +13,11 @@ _IDLE: Final = 0.5
 def training_table(report: TrainingReport) -> str:
     """The report as text."""
     cores = "one core" if report.threads == 1 else f"{report.threads} cores"
-    limits = ", ".join(f"{value:,.0f} in {name}" for name, value in report.limits.items())
     own = [row for row in report.rows if row.distinct is not None]
     lines = [
         f"{report.machine}; {cores}; {report.scenario}",
         ", ".join(f"{name} {version}" for name, version in report.versions.items()),
         f"reference loop: {report.reference / 1e6:.0f} M iterations per CPU second",
-        f"convolutions of the paper's network, forward and backward, GFLOP/s: {limits}",
         *_busy(report.load),
         "",
         f"{'name':<18} {'envs x steps':>12} {'parts':>5} {'epochs':>6} {'histories':<19} {'numbers':<8} "
@@ -28,14 +26,9 @@ def training_table(report: TrainingReport) -> str:
         "frames/s: rollout and all epochs, on the clock, median of n updates",
     ]
     if own:
-        lines += ["", f"{'name':<18} {'distinct':>8} {'rollout':>7} {'GFLOP/s':>8} {'of limit':>8}"]
+        lines += ["", f"{'name':<18} {'distinct':>8} {'rollout':>7}"]
         lines += [_work(row) for row in own]
-        lines.append(
-            "distinct: share of the frames computed in the update; rollout: its share of the time; of limit:"
-        )
-        lines.append(
-            "the paper network's arithmetic in parts of its convolutions' speed with the same numbers"
-        )
+        lines.append("distinct: share of the frames computed in the update; rollout: its share of the time")
     if report.comparisons:
         lines += ["", f"{'ours':<18} {'peer':<12} {'clock':>7} {'cpu':>7} {'floor':>6} {'scaled':>7}"]
         lines += [_comparison(comparison) for comparison in report.comparisons]
@@ -66,9 +59,7 @@ def _speed(row: Row) -> str:
 
 
 def _work(row: Row) -> str:
-    gflops = "" if row.gflops is None else f"{row.gflops:,.0f}"
-    share = "" if row.limit_share is None else f"{100 * row.limit_share:.0f} %"
-    return f"{row.name:<18} {row.distinct:>8.2f} {f'{100 * (row.rollout_share or 0):.0f} %':>7} {gflops:>8} {share:>8}"
+    return f"{row.name:<18} {row.distinct:>8.2f} {f'{100 * (row.rollout_share or 0):.0f} %':>7}"
 
 
 def _comparison(comparison: Comparison) -> str:

@@ -1,4 +1,4 @@
-"""This module takes the measurements of `socialai bench --train`: frames per second of ours and of the peers."""
+"""The measurements of `socialai bench --train`: frames per second of our trainer and of the peers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ import torch
 
 from socialai_dsl.cli.machine import load, machine, on_cores
 from socialai_dsl.cli.reference_loop import reference_speed
-from socialai_dsl.cli.roofline import Work, convolution_limit
 from socialai_dsl.cli.training_entries import Entry, Update
 
 _PATIENCE: Final = 2.5
@@ -22,6 +21,7 @@ _PACKAGES: Final = ("torch", "numpy", "gymnasium", "stable-baselines3", "sb3-con
 _PAIRS: Final = (
     ("paper-every-frame", "plain-loop"),
     ("paper", "plain-loop"),
+    ("paper-bfloat16", "plain-loop"),
     ("paper-wide", "plain-loop"),
     ("paper-reference", "plain-loop"),
     ("paper", "clean-paper"),
@@ -44,10 +44,6 @@ class Row:
         cpu: median per second of CPU time of the process.
         distinct: share of the frames that were computed in the update; None for peers, who compute all.
         rollout_share: share of the time that went into the rollout; None for peers.
-        gflops: the paper network's arithmetic done per second on the clock, in 10**9; None for other networks and
-            for peers.
-        gflops_cpu: the same per second of CPU time.
-        limit_share: `gflops` in parts of what the convolutions alone could do with these numbers.
     """
 
     name: str
@@ -65,9 +61,6 @@ class Row:
     cpu: float
     distinct: float | None
     rollout_share: float | None
-    gflops: float | None
-    gflops_cpu: float | None
-    limit_share: float | None
 
 
 @dataclass(frozen=True)
@@ -96,7 +89,6 @@ class TrainingReport:
     Attributes:
         load: threads that wanted a core in the minute before; None where the system does not tell.
         reference: iterations per second of the reference loop on one core.
-        limits: convolutions' operations per second by type, forward and backward, in 10**9.
     """
 
     machine: str
@@ -105,7 +97,6 @@ class TrainingReport:
     threads: int
     load: float | None
     reference: float
-    limits: dict[str, float]
     rows: list[Row]
     comparisons: list[Comparison]
 
@@ -135,13 +126,9 @@ def measure_training(
     before, busy = torch.get_num_threads(), load()
     with on_cores(threads):
         reference = reference_speed(3)
-        limits = {
-            "float32": convolution_limit(torch.float32, threads) / 1e9,
-            "bfloat16": convolution_limit(torch.bfloat16, threads) / 1e9,
-        }
         rows = []
         for entry in chosen:
-            rows.append(_measure(entry, scenario, threads, seconds, repetitions, limits))
+            rows.append(_measure(entry, scenario, threads, seconds, repetitions))
             note(f"{entry.name}: {rows[-1].wall:,.0f} frames/s, {rows[-1].cpu:,.0f} per CPU second")
     torch.set_num_threads(before)
     floors = {entry.name: entry.floor.get(threads) for entry in chosen}
@@ -152,15 +139,12 @@ def measure_training(
         threads,
         busy,
         reference,
-        limits,
         rows,
         list(_compare(rows, floors)),
     )
 
 
-def _measure(
-    entry: Entry, scenario: str, threads: int, seconds: float, repetitions: int, limits: dict[str, float]
-) -> Row:
+def _measure(entry: Entry, scenario: str, threads: int, seconds: float, repetitions: int) -> Row:
     training = entry.start(scenario, threads)
     next(training)  # compiles, allocates, and warms up
     walls: list[float] = []
@@ -174,11 +158,8 @@ def _measure(
         if update is not None:
             updates.append(update)
     speeds = entry.frames / np.array(walls)
-    work = (
-        Work(*np.sum([list(asdict(update.work).values()) for update in updates], axis=0)) if updates else None
-    )
     frames = len(walls) * entry.frames
-    flops = work.flops(frames, entry.epochs) / 1e9 if work and entry.paper else None
+    learnt = sum(update.learnt_frames for update in updates)
     return Row(
         entry.name,
         entry.what,
@@ -193,11 +174,8 @@ def _measure(
         float(speeds.min()),
         float(speeds.max()),
         float(np.median(entry.frames / np.maximum(cpus, 1e-9))),
-        float(work.learnt_pairs / (frames * entry.epochs)) if work else None,
+        learnt / (frames * entry.epochs) if updates else None,
         sum(update.rollout_seconds for update in updates) / sum(walls) if updates else None,
-        flops and flops / sum(walls),
-        flops and flops / sum(cpus),
-        flops and flops / sum(walls) / limits[entry.precision],
     )
 
 

@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from benchmarks.training import LongDialogue, clean_loop, plain_loop
 from benchmarks.training.networks import SIZE, Agent, CellTrunk, PaperTrunk
 from benchmarks.training.settings import Settings, advantages, observe, padded
-from trainer.distinct import prefix_tree
+from trainer.features import prefix_tree
 from trainer.nets import ActorCritic, NetSpec, build_net
 from trainer.ppo import compute_gae
 

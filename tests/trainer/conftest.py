@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import torch
 
-from trainer.config import TrainConfig
+from trainer.config import RunConfig
 
 
 @pytest.fixture(autouse=True)
@@ -21,9 +21,9 @@ def one_thread() -> Iterator[None]:
 def small_config() -> Any:
     """Makes configurations small enough for a unit test."""
 
-    def make(**changes: Any) -> TrainConfig:
+    def make(**changes: Any) -> RunConfig:
         values: dict[str, Any] = {
-            "num_envs": 8,
+            "envs": 8,
             "horizon": 8,
             "minibatches": 2,
             "epochs": 2,
@@ -32,6 +32,6 @@ def small_config() -> Any:
             "checkpoint_every": 2,
             "tensorboard": False,
         }
-        return TrainConfig(**(values | changes))
+        return RunConfig(**(values | changes))
 
     return make

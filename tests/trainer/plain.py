@@ -6,8 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from trainer.nets.dialogue import DialogueEncoder
-from trainer.nets.heard import HeardWords
+from trainer.nets.dialogue import DialogueEncoder, HeardWords
 
 
 def encode(dialogue: DialogueEncoder, tokens: np.ndarray) -> Tensor:

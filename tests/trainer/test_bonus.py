@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
-from trainer.bonus import Bonus, cell_codes
-from trainer.config import TrainConfig
+from trainer.bonus import cell_codes
+from trainer.config import RunConfig
 
 IMAGE = np.zeros((2, 7, 7, 4), np.uint8)
 
@@ -23,7 +23,7 @@ def ended(*marks: int) -> np.ndarray:
 
 
 def test_first_silence_and_first_utterances_pay_and_repetitions_do_not() -> None:
-    bonus = Bonus(TrainConfig(explo="lang", explo_c=7.0), 2)
+    bonus = EpisodicBonus(RunConfig(bonus="lang", bonus_c=7.0), 2)
     first = 0.6 * tanh(7 / 40)
     assert first == pytest.approx(0.10394, abs=1e-5)
     assert bonus.step(hears(0, 0), IMAGE, ended(0, 0)) == pytest.approx([first, first])
@@ -33,7 +33,7 @@ def test_first_silence_and_first_utterances_pay_and_repetitions_do_not() -> None
 
 def test_a_second_visit_pays_next_to_nothing() -> None:
     """tanh(x) is x for small x: 0.6 * 0.175 / 2 ** 50."""
-    bonus = Bonus(TrainConfig(explo="lang", explo_c=7.0), 1)
+    bonus = EpisodicBonus(RunConfig(bonus="lang", bonus_c=7.0), 1)
     got = [bonus.step(hears(0), IMAGE[:1], ended(0))[0] for _ in range(2)]
     assert got[0] == pytest.approx(0.10394, abs=1e-5)
     assert got[1] == pytest.approx(9.3e-17, rel=1e-2, abs=0)
@@ -41,17 +41,17 @@ def test_a_second_visit_pays_next_to_nothing() -> None:
 
 @pytest.mark.parametrize(("c", "paid"), [(7.0, 0.10394), (20.0, 0.27727)])
 def test_the_published_scales_of_the_language_bonus(c: float, paid: float) -> None:
-    bonus = Bonus(TrainConfig(explo="lang", explo_c=c), 1)
+    bonus = EpisodicBonus(RunConfig(bonus="lang", bonus_c=c), 1)
     assert bonus.step(hears(3), IMAGE[:1], ended(0))[0] == pytest.approx(paid, abs=1e-5)
 
 
 def test_the_bonus_as_printed() -> None:
     """tanh(C / ((N + 1) ** M * T)): C = .3, T = .6, M = 1 give .5, then .25; silence is nobody's response."""
-    config = TrainConfig(explo="lang", explo_c=0.3, explo_m=1.0, explo_t=0.6, explo_formula="as_printed")
-    bonus = Bonus(config, 1)
+    config = RunConfig(bonus="lang", bonus_c=0.3, bonus_m=1.0, bonus_t=0.6, bonus_formula="as_printed")
+    bonus = EpisodicBonus(config, 1)
     got = [bonus.step(hears(id_), IMAGE[:1], ended(0))[0] for id_ in (0, 5, 0, 5, 6)]
     assert got == pytest.approx([0, tanh(0.5), 0, tanh(0.25), tanh(0.5)])
-    bonus = Bonus(config.model_copy(update={"explo": "cell"}), 1)
+    bonus = EpisodicBonus(config.model_copy(update={"bonus": "cell"}), 1)
     image = IMAGE[:1].copy()
     image[0, 0, 0] = (4, 1, 0, 0)
     assert bonus.step(hears(0), image, ended(0))[0] == pytest.approx(tanh(1.0)), "two kinds of cells, .5 each"
@@ -61,7 +61,7 @@ def test_ids_pay_what_counting_the_strings_would() -> None:
     """The code counts what it heard as text; a real scenario, played at random, several lines at once included."""
     envs = sd.make_vec("talkitout+as_coded", 32, autoreset_mode="SameStep")
     rng = np.random.default_rng(0)
-    bonus = Bonus(TrainConfig(explo="lang", explo_c=7.0, explo_m=2.0), 32)
+    bonus = EpisodicBonus(RunConfig(bonus="lang", bonus_c=7.0, bonus_m=2.0), 32)
     counts: list[Counter[str]] = [Counter() for _ in range(32)]
     heard: set[str] = set()
     observation, _ = envs.reset(seed=0)
@@ -85,7 +85,7 @@ def test_ids_pay_what_counting_the_strings_would() -> None:
 
 
 def test_an_episode_s_end_pays_nothing_and_forgets() -> None:
-    bonus = Bonus(TrainConfig(explo="lang"), 2)
+    bonus = EpisodicBonus(RunConfig(bonus="lang"), 2)
     bonus.step(hears(5, 5), IMAGE, ended(0, 0))
     assert bonus.step(hears(7, 7), IMAGE, ended(1, 0))[0] == 0
     again = bonus.step(hears(5, 5), IMAGE, ended(0, 0))
@@ -93,13 +93,13 @@ def test_an_episode_s_end_pays_nothing_and_forgets() -> None:
 
 
 def test_small_powers_pay_repetitions_less() -> None:
-    bonus = Bonus(TrainConfig(explo="lang", explo_c=4.0, explo_m=1.0, explo_t=2.0), 1)
+    bonus = EpisodicBonus(RunConfig(bonus="lang", bonus_c=4.0, bonus_m=1.0, bonus_t=2.0), 1)
     got = [bonus.step(hears(5), IMAGE[:1], ended(0))[0] for _ in range(3)]
     assert got == pytest.approx([2 * tanh(0.1), 2 * tanh(0.05), 2 * tanh(0.1 / 3)])
 
 
 def test_cells_pay_for_each_new_kind_in_the_image() -> None:
-    bonus = Bonus(TrainConfig(explo="cell", explo_c=3.0), 2)
+    bonus = EpisodicBonus(RunConfig(bonus="cell", bonus_c=3.0), 2)
     image = IMAGE.copy()
     image[0, 0, 0] = (4, 1, 0, 0)
     image[0, 3, 3] = (4, 1, 0, 0)
@@ -113,7 +113,7 @@ def test_cells_pay_for_each_new_kind_in_the_image() -> None:
 
 def test_cells_are_counted_as_a_plain_dictionary_would() -> None:
     rng = np.random.default_rng(0)
-    bonus = Bonus(TrainConfig(explo="cell", explo_c=3.0, explo_m=2.0), 3)
+    bonus = EpisodicBonus(RunConfig(bonus="cell", bonus_c=3.0, bonus_m=2.0), 3)
     counts: list[dict[bytes, int]] = [{} for _ in range(3)]
     for _ in range(60):
         image = rng.integers(0, 3, (3, 7, 7, 4)).astype(np.uint8)
@@ -130,18 +130,18 @@ def test_cells_are_counted_as_a_plain_dictionary_would() -> None:
 def test_a_saved_bonus_continues_exactly() -> None:
     rng = np.random.default_rng(1)
     steps = [(rng.integers(0, 9, 2), rng.random(2) < 0.2) for _ in range(40)]
-    whole, half = (Bonus(TrainConfig(explo="lang", explo_m=1.0), 2) for _ in range(2))
+    whole, half = (EpisodicBonus(RunConfig(bonus="lang", bonus_m=1.0), 2) for _ in range(2))
     for ids, ends in steps[:20]:
         whole.step(hears(*ids), IMAGE, ends)
         half.step(hears(*ids), IMAGE, ends)
-    other = Bonus(TrainConfig(explo="lang", explo_m=1.0), 2)
+    other = EpisodicBonus(RunConfig(bonus="lang", bonus_m=1.0), 2)
     other.load_state(half.state())
     for ids, ends in steps[20:]:
         assert (whole.step(hears(*ids), IMAGE, ends) == other.step(hears(*ids), IMAGE, ends)).all()
 
 
 def test_a_bonus_of_another_size_is_refused() -> None:
-    bonus = Bonus(TrainConfig(explo="lang"), 2)
+    bonus = EpisodicBonus(RunConfig(bonus="lang"), 2)
     with pytest.raises(ValueError, match="bonus: got counts"):
         bonus.load_state({"counts": np.zeros((3, 1), np.int32), "keys": np.zeros(1, np.int64)})
 

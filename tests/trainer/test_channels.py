@@ -7,17 +7,17 @@ import pytest
 
 import socialai_dsl as sd
 from trainer.checkpoint import read, restore_net
-from trainer.config import TrainConfig
+from trainer.config import RunConfig
 from trainer.errors import CheckpointError
+from trainer.ppo import train
 from trainer.session import net_spec
-from trainer.train import train
 
 PLAYROOM = str(Path(__file__).parents[1] / "data" / "playroom.yaml")
 
 
-def config(net: str) -> TrainConfig:
+def config(net: str) -> RunConfig:
     values: dict[str, Any] = {"frames": 64, "num_envs": 4, "horizon": 8, "minibatches": 2, "epochs": 1}
-    return TrainConfig(net=net, tensorboard=False, threads=1, **values)
+    return RunConfig(net=net, tensorboard=False, threads=1, **values)
 
 
 @pytest.mark.parametrize("net", ["fast", "paper", "paper-reference"])

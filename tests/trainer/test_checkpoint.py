@@ -18,12 +18,12 @@ import numpy as np
 import pytest
 import safetensors.torch
 import torch
+from trainer.crew import Crew
 
 from socialai_dsl.cli.main import main
 from tests.trainer.fake_envs import EchoEnvs
 from trainer import checkpoint as checkpoints
 from trainer.checkpoint import Checkpoint, read, restore_net, write
-from trainer.crew import Crew
 from trainer.errors import CheckpointError
 from trainer.ppo import update
 from trainer.rollout import collect
@@ -34,7 +34,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture
 def session(small_config: Any) -> Session:
-    session = Session.start(small_config(explo="lang"), EchoEnvs(8))
+    session = Session.start(small_config(bonus="lang"), EchoEnvs(8))
     rollout = collect(
         session.actor, session.envs, session.state, session.config, session.generator, session.bonus
     )
@@ -190,7 +190,7 @@ def test_weights_that_do_not_fit_are_refused(session: Session, changes: Any, mes
 def test_a_run_does_not_resume_from_incomplete_or_odd_state(
     session: Session, small_config: Any, name: str, value: torch.Tensor | None
 ) -> None:
-    fresh = Session.start(small_config(explo="lang"), EchoEnvs(8))
+    fresh = Session.start(small_config(bonus="lang"), EchoEnvs(8))
     with pytest.raises(CheckpointError, match="cannot continue this run"):
         fresh.load(tampered(session, **{name: value}))
 
@@ -280,11 +280,11 @@ sys.path.insert(0, {str(ROOT)!r})
 from pathlib import Path
 from tests.trainer.fake_envs import EchoEnvs
 from trainer.checkpoint import Checkpoint, read, write
-from trainer.config import TrainConfig
+from trainer.config import RunConfig
 from trainer.session import Session
 
 folder, kills = Path(sys.argv[1]), int(sys.argv[2])
-config = TrainConfig(num_envs=8, horizon=8, minibatches=2, threads=1)
+config = RunConfig(envs=8, horizon=8, minibatches=2, threads=1)
 good = Session.start(config, EchoEnvs(8)).checkpoint()
 rng = random.Random(0)
 warnings.simplefilter("error")  # to fall back to an older file is only a warning
@@ -473,11 +473,11 @@ def test_a_file_does_not_choose_what_is_imported(session: Session) -> None:
 
 def test_a_run_resumes_only_with_the_same_settings_and_scenario(session: Session, small_config: Any) -> None:
     good = session.checkpoint()
-    other = Session.start(small_config(explo="lang", lr=1e-3), EchoEnvs(8))
+    other = Session.start(small_config(bonus="lang", lr=1e-3), EchoEnvs(8))
     with pytest.raises(CheckpointError, match=r"changed: lr: 0\.0007 -> 0\.001"):
         other.load(good)
     envs = EchoEnvs(8)
     envs.program.sha256 = "1" * 64
     with pytest.raises(CheckpointError, match="scenario has changed"):
-        Session.start(small_config(explo="lang"), envs).load(good)
-    Session.start(small_config(explo="lang", frames=10_000, checkpoint_every=9), EchoEnvs(8)).load(good)
+        Session.start(small_config(bonus="lang"), envs).load(good)
+    Session.start(small_config(bonus="lang", frames=10_000, checkpoint_every=9), EchoEnvs(8)).load(good)

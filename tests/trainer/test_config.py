@@ -9,15 +9,14 @@ import trainer
 from trainer.config import (
     PRESETS,
     RESUMABLE_FIELDS,
-    TrainConfig,
+    RunConfig,
     configure,
-    paper_preset,
 )
 
 
 def test_the_defaults_are_the_settings_that_worked() -> None:
-    config = TrainConfig()
-    assert (config.num_envs, config.horizon, config.epochs, config.minibatches) == (256, 32, 4, 4)
+    config = RunConfig()
+    assert (config.envs, config.horizon, config.epochs, config.minibatches) == (256, 32, 4, 4)
     assert (config.lr, config.gamma, config.gae_lambda, config.clip) == (7e-4, 0.99, 0.95, 0.2)
     assert (config.entropy_coef, config.max_grad_norm, config.normalize_advantages) == (0.01, 0.5, True)
     assert not config.bootstrap_timeouts
@@ -45,10 +44,10 @@ PUBLISHED = {
     "max_grad_norm": 0.5,
     "normalize_advantages": False,
     "bootstrap_timeouts": False,
-    "explo": "none",
-    "explo_m": 50.0,
-    "explo_t": 0.6,
-    "explo_formula": "as_coded",
+    "bonus": "none",
+    "bonus_m": 50.0,
+    "bonus_t": 0.6,
+    "bonus_formula": "as_coded",
 }
 
 
@@ -66,19 +65,19 @@ def test_the_tuned_preset_differs_in_recurrence_and_epsilon_only() -> None:
 
 
 def test_what_is_said_overrides_a_preset() -> None:
-    config = configure("paper-reference", num_envs=4, frames=100, seed=3, lr=1e-3)
-    assert config == paper_preset(num_envs=4, frames=100, seed=3, lr=1e-3)
-    assert (config.num_envs, config.frames, config.seed, config.lr, config.horizon) == (4, 100, 3, 1e-3, 40)
+    config = configure("paper-reference", envs=4, frames=100, seed=3, lr=1e-3)
+    assert config == configure(net="paper-reference", envs=4, frames=100, seed=3, lr=1e-3)
+    assert (config.envs, config.frames, config.seed, config.lr, config.horizon) == (4, 100, 3, 1e-3, 40)
 
 
 def test_other_names_are_networks_with_the_default_numbers() -> None:
-    assert configure("paper", seed=1) == TrainConfig(net="paper", seed=1)
+    assert configure("paper", seed=1) == RunConfig(net="paper", seed=1)
     assert set(PRESETS) == {"paper-reference", "paper-reference-tuned"}
 
 
 def test_updates_are_rounded_up() -> None:
-    assert TrainConfig(frames=8193).updates == 2
-    assert TrainConfig(frames=8192).updates == 1
+    assert RunConfig(frames=8193).updates == 2
+    assert RunConfig(frames=8192).updates == 1
 
 
 @pytest.mark.parametrize(
@@ -88,28 +87,28 @@ def test_updates_are_rounded_up() -> None:
         ({"bptt": 5}, "bptt: got 5, expected a divisor of horizon = 32"),
         ({"update": "chunks"}, "bptt: got 0, expected less than horizon = 32 and not 0"),
         ({"update": "chunks", "bptt": 32}, "bptt: got 32, expected less than horizon = 32"),
-        ({"explo_t": 0.0}, "explo_t"),
+        ({"bonus_t": 0.0}, "bonus_t"),
         ({"lr": float("nan")}, "lr"),
         ({"lr": 0}, "lr"),
         ({"seed": -1}, "seed"),
-        ({"explo": "rnd"}, "explo"),
+        ({"bonus": "rnd"}, "bonus"),
         ({"learning_rate": 1e-3}, "learning_rate"),
         ({"frames": "many"}, "frames"),
     ],
 )
 def test_nonsense_is_a_value_error(values: dict[str, object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        TrainConfig(**values)  # type: ignore[arg-type]
+        RunConfig(**values)  # type: ignore[arg-type]
 
 
 def test_json_gives_it_back() -> None:
-    config = paper_preset(explo="cell", explo_c=2.0, device="cuda:1")
-    assert TrainConfig.model_validate_json(config.model_dump_json()) == config
+    config = configure(net="paper-reference", bonus="cell", bonus_c=2.0, device="cuda:1")
+    assert RunConfig.model_validate_json(config.model_dump_json()) == config
 
 
 def test_every_field_says_what_it_is() -> None:
-    assert all(field.description for field in TrainConfig.model_fields.values())
-    assert set(TrainConfig.model_fields) >= RESUMABLE_FIELDS
+    assert all(field.description for field in RunConfig.model_fields.values())
+    assert set(RunConfig.model_fields) >= RESUMABLE_FIELDS
 
 
 def test_the_exploration_table_is_the_published_one() -> None:

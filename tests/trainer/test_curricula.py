@@ -9,13 +9,13 @@ import torch
 
 import socialai_dsl as sd
 from trainer.checkpoint import read
-from trainer.config import TrainConfig
+from trainer.config import RunConfig
 from trainer.curricula import Leaves, Phases, build_curriculum
 from trainer.curricula.phases import read_phases
 from trainer.curricula.progress import WINDOW, LearningProgress
 from trainer.errors import CheckpointError
+from trainer.ppo import train
 from trainer.session import Session
-from trainer.train import train
 
 SCHOOL = str(Path(__file__).parents[1] / "data" / "suites" / "school.yaml")
 INTRODUCTIONS = ("none", "eye_contact", "ask", "ask_eye_contact")
@@ -142,10 +142,10 @@ def test_the_state_is_all_it_remembers(name: str) -> None:
         assert one.weights() == other.weights()
 
 
-def config(frames: int, curriculum: str, **more: Any) -> TrainConfig:
+def config(frames: int, curriculum: str, **more: Any) -> RunConfig:
     values: dict[str, Any] = {
         "frames": frames,
-        "num_envs": 8,
+        "envs": 8,
         "horizon": 16,
         "minibatches": 2,
         "epochs": 1,
@@ -153,7 +153,7 @@ def config(frames: int, curriculum: str, **more: Any) -> TrainConfig:
         "tensorboard": False,
         "threads": 1,
     }
-    return TrainConfig(curriculum=curriculum, **(values | more))
+    return RunConfig(curriculum=curriculum, **(values | more))
 
 
 class Alternating:

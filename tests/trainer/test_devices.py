@@ -11,18 +11,18 @@ import pytest
 import torch
 from gymnasium.vector import AutoresetMode
 
+from socialai_dsl.evaluation import evaluate
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.pretend import DevicesMixed, PretendedCard
 from trainer.checkpoint import read
-from trainer.evaluate import evaluate
-from trainer.policies import CheckpointPolicy
-from trainer.train import train
+from trainer.play import CheckpointPolicy
+from trainer.ppo import train
 
 
 @pytest.mark.parametrize("net", ["fast", "paper", "paper-reference"])
 def test_training_on_a_card_moves_everything_there(net: str, tmp_path: Path, small_config: Any) -> None:
     """It also does the same arithmetic as on the CPU, because the pretended card computes there."""
-    settings = {"net": net, "explo": "lang", "bootstrap_timeouts": True, "bptt": 4, "frames": 64 * 2}
+    settings = {"net": net, "bonus": "lang", "bootstrap_timeouts": True, "bptt": 4, "frames": 64 * 2}
     here = read(train(small_config(**settings), EchoEnvs(8, chatter=0.3), tmp_path / "here"))
     # PyTorch for CPUs has no cuDNN, which it would look for.
     with torch.backends.cudnn.flags(enabled=False), PretendedCard() as card:

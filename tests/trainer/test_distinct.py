@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from trainer.distinct import DistinctRows, PrefixTree, content_ids, prefix_tree
+from trainer.features import DistinctRows, PrefixTree, content_ids, prefix_tree
 
 HISTORIES = st.lists(st.lists(st.integers(1, 3), max_size=6), min_size=1, max_size=12)
 

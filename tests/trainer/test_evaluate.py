@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
+from socialai_dsl.evaluation import EvalResult, RandomPolicy, ScriptedPolicy, evaluate, wilson_interval
 from tests.trainer.fake_envs import EchoEnvs
 from trainer.checkpoint import write
-from trainer.evaluate import EvalResult, evaluate, wilson_interval
-from trainer.policies import CheckpointPolicy, RandomPolicy, ScriptedPolicy
+from trainer.play import CheckpointPolicy
 from trainer.session import Session
 
 DISABLED = AutoresetMode.DISABLED

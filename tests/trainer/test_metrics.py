@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from trainer.metrics import MetricsLog, episode_metrics
+from trainer.logging import MetricsLog, episode_metrics
 from trainer.rollout import EpisodeTally
 
 

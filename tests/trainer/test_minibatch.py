@@ -9,9 +9,8 @@ from torch import Tensor
 
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.plain import encode
-from trainer.actor import Actor
-from trainer.config import TrainConfig
-from trainer.minibatch import make_minibatch
+from trainer.config import RunConfig
+from trainer.features import Actor, make_minibatch
 from trainer.nets import ActorCritic, build_net
 from trainer.rollout import Rollout, RolloutState, collect
 from trainer.session import net_spec
@@ -29,7 +28,7 @@ def double() -> Iterator[None]:
 def play(net_name: str, distinct: bool) -> tuple[Actor, Rollout, list[dict[str, np.ndarray]]]:
     """A rollout with a network of doubles, and what was observed (T items)."""
     envs = EchoEnvs(ENVS, length=12, chatter=0.7, pictures=3, lethal=False, limit=9)
-    config = TrainConfig(num_envs=ENVS, horizon=STEPS, bptt=STRETCH, minibatches=1, net=net_name, threads=1)
+    config = RunConfig(envs=ENVS, horizon=STEPS, bptt=STRETCH, minibatches=1, net=net_name, threads=1)
     net = build_net(net_name, net_spec(envs), 0)
     net.distinct = distinct
     observation, _ = envs.reset(seed=3)

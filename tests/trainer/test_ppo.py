@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import torch
 from torch import Tensor
+from trainer.crew import Crew
 
 from tests.trainer.fake_envs import EchoEnvs
-from trainer.config import TrainConfig
-from trainer.crew import Crew
-from trainer.minibatch import Batch, make_minibatch
+from trainer.config import RunConfig
+from trainer.features import Batch, make_minibatch
 from trainer.ppo import compute_gae, ppo_loss, update
 from trainer.rollout import collect
 from trainer.session import Session
@@ -85,8 +85,8 @@ def entropy_of(p: float) -> float:
     return -(p * log(p) + (1 - p) * log(1 - p))
 
 
-def config(**changes: Any) -> TrainConfig:
-    return TrainConfig(**({"value_coef": 0.5, "entropy_coef": 0.01, "clip": 0.2} | changes))
+def config(**changes: Any) -> RunConfig:
+    return RunConfig(**({"value_coef": 0.5, "entropy_coef": 0.01, "clip": 0.2} | changes))
 
 
 def test_joint_loss_of_a_spoken_action() -> None:
@@ -179,8 +179,8 @@ def test_each_head_clips_its_own_ratio(advantage: float, now: float, expected: f
     assert parts.policy.item() == pytest.approx(expected, rel=1e-5), "the mean of four equal heads"
 
 
-def played(config: TrainConfig) -> tuple[Session, Any]:
-    envs = EchoEnvs(config.num_envs, length=8, chatter=0.4)
+def played(config: RunConfig) -> tuple[Session, Any]:
+    envs = EchoEnvs(config.envs, length=8, chatter=0.4)
     session = Session.start(config, envs)
     for _ in range(2):
         rollout = collect(session.actor, envs, session.state, config, session.generator, None)
@@ -208,7 +208,7 @@ def test_the_update_sees_the_policy_that_acted(net: str, bptt: int, small_config
 def test_minibatches_hold_whole_environments_in_time_order(small_config: Any) -> None:
     config = small_config(bptt=4)
     session, rollout = played(config)
-    marks = torch.arange(config.horizon)[:, None] * 100.0 + torch.arange(config.num_envs)
+    marks = torch.arange(config.horizon)[:, None] * 100.0 + torch.arange(config.envs)
     minibatch = make_minibatch(session.actor, rollout, marks, marks, torch.tensor([5, 2]), 4)
     got = minibatch.batch.advantages.view(4, 4)
     assert got.tolist() == [
@@ -228,7 +228,7 @@ def test_an_update_makes_the_better_action_likelier(small_config: Any) -> None:
     rollout.terminated[:], rollout.truncated[:] = True, False
     before = rollout.log_probs[..., 0][favoured].mean().item()
     update(session.actor, session.optimizer, rollout, config, session.generator, Crew(1))
-    group = torch.arange(config.num_envs)
+    group = torch.arange(config.envs)
     minibatch = make_minibatch(session.actor, rollout, rollout.values, rollout.values, group, config.horizon)
     logits, _ = minibatch.evaluate(session.actor.net)
     chosen = torch.log_softmax(logits[:, :4], 1)[:, 2].view(rollout.values.shape)[favoured]

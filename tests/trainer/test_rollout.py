@@ -9,8 +9,8 @@ import torch
 
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.plain import encode
-from trainer.actor import Actor
 from trainer.errors import ObservationError, TrainingStopped
+from trainer.features import Actor
 from trainer.nets import build_net
 from trainer.rollout import Rollout, collect, ended_info, final_observation
 from trainer.session import Session, net_spec
@@ -116,7 +116,7 @@ def test_time_outs_are_bootstrapped_with_the_value_of_their_last_observation(sma
 
 
 def test_the_bonus_is_paid_on_top_and_does_not_count_as_return(small_config: Any) -> None:
-    config = small_config(explo="lang")
+    config = small_config(bonus="lang")
     envs = Witness(8)
     session, rollout = play(config, envs)
     paid = rollout.rewards - np.array([step[1] for step in envs.steps])

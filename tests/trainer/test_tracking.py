@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from tests.trainer.fake_envs import EchoEnvs
-from trainer.tracking import TrackingWarning, WandbTracker
-from trainer.train import train
+from trainer.logging import TrackingWarning, WandbTracker
+from trainer.ppo import train
 
 
 class FakeRun:

@@ -14,15 +14,15 @@ import pytest
 import torch
 from gymnasium.vector import AutoresetMode
 
+from socialai_dsl.evaluation import evaluate
 from tests.trainer.fake_envs import EchoEnvs
 from trainer import checkpoint as checkpoints
 from trainer import train as training
 from trainer.checkpoint import read
-from trainer.config import TrainConfig
+from trainer.config import RunConfig
 from trainer.errors import CheckpointError, TrainingStopped
-from trainer.evaluate import evaluate
-from trainer.policies import CheckpointPolicy
-from trainer.train import Progress, train
+from trainer.play import CheckpointPolicy
+from trainer.ppo import Progress, train
 
 ROOT = Path(__file__).parents[2]
 
@@ -45,8 +45,8 @@ def rows(run_dir: Path) -> list[dict[str, Any]]:
 
 
 def test_it_learns_to_repeat_a_word_it_heard(tmp_path: Path) -> None:
-    config = TrainConfig(
-        frames=45_000, num_envs=128, horizon=16, lr=2e-3, threads=1, tensorboard=False, explo="none"
+    config = RunConfig(
+        frames=45_000, envs=128, horizon=16, lr=2e-3, threads=1, tensorboard=False, bonus="none"
     )
     envs = EchoEnvs(128)
     path = train(config, envs, tmp_path)
@@ -60,7 +60,7 @@ def test_it_learns_to_repeat_a_word_it_heard(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("net", "explo", "threads", "update"),
+    ("net", "bonus", "threads", "update"),
     [
         ("fast", "lang", 1, "environments"),
         ("fast", "cell", 2, "environments"),
@@ -73,7 +73,7 @@ def test_a_run_stopped_three_times_ends_with_the_same_bits(
     updates = 9 if net == "fast" else 4
     config = small_config(
         net=net,
-        explo=explo,
+        bonus=explo,
         threads=threads,
         update=update,
         bptt=4,
@@ -242,11 +242,11 @@ import resource, sys
 sys.path.insert(0, {str(ROOT)!r})
 from pathlib import Path
 from tests.trainer.fake_envs import EchoEnvs
-from trainer.config import TrainConfig
+from trainer.config import RunConfig
 from trainer.errors import TrainingStopped
-from trainer.train import train
+from trainer.ppo import train
 
-config = TrainConfig(num_envs=8, horizon=8, minibatches=2, epochs=1, frames=1000, threads=1, tensorboard=False,
+config = RunConfig(envs=8, horizon=8, minibatches=2, epochs=1, frames=1000, threads=1, tensorboard=False,
                      checkpoint_every=3)
 
 def fill(progress):
@@ -275,10 +275,10 @@ import sys
 sys.path.insert(0, {str(ROOT)!r})
 from pathlib import Path
 from tests.trainer.fake_envs import EchoEnvs
-from trainer.config import TrainConfig
-from trainer.train import train
+from trainer.config import RunConfig
+from trainer.ppo import train
 
-config = TrainConfig.model_validate_json(sys.argv[1])
+config = RunConfig.model_validate_json(sys.argv[1])
 run_dir = Path({str(tmp_path / "killed")!r})
 train(config, EchoEnvs(8), run_dir, lambda progress: print(progress.update, flush=True),
       resume=any((run_dir / "checkpoints").glob("*.safetensors")))

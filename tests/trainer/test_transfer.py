@@ -8,9 +8,8 @@ import pytest
 
 from tests.trainer.fake_envs import EchoEnvs
 from trainer.checkpoint import CheckpointMeta, write
-from trainer.policies import CheckpointPolicy
+from trainer.play import CheckpointPolicy, TransferWarning, warn_of_differences
 from trainer.session import Session
-from trainer.transfer import TransferWarning, warn_of_differences
 
 
 def meta_of(small_config: Any, **changes: Any) -> CheckpointMeta:

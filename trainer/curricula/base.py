@@ -1,4 +1,4 @@
-"""This module states what a curriculum is, and lets one choose what the environments play."""
+"""What a curriculum is, and how one chooses what the environments play."""
 
 from __future__ import annotations
 
@@ -8,10 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-
-from trainer.team import ALONE, Team
 
 
 @dataclass(frozen=True)
@@ -61,18 +58,15 @@ class Curriculum(Protocol):
 
 
 class Tutor:
-    """Tells a curriculum how episodes ended, and the environments what it chooses.
+    """Tells a curriculum how episodes ended, and the environments what it chooses."""
 
-    Where several processes share the environments, each has a curriculum, and all of these are told of all episodes.
-    """
-
-    def __init__(self, curriculum: Curriculum, envs: Any, team: Team = ALONE) -> None:
+    def __init__(self, curriculum: Curriculum, envs: Any) -> None:
         """The first episodes are chosen as well, so this comes before the environments' reset.
 
         Raises:
             ValueError: the environments do not draw members, or the weights are not right.
         """
-        self.curriculum, self._envs, self._team = curriculum, envs, team
+        self.curriculum, self._envs = curriculum, envs
         self._weights: list[int] = []
         self._playing: NDArray[np.int64] = np.zeros(0, np.int64)
         self._choose()
@@ -83,12 +77,10 @@ class Tutor:
 
     def step(self, ended: NDArray[np.bool_], success: NDArray[np.bool_]) -> None:
         """Take in the episodes that ended in a step, bool (E,) each, in the order of the environments."""
-        played = np.where(ended, 1 + 2 * self._playing + success, 0)
-        codes = self._team.gather(torch.from_numpy(played)).numpy()
-        if not codes.any():
+        if not ended.any():
             return
-        for code in (codes[codes > 0] - 1).tolist():
-            self.curriculum.observe(code // 2, bool(code % 2))
+        for environment in np.flatnonzero(ended).tolist():
+            self.curriculum.observe(int(self._playing[environment]), bool(success[environment]))
         self._choose()
         self._playing = self._envs.member_ids()
 

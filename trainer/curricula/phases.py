@@ -1,4 +1,4 @@
-"""This module plays curricula that are written down: phases, each with what it plays and until when."""
+"""Curricula that are written down: phases, each with what is played and until when."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""This module prefers the members of a suite on which the agent's success is changing most."""
+"""A curriculum that prefers the members of a suite on which the agent's success changes most."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""This module states what the trainer asks of a network and provides the parts all of them share."""
+"""What the trainer asks of a network, and the parts that all networks share."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gymnasium import spaces
 from torch import Tensor, nn
 
 from trainer.nets.dialogue import DialogueEncoder
-from trainer.nets.memory import Memory
+from trainer.nets.memory import LstmMemory, Memory
 from trainer.nets.reading import Reader
 
 Precision = Literal["float32", "bfloat16"]
@@ -102,17 +102,16 @@ def unit_row_linear(module: nn.Module) -> None:
 
 
 class ActorCritic(nn.Module, ABC):
-    """A recurrent policy and value: images and dialogue to features, LSTM, four heads and a critic.
+    """A recurrent policy and value: images and dialogue to features, a memory, four heads and a critic.
 
-    A subclass implements `prepare` and `perceive`; `--net my.module:MyNet` builds `MyNet(spec)`. The trainer calls
-    the parts one by one, so that each distinct image, history and pair of the two is processed once.
+    A subclass implements `prepare` and `perceive`, and may replace `memory`, `dialogue` or `heads` after this
+    constructor; `--net mine:Net` builds `Net(spec)`. The trainer calls the parts one by one, so that each distinct
+    image, history and pair of the two is processed once.
 
     Attributes:
         distinct: whether equal frames may share their features; False for networks whose features depend on the
             rest of the batch.
         reducible: whether the network can do the bulk of its arithmetic in bfloat16.
-        shared_from: new frames from which on threads share a step while acting, None for never. Handing a share over
-            costs as much as a few dozen small operations.
         precision: number type of that bulk; all that is stored, and everything else, is float32.
         word_rows: the parameters that have a row for each word, by which an agent keeps what it knows of words in
             another vocabulary.
@@ -121,7 +120,6 @@ class ActorCritic(nn.Module, ABC):
 
     distinct = True
     reducible = False
-    shared_from: int | None = None
     precision: Precision = "float32"
     word_rows: tuple[str, ...] = ("dialogue.embedding.weight",)
     reader_class: type[Reader] = Reader
@@ -134,23 +132,8 @@ class ActorCritic(nn.Module, ABC):
         self.reader = self.reader_class(spec.vocabulary)
         self.features = features
         self.dialogue = dialogue
-        self.memory = Memory(features, memory_size)
+        self.memory: Memory = LstmMemory(features, memory_size)
         self.heads = Heads(memory_size, spec.action_sizes)
-
-    def compile_perception(self) -> None:
-        """From now on let `perceive` run as `torch.compile` makes it, after a pause at the first call of each kind.
-
-        The other parts are no single computation: dialogue and memory go from word to word and from step to step.
-
-        Raises:
-            ValueError: nothing can be compiled here, for want of a C++ compiler, say, or of Triton.
-        """
-        try:
-            torch.compile(torch.neg)(self.heads.hidden.bias.detach())
-        except RuntimeError as error:
-            reason = str(error).splitlines()[0]
-            raise ValueError(f"compile: torch.compile does not work here: {reason}") from error
-        self.perceive = torch.compile(self.perceive, dynamic=True)  # type: ignore[method-assign]
 
     @abstractmethod
     def prepare(self, images: Tensor) -> Any:

@@ -1,102 +1,13 @@
-"""This module encodes dialogue histories with a GRU that visits every distinct prefix of them once."""
+"""Encoders of the dialogue: a GRU that visits every distinct beginning of the histories once."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
-
-
-class _TreeGru(torch.autograd.Function):
-    """GRU over a prefix tree, level by level, with the backward pass written out.
-
-    Autograd would keep and replay about ten small nodes per level; here weight gradients are one product over all
-    states. Gates are in PyTorch's order: reset, update, new.
-    """
-
-    @staticmethod
-    def forward(
-        ctx: Any,
-        inputs: Tensor,
-        w_hh: Tensor,
-        b_hh: Tensor,
-        root: Tensor,
-        parents: Tensor,
-        offsets: Sequence[int],
-    ) -> Tensor:
-        count, size = len(parents), w_hh.shape[1]
-        states = root.new_empty(count + 1, size)
-        states[0] = root
-        before, new = root.new_empty(count, size), root.new_empty(count, size)
-        hidden, gates = root.new_empty(count, 3 * size), root.new_empty(count, 2 * size)
-        sizes = [b - a for a, b in pairwise(offsets)]
-        rows = zip(
-            *(torch.split(array, sizes) for array in (parents, before, hidden, hidden[:, : 2 * size])),
-            *(
-                torch.split(array, sizes)
-                for array in (inputs[:, : 2 * size], gates, gates[:, :size], gates[:, size:])
-            ),
-            *(
-                torch.split(array, sizes)
-                for array in (inputs[:, 2 * size :], hidden[:, 2 * size :], new, states[1:])
-            ),
-            strict=True,
-        )
-        w_t = w_hh.t()
-        for (
-            parent,
-            previous,
-            hid,
-            hid_gates,
-            in_gates,
-            gate,
-            reset,
-            update,
-            in_new,
-            hid_new,
-            cand,
-            state,
-        ) in rows:
-            torch.index_select(states, 0, parent, out=previous)
-            torch.addmm(b_hh, previous, w_t, out=hid)
-            torch.add(in_gates, hid_gates, out=gate).sigmoid_()
-            torch.addcmul(in_new, reset, hid_new, out=cand).tanh_()
-            torch.lerp(cand, previous, update, out=state)
-        ctx.save_for_backward(before, gates, new, hidden, w_hh, parents)
-        ctx.sizes = sizes
-        return states
-
-    @staticmethod
-    def backward(ctx: Any, grad: Tensor) -> tuple[Tensor | None, ...]:
-        before, gates, new, hidden, w_hh, parents = ctx.saved_tensors
-        size = w_hh.shape[1]
-        reset, update = torch.split(gates, size, 1)
-        aten = torch.ops.aten
-        # Local derivatives of all states at once; only the products along the tree have to go level by level.
-        to_new = aten.tanh_backward(1 - update, new)
-        d_hidden = torch.cat(
-            (
-                aten.sigmoid_backward(to_new * hidden[:, 2 * size :], reset),
-                aten.sigmoid_backward(before - new, update),
-                to_new * reset,
-            ),
-            1,
-        )
-        d_states = grad.clone()
-        rows = zip(
-            *(torch.split(array, ctx.sizes) for array in (d_hidden, d_hidden.view(-1, 3, size), update)),
-            *(torch.split(array, ctx.sizes) for array in (parents, d_states[1:], d_states[1:].unsqueeze(1))),
-            strict=True,
-        )
-        for d_gates, factors, kept, parent, d_state, d_state_row in reversed(list(rows)):
-            factors.mul_(d_state_row)
-            d_states.index_add_(0, parent, torch.addmm(d_state * kept, d_gates, w_hh))
-        d_inputs = torch.cat((d_hidden[:, : 2 * size], d_states[1:] * to_new), 1)
-        return d_inputs, d_hidden.t() @ before, d_hidden.sum(0), d_states[0], None, None
 
 
 class DialogueEncoder(nn.Module):
@@ -120,18 +31,32 @@ class DialogueEncoder(nn.Module):
         w_ih, b_ih = self.gru.get_parameter("weight_ih_l0"), self.gru.get_parameter("bias_ih_l0")
         return functional.linear(self.embedding.weight, w_ih, b_ih)
 
+    def _advance(self, inputs: Tensor, states: Tensor) -> Tensor:
+        """One word more: input gates (K, 3 * hidden) and states (K, hidden) to the next states.
+
+        PyTorch's GRU (Cho et al. 2014), gates in its order: reset, update, new.
+        """
+        size = self.hidden
+        w_hh, b_hh = self.gru.get_parameter("weight_hh_l0"), self.gru.get_parameter("bias_hh_l0")
+        recurrent = functional.linear(states, w_hh, b_hh)
+        gates = torch.sigmoid(inputs[:, : 2 * size] + recurrent[:, : 2 * size])
+        new = torch.tanh(torch.addcmul(inputs[:, 2 * size :], gates[:, :size], recurrent[:, 2 * size :]))
+        return torch.lerp(new, states, gates[:, size:])
+
     def forward(self, tokens: Tensor, parents: Tensor, offsets: Sequence[int]) -> Tensor:
-        """Encode the states of a `PrefixTree` (its fields as int64 tensors).
+        """Encode the states of a `features.PrefixTree` (its fields as int64 tensors), level by level.
 
         Returns:
             Encodings (K + 1, size); row 0, the empty history, is zero.
         """
         inputs = functional.embedding(tokens, self.word_inputs())
-        root = inputs.new_zeros(self.hidden)
-        states: Tensor = _TreeGru.apply(  # type: ignore[no-untyped-call]
-            inputs, self.gru.weight_hh_l0, self.gru.bias_hh_l0, root, parents, offsets
-        )
-        return states
+        levels = [inputs.new_zeros(1, self.hidden)]
+        first_of_parents = 0
+        for first, behind in pairwise(offsets):
+            before = levels[-1].index_select(0, parents[first:behind] - first_of_parents)
+            levels.append(self._advance(inputs[first:behind], before))
+            first_of_parents = first + 1
+        return torch.cat(levels)
 
     @torch.no_grad()
     def extend(self, states: Tensor, tokens: Tensor, lengths: Sequence[int], inputs: Tensor) -> Tensor:
@@ -147,17 +72,45 @@ class DialogueEncoder(nn.Module):
             (K, size) encodings after the new words.
         """
         states = states.clone()
-        size, active = self.hidden, len(lengths)
-        w_t, b_hh = self.gru.get_parameter("weight_hh_l0").t(), self.gru.get_parameter("bias_hh_l0")
+        active = len(lengths)
         for position in range(lengths[0] if lengths else 0):
             while lengths[active - 1] <= position:
                 active -= 1
-            previous = states[:active]
-            given = inputs[tokens[:active, position]]
-            hidden = torch.addmm(b_hh, previous, w_t)
-            gates = torch.sigmoid(given[:, : 2 * size] + hidden[:, : 2 * size])
-            candidate = torch.tanh(
-                torch.addcmul(given[:, 2 * size :], gates[:, :size], hidden[:, 2 * size :])
-            )
-            states[:active] = torch.lerp(candidate, previous, gates[:, size:])
+            states[:active] = self._advance(inputs[tokens[:active, position]], states[:active])
         return states
+
+
+class HeardWords(DialogueEncoder):
+    """The encoding of `DialogueEncoder`, then for each word of the vocabulary 1 if it is in the history, else 0.
+
+    A recurrent state forgets a word while others are said after it, and has to learn not to. Here nothing is forgotten,
+    and what order means is left to the recurrent state.
+    """
+
+    def __init__(self, vocabulary_size: int, hidden: int = 128) -> None:
+        super().__init__(vocabulary_size, hidden)
+        self.size = hidden + vocabulary_size
+
+    def split(self, encodings: Tensor) -> tuple[Tensor, Tensor]:
+        """Encodings (D, size) as recurrent states (D, hidden) and the words heard (D, V)."""
+        return encodings[:, : self.hidden], encodings[:, self.hidden :]
+
+    def forward(self, tokens: Tensor, parents: Tensor, offsets: Sequence[int]) -> Tensor:
+        """See `DialogueEncoder.forward`."""
+        states = super().forward(tokens, parents, offsets)
+        heard = states.new_zeros(len(states), self.size - self.hidden)
+        # Level by level: a history has the words of its parent, and one more.
+        for first, behind in pairwise(offsets):
+            words = heard.index_select(0, parents[first:behind])
+            heard[1 + first : 1 + behind] = words.scatter_(1, tokens[first:behind, None], 1)
+        return torch.cat((states, heard), 1)
+
+    @torch.no_grad()
+    def extend(self, states: Tensor, tokens: Tensor, lengths: Sequence[int], inputs: Tensor) -> Tensor:
+        """See `DialogueEncoder.extend`."""
+        recurrent, heard = self.split(states)
+        heard = heard.clone()
+        behind = torch.tensor(lengths, device=tokens.device)
+        new = torch.arange(tokens.shape[1], device=tokens.device) < behind[:, None]
+        heard[new.nonzero()[:, 0], tokens[new]] = 1
+        return torch.cat((super().extend(recurrent, tokens, lengths, inputs), heard), 1)

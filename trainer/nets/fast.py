@@ -1,4 +1,4 @@
-"""This module is the default network: cells read in the light of the dialogue, no convolutions, for ordinary CPUs."""
+"""The default network: cells read in the light of the dialogue, no convolutions, for ordinary CPUs."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import torch
 from torch import Tensor, nn
 
 from trainer.nets.base import ActorCritic, NetSpec
-from trainer.nets.heard import HeardWords
+from trainer.nets.dialogue import HeardWords
 
 LARGEST_TABLE = 1 << 16
-"""Up to so many kinds of cells there can be, a table finds those that there are; beyond, sorting is faster."""
+"""Possible kinds of cells up to which a table finds those that occur; beyond, sorting is faster."""
 
 
 class Cells:
-    """Images as the kinds of their cells: there are far fewer kinds than cells.
+    """Images as kinds of cells, of which there are far fewer than cells.
 
     Attributes:
         kinds: int64 (C, channels), the distinct cells.
@@ -53,12 +53,11 @@ def _unravel(codes: Tensor, sizes: tuple[int, ...]) -> Tensor:
 class FastNet(ActorCritic):
     """Every cell read in the light of the dialogue, a linear layer over all cells, LSTM, heads.
 
-    Each kind of cell is embedded from its channels. The dialogue scales and shifts the embedding before a rectifier, in
-    two ways: feature by feature (FiLM, Perez et al. 2018), by the recurrent state; and as a whole, by the sum of what
-    each word that was heard has to do with each code of the cell. So a word such as a colour picks out the cells it
-    speaks of, wherever they are and however much was said since; with FiLM alone agents asked and did not heed
-    (docs/learning.md). All this is computed once for each pair of a history and a kind of cell, then looked up for the
-    cells of an image.
+    Each kind of cell is embedded from its channels. The dialogue scales and shifts the embedding before a rectifier in
+    two ways: feature by feature, by the recurrent state (FiLM, Perez et al. 2018); and as a whole, by a learnt weight
+    of every heard word for every code of the cell. So a word such as a colour picks out the cells it names, wherever
+    they are and however much was said since; with FiLM alone, agents asked and did not heed the answer. All this is
+    computed once for each pair of a history and a kind of cell, then looked up for the cells of an image.
 
     Attributes:
         kind_size: width of a cell's embedding.

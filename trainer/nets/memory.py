@@ -1,7 +1,8 @@
-"""This module runs an LSTM over rollouts whose environments start new episodes at different times."""
+"""Memories of a network: what it carries from step to step, emptied whenever an episode starts."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 import torch
@@ -113,44 +114,76 @@ class _ResettableLstm(torch.autograd.Function):
         return d_inputs, d_w_ih, d_w_hh, flat.sum(0), torch.stack((d_h, d_c)), None, None
 
 
-class Memory(nn.Module):
-    """An LSTM whose memory (h, c) is emptied whenever an episode starts.
+class Memory(nn.Module, ABC):
+    """What a network carries from step to step: a float32 tensor (E, *shape), all zeros where an episode starts.
+
+    A subclass says how one step changes it. Back-propagation through time follows from that; `forward` may be
+    overridden by something faster.
 
     Attributes:
-        size: width of h and of c, floats.
+        shape: of one environment's memory.
+        size: width of the output.
     """
 
-    def __init__(self, input_size: int, size: int = 128) -> None:
+    def __init__(self, shape: tuple[int, ...], size: int) -> None:
         super().__init__()
-        self.size = size
-        self.cell = nn.LSTMCell(input_size, size)
+        self.shape, self.size = shape, size
 
     def initial(self, batch: int) -> Tensor:
-        """The empty memory, zeros (2, batch, size): h and c."""
-        return self.cell.weight_hh.new_zeros(2, batch, self.size)
+        """The empty memory, zeros (batch, *shape)."""
+        return next(self.parameters()).new_zeros(batch, *self.shape)
 
-    def step(self, inputs: Tensor, memory: Tensor) -> Tensor:
-        """One step for acting: (E, input_size) and memory (2, E, size) to the new memory, whose row 0 is the output."""
-        return torch.stack(self.cell(inputs, (memory[0], memory[1])))
+    @abstractmethod
+    def step(self, inputs: Tensor, memory: Tensor) -> tuple[Tensor, Tensor]:
+        """One step: inputs (E, F) and memory (E, *shape) to the output (E, size) and the new memory."""
 
     def forward(self, inputs: Tensor, starts: Tensor, memory: Tensor) -> Tensor:
         """Outputs over time, differentiable.
 
         Args:
-            inputs: (T, B, input_size).
+            inputs: (T, B, F).
             starts: bool (T, B), whether an episode starts with this step.
-            memory: (2, B, size) before the first step.
+            memory: (B, *shape) before the first step.
 
         Returns:
             (T, B, size).
         """
+        outputs = []
+        for now, start in zip(inputs, starts, strict=True):
+            output, memory = self.step(now, emptied(memory, start))
+            outputs.append(output)
+        return torch.stack(outputs)
+
+
+def emptied(memory: Tensor, starts: Tensor) -> Tensor:
+    """The memory (E, *shape) with zeros where `starts`, bool (E,)."""
+    return memory.masked_fill(starts.view(-1, *(1,) * (memory.dim() - 1)), 0)
+
+
+class LstmMemory(Memory):
+    """An LSTM (Hochreiter and Schmidhuber 1997); the memory is h and c, (E, 2, size), the output h.
+
+    Its passes over a rollout are written out, which makes training a fifth faster than `Memory.forward`.
+    """
+
+    def __init__(self, inputs: int, size: int = 128) -> None:
+        super().__init__((2, size), size)
+        self.cell = nn.LSTMCell(inputs, size)
+
+    def step(self, inputs: Tensor, memory: Tensor) -> tuple[Tensor, Tensor]:
+        """See `Memory.step`."""
+        h, c = self.cell(inputs, tuple(memory.unbind(1)))
+        return h, torch.stack((h, c), 1)
+
+    def forward(self, inputs: Tensor, starts: Tensor, memory: Tensor) -> Tensor:
+        """See `Memory.forward`."""
         cell = self.cell
         outputs: Tensor = _ResettableLstm.apply(  # type: ignore[no-untyped-call]
             inputs,
             _reordered(cell.weight_ih),
             _reordered(cell.weight_hh),
             _reordered(cell.bias_ih + cell.bias_hh),
-            memory,
+            memory.transpose(0, 1).contiguous(),
             (~starts).to(inputs.dtype).unsqueeze(2),
             starts.any(1).tolist(),
         )

@@ -1,4 +1,4 @@
-"""This module turns the engine's tokens into the words a network's dialogue encoder knows."""
+"""Readers: from the tokens of the engine to the words that a dialogue encoder knows."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ import socialai_dsl
 from socialai_dsl.cli.endings import Ending, endings_of
 from socialai_dsl.cli.evaluation import Evaluation, Player
 from socialai_dsl.cli.main import main, run_main
-from trainer.evaluate import EvalResult, wilson_interval
+from socialai_dsl.evaluation import EvalResult, wilson_interval
 
 Capture = pytest.CaptureFixture[str]
 

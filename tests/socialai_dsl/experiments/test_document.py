@@ -199,7 +199,7 @@ def test_conditions_that_both_files_have_are_the_same_runs(shipped):
 
 
 def test_the_hyper_parameters_are_those_of_the_trainer():
-    from trainer.config import TrainConfig
+    from trainer.config import RunConfig
 
     with_options = {
         "frames",
@@ -213,9 +213,9 @@ def test_the_hyper_parameters_are_those_of_the_trainer():
         "device",
     }
     with_options |= {"threads", "checkpoint_every", "tensorboard"}
-    assert set(Hyper.model_fields) == set(TrainConfig.model_fields) - with_options
+    assert set(Hyper.model_fields) == set(RunConfig.model_fields) - with_options
     for name, mine in Hyper.model_fields.items():
-        theirs = TrainConfig.model_fields[name]
+        theirs = RunConfig.model_fields[name]
         assert set(map(str, mine.metadata)) == set(map(str, theirs.metadata)), f"{name} has other bounds"
         usual = theirs.default
         assert getattr(Hyper.model_validate({name: usual}), name) == usual

@@ -6,9 +6,8 @@ import torch
 from torch import Tensor
 
 from tests.trainer.plain import encode
-from trainer.distinct import prefix_tree
-from trainer.nets.dialogue import DialogueEncoder
-from trainer.nets.heard import HeardWords
+from trainer.features import prefix_tree
+from trainer.nets.dialogue import DialogueEncoder, HeardWords
 
 
 @pytest.fixture

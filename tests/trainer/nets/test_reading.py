@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
-from trainer.actor import Actor
+from trainer.features import Actor
 from trainer.nets import NetSpec, build_net
 from trainer.nets.reading import LetterReader, Reader
 

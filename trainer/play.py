@@ -1,73 +1,28 @@
-"""This module holds what can play a scenario: chance, the scenario's own script, and a trained network."""
+"""Trained agents at play."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from socialai_dsl.evaluation import Observation, Streams
 from trainer import actions as heads
 from trainer import checkpoint as checkpoints
-from trainer.actor import Actor
-from trainer.distinct import Int64
+from trainer.checkpoint import CheckpointMeta
+from trainer.features import Actor, Int64
 from trainer.nets import ActorCritic
+from trainer.nets.memory import emptied
 from trainer.session import net_spec
-from trainer.streams import Streams
-from trainer.transfer import warn_of_differences
-
-Observation = Mapping[str, NDArray[Any]]
 
 # Encodings kept before they are made anew, so that endless play does not fill the memory.
 _REMEMBERED_FRAMES = 1 << 16
-
-
-class Policy(Protocol):
-    """Plays E environments together."""
-
-    def reset(self, mask: NDArray[np.bool_], episodes: Int64 | None = None) -> None:
-        """Forget the past of the environments where `mask`, bool (E,), is true: a new episode begins there.
-
-        Where `episodes`, int64 (E,), gives the episode's number, whatever is drawn in it depends on that alone.
-        """
-
-    def act(self, observation: Observation) -> Int64:
-        """Actions, int64 (E, 4), for `image` (E, H, W, C) and `tokens` (E, L)."""
-
-
-class RandomPolicy:
-    """Chooses uniformly in every head; so it speaks half of the time."""
-
-    def __init__(self, action_sizes: tuple[int, ...], seed: int = 0) -> None:
-        self._sizes = np.array(action_sizes)
-        self._streams = Streams(seed)
-
-    def reset(self, mask: NDArray[np.bool_], episodes: Int64 | None = None) -> None:
-        """See `Policy.reset`."""
-        self._streams.begin(mask, episodes)
-
-    def act(self, observation: Observation) -> Int64:
-        """See `Policy.act`."""
-        drawn = self._streams.uniform(len(observation["tokens"]), len(self._sizes))
-        chosen: Int64 = (drawn * self._sizes).astype(np.int64)
-        return chosen
-
-
-class ScriptedPolicy:
-    """Does what the scenario's own script for the agent would do now."""
-
-    def __init__(self, envs: Any) -> None:
-        self._envs = envs
-
-    def reset(self, mask: NDArray[np.bool_], episodes: Int64 | None = None) -> None:
-        """Nothing to forget; the script's state is the environments'."""
-
-    def act(self, observation: Observation) -> Int64:
-        """See `Policy.act`."""
-        return np.array(self._envs.scripted_actions(), np.int64)
+_WORDS_SHOWN = 6
 
 
 class CheckpointPolicy:
@@ -96,6 +51,7 @@ class CheckpointPolicy:
         seed: int = 0,
         device: str = "cpu",
         net: str | None = None,
+        folder: Path = Path(),
     ) -> CheckpointPolicy:
         """Load an agent for playing `envs`; where they are not what it was trained on, a warning lists the differences.
 
@@ -106,6 +62,7 @@ class CheckpointPolicy:
             seed: of the sampling.
             device: where the network runs.
             net: name of the network, needed if it is not a shipped one: no file chooses what is imported.
+            folder: where the file of such a network is looked for first.
 
         Raises:
             CheckpointError: see `checkpoint.read` and `checkpoint.restore_net`.
@@ -114,7 +71,7 @@ class CheckpointPolicy:
         folder = path / checkpoints.FOLDER
         checkpoint = checkpoints.read(folder if folder.is_dir() else path)
         restored = checkpoints.restore_net(
-            checkpoint, net_spec(envs.unwrapped), list(program.vocabulary), net
+            checkpoint, net_spec(envs.unwrapped), list(program.vocabulary), net, folder
         )
         warn_of_differences(checkpoint.meta, program)
         return cls(restored.to(device), greedy, seed)
@@ -122,9 +79,9 @@ class CheckpointPolicy:
     def reset(self, mask: NDArray[np.bool_] | None = None, episodes: Int64 | None = None) -> None:
         """Forget the past of the environments where `mask`, bool (E,), is true; without it, that of all."""
         if mask is None:
-            mask = np.ones(self._memory.shape[1], np.bool_)
+            mask = np.ones(len(self._memory), np.bool_)
         self._require(len(mask))
-        self._memory[:, torch.from_numpy(mask).to(self._memory.device)] = 0
+        self._memory = emptied(self._memory, torch.from_numpy(mask).to(self._memory.device))
         self._streams.begin(mask, episodes)
 
     @torch.no_grad()
@@ -141,8 +98,8 @@ class CheckpointPolicy:
             self._actor = Actor(self.net, tokens.shape[1])
         self._require(len(tokens))
         _, features = self._actor.see(images, tokens)
-        self._memory = self.net.memory.step(features, self._memory)
-        logits, _ = self.net.heads(self._memory[0])
+        output, self._memory = self.net.memory.step(features, self._memory)
+        logits, _ = self.net.heads(output)
         if not self._greedy:
             noise = torch.from_numpy(self._streams.gumbel(len(tokens), logits.shape[1]))
             logits = logits + noise.to(logits.device)
@@ -151,5 +108,50 @@ class CheckpointPolicy:
 
     def _require(self, count: int) -> None:
         """Begin with an empty memory if another number of environments is played now."""
-        if self._memory.shape[1] != count:
+        if len(self._memory) != count:
             self._memory = self.net.memory.initial(count)
+
+
+class TransferWarning(UserWarning):
+    """An agent plays something else than it was trained on."""
+
+
+def warn_of_differences(meta: CheckpointMeta, program: Any) -> None:
+    """Warn if a checkpoint is played on another program than it was made for, naming what differs.
+
+    Words of the dialogue are left out: `checkpoint.restore_net` moves them, and warns by itself.
+    """
+    if meta.program_sha256 == program.sha256:
+        return
+    made_for = f"{meta.scenario} " if meta.scenario else ""
+    message = (
+        f"the agent was trained on {made_for}(program {meta.program_sha256[:8]}) "
+        f"and plays {program.name} ({program.sha256[:8]})"
+    )
+    parts = [message, *_differences(meta, program)]
+    warnings.warn("; ".join(parts), TransferWarning, stacklevel=3)
+
+
+def _differences(meta: CheckpointMeta, program: Any) -> list[str]:
+    """What each choice of the agent's action means, where that has changed."""
+    if not meta.actions:  # made before checkpoints knew
+        return []
+    compared = (
+        ("actions", meta.actions, program.actions),
+        ("templates", meta.templates, program.templates),
+        ("nouns", meta.nouns, program.nouns),
+    )
+    return [f"{what}: {_changes(old, new)}" for what, old, new in compared if list(old) != list(new)]
+
+
+def _changes(old: Sequence[str], new: Sequence[str]) -> str:
+    """`2: "Hello" is now "Good day", ...`, the first few."""
+    changed = [
+        f'{i}: "{before}" is now "{after}"'
+        for i, (before, after) in enumerate(zip(old, new, strict=False))
+        if before != after
+    ]
+    if len(old) != len(new):
+        changed.append(f"{len(old)} are now {len(new)}")
+    more = len(changed) - _WORDS_SHOWN
+    return ", ".join(changed[:_WORDS_SHOWN]) + (f" and {more} more" if more > 0 else "")

@@ -1,4 +1,4 @@
-"""This module is the update of the paper's code: chunks of a rollout, one step of all of them at a time."""
+"""The update of the paper's code: chunks of a rollout, one step of all of them at a time."""
 
 from __future__ import annotations
 
@@ -8,14 +8,12 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from trainer.actor import Actor
-from trainer.config import TrainConfig
-from trainer.crew import Crew
-from trainer.distinct import prefix_tree
-from trainer.minibatch import Batch
+from trainer.features import Actor, Batch, prefix_tree
 from trainer.nets import ActorCritic
-from trainer.ppo import descend, estimate_advantages, ppo_loss, scale_advantages, summarize
+from trainer.nets.memory import emptied
+from trainer.ppo import descend, estimate_advantages, ppo_loss, summarize
 from trainer.rollout import Rollout
+from trainer.session import Session
 
 
 def chunk_starts(num_envs: int, horizon: int, length: int, shifted: bool) -> Tensor:
@@ -36,14 +34,14 @@ class _Frames:
 
     Attributes:
         batch: what the loss needs; its tensors are (T, E, ...).
-        keep: float32 (T, E, 1), 0 where an episode starts, so that no memory reaches into it.
+        starts: bool (T, E), where an episode starts, into which no memory reaches.
         pairs: int64 (T, E, 2), row of the image in `images` and state of the history in the tree.
         images: uint8 (I, H, W, C).
         tree: tokens, parents and offsets of the histories' prefix tree.
     """
 
     batch: Batch
-    keep: Tensor
+    starts: Tensor
     pairs: Tensor
     images: Tensor
     tree: tuple[Tensor, Tensor, list[int]]
@@ -58,22 +56,15 @@ class _Frames:
 
         return cls(
             Batch(rollout.actions, rollout.log_probs, rollout.values, advantages, returns),
-            move(~rollout.starts).float()[..., None],
+            move(rollout.starts),
             torch.stack((move(image), move(tree.leaves[history])), 2),
             move(actor.images.data),
             (move(tree.tokens), move(tree.parents), tree.offsets),
         )
 
 
-def update_chunks(
-    actor: Actor,
-    optimizer: torch.optim.Optimizer,
-    rollout: Rollout,
-    config: TrainConfig,
-    generator: torch.Generator,
-    crew: Crew,
-) -> dict[str, float]:
-    """Improve the network on one rollout as the paper's code does; takes and returns what `ppo.update` does.
+def update_chunks(session: Session, rollout: Rollout) -> dict[str, float]:
+    """Improve the network on one rollout as the paper's code does; returns what `ppo.update` does.
 
     A rollout is cut into chunks of `bptt` steps (`chunk_starts`), shifted in every second epoch, in a new order in
     each. A minibatch is some of them, all by the paper's presets. Its loss is the mean over the steps of the chunks
@@ -82,59 +73,53 @@ def update_chunks(
 
     A chunk begins with the memory that was last computed for its first step: in the first epoch that of the acting
     network; and since each epoch stores the memories it passes through, one of an earlier epoch afterwards.
-
-    The crew is not asked for help: statistics of a step are those of all its frames.
     """
-    raw = estimate_advantages(actor, rollout, config)
-    returns = raw + rollout.values
-    advantages = scale_advantages(raw, config)
-    frames = _Frames.of(actor, rollout, advantages, returns)
-    memories = acting_memories(rollout, config.bptt)
+    config = session.config
+    advantages, returns = estimate_advantages(session, rollout)
+    frames = _Frames.of(session.actor, rollout, advantages, returns)
+    memories = acting_memories(rollout, config.bptt)  # (T, E, *shape)
     horizon, envs = rollout.values.shape
     steps = []
     for epoch in range(config.epochs):
         starts = chunk_starts(envs, horizon, config.bptt, shifted=epoch % 2 == 1)
-        order = torch.randperm(len(starts), generator=generator)
+        order = torch.randperm(len(starts), generator=session.generator)
         size = envs * horizon // config.bptt // config.minibatches
         for chunks in torch.split(starts[order], size):
-            steps.append(_step(actor.net, optimizer, frames, memories, chunks.to(actor.device), config))
+            steps.append(_step(session, frames, memories, chunks.to(session.actor.device)))
     return summarize(steps, rollout.values, returns)
 
 
 def acting_memories(rollout: Rollout, length: int) -> Tensor:
-    """Memory before each step, float32 (T, E, 2, M), known at the first steps of unshifted chunks only.
+    """Memory before each step, float32 (T, E, *shape), known at the first steps of unshifted chunks only.
 
     The others are not numbers until the first epoch fills them in, so that none can be used by mistake.
     """
-    _, two, envs, size = rollout.memories.shape
-    memories = rollout.memories.new_full((len(rollout.values), envs, two, size), float("nan"))
-    memories[::length] = rollout.memories.transpose(1, 2)
+    _, envs, *shape = rollout.memories.shape
+    memories = rollout.memories.new_full((len(rollout.values), envs, *shape), float("nan"))
+    memories[::length] = rollout.memories
     return memories
 
 
-def _step(
-    net: ActorCritic,
-    optimizer: torch.optim.Optimizer,
-    frames: _Frames,
-    memories: Tensor,
-    chunks: Tensor,
-    config: TrainConfig,
-) -> Tensor:
+def _step(session: Session, frames: _Frames, memories: Tensor, chunks: Tensor) -> Tensor:
     """One gradient step on chunks, int64 (C, 2); replaces the memories it passes through and returns `STATISTICS`."""
-    optimizer.zero_grad()
+    net, config = session.actor.net, session.config
+    session.optimizer.zero_grad()
     texts = net.dialogue(*frames.tree)
     env, first = chunks.unbind(1)
-    memory = memories[first, env].transpose(0, 1)  # (2, C, M)
+    memory = memories[first, env]  # (C, *shape)
     losses = []
     for t in range(config.bptt):
         now = (first + t, env)
-        memory = net.memory.step(_features(net, frames, texts, now), memory * frames.keep[now])
+        output, memory = net.memory.step(
+            _features(net, frames, texts, now), emptied(memory, frames.starts[now])
+        )
         if t + 1 < config.bptt:
-            memories[first + t + 1, env] = memory.detach().transpose(0, 1)
-        logits, values = net.heads(memory[0])
-        losses.append(ppo_loss(_at(frames.batch, now), logits, values, net.spec.action_sizes, config))
+            memories[first + t + 1, env] = memory.detach()
+        logits, values = net.heads(output)
+        batch = _at(frames.batch, now)
+        losses.append(ppo_loss(batch, logits, values, net.spec.action_sizes, config, session.entropy_coef))
     torch.stack([loss.total for loss in losses]).mean().backward()  # type: ignore[no-untyped-call]
-    return descend(net, optimizer, torch.stack([loss.row() for loss in losses]).mean(0), config)
+    return descend(net, session.optimizer, torch.stack([loss.row() for loss in losses]).mean(0), config)
 
 
 def _features(net: ActorCritic, frames: _Frames, texts: Tensor, now: tuple[Tensor, Tensor]) -> Tensor:

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 import torch
 from torch import Tensor, nn
+from trainer.crew import Crew
 
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.plain import encode
-from trainer.config import TrainConfig, paper_preset, paper_tuned_preset
-from trainer.crew import Crew
-from trainer.policies import CheckpointPolicy
+from trainer.chunks import acting_memories, chunk_starts, update_chunks
+from trainer.config import RunConfig, configure, paper_tuned_preset
+from trainer.play import CheckpointPolicy
 from trainer.ppo import compute_gae
-from trainer.ppo_chunks import acting_memories, chunk_starts, update_chunks
 from trainer.rollout import Rollout, collect
 from trainer.session import Session
 
 
-def small(**changes: Any) -> TrainConfig:
+def small(**changes: Any) -> RunConfig:
     values: dict[str, Any] = {
         "num_envs": 6,
         "horizon": 8,
@@ -29,12 +29,12 @@ def small(**changes: Any) -> TrainConfig:
         "frames": 480,
         "threads": 1,
     }
-    return paper_preset(**(values | changes))
+    return configure(net="paper-reference", **(values | changes))
 
 
-def played(config: TrainConfig) -> tuple[Session, Rollout]:
+def played(config: RunConfig) -> tuple[Session, Rollout]:
     """A session after two rollouts, so that the second begins in the middle of episodes."""
-    session = Session.start(config, EchoEnvs(config.num_envs, length=8, chatter=0.4))
+    session = Session.start(config, EchoEnvs(config.envs, length=8, chatter=0.4))
     session.actor.net.train()
     for _ in range(2):
         rollout = collect(session.actor, session.envs, session.state, config, session.generator, None)
@@ -64,7 +64,7 @@ def test_shifted_chunks_begin_half_a_chunk_later_and_the_last_is_dropped() -> No
 @pytest.mark.parametrize(("preset", "kept"), [(paper_preset, 3 / 4), (paper_tuned_preset, 7 / 8)])
 def test_the_presets_keep_the_published_share_of_the_frames(preset: Any, kept: float) -> None:
     config = preset()
-    chunks = chunk_starts(config.num_envs, config.horizon, config.bptt, shifted=True)
+    chunks = chunk_starts(config.envs, config.horizon, config.bptt, shifted=True)
     assert len(chunks) * config.bptt == kept * config.frames_per_update
     assert (chunks[:, 1] + config.bptt <= config.horizon).all()
 
@@ -141,7 +141,7 @@ def test_memories_not_yet_known_are_not_numbers() -> None:
 
 
 def test_batch_norm_sees_the_environments_while_acting_and_one_step_of_all_chunks_while_learning() -> None:
-    config = paper_preset()
+    config = configure(net="paper-reference")
     session = Session.start(config, EchoEnvs(16))
     net = session.actor.net.train()
     norms = [module for module in net.modules() if isinstance(module, nn.BatchNorm2d)]
@@ -224,7 +224,7 @@ def test_the_update_is_that_of_a_plain_loop_over_frames(net: str) -> None:
         assert torch.allclose(got, other, rtol=1e-7, atol=1e-9), name
 
 
-def plain_update(net: Any, session: Session, rollout: Rollout, config: TrainConfig) -> float:
+def plain_update(net: Any, session: Session, rollout: Rollout, config: RunConfig) -> float:
     """Train `net` on the rollout and return the mean loss of the epochs."""
     actor = session.actor
     pairs = actor.pairs.data[rollout.pair_rows]
@@ -235,7 +235,7 @@ def plain_update(net: Any, session: Session, rollout: Rollout, config: TrainConf
     )  # fmt: skip
     returns = advantages + rollout.values
     memory_of = {
-        (t, e): rollout.memories[t // 4, :, e] for t in (0, 4) for e in range(config.num_envs)
+        (t, e): rollout.memories[t // 4, :, e] for t in (0, 4) for e in range(config.envs)
     }  # before step t of environment e
     optimizer = torch.optim.Adam(net.parameters(), lr=1e-4, eps=1e-5, foreach=False)
     losses = []
@@ -314,7 +314,7 @@ def test_minibatches_are_of_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_time_outs_are_terminal() -> None:
-    assert not paper_preset().bootstrap_timeouts
+    assert not configure(net="paper-reference").bootstrap_timeouts
     values, none = torch.tensor([[0.5], [0.25]]), torch.zeros(2, 1, dtype=torch.bool)
     cut = torch.tensor([[True], [False]])
     got = compute_gae(

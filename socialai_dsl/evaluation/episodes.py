@@ -1,20 +1,113 @@
-"""This module measures a policy on the fixed test episodes of a scenario."""
+"""Playing the test episodes of a scenario: policies without a network, and how well a policy does.
+
+Needs no PyTorch, so that scripts, chance, language models and people are measured without it.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from trainer.policies import Policy
+Int64 = NDArray[np.int64]
+Observation = Mapping[str, NDArray[Any]]
 
 # The two-sided 95 % quantile of the normal distribution.
 _Z = 1.959963984540054
+# Streams that no numbered episode begins lie in a domain of keys of their own.
+_UNNUMBERED = 1 << 63
+
+
+class Policy(Protocol):
+    """Plays E environments together."""
+
+    def reset(self, mask: NDArray[np.bool_], episodes: Int64 | None = None) -> None:
+        """Forget the past of the environments where `mask`, bool (E,), is true: a new episode begins there.
+
+        Where `episodes`, int64 (E,), gives the episode's number, whatever is drawn in it depends on that alone.
+        """
+
+    def act(self, observation: Observation) -> Int64:
+        """Actions, int64 (E, 4), for `image` (E, H, W, C) and `tokens` (E, L)."""
+
+
+class RandomPolicy:
+    """Chooses uniformly in every head; so it speaks half of the time."""
+
+    def __init__(self, action_sizes: tuple[int, ...], seed: int = 0) -> None:
+        self._sizes = np.array(action_sizes)
+        self._streams = Streams(seed)
+
+    def reset(self, mask: NDArray[np.bool_], episodes: Int64 | None = None) -> None:
+        """See `Policy.reset`."""
+        self._streams.begin(mask, episodes)
+
+    def act(self, observation: Observation) -> Int64:
+        """See `Policy.act`."""
+        drawn = self._streams.uniform(len(observation["tokens"]), len(self._sizes))
+        chosen: Int64 = (drawn * self._sizes).astype(np.int64)
+        return chosen
+
+
+class ScriptedPolicy:
+    """Does what the scenario's own script for the agent would do now."""
+
+    def __init__(self, envs: Any) -> None:
+        self._envs = envs
+
+    def reset(self, mask: NDArray[np.bool_], episodes: Int64 | None = None) -> None:
+        """Nothing to forget; the script's state is the environments'."""
+
+    def act(self, observation: Observation) -> Int64:
+        """See `Policy.act`."""
+        return np.array(self._envs.scripted_actions(), np.int64)
+
+
+class Streams:
+    """One stream of random numbers for each of E environments.
+
+    What an environment draws depends on the seed and on the number of its episode alone, not on how many others
+    are played beside it. Where episodes have no numbers, it depends on the seed and the environment's place.
+    """
+
+    def __init__(self, seed: int) -> None:
+        if not 0 <= seed < _UNNUMBERED:
+            raise ValueError(f"seed: got {seed}, expected a whole number from 0 to 2**63 - 1")
+        self._seed = seed
+        self._streams: list[np.random.Generator] = []
+
+    def begin(self, mask: NDArray[np.bool_], episodes: NDArray[np.int64] | None = None) -> None:
+        """Note that episodes begin where `mask`, bool (E,), with these numbers, int64 (E,), if they have any."""
+        self._require(len(mask))
+        if episodes is None:
+            return
+        for place in np.flatnonzero(mask).tolist():
+            self._streams[place] = _stream(self._seed, int(episodes[place]))
+
+    def uniform(self, count: int, width: int) -> NDArray[np.float64]:
+        """The next numbers of each stream, from 0 up to but not including 1, float64 (E, width)."""
+        self._require(count)
+        return np.stack([stream.random(width) for stream in self._streams])
+
+    def gumbel(self, count: int, width: int) -> NDArray[np.float32]:
+        """The next standard Gumbel numbers of each stream, float32 (E, width)."""
+        self._require(count)
+        return np.stack([stream.gumbel(size=width) for stream in self._streams]).astype(np.float32)
+
+    def _require(self, count: int) -> None:
+        """Make the streams of `count` environments, if there are others or none."""
+        if len(self._streams) != count:
+            self._streams = [_stream(self._seed | _UNNUMBERED, place) for place in range(count)]
+
+
+def _stream(seed: int, number: int) -> np.random.Generator:
+    """Philox, whose streams of different keys are independent (Salmon et al. 2011)."""
+    return np.random.Generator(np.random.Philox(key=np.array([seed, number], np.uint64)))
 
 
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:

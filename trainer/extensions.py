@@ -1,0 +1,78 @@
+"""Loads networks, bonuses, curricula and guides of the user's own: `mine:Net` is class `Net` of `mine.py`."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import importlib.util
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+
+def load_class(name: str, option: str, shipped: Sequence[str], methods: Sequence[str], folder: Path) -> Any:
+    """Find the class that `module:Class` names.
+
+    The module is `module.py` in `folder`, or one that Python finds by itself.
+
+    Args:
+        name: what the user typed.
+        option: the option it was typed for, to begin messages with.
+        shipped: the names that need no module.
+        methods: what the class must have.
+        folder: where its file is looked for first, the scenario's own.
+
+    Raises:
+        ValueError: there is no such module or class, or it lacks a method; the message names file and method.
+    """
+    module_name, colon, class_name = name.partition(":")
+    if not (colon and module_name and class_name):
+        raise ValueError(
+            f"{option}: got {name!r}, expected one of {', '.join(shipped)}, or mine:{option.title()}"
+        )
+    module = _load_module(module_name, option, folder)
+    file = getattr(module, "__file__", None) or module_name
+    found = getattr(module, class_name, None)
+    if not isinstance(found, type):
+        raise ValueError(f"{option}: {file} has no class {class_name!r}")
+    lacking = [method for method in methods if not callable(getattr(found, method, None))]
+    if lacking:
+        raise ValueError(f"{option}: {file}: {class_name} lacks the method {lacking[0]!r}")
+    return found
+
+
+def _load_module(name: str, option: str, folder: Path) -> ModuleType:
+    file = folder.resolve() / (name.replace(".", "/") + ".py")
+    try:
+        return _load_file(file) if file.is_file() else importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        if error.name == name.partition(".")[0]:
+            raise ValueError(
+                f"{option}: there is no module {name!r}: looked for {file}, then for an installed module"
+            ) from error
+        raise ValueError(f"{option}: {file}: {error}") from error
+    except Exception as error:  # whatever the user's module does while it is imported
+        raise ValueError(f"{option}: {file} cannot be imported: {type(error).__name__}: {error}") from error
+
+
+def _load_file(file: Path) -> ModuleType:
+    """Import a file under a name of its own, so that equally named files of two folders do not meet."""
+    unique = f"{file.stem}_{hashlib.sha256(str(file).encode()).hexdigest()[:12]}"
+    if unique in sys.modules:
+        return sys.modules[unique]
+    spec = importlib.util.spec_from_file_location(unique, file)
+    assert spec is not None, "internal: a .py file has a spec"
+    assert spec.loader is not None, "internal: a .py file has a loader"
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[unique] = module
+    sys.path.insert(0, str(file.parent))  # for the modules beside it
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[unique]
+        raise
+    finally:
+        sys.path.remove(str(file.parent))
+    return module

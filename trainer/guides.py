@@ -1,0 +1,112 @@
+"""Guides: somebody else who acts in some steps, and whose actions the agent imitates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trainer.config import RunConfig
+from trainer.extensions import load_class
+
+SHIPPED = ("none", "script")
+
+Actions = TypeVar("Actions")
+Flags = TypeVar("Flags")
+Weights = TypeVar("Weights")
+
+
+class Lead(NamedTuple, Generic[Actions, Flags, Weights]):
+    """What a guide does in one step of E environments; a rollout has it as tensors (T, E, ...).
+
+    Attributes:
+        actions: int64 (E, 4), what the guide would do now.
+        led: bool (E,), where its action is played instead of the policy's. The policy gradient skips these steps. An
+            environment that is led stays led or is handed over once: who plays on after a hand-over decides alone,
+            or generalised advantage estimation would be biased.
+        weights: float32 (E,), weight of the cross-entropy between the policy and `actions`: of led steps that is
+            imitation, of others advice. 0: nothing is imitated.
+    """
+
+    actions: Actions
+    led: Flags
+    weights: Weights
+
+
+StepLead = Lead[NDArray[np.int64], NDArray[np.bool_], NDArray[np.float32]]
+
+
+class Guide(Protocol):
+    """Leads and advises while the agent is trained; never asked while it is evaluated.
+
+    A guide of the user's own, `--guide mine:Guide`, is built as `Guide(config, envs)`.
+    """
+
+    def lead(self, envs: Any, starts: NDArray[np.bool_], progress: float) -> StepLead:
+        """What happens in the coming step.
+
+        Args:
+            envs: the vector environment, before the step; `envs.scripted_actions()` is what its script would do.
+            starts: bool (E,), where the coming step is an episode's first.
+            progress: share of the run's frames made so far, 0 to 1.
+        """
+
+    def state(self) -> dict[str, Any]:
+        """All it remembers, as JSON data."""
+
+    def load_state(self, state: Mapping[str, Any]) -> None:
+        """Go on from `state()` of an equal one."""
+
+
+class ScriptGuide:
+    """The scenario's own script plays whole episodes, and the agent imitates it; then the agent learns alone.
+
+    Source: behaviour cloning (Pomerleau 1991) before reinforcement learning, as in DAPG (Rajeswaran et al. 2018).
+    """
+
+    def __init__(self, config: RunConfig, envs: Any) -> None:
+        """Begin with nobody led.
+
+        Raises:
+            ValueError: the environments have no script for the agent.
+        """
+        try:
+            envs.scripted_actions()
+        except ValueError as error:
+            raise ValueError(f"guide: the scenario has no script to imitate: {error}") from error
+        self._share = config.guide_share
+        self._led = np.zeros(envs.num_envs, np.bool_)
+
+    def lead(self, envs: Any, starts: NDArray[np.bool_], progress: float) -> StepLead:
+        """See `Guide.lead`; an episode that began with the script is played by it to its end."""
+        self._led = np.where(starts, progress < self._share, self._led)
+        if self._led.any():
+            actions = np.asarray(envs.scripted_actions(), np.int64)
+        else:
+            actions = np.zeros((len(starts), 4), np.int64)
+        return Lead(actions, self._led.copy(), self._led.astype(np.float32))
+
+    def state(self) -> dict[str, Any]:
+        """See `Guide.state`."""
+        return {"led": self._led.tolist()}
+
+    def load_state(self, state: Mapping[str, Any]) -> None:
+        """See `Guide.load_state`."""
+        self._led = np.array(state["led"], np.bool_)
+
+
+def build_guide(config: RunConfig, envs: Any) -> Guide | None:
+    """The guide that a configuration names, None for `none`.
+
+    Raises:
+        ValueError: there is no such guide, it lacks a method, or it does not fit the scenario.
+    """
+    if config.guide == "none":
+        return None
+    if config.guide == "script":
+        return ScriptGuide(config, envs)
+    methods = ("lead", "state", "load_state")
+    guide: Guide = load_class(config.guide, "guide", SHIPPED, methods, config.code_folder)(config, envs)
+    return guide
