@@ -113,6 +113,6 @@ def _check_nets(cells: Sequence[Cell], resolved: Resolved, bag: DiagnosticBag) -
         net = cell.options.get("net", "fast")
         if isinstance(net, str) and net not in NETS and ":" not in net:
             near = did_you_mean(net, NETS)
-            hint = None if near else "one of " + ", ".join(NETS) + ", or my.module:MyNet"
+            hint = None if near else "one of " + ", ".join(NETS) + ", or mine:Net"
             span = resolved.value_span(cell.places["net"])
             bag.error("S103", f"`{net}` is not a word for `net`", span, suggestion=near, hint=hint)

@@ -11,9 +11,10 @@ from typing import IO, TYPE_CHECKING, Any, Final, get_args
 from pydantic import ValidationError
 
 from socialai_dsl.cli.errors import RunFailed, UsageError
-from socialai_dsl.cli.run_folder import SETTINGS, base_name, read_json
+from socialai_dsl.cli.run_folder import SETTINGS, read_json
 from socialai_dsl.diagnostics import did_you_mean
-from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, RunConfig, configure
+from socialai_dsl.experiments.settings import resolved_config
+from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, RunConfig
 
 if TYPE_CHECKING:
     from socialai_dsl.program_suite import Playable
@@ -31,7 +32,6 @@ _AUTOMATIC: Final = {
 _OF_ANY_AGENT: Final = ("agent", "seed", "device", "eval_episodes", "net")
 """Options that matter to agents that are not trained."""
 
-_BONUS_C: Final = {"lang": 7.0, "cell": 3.0}
 _MOST_THREADS: Final = 4
 """More threads than this wait for Python's interpreter lock rather than compute."""
 
@@ -115,7 +115,6 @@ def new_config(arguments: argparse.Namespace) -> RunConfig:
     if not trains:
         return checked_config("plain", given | {"frames": 0})
     given.setdefault("threads", automatic_threads())
-    given |= _resolved_bonus(given.get("bonus", "none"), arguments.scenario)
     recipe = arguments.recipe or _usual_recipe(given | hyper, arguments.scenario)
     if "frames" not in given and given.get("net") not in NET_PRESETS:
         given["frames"] = frames_for(recipe, arguments.scenario)
@@ -123,13 +122,13 @@ def new_config(arguments: argparse.Namespace) -> RunConfig:
 
 
 def checked_config(recipe: str, given: dict[str, Any]) -> RunConfig:
-    """`trainer.config.configure`, with what is wrong said as the option was typed.
+    """`resolved_config`, with what is wrong said as the option was typed.
 
     Raises:
         UsageError: a value is out of bounds.
     """
     try:
-        return configure(recipe, **given)
+        return resolved_config(recipe, given)
     except ValidationError as error:
         first = error.errors()[0]
         name = str(first["loc"][0]) if first["loc"] else ""
@@ -197,23 +196,6 @@ def automatic_threads() -> int:
     """Threads where nobody says how many."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(1, min(cores, _MOST_THREADS))
-
-
-def _resolved_bonus(kind: str, scenario: str) -> dict[str, Any]:
-    """Kind and scale of the exploration bonus; `auto` looks the scenario up in the paper's table."""
-    import yaml
-
-    import trainer
-
-    table_file = Path(trainer.__file__).with_name("exploration.yaml")
-    table = yaml.safe_load(table_file.read_text(encoding="utf-8"))
-    listed = table.get(base_name(scenario), {"kind": "none"})
-    if kind == "auto":
-        kind = listed["kind"]
-    if kind not in _BONUS_C:
-        return {"bonus": kind}
-    scale = listed["c"] if kind == listed["kind"] else _BONUS_C[kind]
-    return {"bonus": kind, "bonus_c": float(scale)}
 
 
 def _usual_recipe(given: dict[str, Any], scenario: str) -> str:

@@ -11,28 +11,15 @@ from typing import Any, Final
 from socialai_dsl.checking.experiments import LoadedExperiment, from_anywhere
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.experiments.folder import CHECKPOINTS
+from socialai_dsl.experiments.settings import resolved_config
 from socialai_dsl.schema.experiment import AGENTS, Reference
 from socialai_dsl.semantics.experiment import Cell
+from trainer.config import WITHOUT_EFFECT, RunConfig
 
 FORMAT: Final = 1
 
-DEFAULTS: Final[Mapping[str, str | int]] = {
-    "net": "fast",
-    "explo": "none",
-    "curriculum": "none",
-    "precision": "auto",
-    "device": "cpu",
-    "threads": 1,
-    "checkpoint_every": 50,
-    "eval_episodes": 500,
-}
-"""Options of a run where its condition does not say. One thread: what a run computes must not depend on the machine."""
-
 OF_ANY_AGENT: Final = ("device", "eval_episodes")
 """Options that also matter to agents that are not trained."""
-
-_WITHOUT_EFFECT: Final = ("checkpoint_every",)
-"""Options that change nothing about the result, and so nothing about which run it is."""
 
 _ID_LENGTH: Final = 12
 
@@ -85,25 +72,50 @@ def run_id(cell: Cell, seed: int, program: str, agent: str) -> str:
         program: digest of the compiled scenario.
         agent: its name, or the digest of its weights.
     """
-    options = {key: value for key, value in options_of(cell).items() if key not in _WITHOUT_EFFECT}
-    identity = {
-        "scenario": cell.scenario,
-        "program": program,
-        "agent": agent,
-        "frames": cell.frames if cell.trains else 0,
-        "options": options,
-        "seed": seed,
-    }
-    text = json.dumps(identity, sort_keys=True, ensure_ascii=True)
+    options = config_of(cell, seed).model_dump(
+        exclude={"scenario", "agent", "recipe", *(WITHOUT_EFFECT - {"frames"})}
+    )
+    text = json.dumps(options | {"program": program, "agent": agent}, sort_keys=True, ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()[:_ID_LENGTH]
 
 
+def config_of(cell: Cell, seed: int = 0) -> RunConfig:
+    """The configuration of a condition's runs, with every value resolved.
+
+    Raises:
+        pydantic.ValidationError: its options contradict each other.
+    """
+    given: dict[str, Any] = {"scenario": cell.scenario, "agent": cell.agent, "seed": seed}
+    options = {**{name: value for name, value in cell.options.items() if name != "hyper"}}
+    options |= dict(cell.options.get("hyper", {}))
+    if not cell.trains:
+        kept = {name: options[name] for name in OF_ANY_AGENT if name in options}
+        return resolved_config("plain", given | kept | {"frames": 0})
+    if cell.frames is not None:
+        given["frames"] = cell.frames
+    return resolved_config(str(options.pop("recipe", "plain")), given | options)
+
+
 def options_of(cell: Cell) -> dict[str, Any]:
-    """The options of a condition's runs, without those that its agent has no use for."""
-    options: dict[str, Any] = dict(DEFAULTS) | dict(cell.options)
-    if cell.trains:
-        return options
-    return {key: value for key, value in options.items() if key in OF_ANY_AGENT}
+    """The options that `socialai-run` is given for a condition's runs, the automatic ones among them by value.
+
+    One thread unless the condition says more: what a run computes must not depend on the machine.
+    """
+    config = config_of(cell).model_dump()
+    if not cell.trains:
+        return {name: config[name] for name in OF_ANY_AGENT}
+    asked = [name for name in cell.options if name not in ("hyper", "recipe")]
+    names = dict.fromkeys(
+        ("net", "envs", "bonus", "device", "threads", "checkpoint_every", "eval_episodes", *asked)
+    )
+    hyper = dict(cell.options.get("hyper", {}))
+    if config["bonus"] in ("lang", "cell"):
+        hyper["bonus_c"] = config["bonus_c"]
+    return {
+        "recipe": config["recipe"],
+        **{name: config[name] for name in names},
+        **({"hyper": hyper} if hyper else {}),
+    }
 
 
 def differences(kept: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]:

@@ -28,10 +28,9 @@ from socialai_dsl.reporting.records import (
     UpdateRecord,
 )
 from socialai_dsl.reporting.seeds import read_updates
+from trainer.config import HYPER, RunConfig, configure
 
 _SEED_KEYS: Final = frozenset({"seed"})
-_SHOWN: Final = ("net", "explo", "curriculum")
-_USUAL: Final = (None, "none", "fast")
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -183,10 +182,24 @@ def _column(settings: Mapping[str, Any]) -> str:
 
 
 def unusual(settings: Mapping[str, Any]) -> list[str]:
-    """Which of a run's settings are not the default and make it another condition, each as it is shown."""
-    named = [f"{key} {settings[key]}" for key in _SHOWN if settings.get(key) not in _USUAL]
-    hyper = settings.get("hyper")
-    return named + [f"{k}={v}" for k, v in sorted(hyper.items())] if isinstance(hyper, Mapping) else named
+    """Which of a run's options are not the default and make it another condition, each as it is shown."""
+    try:
+        config = RunConfig.model_validate_json(json.dumps(settings))
+    except ValidationError:
+        return []
+    named = [f"net {config.net}"] * (config.net != "fast") + [f"recipe {config.recipe}"] * (
+        config.recipe != "plain"
+    )
+    told = configure(config.recipe, net=config.net).model_dump()
+    chosen = [
+        name for name in ("bonus", "curriculum", "guide", *HYPER) if getattr(config, name) != told[name]
+    ]
+    words = ("bonus", "curriculum", "guide")
+    return named + [
+        f"{name} {getattr(config, name)}" if name in words else f"{name}={getattr(config, name)}"
+        for name in chosen
+        if not (name == "bonus_c" and "bonus" in chosen)
+    ]
 
 
 def _read_run(folder: Path, name: str, seed: int) -> Run:

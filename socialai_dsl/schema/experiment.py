@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Final, Literal
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from pydantic import BeforeValidator, Discriminator, Field, StringConstraints, Tag, ValidationError
+from pydantic import (
+    BeforeValidator,
+    Discriminator,
+    Field,
+    StringConstraints,
+    Tag,
+    ValidationError,
+    create_model,
+)
 
 from socialai_dsl.schema.base import Model, Word, _as_tuple, _one_or_many
 from socialai_dsl.schema.suite import MemberName
+from trainer.config import FLAGS, HYPER, RunConfig
 
 Label = Annotated[str, StringConstraints(min_length=1, max_length=80)]
 """A name for people: of a condition, a row, a column."""
@@ -50,37 +60,45 @@ Test = Annotated[
 ]
 
 
-class Hyper(Model):
-    """Hyper-parameters of the trainer that have no key of their own; what is left out is as the network has it."""
+def _made_optional(names: Iterable[str]) -> dict[str, Any]:
+    """Fields of `RunConfig` as keys that may be left out: the same meaning, words and bounds."""
+    fields: dict[str, Any] = {}
+    for name in names:
+        field = RunConfig.model_fields[name]
+        annotation: Any = _WORDS.get(name, field.annotation)
+        if annotation is float or annotation == float | None:
+            annotation = float | int
+        optional: Any = annotation | None
+        bounded = Annotated[optional, *field.metadata] if field.metadata else optional
+        fields[name] = (bounded, Field(None, description=field.description))
+    return fields
 
-    horizon: int | None = Field(None, ge=1, description="steps per environment in one rollout")
-    bptt: int | None = Field(None, ge=0, description="steps back-propagation goes back; 0: the whole rollout")
-    update: Literal["environments", "chunks"] | None = Field(None, description="what a minibatch is made of")
-    epochs: int | None = Field(None, ge=1, description="passes over each rollout")
-    minibatches: int | None = Field(None, ge=1, description="parts a rollout is cut into")
-    lr: float | int | None = Field(None, gt=0, description="Adam's learning rate")
-    adam_eps: float | int | None = Field(None, gt=0, description="Adam's epsilon")
-    gamma: float | int | None = Field(None, ge=0, le=1, description="discount per step")
-    gae_lambda: float | int | None = Field(None, ge=0, le=1, description="lambda of the advantages (GAE)")
-    clip: float | int | None = Field(None, gt=0, description="clipping range of the probability ratio")
-    clip_value: bool | None = Field(None, description="whether to clip the value's change as well")
-    value_coef: float | int | None = Field(None, ge=0, description="weight of the squared value error")
-    entropy_coef: float | int | None = Field(None, ge=0, description="weight of each head's entropy")
-    max_grad_norm: float | int | None = Field(None, gt=0, description="norm that gradients are clipped to")
-    normalize_advantages: bool | None = Field(None, description="whether to scale a rollout's advantages")
-    loss: Literal["joint", "per_head"] | None = Field(
-        None, description="one ratio of the action, or one per head"
+
+_WORDS: Final[dict[str, Any]] = {"device": Literal["cpu", "cuda"]}
+"""Options of which a file may say less than a command line."""
+
+OPTIONS: Final = tuple(n for n in FLAGS if n not in ("agent", "seed", "frames", "wandb"))
+"""Options that are keys of their own; every other one is a key of `hyper`."""
+
+if TYPE_CHECKING:
+
+    class Hyper(Model):
+        """Options of the trainer that have no key of their own; what is left out is as the network has it."""
+
+    class _RunOptions(Model):
+        """Options of `socialai-run`."""
+
+else:
+    Hyper = create_model(
+        "Hyper",
+        __base__=Model,
+        __doc__="Options of the trainer that have no key of their own; what is left out is as the network has it.",
+        **_made_optional(HYPER),
     )
-    bootstrap_timeouts: bool | None = Field(None, description="whether the value goes on through a time-out")
-    explo_c: float | int | None = Field(None, ge=0, description="C of the exploration bonus")
-    explo_m: float | int | None = Field(None, ge=0, description="M of the exploration bonus")
-    explo_t: float | int | None = Field(None, gt=0, description="T of the exploration bonus")
-    explo_formula: Literal["as_coded", "as_printed"] | None = Field(
-        None, description="the bonus of the paper's code, or of its text"
-    )
+    _RunOptions = create_model("_RunOptions", __base__=Model, **_made_optional(OPTIONS))
 
 
-class Settings(Model):
+class Settings(_RunOptions):
     """What can be said of runs; a key that is left out is as `socialai-run` has it."""
 
     scenario: MemberName | None = Field(
@@ -107,24 +125,10 @@ class Settings(Model):
         None, description="scenarios that the agents play besides their own when they are trained"
     )
     reference: Reference | None = Field(None, description="what was found elsewhere on the scenario itself")
-    net: Annotated[str, StringConstraints(min_length=1, max_length=200)] | None = Field(
-        None, description="a network or preset: " + ", ".join(NETS) + ", or my.module:MyNet"
+    recipe: Literal["plain", "guided", "paper"] | None = Field(
+        None, description="how the agents learn; guided: the scenario's script shows it first; default plain"
     )
-    explo: Literal["none", "auto", "lang", "cell"] | None = Field(
-        None, description="exploration bonus; auto: the paper's choice for the scenario"
-    )
-    envs: int | None = Field(None, ge=1, description="environments stepped together")
-    curriculum: Annotated[str, StringConstraints(min_length=1, max_length=1000)] | None = Field(
-        None, description="who chooses the members of a suite while training"
-    )
-    precision: Literal["auto", "float32", "bfloat16"] | None = Field(
-        None, description="numbers the convolutions of `paper` compute with"
-    )
-    hyper: Hyper | None = Field(None, description="any other hyper-parameter of the trainer")
-    device: Literal["auto", "cpu", "cuda"] | None = Field(None, description="default here: cpu")
-    threads: int | None = Field(None, ge=1, le=64, description="CPU threads of each run; default here: 1")
-    checkpoint_every: int | None = Field(None, ge=1, description="updates between checkpoints")
-    eval_episodes: int | None = Field(None, ge=1, description="episodes of each test set")
+    hyper: Hyper | None = Field(None, description="any other option of the trainer")
 
 
 def one_setting(name: str, value: str | int) -> Settings | str:

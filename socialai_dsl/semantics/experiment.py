@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.schema.annotations import annotation_at, literals
+from socialai_dsl.schema.experiment import OPTIONS as KEYS
 from socialai_dsl.schema.experiment import (
     Condition,
     Experiment,
@@ -27,10 +28,7 @@ from socialai_dsl.schema.positions import DataPath, Positions
 MAX_RUNS: Final = 10_000
 """How many runs an experiment may have."""
 
-OPTIONS: Final = (
-    "net", "explo", "envs", "curriculum", "precision", "hyper", "device", "threads", "checkpoint_every",
-    "eval_episodes",
-)  # fmt: skip
+OPTIONS: Final = (*KEYS, "recipe", "hyper")
 """Settings that are options of `socialai-run`, under its names with `_` for `-`."""
 
 

@@ -57,10 +57,10 @@ def test_a_shorter_run_is_unknown_after_its_end(tmp_path: Path) -> None:
     assert read_seeds([long]).shortest == 800
 
 
-def make_run(folder: Path, scenario: str, seed: int, rate: float, explo: str = "none") -> Path:
-    run = folder / f"{scenario}-{explo}-{seed}"
+def make_run(folder: Path, scenario: str, seed: int, rate: float, bonus: str = "none") -> Path:
+    run = folder / f"{scenario}-{bonus}-{seed}"
     run.mkdir()
-    settings = {"scenario": scenario, "seed": seed, "net": "fast", "explo": explo, "curriculum": "none"}
+    settings = {"scenario": scenario, "seed": seed, "net": "fast", "bonus": bonus, "curriculum": "none"}
     (run / "config.json").write_text(json.dumps(settings))
     (run / "result.json").write_text(json.dumps({"frames": 300, "eval": {"success_rate": rate}}))
     write_metrics(run / "metrics.jsonl", [row(n, 10, rate, 1.0) for n in range(1, 4)])
@@ -71,14 +71,14 @@ def test_seeds_of_one_condition_share_a_column_and_a_table(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     runs = [make_run(tmp_path, "talkitout", seed, 0.2 + seed / 10) for seed in (0, 1)]
-    runs.append(make_run(tmp_path, "talkitout", 0, 0.9, explo="lang"))
+    runs.append(make_run(tmp_path, "talkitout", 0, 0.9, bonus="lang"))
     picture = tmp_path / "curves.png"
     assert main(["curves", *map(str, runs), "--out", str(picture)]) == 0
     printed = capsys.readouterr().out
     assert "talkitout\n\n| frames | run 1 | run 2 | success@9 | timeout | ask |" in printed
     assert "| 0.00 M | 0.20 | 0.30 | 0.25 | 0.75 | 1.00 |" in printed
     assert "test set: 0.200, 0.300" in printed
-    assert "talkitout, explo lang\n" in printed
+    assert "talkitout, bonus lang\n" in printed
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
@@ -87,11 +87,11 @@ def test_runs_with_other_hyper_parameters_are_another_condition(
 ) -> None:
     runs = [make_run(tmp_path, "talkitout", seed, 0.5) for seed in (0, 1)]
     settings = json.loads((runs[1] / "config.json").read_text())
-    (runs[1] / "config.json").write_text(json.dumps(settings | {"hyper": {"lr": 0.1, "entropy_coef": 0.02}}))
+    (runs[1] / "config.json").write_text(json.dumps(settings | {"lr": 0.1, "entropy_coef": 0.02}))
     assert main(["curves", *map(str, runs), "--out", str(tmp_path / "curves.png")]) == 0
     printed = capsys.readouterr().out
     assert "talkitout\n" in printed
-    assert "talkitout, entropy_coef=0.02, lr=0.1\n" in printed
+    assert "talkitout, lr=0.1, entropy_coef=0.02\n" in printed
 
 
 def test_what_is_no_finished_run_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -190,7 +190,7 @@ def test_progress(tmp_path: Path, stream: io.StringIO, monkeypatch: pytest.Monke
 def test_the_words_of_a_run_are_those_of_the_command(file: Path) -> None:
     """Whatever a condition can say, `socialai run` and `socialai evaluate` understand."""
     options = (
-        "net: fast, explo: cell, envs: 64, curriculum: expert, precision: bfloat16, device: cpu, threads: 2, "
+        "net: fast, bonus: cell, envs: 64, curriculum: expert, precision: bfloat16, device: cpu, threads: 2, "
         "checkpoint_every: 7, eval_episodes: 30"
     )
     file.write_text(
@@ -205,7 +205,8 @@ def test_the_words_of_a_run_are_those_of_the_command(file: Path) -> None:
     learns, chance = (_Work(run, lambda: False) for run in runs_of(file.parent, document))
     given = parser.parse_args(learns._run_command())
     for name, value in document["conditions"][0]["options"].items():
-        assert getattr(given, name) == value
+        words = [f"{key}={each}" for key, each in value.items()] if name == "hyper" else value
+        assert getattr(given, name) == words
     assert (given.scenario, given.agent, given.seed, given.frames) == ("social_env", "ppo", 5, 1000)
     assert parser.parse_args(chance._run_command()).seed == 5
     own = str(file.parent / "runs" / document["runs"][0]["id"])
@@ -219,7 +220,7 @@ def test_a_real_run(file: Path, capsys: Capture) -> None:
     """The words of the command line are those that `socialai run` and `socialai evaluate` know."""
     file.write_text(
         "experiment: real\nset: {scenario: help, eval_episodes: 3}\nconditions:\n"
-        "  - {name: learns, frames: 256, envs: 4, explo: auto, checkpoint_every: 1, tests: [help_as_helper]}\n"
+        "  - {name: learns, frames: 256, envs: 4, bonus: auto, checkpoint_every: 1, tests: [help_as_helper]}\n"
         "  - {name: chance, agent: random, seeds: [1]}\n"
     )
     assert main(["experiment", "run", str(file), "--json"]) == 0
@@ -235,4 +236,4 @@ def test_a_real_run(file: Path, capsys: Capture) -> None:
     assert chance["eval"]["actions"] == "sampled actions, seed 1", (
         "the seed of who is not trained is of what it draws"
     )
-    assert (config["explo"], config["threads"], config["device"]) == ("cell", 1, "cpu")
+    assert (config["bonus"], config["threads"], config["device"]) == ("cell", 1, "cpu")

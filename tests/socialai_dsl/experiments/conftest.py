@@ -24,7 +24,7 @@ SMALL = """\
 experiment: small
 set: {scenario: dance, frames: 1000, checkpoint_every: 2, eval_episodes: 5}
 conditions:
-  - grid: {explo: [none, cell]}
+  - grid: {bonus: [none, cell]}
   - {name: chance, agent: random, tests: [help]}
 """
 """Three runs."""

@@ -23,7 +23,7 @@ EXPERIMENT = """\
 experiment: faults
 set: {frames: 7680, envs: 8, checkpoint_every: 1, eval_episodes: 10, seeds: 5}
 conditions:
-  - grid: {scenario: [help, dance], explo: [none, auto]}
+  - grid: {scenario: [help, dance], bonus: [none, auto]}
 overrides:
   - {where: {scenario: help}, set: {tests: [help_as_helper]}}
 """

@@ -202,7 +202,7 @@ def test_experiments_that_share_a_folder_share_runs(place, tmp_path):
     other = tmp_path / "other.yaml"
     other.write_text(
         "experiment: other\nset: {frames: 1000, eval_episodes: 5}\nconditions:\n"
-        "  - {name: once more, scenario: dance, explo: cell, checkpoint_every: 3, seeds: 2}\n"
+        "  - {name: once more, scenario: dance, bonus: cell, checkpoint_every: 3, seeds: 2}\n"
     )
     before = set(shared.iterdir())
     assert place.socialai("run", str(other), "--out", str(tmp_path / "other"), "--runs", str(shared)) == 0

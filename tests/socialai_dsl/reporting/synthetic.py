@@ -37,7 +37,7 @@ def write_run(run: Path, scenario: str, seed: int, rate: float, frames: int = FR
     """A finished run whose success grows evenly up to `rate` in the first half of training and stays there."""
     run.mkdir(parents=True)
     settings = {"scenario": scenario, "agent": "ppo", "seed": seed, "net": "fast", "frames": frames}
-    _write(run / "config.json", settings | {"trainer": {"seed": seed, "lr": 0.1}})
+    _write(run / "config.json", settings)
     lines = []
     for update in range(1, UPDATES + 1):
         success = rate * min(1.0, 2 * update / UPDATES)
@@ -49,7 +49,7 @@ def write_run(run: Path, scenario: str, seed: int, rate: float, frames: int = FR
     result = {"frames": frames, "train_seconds": 90.0, "frames_per_second": 11.1, "eval": figures(rate),
               "program_sha256": "b" * 64, "versions": {"python": "3.11.7", "torch": "2.13.0"}}  # fmt: skip
     _write(run / "result.json", result)
-    start = {"time": "", "torch": "2.13.0", "cpu": "AVX2", "device": "cpu", "threads": 1, "processes": 1}
+    start = {"time": "", "torch": "2.13.0", "cpu": "AVX2", "device": "cpu", "threads": 1}
     (run / "starts.jsonl").write_text(json.dumps(start) + "\n", encoding="utf-8")
     _write(run / "status.json", {"state": "done", "attempts": [{}], "message": None})
     return run

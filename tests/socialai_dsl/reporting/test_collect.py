@@ -122,7 +122,7 @@ def test_runs_without_an_experiment_are_grouped_by_what_they_are(tmp_path: Path)
     assert (helped.entry.row, helped.entry.column) == ("help", "ppo")
     assert unsocial.entry.name == "talkitout+unsocial / ppo"
     settings = json.loads((tmp_path / "b" / "config.json").read_text())
-    (tmp_path / "b" / "config.json").write_text(json.dumps(settings | {"hyper": {"lr": 0.1}}))
+    (tmp_path / "b" / "config.json").write_text(json.dumps(settings | {"lr": 0.1}))
     columns = [condition.entry.column for condition in read_runs(folders).conditions]
     assert columns == ["ppo", "ppo, lr=0.1", "ppo"]
     with pytest.raises(ValueError, match=r"expected the folder of a run, with its config\.json"):

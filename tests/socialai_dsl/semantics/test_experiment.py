@@ -38,7 +38,7 @@ def test_a_grid_is_every_combination(tmp_path):
           - group: table
             grid:
               scenario: [dance, help]
-              explo: {PPO: none, PPO+Explo: auto}
+              bonus: {PPO: none, PPO+Explo: auto}
               envs: [8, 16]
         """,
     )
@@ -46,7 +46,7 @@ def test_a_grid_is_every_combination(tmp_path):
     assert len(found) == 8
     cell = found["help / PPO+Explo / 16"]
     assert (cell.row, cell.column, cell.group) == ("help", "PPO+Explo 16", "table")
-    assert cell.options == {"net": "paper", "explo": "auto", "envs": 16}
+    assert cell.options == {"net": "paper", "bonus": "auto", "envs": 16}
 
 
 def test_an_axis_whose_values_are_several_settings(tmp_path):
