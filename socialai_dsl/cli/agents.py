@@ -132,10 +132,13 @@ def checked_config(recipe: str, given: dict[str, Any]) -> RunConfig:
         return configure(recipe, **given)
     except ValidationError as error:
         first = error.errors()[0]
-        name = str(first["loc"][0]) if first["loc"] else ""
-        typed = f"--{name.replace('_', '-')}" if name in FLAGS else f"--hyper {name}" if name else "options"
-        got = f", got {first['input']!r}" if name else ""
-        raise UsageError(f"{typed}: {first['msg'].removeprefix('Value error, ')}{got}") from None
+        said = first["msg"].removeprefix("Value error, ")
+        if first["loc"]:
+            name, said = str(first["loc"][0]), f"{said}, got {first['input']!r}"
+        else:  # of options that contradict each other, the message begins with one
+            name, _, said = said.partition(": ")
+        typed = f"--{name.replace('_', '-')}" if name in FLAGS else f"--hyper {name}"
+        raise UsageError(f"{typed}: {said}") from None
 
 
 def _refuse_training_options(given: dict[str, Any], arguments: argparse.Namespace) -> None:

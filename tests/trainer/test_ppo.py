@@ -309,3 +309,13 @@ def test_statistics_are_finite_and_complete(small_config: Any) -> None:
     assert np.isfinite(list(statistics.values())).all()
     assert 0 < statistics["entropy"] <= log(4) + log(2) + log(2) + log(4) + 1e-6
     assert exp(statistics["approx_kl"]) < 2
+
+
+@pytest.mark.parametrize(("target", "epochs"), [(None, 3), (1e-12, 1), (1e6, 3)])
+def test_a_divergence_above_the_target_ends_the_epochs(
+    target: float | None, epochs: int, small_config: Any
+) -> None:
+    session, rollout = played(small_config(epochs=3, target_kl=target))
+    update(session, rollout)
+    (steps,) = {int(state["step"]) for state in session.optimizer.state.values()}
+    assert steps == epochs * session.config.minibatches

@@ -115,6 +115,14 @@ def test_time_outs_are_bootstrapped_with_the_value_of_their_last_observation(sma
     assert (terminal.bootstrap == 0).all()
 
 
+def test_batch_normalisation_counts_each_observation_once(small_config: Any) -> None:
+    """Neither the value after a rollout's last step nor that of a time-out's last observation counts again."""
+    session, rollout = play(small_config(net="paper-reference"), EchoEnvs(8, limit=4), rollouts=2)
+    assert rollout.bootstrap.any()
+    norms = [part for part in session.actor.net.modules() if isinstance(part, torch.nn.BatchNorm2d)]
+    assert {int(norm.num_batches_tracked) for norm in norms} == {16}, "two rollouts of eight steps"
+
+
 def test_the_bonus_is_paid_on_top_and_does_not_count_as_return(small_config: Any) -> None:
     config = small_config(bonus="lang")
     envs = Witness(8)

@@ -97,6 +97,32 @@ def test_a_finished_run_can_be_resumed_for_longer(tmp_path: Path, small_config: 
     assert all(torch.equal(longer.tensors[name], value) for name, value in whole.tensors.items())
 
 
+def test_schedules_fall_evenly_to_their_ends(
+    tmp_path: Path, small_config: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    used: list[tuple[float, float]] = []
+    real = training.update
+
+    def note(session: Any, *rest: Any) -> Any:
+        (group,) = session.optimizer.param_groups
+        used.append((group["lr"], session.entropy_coef))
+        return real(session, *rest)
+
+    monkeypatch.setattr(training, "update", note)
+    config = small_config(frames=64 * 4, lr=8e-4, lr_end=4e-4, entropy_coef=0.04, entropy_coef_end=0.0)
+    train(config, EchoEnvs(8), tmp_path)
+    assert used == [pytest.approx((8e-4 - k * 1e-4, 0.04 - k * 0.01)) for k in range(4)]
+    used.clear()
+    train(small_config(frames=64 * 2, lr=8e-4, entropy_coef=0.04), EchoEnvs(8), tmp_path / "flat")
+    assert used == [(8e-4, 0.04)] * 2
+
+
+def test_as_many_checkpoints_are_kept_as_were_asked_for(tmp_path: Path, small_config: Any) -> None:
+    train(small_config(keep_checkpoints=3, checkpoint_every=1), EchoEnvs(8), tmp_path)
+    kept = sorted(path.stem for path in (tmp_path / "checkpoints").iterdir())
+    assert kept == [f"{64 * update:015d}" for update in (4, 5, 6)]
+
+
 def test_progress_and_metrics_are_complete(tmp_path: Path, small_config: Any) -> None:
     seen: list[Progress] = []
     config = small_config(frames=300, tensorboard=True)
