@@ -188,8 +188,8 @@ class Session:
         stored = checkpoint.part("adam")
         state: dict[int, dict[str, Tensor]] = {}
         for index, (name, parameter) in enumerate(self.actor.net.named_parameters()):
-            if not stored:
-                break
+            if not any(f"{key}.{name}" in stored for key in _ADAM):
+                continue  # it had no gradient yet, as an encoder of words before the first word
             values = {key: stored[f"{key}.{name}"] for key in _ADAM}
             if values["step"].ndim or any(values[key].shape != parameter.shape for key in _ADAM[1:]):
                 raise ValueError(f"optimiser state of {name} has another shape")

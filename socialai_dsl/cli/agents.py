@@ -113,23 +113,23 @@ def new_config(arguments: argparse.Namespace) -> RunConfig:
     given["device"] = resolve_device(given.get("device", "auto"))
     given["scenario"] = arguments.scenario
     if not trains:
-        return checked_config("plain", given | {"frames": 0})
+        return checked_config(given | {"frames": 0})
     given.setdefault("threads", automatic_threads())
     given |= _resolved_bonus(given.get("bonus", "none"), arguments.scenario)
     recipe = arguments.recipe or _usual_recipe(given | hyper, arguments.scenario)
     if "frames" not in given and given.get("net") not in NET_PRESETS:
         given["frames"] = frames_for(recipe, arguments.scenario)
-    return checked_config(recipe, given | hyper)
+    return checked_config({"recipe": recipe} | given | hyper)
 
 
-def checked_config(recipe: str, given: dict[str, Any]) -> RunConfig:
+def checked_config(given: dict[str, Any]) -> RunConfig:
     """`trainer.config.configure`, with what is wrong said as the option was typed.
 
     Raises:
         UsageError: a value is out of bounds.
     """
     try:
-        return configure(recipe, **given)
+        return configure(**given)
     except ValidationError as error:
         first = error.errors()[0]
         said = first["msg"].removeprefix("Value error, ")

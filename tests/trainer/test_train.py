@@ -90,6 +90,15 @@ def test_a_run_stopped_three_times_ends_with_the_same_bits(
     assert rows(tmp_path / "parts") == rows(tmp_path / "whole")
 
 
+def test_a_run_that_has_heard_nothing_yet_resumes(tmp_path: Path, small_config: Any) -> None:
+    """What encodes words has had no gradient, so that Adam knows nothing of it."""
+    whole = read(train(small_config(frames=64 * 4), EchoEnvs(8, limit=1), tmp_path / "whole"))
+    assert "adam.step.dialogue.embedding.weight" not in whole.tensors
+    train(small_config(frames=64 * 2), EchoEnvs(8, limit=1), tmp_path / "parts")
+    longer = read(train(small_config(frames=64 * 4), EchoEnvs(8, limit=1), tmp_path / "parts", resume=True))
+    assert all(torch.equal(longer.tensors[name], value) for name, value in whole.tensors.items())
+
+
 def test_a_finished_run_can_be_resumed_for_longer(tmp_path: Path, small_config: Any) -> None:
     whole = read(train(small_config(frames=64 * 5), EchoEnvs(8), tmp_path / "whole"))
     train(small_config(frames=64 * 3), EchoEnvs(8), tmp_path / "parts")
