@@ -71,7 +71,9 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
 }
 
 # What the trainer may use: the facade's names, nothing below it.
-FACADE = {"socialai_dsl"} | {f"socialai_dsl.{name}" for name in ("load", "compile", "make", "make_vec", "evaluation")}
+FACADE = {"socialai_dsl"} | {
+    f"socialai_dsl.{name}" for name in ("load", "compile", "make", "make_vec", "evaluation")
+}
 
 
 def modules(package: str) -> list[Path]:
