@@ -70,10 +70,13 @@ class Session:
         """Begin a run: fresh weights, environments reset with the run's seed.
 
         Raises:
-            ValueError: the environments do not fit the configuration, or are not of the form the trainer learns.
+            ValueError: the environments do not fit the configuration or the program, or are not of the form the
+                trainer learns.
         """
         if envs.num_envs != config.envs:
             raise ValueError(f"envs: got {envs.num_envs} environments, expected envs = {config.envs}")
+        if program is not None:
+            _check_alike(program, envs.program)
         folder = config.code_folder
         net = build_net(config.net, net_spec(envs), config.seed, config.precision, folder).to(config.device)
         tutor = None
@@ -216,6 +219,19 @@ class Session:
                 f"state.memory: got {tuple(stored['memory'].shape)}, expected {tuple(state.memory.shape)}"
             )
         state.memory = stored["memory"].to(state.memory)
+
+
+def _check_alike(program: Any, played: Any) -> None:
+    """Refuse a variant, played for its script, that says or does other things than the scenario itself."""
+    for name in ("actions", "templates", "nouns", "vocabulary"):
+        own, others = list(getattr(program, name)), list(getattr(played, name))
+        if own != others:
+            strange = sorted(set(own) ^ set(others))
+            raise ValueError(
+                f"guide: {played.name} with its script has other {name} than without it"
+                f"{': ' + ', '.join(strange) if strange else ', in another order'}; let both have the same, or train "
+                "without a guide"
+            )
 
 
 _STATE = ("image", "tokens", "starts", "returns", "lengths", "led")

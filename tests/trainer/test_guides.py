@@ -234,3 +234,15 @@ def test_a_scenario_without_a_script_is_refused(small_config: Any) -> None:
         ValueError, match="guide: the scenario has no script to imitate: echo: the agent has no fra"
     ):
         Session.start(guided(small_config), Scriptless(8))
+
+
+def test_a_script_that_says_other_things_than_the_scenario_is_refused(small_config: Any) -> None:
+    """Its words would have other numbers, and the agent could not play the scenario it is for."""
+    plain = EchoEnvs(8).program
+    playing = EchoEnvs(8)
+    Session.start(guided(small_config), playing, plain)
+    playing.program.vocabulary = [*plain.vocabulary, "psst"]
+    with pytest.raises(
+        ValueError, match="guide: echo with its script has other vocabulary than without it: psst; let"
+    ):
+        Session.start(guided(small_config), playing, plain)
