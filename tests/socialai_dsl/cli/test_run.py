@@ -234,11 +234,11 @@ def test_a_trained_agent_is_evaluated_elsewhere(capsys: Capture) -> None:
         (["corridor.yaml", "--seed", "-1"], "--seed: Input should be greater than or equal to 0, got -1"),
         (
             ["corridor.yaml", "--guide", "script"],
-            "corridor.yaml: the agent has no frame, and there is no variant",
+            "corridor.yaml: the agent of corridor has no frame, and there is no variant",
         ),
         (
             ["corridor.yaml", "--recipe", "guided"],
-            "corridor.yaml: the agent has no frame, and there is no variant",
+            "corridor.yaml: the agent of corridor has no frame, and there is no variant",
         ),
         (["corridor.yaml", "--net", "nowhere:Net"], "net: there is no module 'nowhere': looked for "),
         (["corridor.yaml", "--bonus", "mine:Bonus"], "bonus: there is no module 'mine': looked for "),
@@ -366,6 +366,15 @@ def test_a_scripted_scenario_is_guided_unless_another_recipe_is_asked_for(capsys
     assert "--frames: Input should be greater than or equal to 0, got -1" in capsys.readouterr().err
     assert run_main(["help", "--recipe", "plain", *few, "--out", "plain"]) == 0
     assert (result_of("plain")["recipe"], result_of("plain")["guide"]) == ("plain", "none")
+
+
+def test_a_suite_of_which_one_member_has_no_script(capsys: Capture) -> None:
+    Path("two.yaml").write_text("suite: two\nabout: One has a script.\nmembers: [corridor.yaml, help]\n")
+    assert run_main(["two.yaml", *QUICK, "--recipe", "guided", "--out", "here"]) == 2
+    assert "two.yaml: the agent of corridor has no frame" in capsys.readouterr().err
+    assert not Path("here").exists()
+    assert run_main(["two.yaml", *QUICK, "--out", "here"]) == 0
+    assert (result_of("here")["recipe"], result_of("here")["guide"]) == ("plain", "none")
 
 
 def test_unwritable_output(capsys: Capture) -> None:
