@@ -102,10 +102,10 @@ Playable = Program | ProgramSuite
 
 def unscripted(playable: Playable) -> tuple[str, ...]:
     """The members of a suite, or the scenario, in which the agent follows no frame."""
-    is_suite = isinstance(playable, ProgramSuite)
-    programs = (
-        zip(playable.members, playable.programs, strict=True) if is_suite else [(playable.name, playable)]
-    )
+    if isinstance(playable, ProgramSuite):
+        programs = list(zip(playable.members, playable.programs, strict=True))
+    else:
+        programs = [(playable.name, playable)]
     return tuple(name for name, program in programs if not program.header(Header.FLAGS) & Flag.AGENT_FRAME)
 
 
