@@ -114,28 +114,31 @@ def new_config(arguments: argparse.Namespace) -> RunConfig:
     given["device"] = resolve_device(given.get("device", "auto"))
     given["scenario"] = arguments.scenario
     if not trains:
-        return checked_config("plain", given | {"frames": 0})
+        return checked_config(given | {"frames": 0})
     given.setdefault("threads", automatic_threads())
     recipe = arguments.recipe or _usual_recipe(given | hyper, arguments.scenario)
     if "frames" not in given and given.get("net") not in NET_PRESETS:
         given["frames"] = frames_for(recipe, arguments.scenario)
-    return checked_config(recipe, given | hyper)
+    return checked_config({"recipe": recipe} | given | hyper)
 
 
-def checked_config(recipe: str, given: dict[str, Any]) -> RunConfig:
+def checked_config(given: dict[str, Any]) -> RunConfig:
     """`resolved_config`, with what is wrong said as the option was typed.
 
     Raises:
         UsageError: a value is out of bounds.
     """
     try:
-        return resolved_config(recipe, given)
+        return resolved_config(given)
     except ValidationError as error:
         first = error.errors()[0]
-        name = str(first["loc"][0]) if first["loc"] else ""
-        typed = f"--{name.replace('_', '-')}" if name in FLAGS else f"--hyper {name}" if name else "options"
-        got = f", got {first['input']!r}" if name else ""
-        raise UsageError(f"{typed}: {first['msg'].removeprefix('Value error, ')}{got}") from None
+        said = first["msg"].removeprefix("Value error, ")
+        if first["loc"]:
+            name, said = str(first["loc"][0]), f"{said}, got {first['input']!r}"
+        else:  # of options that contradict each other, the message begins with one
+            name, _, said = said.partition(": ")
+        typed = f"--{name.replace('_', '-')}" if name in FLAGS else f"--hyper {name}"
+        raise UsageError(f"{typed}: {said}") from None
 
 
 def _refuse_training_options(given: dict[str, Any], arguments: argparse.Namespace) -> None:
@@ -232,20 +235,8 @@ def scripted_name(scenario: str) -> str | None:
     Raises:
         ScenarioError: the scenario, or its variant, has mistakes.
     """
-    import socialai_dsl
-    from socialai_dsl.program_suite import is_scripted
-
-    if is_scripted(socialai_dsl.compile(socialai_dsl.load(scenario))):
-        return scenario
-    name, mark, parameters = scenario.partition("?")
-    scripted = f"{name}+oracle{mark}{parameters}"
-    try:
-        socialai_dsl.load(scripted)
-    except socialai_dsl.ScenarioError as error:
-        if all(diagnostic.code == "S503" for diagnostic in error.diagnostics):
-            return None
-        raise
-    return scripted
+    name, lacking = _closest_script(scenario)
+    return None if lacking else name
 
 
 def with_script(scenario: str) -> str:
@@ -254,10 +245,31 @@ def with_script(scenario: str) -> str:
     Raises:
         UsageError: there is no script.
     """
-    scripted = scripted_name(scenario)
-    if scripted is None:
-        raise UsageError(f"{scenario}: the agent has no frame, and there is no variant `oracle`")
-    return scripted
+    name, lacking = _closest_script(scenario)
+    if lacking:
+        raise UsageError(
+            f"{scenario}: the agent of {lacking[0]} has no frame, and there is no variant `oracle`"
+        )
+    return name
+
+
+def _closest_script(scenario: str) -> tuple[str, Sequence[str]]:
+    """The scenario itself or its variant `oracle`, and which of its members have no script even there."""
+    import socialai_dsl
+    from socialai_dsl.program_suite import unscripted
+
+    lacking = unscripted(socialai_dsl.compile(socialai_dsl.load(scenario)))
+    if not lacking:
+        return scenario, ()
+    name, mark, parameters = scenario.partition("?")
+    scripted = f"{name}+oracle{mark}{parameters}"
+    try:
+        loaded = socialai_dsl.load(scripted)
+    except socialai_dsl.ScenarioError as error:
+        if all(diagnostic.code == "S503" for diagnostic in error.diagnostics):
+            return scenario, lacking
+        raise
+    return scripted, unscripted(socialai_dsl.compile(loaded))
 
 
 # -- training -----------------------------------------------------------------------------------------------------
