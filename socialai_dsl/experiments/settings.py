@@ -15,7 +15,9 @@ _TABLE: Final = Path(__file__).with_name("paper_bonus.yaml")
 
 
 def resolved_config(given: Mapping[str, Any]) -> RunConfig:
-    """The configuration of a run from its options, `recipe` among them; `bonus` may be `auto`, and its scale is the paper's unless it is given.
+    """The configuration of a run from its options, `recipe` among them.
+
+    `bonus` may be `auto`, and its scale is the paper's unless it is given.
 
     Raises:
         pydantic.ValidationError: see `trainer.config.configure`.

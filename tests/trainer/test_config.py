@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-import trainer
+from socialai_dsl.experiments import settings
 from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, RunConfig, configure
 
 
@@ -147,8 +147,8 @@ def test_code_of_ones_own_is_looked_for_beside_the_scenario_s_file(scenario: str
 
 
 def test_the_exploration_table_is_the_published_one() -> None:
-    table = yaml.safe_load(Path(trainer.__file__).with_name("exploration.yaml").read_text())
-    assert {name: (settings["kind"], settings["c"]) for name, settings in table.items()} == {
+    table = yaml.safe_load(Path(settings.__file__).with_name("paper_bonus.yaml").read_text())
+    assert {name: (listed["kind"], listed["c"]) for name, listed in table.items()} == {
         "talkitout": ("lang", 7),
         "talkitout_no_liar": ("lang", 7),
         "diverse_exit": ("lang", 20),
