@@ -29,6 +29,7 @@ from socialai_dsl.semantics.terms import (
 )
 from socialai_dsl.semantics.wording import described, quoted, spoken
 from socialai_dsl.source import Span
+from socialai_dsl.vocabulary import normal
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
@@ -37,11 +38,6 @@ MAX_TEXTS = 4096
 """How many different texts one line may have."""
 
 _SAYABLE = ("text", "noun", "color", "int", "status", "direction", "action")
-
-
-def normal(text: str) -> str:
-    """What counts of a text when it is matched: not its case, nor a final . ! ? or blanks."""
-    return " ".join(text.casefold().strip().rstrip(".!?").split())
 
 
 class Utterances:
