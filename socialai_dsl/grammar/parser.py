@@ -237,9 +237,18 @@ def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
         return ParseProblem("S202", "something is missing before this bracket", offset)
     hint = None
     if token.type == "NAME":
-        hint = "between two names stands a dot, an operator, or a word such as `and`: `agent.next_to(exit)`"
+        words = next(found[0] for found in _SEVERAL.finditer(text) if found.start() <= offset < found.end())
+        hint = (
+            "between two names stands a dot, an operator, or a word such as `and`: `agent.next_to(exit)`; "
+            f'a text is quoted: "{words}"'
+        )
     return ParseProblem("S210", f"did not expect `{token}` here", offset, hint)
 
+
+_SEVERAL = re.compile(
+    r"\b(?!(?:and|or|not|in|where|to)\b)[\w']+(?: +(?!(?:and|or|not|in|where|to)\b)[\w']+)*"
+)
+"""Words with nothing but blanks between them."""
 
 _WORDS = re.compile(r"\"[^\"]*\"|[<>=!]=|[<>()]|,|\b(?:and|or|not|where|to)\b|[^<>=!()\",\s]+|\s+|.")
 """The pieces of an expression, as far as they say where a comparison begins and ends."""

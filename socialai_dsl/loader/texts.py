@@ -8,10 +8,11 @@ from typing import Final
 from socialai_dsl.loader.document import Data, DataPath
 from socialai_dsl.loader.scalars import read_plain
 
-_TEXTS: Final = frozenset(
-    "say hears templates about notes note skills name state goto goto_now id role frame".split()
-)
-"""Keys of the language whose values are texts or names."""
+_TEXTS: Final = frozenset("say hears templates about notes note skills name state goto goto_now".split())
+"""Keys of the language whose values are texts or names of states."""
+
+_PROSE: Final = frozenset("about notes note skills".split())
+"""Texts for people, for which `null` says that there is none."""
 
 _AUTHORS: Final = frozenset(
     "objects let define state tables memory params frames slots states roles cast set beliefs".split()
@@ -33,10 +34,11 @@ def value_at(path: DataPath, text: str) -> Data | None:
         return None
     keys = _keys(path)
     if _is_text(keys):
-        return text
-    if _may_be_text(keys):
+        return None if text == "null" and keys[-1] in _PROSE else text
+    kept = _kept(keys)
+    if kept:
         value = read_plain(text).value
-        return value if isinstance(value, bool | int) else text
+        return value if type(value) in kept else text
     return None
 
 
@@ -61,9 +63,11 @@ def _is_text(keys: list[str]) -> bool:
     return False
 
 
-def _may_be_text(keys: list[str]) -> bool:
-    """Whether a text can stand there, and a number or truth value as well."""
+def _kept(keys: list[str]) -> tuple[type, ...]:
+    """Kinds of values that can stand there beside texts; none where no text can."""
     match keys:
-        case [*_, "with", _] | [*_, "tables", _, _] | [*_, "grammar", "nouns"] | [*_, "grammars", _, "nouns"]:
-            return True
-    return False
+        case [*_, "with", _] | [*_, "tables", _, _]:
+            return (bool, int)
+        case [*_, "grammar", "nouns"] | [*_, "grammars", _, "nouns"]:
+            return (int,)
+    return ()

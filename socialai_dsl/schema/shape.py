@@ -21,8 +21,9 @@ from socialai_dsl.schema.annotations import (
     model_at,
 )
 from socialai_dsl.schema.behaviour import Npc, Ranged, State, ThenRule
+from socialai_dsl.schema.indentation import mend_indentation
 from socialai_dsl.schema.positions import DataPath, Positions
-from socialai_dsl.schema.repair import RenamedPlaces, Repaired, copied, fill_gaps, part_at
+from socialai_dsl.schema.repair import MovedPlaces, Repaired, copied, fill_gaps, part_at
 from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.source import Span
 
@@ -69,22 +70,34 @@ def model_of(
             scenario will give it.
     """
     repaired = Repaired(copied(data))
-    fill_gaps(repaired, places, bag)
+    known = len(bag)
+    made = _tried(model, repaired.data)
+    if made is None:
+        mend_indentation(model, repaired, places, bag)
+    found: Positions = MovedPlaces(places, repaired.moved)
+    fill_gaps(repaired, found, bag)
+    if made is not None and len(bag) == known:
+        return Shaped(made, repaired.data, places, False)
     try:
-        made: M | None = _made(model, repaired.data)
+        made = _made(model, repaired.data)
     except ValidationError as error:
-        _Report(model, repaired, places, bag, partial, parameters).add_all(error)
-        made = None
-        with suppress(ValidationError):
-            made = _made(model, repaired.data)
+        _Report(model, repaired, found, bag, partial, parameters).add_all(error)
+        made = _tried(model, repaired.data)
     lost = any(_matters(path) for path in repaired.lost)
-    kept: Positions = RenamedPlaces(places, repaired.renamed) if repaired.renamed else places
+    kept = found if repaired.moved else places
     return Shaped(made, repaired.data, kept, lost)
 
 
 def _made(model: type[M], data: object) -> M:
     """The model of data; a field that has an alias (`for`, `with`) is known by that alone."""
     return model.model_validate(data, by_alias=True, by_name=False)
+
+
+def _tried(model: type[M], data: object) -> M | None:
+    """The model of data; None if the data has mistakes."""
+    with suppress(ValidationError):
+        return _made(model, data)
+    return None
 
 
 _INDIFFERENT: Final = frozenset(

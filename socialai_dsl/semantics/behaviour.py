@@ -328,7 +328,9 @@ class _Planner:
             findings.error("S106", message, findings.at(path))
             return None, None
         if term.type.low < 1:
-            message = f"`for` can be {term.type.low} here; a number that is not known beforehand is at least 1"
+            message = (
+                f"`for` can be {term.type.low} here; a number that is not known beforehand is at least 1"
+            )
             findings.error("S106", message, findings.at(path), hint=f"write `max(1, {raw})`")
             return None, None
         clock = Read(Type("int", 0, horizon), f"{self.played.member}.clock")

@@ -37,15 +37,19 @@ class Findings:
     substituted: frozenset[DataPath] = frozenset()
     data: object = None
 
-    def is_list(self, path: DataPath) -> bool:
-        """Whether a list is written at `path`."""
+    def part(self, path: DataPath) -> object:
+        """What is written at `path`; None if nothing is."""
         part: Any = self.data
         for step in path:
             known = range(len(part)) if isinstance(part, list) else part if isinstance(part, dict) else ()
             if step not in known:
-                return False
+                return None
             part = part[step]
-        return isinstance(part, list)
+        return part
+
+    def is_list(self, path: DataPath) -> bool:
+        """Whether a list is written at `path`."""
+        return isinstance(self.part(path), list)
 
     def at(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
         """The place of a character of the text at `path`."""

@@ -32,6 +32,7 @@ from socialai_dsl.semantics.terms import (
     World,
 )
 from socialai_dsl.semantics.wording import described, usage, words_of
+from socialai_dsl.vocabulary import normal
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
@@ -257,7 +258,18 @@ def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: S
         hint = None if near else "one of " + words_of(expected)
     elif expected is not None and expected.kind == "bool" and word.casefold() in _YES_AND_NO:
         message = f"`{word}` means nothing here; a truth is written `true` or `false`"
+    nouns = [noun for noun in resolver.symbols.nouns.words if normal(noun) == normal(word)]
+    if nouns and (expected is None or expected.kind == "noun"):
+        near, place, hint = _as_text(resolver, nouns[0], word, scope), None, "a noun is quoted, as every text"
+    elif near is None and expected is None:
+        hint = f"if a text is meant, quote it: {_as_text(resolver, word, word, scope)}"
     return resolver.fail("S201", message, node, scope, suggestion=near, suggestion_place=place, hint=hint)
+
+
+def _as_text(resolver: Resolver, text: str, word: str, scope: Scope) -> str:
+    """How a text is written in place of a word: where that is the whole value, YAML takes the outer quotes away."""
+    whole = resolver.findings.part(scope.path) == word
+    return f"""'"{text}"'""" if whole else f'"{text}"'
 
 
 def suggestion(

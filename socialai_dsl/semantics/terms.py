@@ -516,7 +516,8 @@ class StepPlan:
 
     Attributes:
         state: its name, if any. until: what ends it.
-        duration: for how many turns; -1: for ever. lasted: whether it has lasted as long as a value that is computed says.
+        duration: for how many turns; -1: for ever.
+        lasted: whether it has lasted for as many turns as a value that is computed says.
     """
 
     name: str
