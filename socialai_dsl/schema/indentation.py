@@ -111,9 +111,7 @@ class _Mender:
         element = _element(annotation_at(self._model, path))
         if element is None:
             return True
-        if isinstance(value, dict):
-            return not value or _looks_like(value, element) or not self._is_word_of(path, element, key)
-        return key not in keys_of(element)
+        return value == {} or _looks_like(value, element) or not self._is_word_of(path, element, key)
 
     def _is_word_of(self, path: DataPath, element: type[BaseModel], key: str) -> bool:
         """Whether a key is a word of what is in a mapping of names, or of what is around it."""

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from socialai_dsl.diagnostics import DiagnosticBag
-from socialai_dsl.schema.behaviour import FirstRule, ThenRule, WorldRule
+from socialai_dsl.schema.behaviour import FirstRule, Step, ThenRule, WorldRule
 from socialai_dsl.schema.positions import DataPath, Positions
 from socialai_dsl.source import Span
 
-_KEYS = {key for model in (FirstRule, ThenRule, WorldRule) for key in model.model_fields}
+_KEYS = {key for model in (FirstRule, ThenRule, Step, WorldRule) for key in model.model_fields}
 """Keys of rules, which are mostly written inside { }."""
 
 
@@ -127,8 +127,11 @@ def _join_cut_values(
 
 
 def _looks_cut(key: str, before: str, path: DataPath, places: Positions) -> bool:
-    inside = places.in_flow((*path, key))
-    return inside and (not key.isidentifier() or before.count("(") > before.count(")"))
+    """Whether a key without a value is the rest of the value before it."""
+    if not places.in_flow((*path, key)):
+        return False
+    in_text = path[-1:] == ("with",) or (isinstance(path[-1], int) and key not in _KEYS) if path else False
+    return in_text or not key.isidentifier() or before.count("(") > before.count(")")
 
 
 def _report_nothing(path: DataPath, places: Positions, bag: DiagnosticBag) -> None:

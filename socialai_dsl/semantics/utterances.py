@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product
@@ -37,6 +38,9 @@ if TYPE_CHECKING:
 
 MAX_TEXTS = 4096
 """How many different texts one line may have."""
+
+_JOINED = re.compile(r"\s*\|\s*|\s+or\s+")
+"""What an author may put between alternatives."""
 
 _SAYABLE = ("text", "noun", "color", "int", "status", "direction", "action")
 
@@ -285,6 +289,11 @@ class Utterances:
             missing = f"`{word}`" if word not in nouns else "what is missing"
             report("S402", message, span, hint=f"add {missing} to the nouns, or narrow what is drawn")
             return
+        alternatives = [part for part in _JOINED.split(said) if part]
+        if len(alternatives) > 1 and any(self._match(part) for part in alternatives):
+            message = f'nobody can say "{said}" with this grammar'
+            hint = f"alternatives are a list: [{', '.join(alternatives)}]"
+            raise findings.fail("S401", message, span, hint=hint)
         near = did_you_mean(said, [*self.all_texts(), *(self._resolver.npc_texts if from_npcs else ())])
         raise findings.fail(
             "S401",
