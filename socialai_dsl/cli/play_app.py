@@ -15,7 +15,7 @@ from textual.suggester import Suggester
 from textual.widgets import Input, OptionList, Static
 
 from socialai_dsl.cli.play_game import Game, Played
-from socialai_dsl.cli.play_words import ahead, view_text
+from socialai_dsl.cli.play_words import ahead
 from socialai_dsl.cli.typed import Phrases, split_line
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.engine.errors import RoomError
@@ -270,8 +270,12 @@ class PlayApp(App[list[Played]]):
             Text(printable(f"{game.title}{member} · step {game.steps} · reward {now.reward:.3f}"))
         )
         self.query_one("#room", Static).update(Text.from_ansi(game.room()))
-        self.query_one("#view", Static).update(Text.from_ansi(view_text(now.view)))
-        facts = Text.assemble("ahead: ", (ahead(now.view), "bold"), "\n\n", (printable(game.about), "dim"))
+        view = game.view()
+        self.query_one("#view", Static).update(Text.from_ansi(view.text))
+        shown = "".join(f"\n{line}" for line in view.figures)
+        facts = Text.assemble(
+            "ahead: ", (ahead(now.view), "bold"), shown, "\n\n", (printable(game.about), "dim")
+        )
         self.query_one("#facts", Static).update(facts)
         self._show_told()
         if self.query_one("#right").has_class("behind"):

@@ -154,7 +154,7 @@ class Traced:
         member, cast = info.get("member"), self._cast(info)
         return Trace(
             *(self.scenario, self.agent, origin, member, cast, self._names()),
-            picture=env.render(),
+            picture=env.plain_text(),
             state=env.describe(),
         )
 
@@ -179,7 +179,7 @@ class Traced:
                 done["action"],
                 None if done["said"] is None else str(done["said"]),
                 () if info["utterance"] == "NA" else tuple(info["utterance"].splitlines()),
-                env.render(),
+                env.plain_text(),
                 after,
                 self._cast(info),
                 changes(before, after),
