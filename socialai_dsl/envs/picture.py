@@ -48,13 +48,14 @@ def plain_text(table: Table, row: int) -> str:
 def coloured_text(table: Table, row: int) -> str:
     """The room as text with escape codes for colours, what the agent has in view on a lighter ground.
 
-    Where the scenario shows its agent gestures, lines below the room say who points and what everybody did last.
+    Where the scenario shows its agent gestures, lines below the room say who points and who did what last.
     """
     codes, agent = table.cells(row)
     width, height = table.room(row)
     seen = _seen(table, row, agent)[:height, :width]
     gestures = gestures_of(table.program(row), table.state.registers[row])
-    told = figures(codes[:height, :width], gestures) if gestures else []
+    shown = {place: gesture for place, gesture in gestures.items() if gesture.words}
+    told = figures(codes[:height, :width], shown, shown)
     return "\n".join([draw_ansi(codes[:height, :width], agent, colour=True, seen=seen), *told])
 
 

@@ -1,6 +1,6 @@
 """This module turns what a room looks like now into pictures and text, without a display."""
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from typing import Final
 
 import numpy as np
@@ -134,10 +134,22 @@ def draw_ansi(
     return "\n".join(lines)
 
 
-def figures(codes: NDArray[np.uint8], gestures: Mapping[tuple[int, int], Gesture]) -> list[str]:
-    """What the two letters of an NPC do not say, one line each in reading order: `A> 3,1 red, points down`."""
+def figures(
+    codes: NDArray[np.uint8],
+    gestures: Mapping[tuple[int, int], Gesture],
+    places: Container[tuple[int, int]] | None = None,
+) -> list[str]:
+    """What the two letters of an NPC do not say, one line each in reading order: `A> 3,1 red, points down`.
+
+    Args:
+        codes: as for `draw_grid`.
+        gestures: (x, y) -> where the NPC there points and what it did last.
+        places: the cells to be told of; None for all.
+    """
     lines = []
     for row, column in np.argwhere(codes[..., 0] == tiles.NPC).tolist():
+        if places is not None and (column, row) not in places:
+            continue
         code, gesture = _code(codes, row, column), gestures.get((column, row))
         said = [COLORS[code[1] % len(COLORS)], *([gesture.words] if gesture and gesture.words else [])]
         lines.append(f"{_letters_of(code)} {column},{row} {', '.join(said)}")
