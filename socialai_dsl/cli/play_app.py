@@ -163,9 +163,9 @@ class PlayApp(App[list[Played]]):
         try:
             self._game.act(movement, sentence)
         except ValueError:
-            near = self._game.phrases.corrected(sentence or "")
-            hint = f"; did you mean {near!r}? Tab puts it in" if near is not None else ""
-            self.tell(f"{sentence!r} cannot be said{hint}", "bad")
+            phrases, line = self._game.phrases, sentence or ""
+            hint = " Tab puts it in" if phrases.corrected(line) is not None else ""
+            self.tell(phrases.problem(line) + hint, "bad")
             return
         line = self.query_one(_Line)
         line.value = ""
@@ -471,7 +471,8 @@ def _help(actions: Sequence[str], practice: bool) -> str:
     lines = [
         ", ".join([*moves, ". stand still"]),
         "",
-        "/ or Enter   type a sentence, a movement, or both: forward How are you",
+        "/ or Enter   type a sentence, a movement, or both: forward How are you;",
+        "             . or none stands still",
         "             Tab completes what is begun, or puts in what was meant",
         "c            choose a sentence from lists",
         "PgUp PgDn    what was said before",
