@@ -22,6 +22,7 @@ CODES: Final[dict[str, str]] = {
     "S006": "encoding or control character",
     "S007": "a file that cannot be read",
     "W008": "a comment that ignores nothing",
+    "W009": "a text that a comment cuts short",
     # S1xx: the shape of the document
     "S101": "unknown key",
     "S102": "a comma inside { } ends the value",

@@ -118,13 +118,17 @@ def _parts(checked: Checked) -> Iterator[tuple[_Key, Part]]:
 
 def _missing(parts: list[tuple[_Key, Part]], seen: _Seen) -> list[Part]:
     """What has not happened; what several members have in common has happened if it did with one of them."""
-    happened = {
-        part.span
-        for key, part in parts
-        if (key in seen.names if isinstance(key, str) else key[1] in seen.states.get(key[0], ()))
-    }
+    happened = {part.span for key, part in parts if _has_happened(key, part, seen)}
     missing = {part.span: part for _, part in reversed(parts) if part.span not in happened}
     return sorted(missing.values(), key=lambda part: (part.span.file, part.span.line, part.span.column))
+
+
+def _has_happened(key: _Key, part: Part, seen: _Seen) -> bool:
+    if isinstance(key, str):
+        return key in seen.names
+    states = seen.states.get(key[0], set())
+    # Entries of `steps` follow each other, and one that ends in the turn in which it begins is not seen in between.
+    return max(states, default=-1) >= key[1] if part.kind == "step" else key[1] in states
 
 
 def _play_at_random(program: Program, seen: _Seen, effort: Effort) -> None:

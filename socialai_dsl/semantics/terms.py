@@ -512,7 +512,13 @@ class StatePlan:
 
 @dataclass(frozen=True, slots=True)
 class StepPlan:
-    """An entry of `steps`. `steps` None: until finished (or one step); -1: for ever. `state` is its name, if any."""
+    """An entry of `steps`.
+
+    Attributes:
+        state: its name, if any. until: what ends it.
+        duration: for how many turns; -1: for ever.
+        lasted: whether it has lasted for as many turns as a value that is computed says.
+    """
 
     name: str
     state: str | None
@@ -520,9 +526,15 @@ class StepPlan:
     span: Span
     until: Sited | None = None
     duration: int | None = None
+    lasted: Sited | None = None
     sets: tuple[tuple[str, Sited], ...] = ()
     causes: tuple[Effect, ...] = ()
     say: Line | None = None
+
+    @property
+    def ends_with_its_activity(self) -> bool:
+        """Whether nothing else says how long it lasts."""
+        return self.until is None and self.duration is None and self.lasted is None
 
 
 @dataclass(frozen=True, slots=True)
