@@ -160,6 +160,7 @@ class _Entry:
             raise self._findings.fail(
                 "S201", message, self._findings.at(path, width=len(word)), suggestion=near
             )
+        self._resolver.used.add(("let", word))
         return f"let.{word}"
 
     def _not_a_pick(self, path: DataPath, word: str) -> Exception:
