@@ -45,7 +45,7 @@ def check_absences(checked: Checked, findings: Findings, undecided: Collection[i
     no cell in rooms that are drawn (S601 in all, W603 in some).
     """
     placings = [item for item in checked.setup if isinstance(item, Placing)]
-    asked = [item for item in placings if item.entity in undecided and _asks_about_cells(item)]
+    asked = [item for item in placings if item.entity in undecided and asks_about_cells(item)]
     told: set[str] = set()
     for placing in placings:
         if placing.at is not None and (share := _outside(placing.at, checked)):
@@ -104,7 +104,7 @@ def _sizes_of(checked: Checked) -> str:
     return f"x goes from 0 to {width - 1} and y from 0 to {height - 1}, walls included"
 
 
-def _asks_about_cells(placing: Placing) -> bool:
+def asks_about_cells(placing: Placing) -> bool:
     """Whether a place may be empty without being meant to: a `where` that reads no cell decides who is there."""
     return placing.where is None or any(_reads_cell(part) for part in walk(placing.where))
 
