@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 SUMMARY: Final = "verify the properties that scenarios claim in `check`, and that everything in them can happen and be known"
 
-ROOMS: Final = 200
+ROOMS: Final = 100
 STATES: Final = 50_000
 SECONDS: Final = 20.0
 

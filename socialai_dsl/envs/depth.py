@@ -9,7 +9,7 @@ from socialai_dsl.checking import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.envs.alone import Alone, success_alone
 from socialai_dsl.envs.effort import Effort
-from socialai_dsl.envs.properties import Trial, solved_by_script
+from socialai_dsl.envs.properties import Trial
 from socialai_dsl.envs.search import Finding, Verdict
 
 
@@ -39,7 +39,7 @@ def depth(trial: Trial, effort: Effort) -> Depth:
     findings = list(trial.successes(searching, "shortest successes"))
     unsolved = None
     if trial.scripted is not None:
-        unsolved = tuple((~solved_by_script(trial.scripted, effort)).nonzero()[0].tolist())
+        unsolved = tuple((~trial.solved).nonzero()[0].tolist())
     return Depth(
         len(findings),
         tuple(sorted(finding.steps for finding in findings if finding.steps is not None)),

@@ -67,7 +67,7 @@ class Clock:
 class Effort:
     """How much is tried: rooms 0, 1, ... of a seed, so many states of each, as long as the clock says."""
 
-    rooms: int = 200
+    rooms: int = 100
     seed: int = 0
     states: int = 50_000
     clock: Clock = field(default_factory=Clock, compare=False)

@@ -189,8 +189,7 @@ class Guessing:
                 apart = np.flatnonzero(~alike & reached.going.all(axis=1) & exact)
                 if len(apart):
                     return made[int(apart[0])]
-                kept = self._numbers_of_new(reached)
-                kept = kept[(alike & reached.going.all(axis=1) & exact)[kept]]
+                kept = self._new(reached, alike & reached.going.all(axis=1) & exact)
                 following.append(reached.part(kept))
                 longer += [made[number] for number in kept.tolist()]
                 if len(self._seen) > effort.states or effort.clock.is_over:
@@ -211,7 +210,7 @@ class Guessing:
                 if (reached.won > self._level).any():
                     return Guess(Answer.KNOWS, len(self._seen), True, step)
                 hopeful = reached.won + reached.going @ self._weights > self._level
-                following.append(self._new(reached.part(np.flatnonzero(hopeful & alike))))
+                following.append(reached.part(self._new(reached, hopeful & alike)))
                 if late is None and (~alike).any():
                     late = step
                 if self._may_know(reached.part(np.flatnonzero(hopeful & ~alike)), states):
@@ -289,37 +288,43 @@ class Guessing:
     def _step(self, layer: _Together) -> tuple[_Together, NDArray[np.bool_]]:
         """Do everything in these states; what follows, and whether the rooms that go on still look alike."""
         count = len(layer)
-        before = layer.repeated(len(self._actions))
-        return self._advance(before, np.tile(self._actions, (count, 1)), np.tile(self._marks, count))
+        return self._advance(layer, np.tile(self._actions, (count, 1)), np.tile(self._marks, count))
 
     def _advance(
-        self, before: _Together, actions: NDArray[np.int64], chance: NDArray[np.uint64]
+        self, layer: _Together, actions: NDArray[np.int64], chance: NDArray[np.uint64]
     ) -> tuple[_Together, NDArray[np.bool_]]:
-        """Do one action in each of these states, int64 (S, 4), with other draws of this step, uint64 (S,)."""
+        """Do actions in each of S states, equally many, int64 (S times k, 4), with other draws of this step, uint64.
+
+        What follows are views of the table, until the next step.
+        """
         state, ports = self._table.state, self._table.batch.ports
-        rooms = len(self._weights)
-        used = len(before) * rooms
-        state.registers[:used] = before.registers.reshape(used, -1)
+        count, rooms = layer.going.shape
+        times = len(actions) // count
+        used = count * times * rooms
+        going, won = np.repeat(layer.going, times, axis=0), np.repeat(layer.won, times)
+        for own, given in (
+            (state.registers, layer.registers),
+            (state.boards, layer.boards),
+            (state.keys, layer.keys),
+        ):
+            own[:used].reshape(count, times, rooms, -1)[...] = given[:, None]
         state.registers[used:, Register.ENDED] = 1
-        state.registers[:used, Register.ENDED] = ~before.going.reshape(used)
-        state.boards[:used] = before.boards.reshape(used, -1)
-        keys = before.keys.reshape(used, -1).copy()
-        own = keys[:, Key.KEY].copy()
-        keys[:, Key.KEY] ^= np.repeat(chance, rooms)
-        state.keys[:used] = keys
+        state.registers[:used, Register.ENDED] = ~going.reshape(used)
+        changed = np.repeat(chance, rooms)
+        state.keys[:used, Key.KEY] ^= changed
         ports.actions[:used] = np.repeat(actions, rooms, axis=0)
         self._table.batch.step(Task.STEP_ONLY)
+        state.keys[:used, Key.KEY] ^= changed
 
-        registers, keys = state.registers[:used].copy(), state.keys[:used].copy()
-        keys[:, Key.KEY] = own
+        registers = state.registers[:used]
         ended = (registers[:, Register.ENDED] != 0).reshape(-1, rooms)
-        wins = self._wins[registers[:, Register.OUTCOME]].reshape(-1, rooms) & ended & before.going
+        wins = self._wins[registers[:, Register.OUTCOME]].reshape(-1, rooms) & ended & going
         reached = _Together(
             registers.reshape(-1, rooms, registers.shape[1]),
-            state.boards[:used].copy().reshape(-1, rooms, state.boards.shape[1]),
-            keys.reshape(-1, rooms, keys.shape[1]),
-            before.going & ~ended,
-            before.won + wins @ self._weights,
+            state.boards[:used].reshape(-1, rooms, state.boards.shape[1]),
+            state.keys[:used].reshape(-1, rooms, state.keys.shape[1]),
+            going & ~ended,
+            won + wins @ self._weights,
         )
         return reached, self._look_alike(reached.going, self._observed(registers).reshape(-1, rooms))
 
@@ -338,16 +343,14 @@ class Guessing:
         first = np.take_along_axis(observed, going.argmax(axis=1)[:, None], axis=1)
         return np.asarray(~(going & (observed != first)).any(axis=1))
 
-    def _new(self, reached: _Together) -> _Together:
-        """Those states that were not seen before."""
-        return reached.part(self._numbers_of_new(reached))
-
-    def _numbers_of_new(self, reached: _Together) -> NDArray[np.intp]:
-        digests = self._digests(reached)
+    def _new(self, reached: _Together, wanted: NDArray[np.bool_]) -> NDArray[np.intp]:
+        """The numbers of those wanted states, (S,), that were not seen before."""
+        rows = np.flatnonzero(wanted)
+        digests = self._digests(reached)[rows]
         _, firsts = np.unique(digests, return_index=True)
         new = [k for k in np.sort(firsts).tolist() if int(digests[k]) not in self._seen]
         self._seen.update(digests[new].tolist())
-        return np.array(new, np.intp)
+        return rows[new]
 
     def _digests(self, layer: _Together) -> NDArray[np.uint64]:
         count, rooms = layer.going.shape

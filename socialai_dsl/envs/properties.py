@@ -92,6 +92,13 @@ class Trial:
         """The rooms, with what is known of each."""
         return Rooms(self.loaded.checked, self.program, self.effort)
 
+    @cached_property
+    def solved(self) -> NDArray[np.bool_]:
+        """In which rooms the script succeeds, (rooms,); in none if there is no script."""
+        if self.scripted is None:
+            return np.zeros(self.effort.rooms, np.bool_)
+        return solved_by_script(self.scripted, self.effort)
+
     def successes(self, effort: Effort, what: str) -> Iterator[Finding]:
         """A shortest success of room after room."""
         return effort.each_room(what, lambda room: self.rooms.success(room, effort), _is_decided)
@@ -292,7 +299,7 @@ def _oracle(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     if trial.scripted is None:
         said = "nobody plays: the agent has no frame, and there is no variant `oracle`"
         return Report(Verdict.FAILS, 0, 0, 0, (), said, 0)
-    won, idle = solved_by_script(trial.scripted, effort), trial.rooms.solved_by_idling
+    won, idle = trial.solved, trial.rooms.solved_by_idling
     said = f"its own script solves {won.sum()} of {_rooms(effort.rooms)}"
     against = tuple(np.flatnonzero(~won).tolist()[:_SHOWN])
     verdict = Verdict.HOLDS if won.mean() >= max(plan.share, 1 / len(won)) - 1e-9 else Verdict.FAILS
@@ -459,6 +466,8 @@ class _Needing:
 
     def _with_them(self, room: int, alone: Finding) -> tuple[Answer | str, bool]:
         """Nobody succeeds without them; with them?"""
+        if self._trial.solved[room]:
+            return Answer.GUESSES, alone.exact
         verdict = self._trial.rooms.success(room, self._effort).verdict
         if verdict is Searched.UNSOLVABLE:
             return _NO_SUCCESS, True

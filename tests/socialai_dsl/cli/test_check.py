@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from socialai_dsl.cli.main import main
+from socialai_dsl.envs.search import Search
 
 Capture = pytest.CaptureFixture[str]
 ROOT = Path(__file__).parents[3]
@@ -122,6 +124,70 @@ def test_every_member_of_a_suite_is_checked(capsys: Capture) -> None:
     named = [line.split(":")[0] for line in capsys.readouterr().out.splitlines() if not line.startswith(" ")]
     assert named[:3] == ["talkitout", "dance", "cointhief"]
     assert len(named) == 6
+
+
+def test_progress_is_told_beside_the_results(
+    gate: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("socialai_dsl.envs.effort._QUIET", 0.0)
+    assert main(["check", claiming(gate, "{reachable: out}"), "--rooms", "2"]) == 0
+    captured = capsys.readouterr()
+    assert captured.err.splitlines()[:2] == [
+        "reachable: out: room 0 of 2",
+        "reachable: out: room 1 of 2",
+    ]
+    assert "room 1 of 2" not in captured.out
+
+
+def test_quick_checks_tell_no_progress(gate: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("socialai_dsl.envs.effort._QUIET", 3600.0)
+    assert main(["check", str(gate), "--rooms", "2"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_what_there_was_time_for_is_said(gate: Path, capsys: Capture) -> None:
+    name = claiming(gate, "{reachable: out}")
+    assert main(["check", name, "--rooms", "2", "--seconds", "1e-9"]) == 0
+    out = capsys.readouterr().out
+    assert "  undecided: `reachable: out`: there was no time to look at a room" in out
+    assert (
+        "  of 2 rooms there was time for 0 for `reachable: out`, 0 for `knowable: true`; "
+        "`--seconds` gives more time" in out
+    )
+    assert main(["check", name, "--rooms", "2", "--seconds", "1e-9", "--strict"]) == 1
+    assert main(["check", name, "--rooms", "2", "--seconds", "0"]) == 0
+    assert "there was time for" not in capsys.readouterr().out.partition("holds")[2]
+
+
+def test_an_interrupted_check_tells_what_is_known(
+    gate: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C in the third room of the second property."""
+    rooms = 4
+    searched = Search.solve
+    calls = []
+
+    def interrupting(self: Search, *arguments: Any) -> Any:
+        calls.append(self)
+        if len(calls) == rooms + 3:
+            raise KeyboardInterrupt
+        return searched(self, *arguments)
+
+    monkeypatch.setattr(Search, "solve", interrupting)
+    name = claiming(gate, "{reachable: out, share: 1}", "{never: guard.is(asleep)}", "{within: 3}")
+    assert main(["check", name, "--rooms", str(rooms)]) == 130
+    assert capsys.readouterr().out.splitlines() == [
+        f"{name}: 4 rooms of seed 0",
+        "  holds: `reachable: out`: it can come about in 4 of 4 rooms",
+        "  holds: `never: guard.is(asleep)`: it can come about in 0 of 2 rooms",
+        "  of 4 rooms there was time for 2 for `never: guard.is(asleep)`; it was interrupted",
+    ]
+
+
+@pytest.mark.parametrize("seconds", ["-1", "inf", "nan"])
+def test_seconds_are_a_number(gate: Path, seconds: str, capsys: Capture) -> None:
+    assert main(["check", str(gate), f"--seconds={seconds}"]) == 2
+    assert f"--seconds: got {seconds}, expected at least 0" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("option", ["--rooms", "--states"])
