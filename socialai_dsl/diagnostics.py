@@ -60,7 +60,10 @@ CODES: Final[dict[str, str]] = {
     "W311": "a rule that never fires",
     "S312": "states that go round within one step",
     "S313": "two frames that move one body",
+    "W314": "something that can never hold",
     "S315": "files of `one_of` that differ where they must not",
+    "S316": "no success or no room is possible",
+    "W317": "a definition that nothing uses",
     # S4xx: what can be said
     "S401": "an utterance that nobody can say",
     "S402": "a value that cannot be said",
@@ -75,6 +78,8 @@ CODES: Final[dict[str, str]] = {
     "S508": "not a scenario name",
     # S6xx: the room
     "S601": "a placement without a free cell",
+    "S602": "a place outside of the room",
+    "W603": "somebody or something that is absent in some rooms",
     # S7xx: experiments
     "S701": "settings for a condition that does not exist",
     "S702": "a seed given twice",

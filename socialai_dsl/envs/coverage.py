@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from socialai_dsl.checking import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.engine.calls import Task
-from socialai_dsl.envs.properties import Effort
+from socialai_dsl.envs.effort import Effort
 from socialai_dsl.envs.search import Search
 from socialai_dsl.envs.search import Verdict as Searched
 from socialai_dsl.envs.table import Table
@@ -159,11 +159,16 @@ def _search(program: Program, parts: list[tuple[_Key, Part]], seen: _Seen, effor
     table = Table([program], effort.rooms, 1)
     table.reset(effort.seed, None)
     search, state = Search(program, (), seen.watch), table.state
-    proven = True
-    for row in range(effort.rooms):
-        finding = search.solve(state.registers[row], state.boards[row], state.keys[row], effort.states)
+
+    def find(row: int) -> bool:
+        start = state.registers[row], state.boards[row], state.keys[row]
+        finding = search.solve(*start, effort.states, effort.clock)
         seen.count(search.counters())
-        proven &= finding.verdict is Searched.UNSOLVABLE and finding.exact
+        return finding.verdict is Searched.UNSOLVABLE and finding.exact
+
+    ends = []
+    for ended in effort.each_room("whether everything can happen", find, bool):
+        ends.append(ended)
         if not _missing(parts, seen):
             break
-    return proven
+    return len(ends) == effort.rooms and all(ends)

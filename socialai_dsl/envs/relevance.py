@@ -101,6 +101,10 @@ class Relevance:
     chance: bool
     drawn: bool
 
+    def of_rows(self, registers: NDArray[np.int16]) -> NDArray[np.int16]:
+        """What matters of registers, int16 (..., R), as int16 (..., N)."""
+        return np.minimum(np.take(registers, self.registers, axis=-1), self.limits)
+
     @classmethod
     def of(cls, program: Program) -> Relevance:
         """Find out from the code."""

@@ -71,6 +71,7 @@ class Resolver:
         frames: member -> the frame it plays.
         npc_texts: every text that an NPC can say, for what others may hear. said_by: member -> those it can say.
         readings: how everything was written that has been given a meaning.
+        used: where the definitions and draws stand that something uses.
     """
 
     def __init__(
@@ -89,6 +90,7 @@ class Resolver:
         self.npc_texts: dict[str, None] = {}
         self.said_by: dict[str, dict[str, None]] = {}
         self.readings = Readings()
+        self.used: set[DataPath] = set()
         self._within: list[tuple[ast.Expr, Scope]] = []
         self._parts = self._all_parts = 0
         self._tables: dict[str, tuple[tuple[str, ...], tuple[Term, ...]] | None] = {}

@@ -154,6 +154,7 @@ def _declared(resolver: Resolver, node: ast.Name, expected: Type | None, scope: 
     if word in symbols.scenario.state:
         return resolver.registers.read(f"state.{word}", expected, resolver.findings.node(scope.path, node))
     if word in symbols.scenario.let:
+        resolver.used.add(("let", word))
         return resolver.registers.read(f"let.{word}", expected, resolver.findings.node(scope.path, node))
     if word in symbols.defines:
         return expanded(resolver, symbols.defines[word], {}, node, expected, scope)
@@ -429,6 +430,7 @@ def expanded(
     scope: Scope,
 ) -> Term:
     """The value of a definition where it is used; `arguments` are resolved in the user's scope."""
+    resolver.used.add(define.path)
     if len(arguments) != len(define.parameters):
         wanted = ", ".join(define.parameters)
         raise resolver.fail("S211", f"`{define.name}` takes ({wanted})", node, scope)

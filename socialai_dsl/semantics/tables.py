@@ -11,7 +11,7 @@ from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import resolve_names
 from socialai_dsl.semantics.build import all_of
 from socialai_dsl.semantics.findings import FailedError, surviving
-from socialai_dsl.semantics.possible import values_of
+from socialai_dsl.semantics.possible_values import values_of
 from socialai_dsl.semantics.scope import Scope, reset_scope
 from socialai_dsl.semantics.terms import Compare, Const, Quantified, Read, Select, Sited, Term, Type, Variable
 from socialai_dsl.semantics.wording import described, quoted, spoken

@@ -732,10 +732,11 @@ class PropertyPlan:
     `reachable` and `never` are about `condition` or, without one, the outcomes of the names in `goals`; `condition` may
     read `remembered`, which belongs to it alone. `share`: the least share of rooms, of `oracle` that of successes;
     None where none is given. `steps`: of `within`. `members`: of `needs` and `only_through`, as in the cast.
-    `draws`: the registers whose values are tried (`let.exit`), of which for `needs` one is enough.
+    `draws`: the registers whose values are tried (`let.exit`), of which for `needs` one is enough. `expected`: whether
+    what success depends on is to be `knowable`, or not to be.
     """
 
-    kind: Literal["reachable", "never", "within", "oracle", "needs", "only_through"]
+    kind: Literal["reachable", "never", "within", "oracle", "needs", "only_through", "knowable"]
     text: str
     site: str
     span: Span
@@ -746,6 +747,7 @@ class PropertyPlan:
     steps: int = 0
     members: tuple[str, ...] = ()
     draws: tuple[tuple[str, tuple[int, ...]], ...] = ()
+    expected: bool = True
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from socialai_dsl.semantics import resolve_groups
 from socialai_dsl.semantics.alternatives import by_value, drawn, select
 from socialai_dsl.semantics.build import all_of, any_of, walk
 from socialai_dsl.semantics.findings import FailedError
-from socialai_dsl.semantics.possible import values_of
+from socialai_dsl.semantics.possible_values import values_of
 from socialai_dsl.semantics.scope import Draws, Scope
 from socialai_dsl.semantics.terms import (
     Compare,
