@@ -9,6 +9,7 @@ from socialai_dsl.program import BOARDS, CONSTANT, TEMPORARIES, TEMPORARY, TESTS
 from socialai_dsl.source import Span
 
 LARGEST = CONSTANT // 2 - 1
+"""Greatest magnitude of a value that an operand word can hold."""
 _STATES_OF_AN_ANSWER = 255
 """States that `Op.ANSWER` has room for."""
 

@@ -85,7 +85,12 @@ class Changes:
                 return self._items(term)
             case terms.Quantified() if term.to is not None:
                 return max(self._parts(term), self._place(term.to))
-        return self._parts(term)
+            case terms.Operation() | terms.Compare() | terms.Logic() | terms.Not() | terms.Select():
+                return self._parts(term)
+            case terms.Quantified():
+                return self._parts(term)
+            case _:  # what is not known to keep its value may change
+                return When.ANY_TIME
 
     def _parts(self, term: Term) -> When:
         """Of a term that only combines others."""
