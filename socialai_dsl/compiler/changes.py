@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import fields
 from enum import IntEnum
+from typing import assert_never
 
 from socialai_dsl.compiler.folding import substitute
 from socialai_dsl.compiler.mobility import Mobility, numbers_of, plans
@@ -89,8 +90,8 @@ class Changes:
                 return self._parts(term)
             case terms.Quantified():
                 return self._parts(term)
-            case _:  # what is not known to keep its value may change
-                return When.ANY_TIME
+            case _:
+                assert_never(term)
 
     def _parts(self, term: Term) -> When:
         """Of a term that only combines others."""
