@@ -46,6 +46,7 @@ CODES: Final[dict[str, str]] = {
     "S211": "wrong number or kind of arguments",
     "S212": "an expression that is too long or too deep",
     "S213": "a name that is already taken",
+    "S214": "a number too large to compute",
     # S3xx: frames, states, objects
     "S301": "unknown state",
     "S302": "a slot that is not filled",

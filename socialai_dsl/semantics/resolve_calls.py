@@ -184,7 +184,8 @@ def _function(resolver: Resolver, node: ast.Call, expected: Type | None, scope: 
     if node.name == "prev":
         return _before(resolver, node, expected, scope)
     whole = Type("int", 0, 0)
-    return arithmetic(node.name, *(resolver.value(argument, whole, scope) for argument in node.args))
+    args = tuple(resolver.value(argument, whole, scope) for argument in node.args)
+    return resolver.computed(node.name, args, node, scope)
 
 
 def _before(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope) -> Term:

@@ -13,7 +13,7 @@ text       index into `words`: the finite set of texts that the expression can b
 noun       index into `words`, the nouns of the scenario's grammar
 status     index into `words`, the states of an object type
 utterance  0 silence, else 1 + template * nouns + noun; `words` are the texts
-cell       CELL + 32 * y + x (program.py); where an entity is asked for its place, a cell will do
+cell       CELL + 32 * y + x (program); where an entity is asked for its place, a cell will do
 =========  =====================================================================================
 """
 
