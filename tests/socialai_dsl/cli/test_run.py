@@ -1,5 +1,6 @@
 """`socialai-run` and `socialai evaluate` from end to end, on a scenario that trains in seconds."""
 
+import argparse
 import json
 import shutil
 import sys
@@ -10,8 +11,10 @@ import pytest
 from PIL import Image
 
 import socialai_dsl
+from socialai_dsl.cli.agents import new_config
 from socialai_dsl.cli.errors import UsageError
 from socialai_dsl.cli.main import main, run_main
+from socialai_dsl.cli.run import add_arguments
 from trainer.config import RunConfig, configure
 
 DATA = Path(__file__).parents[2] / "data"
@@ -150,6 +153,32 @@ def test_the_number_of_environments_is_the_preset_s_unless_given(
     assert config == usual.model_copy(update=changed)
     assert config.envs == envs
     assert config.threads >= 1
+
+
+def test_the_automatic_bonus_is_the_paper_s() -> None:
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    found = {}
+    for name in BONUSES:
+        typed = [name, "--bonus", "auto", "--recipe", "plain", "--device", "cpu"]
+        config = new_config(parser.parse_args(typed))
+        found[name] = (config.bonus, config.bonus_c)
+    assert found == BONUSES
+
+
+BONUSES = {
+    "talkitout": ("lang", 7),
+    "talkitout_no_liar": ("lang", 7),
+    "diverse_exit": ("lang", 20),
+    "dance": ("cell", 3),
+    "showme": ("cell", 3),
+    "showme_no_social": ("cell", 3),
+    "help": ("cell", 3),
+    "help_as_helper": ("cell", 3),
+    "cointhief": ("cell", 2),
+    "cointhief_tags": ("cell", 2),
+    "social_env": ("cell", 2),
+}
 
 
 def test_hyper_parameters_are_the_trainer_s_and_stay_with_the_run() -> None:
