@@ -42,6 +42,8 @@ def play(name: str, episodes: int, seed: int, noise: float) -> Played:
 
     Args:
         name: of a scenario whose agent follows a frame.
+        episodes: how many to play.
+        seed: of the rooms and of the random moves.
         noise: probability with which an action is replaced, 0 to 1.
     """
     envs = sd.make_vec(name, episodes, autoreset_mode="Disabled")
