@@ -196,15 +196,14 @@ def _choose(row: Row, op: int, a: int, b: int, c: int) -> int:
     if op == Op.POINT:
         set_field(row, mover, Field.POINTING, 1 + (target & 3))
         return np.int64(Body.POINT)
-    direction = field(row, mover, Field.DIR)
     if op == Op.TURN_TO:
-        return paths.turn_towards(row, direction, target, c)
+        return paths.turn_towards(row, mover, target, c)
     way = paths.find_way(row, mover, target, op == Op.GO_NEXT_TO)
     if way == NO_PATH:
         return STILL
-    if way == direction:
+    if way == field(row, mover, Field.DIR):
         return np.int64(Body.FORWARD)
-    return paths.turn_towards(row, direction, way, c)
+    return paths.turn_towards(row, mover, way, c)
 
 
 def _run(

@@ -261,7 +261,8 @@ def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: S
             "S201", f"`{word}` is what somebody is called", node, scope, suggestion=called, hint=hint
         )
     near, place = suggestion(resolver, word, expected, scope)
-    message, hint = f"unknown name `{word}`", None
+    message = f"unknown name `{word}`"
+    hint: str | None = None
     if expected is not None and expected.words and expected.kind not in ("bool", "noun"):
         message = f"unknown name `{word}`, where {described(expected)} is expected"
         hint = None if near else "one of " + words_of(expected)
