@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.loader import DataPath, Resolved
@@ -89,7 +89,7 @@ def check_experiment(resolved: Resolved, bag: DiagnosticBag) -> LoadedExperiment
     }
     for own in cells.values():
         _check_agents(own, resolved, bag)
-        _check_nets(own, resolved, bag)
+        _check_names(own, resolved, bag)
     return LoadedExperiment(experiment, resolved, cells)
 
 
@@ -108,11 +108,17 @@ def _check_agents(cells: Sequence[Cell], resolved: Resolved, bag: DiagnosticBag)
         bag.error("S703", message, resolved.value_span(cell.places["agent"]), suggestion=near, hint=hint)
 
 
-def _check_nets(cells: Sequence[Cell], resolved: Resolved, bag: DiagnosticBag) -> None:
+_NAMES: Final = {"net": NETS, "bonus": ("none", "auto", "lang", "cell"), "guide": ("none", "script")}
+"""Options that name something shipped, or a class of the user's as `mine:Class`."""
+
+
+def _check_names(cells: Sequence[Cell], resolved: Resolved, bag: DiagnosticBag) -> None:
     for cell in cells:
-        net = cell.options.get("net", "fast")
-        if isinstance(net, str) and net not in NETS and ":" not in net:
-            near = did_you_mean(net, NETS)
-            hint = None if near else "one of " + ", ".join(NETS) + ", or mine:Net"
-            span = resolved.value_span(cell.places["net"])
-            bag.error("S103", f"`{net}` is not a word for `net`", span, suggestion=near, hint=hint)
+        for option, shipped in _NAMES.items():
+            name = cell.options.get(option, shipped[0])
+            if name in shipped or ":" in name:
+                continue
+            near = did_you_mean(name, shipped)
+            hint = None if near else f"one of {', '.join(shipped)}, or mine:{option.title()}"
+            span = resolved.value_span(cell.places[option])
+            bag.error("S103", f"`{name}` is not a word for `{option}`", span, suggestion=near, hint=hint)

@@ -41,6 +41,9 @@ _MAY_FOLLOW = frozenset(
 )
 """What may be wrong only because a part of the file was left out, which has been reported."""
 
+_OF_WHOLE_FILES = frozenset({"S316"})
+"""What can only be said of a file without other errors: whatever has one may be what would make it possible."""
+
 
 @dataclass(frozen=True)
 class Draft:
@@ -113,9 +116,8 @@ def meaning_of(draft: Draft, bag: DiagnosticBag) -> Checked | None:
     if not bag.has_errors:
         bag.extend(found)
         return checked
-    bag.extend(
-        d for d in found if d.severity is Severity.ERROR and not (shaped.lost and d.code in _MAY_FOLLOW)
-    )
+    doubtful = _OF_WHOLE_FILES | (_MAY_FOLLOW if shaped.lost else frozenset())
+    bag.extend(d for d in found if d.severity is Severity.ERROR and d.code not in doubtful)
     return None
 
 

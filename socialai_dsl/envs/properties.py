@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Final
 
 import numpy as np
@@ -352,8 +352,7 @@ def _searched_for(
     few = replace(effort, rooms=min(effort.rooms, _SEARCHED_ROOMS))
     for plan in few.each_room("only_through", find, lambda plan: plan is not None):
         if plan is not None:
-            steps = plan
-            yield twins().play(lambda step: np.tile(steps[min(step, len(steps) - 1)], (len(values), 1)))
+            yield twins().play(partial(_acting, plan, len(values)))
             return
 
 
@@ -575,3 +574,8 @@ def _until(steps: Sequence[int | None]) -> str:
     return (
         "to the end" if len(late) < len(steps) else f"until it is too late (step {min(late)} at the earliest)"
     )
+
+
+def _acting(plan: Plan, count: int, step: int) -> NDArray[np.int64]:
+    """The plan's action of a step in as many environments at once, (count, 4); the last one goes on."""
+    return np.tile(plan[min(step, len(plan) - 1)], (count, 1))

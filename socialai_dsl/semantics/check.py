@@ -89,6 +89,10 @@ def check_meaning(
         if found.has_errors or (ranges.settled(registers.ranges) and settled):
             for path in ranges.unbounded:
                 run.report_growth(path)
+            if checked is not None:
+                check_absences(checked, findings, check_placements(checked, findings))
+            if checked is not None and not found.has_errors:  # else what is missing would seem never to happen
+                check_possible(checked, findings)
             break
     bag.extend(_without_consequences(found, scenario))
     return None if found.has_errors else checked
@@ -215,8 +219,6 @@ class _Run:
             properties=claimed,
             readings=resolver.readings,
         )
-        check_absences(made, findings, check_placements(made, findings))
-        check_possible(made, findings)
         return made
 
     def _spoken(self) -> _Spoken:
