@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Final
 
 import numpy as np
@@ -355,10 +355,13 @@ def _searched_for(
     few = replace(effort, rooms=min(effort.rooms, _SEARCHED_ROOMS))
     for plan in few.each_room("only_through", find, lambda plan: plan is not None):
         if plan is not None:
-            yield twins().play(
-                lambda step, plan=plan: np.tile(plan[min(step, len(plan) - 1)], (len(values), 1))
-            )
+            yield twins().play(partial(_repeated, plan, len(values)))
             return
+
+
+def _repeated(plan: Plan, pairs: int, step: int) -> NDArray[np.int64]:
+    """What a plan does in a step, in all pairs; after its end it goes on with its last action."""
+    return np.tile(plan[min(step, len(plan) - 1)], (pairs, 1))
 
 
 _SEARCHED_ROOMS: Final = 8
