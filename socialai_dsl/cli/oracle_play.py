@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from socialai_dsl.envs.effort import Clock
     from socialai_dsl.envs.search import Finding
 
 _TOGETHER: Final = 1000
@@ -74,7 +75,9 @@ class OracleReport:
         return tuple(room for room in self.unsolved if room.verdict == verdict)
 
 
-def play_oracle(scenario: str, rooms: int, seed: int, states: int) -> OracleReport:
+def play_oracle(
+    scenario: str, rooms: int, seed: int, states: int, clock: "Clock | None" = None
+) -> OracleReport:
     """Let the script play, then search every room that it left unsolved.
 
     Args:
@@ -82,6 +85,7 @@ def play_oracle(scenario: str, rooms: int, seed: int, states: int) -> OracleRepo
         rooms: how many.
         seed: of the environments; environment i plays its first episode.
         states: how many states a search may look at.
+        clock: is told how far it is.
 
     Raises:
         UsageError: there is no script.
@@ -92,10 +96,12 @@ def play_oracle(scenario: str, rooms: int, seed: int, states: int) -> OracleRepo
     success, lengths = np.zeros(rooms, np.bool_), np.zeros(rooms, np.int64)
     outcomes = [""] * rooms
     for first in range(0, rooms, _TOGETHER):
+        if clock is not None:
+            clock.progress(f"{scenario}: {first} of {rooms} rooms played")
         indices = np.arange(first, min(first + _TOGETHER, rooms))
         _play(scripted, indices, seed, success, lengths, outcomes)
     failed = np.flatnonzero(~success).tolist()
-    findings = _search(scenario, failed, seed, states)
+    findings = _search(scenario, failed, seed, states, clock)
     unsolved = tuple(
         Room(index, outcomes[index], f.verdict.value, f.exact, len(f.plan) if f.plan else None, f.states)
         for index, f in zip(failed, findings, strict=True)
@@ -157,7 +163,9 @@ def _scripted_actions(envs: Any, scripted: str) -> "NDArray[np.int64]":
     return actions
 
 
-def _search(scenario: str, indices: list[int], seed: int, states: int) -> "list[Finding]":
+def _search(
+    scenario: str, indices: list[int], seed: int, states: int, clock: "Clock | None"
+) -> "list[Finding]":
     import socialai_dsl
     from socialai_dsl.envs.search import search_rooms
 
@@ -166,6 +174,11 @@ def _search(scenario: str, indices: list[int], seed: int, states: int) -> "list[
     envs = socialai_dsl.make_vec(scenario, num_envs=len(indices))
     try:
         envs.reset(seed=seed, options={"index": indices})
-        return list(search_rooms(envs, list(range(len(indices))), states))
+        findings: list[Finding] = []
+        for finding in search_rooms(envs, list(range(len(indices))), states):
+            findings.append(finding)
+            if clock is not None:
+                clock.progress(f"{scenario}: {len(findings)} of {len(indices)} unsolved rooms searched")
+        return findings
     finally:
         envs.close()

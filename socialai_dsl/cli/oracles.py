@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
@@ -10,6 +11,7 @@ from socialai_dsl.cli.errors import Exit, UsageError
 from socialai_dsl.cli.oracle_play import OracleReport, Room, play_oracle
 from socialai_dsl.cli.run_folder import write_text
 from socialai_dsl.cli.shipped import shipped_scenarios, variants_of
+from socialai_dsl.cli.terminal import ProgressLine
 
 SUMMARY: Final = "let the scenarios' own scripts play, and search the rooms that they do not solve"
 
@@ -56,9 +58,13 @@ def execute(arguments: argparse.Namespace) -> Exit:
     if arguments.seed < 0:
         raise UsageError(f"--seed: got {arguments.seed}, expected at least 0")
     names = arguments.scenarios or [name for name in shipped_scenarios() if "oracle" in variants_of(name)]
-    reports = []
+    from socialai_dsl.envs.effort import Clock
+
+    reports, progress = [], ProgressLine(sys.stderr)
     for name in names:
-        reports.append(play_oracle(name, arguments.episodes, arguments.seed, arguments.states))
+        clock = Clock(None, progress.show)
+        reports.append(play_oracle(name, arguments.episodes, arguments.seed, arguments.states, clock))
+        progress.clear()
         if not arguments.json:
             print("\n".join(summary(reports[-1])), flush=True)
     if arguments.json:

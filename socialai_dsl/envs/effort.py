@@ -81,7 +81,7 @@ class Effort:
             complete: whether what was found is more than that the time was spent.
         """
         for room in range(self.rooms):
-            over = self.clock.is_over  # a variable, or the type checker takes it for False below as well
+            over = self.clock.is_over
             if over:
                 return
             self.clock.progress(f"{what}: room {room} of {self.rooms}")

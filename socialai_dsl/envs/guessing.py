@@ -23,12 +23,12 @@ from socialai_dsl.envs.rooms import wins_of
 from socialai_dsl.envs.search import (
     CHANCES,
     Search,
-    Verdict,
     digests_of,
     marks,
     multipliers,
     useful_actions,
 )
+from socialai_dsl.envs.search import Verdict as Searched
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Header, Program, Register
 
@@ -68,7 +68,8 @@ class Guess:
     Attributes:
         answer: what a policy can do at most.
         states: how many different states of all rooms together were looked at.
-        exact: False where chance during the episode was tried only in part.
+        exact: False where chance during the episode was tried only in part, or where it was not found out whether rooms
+            that look different can still be solved.
         step: after which they are known; of a guess that after which the rooms look different when it is too late.
     """
 
@@ -119,7 +120,7 @@ class Guessing:
         self._table = Table([program], self._at_once * len(self._actions) * rooms, 1)
         self._table.reset(0, None)
         self._alone = Search(program)
-        self._solvable: dict[tuple[int, bytes], Verdict] = {}
+        self._solvable: dict[tuple[int, bytes], Searched] = {}
         self._wins = wins_of(program)
         self._heard = slice(
             program.header(Header.HEARD), program.header(Header.HEARD) + program.header(Header.HEARD_SIZE)
@@ -201,7 +202,7 @@ class Guessing:
         """Everything that can be done, breadth first, as far as so many states."""
         self._seen = set(self._digests(layer).tolist())
         clock = self._effort.clock
-        step, late = 0, None
+        step, late, perhaps = 0, None, None
         while len(layer):
             step += 1
             following = []
@@ -213,11 +214,15 @@ class Guessing:
                 following.append(reached.part(self._new(reached, hopeful & alike)))
                 if late is None and (~alike).any():
                     late = step
-                if self._may_know(reached.part(np.flatnonzero(hopeful & ~alike)), states):
+                known = self._may_know(reached.part(np.flatnonzero(hopeful & ~alike)), states)
+                if known is Searched.SOLVABLE:
                     return Guess(Answer.TELLS_APART, len(self._seen), True, step)
+                perhaps = perhaps or (step if known is Searched.UNDECIDED else None)
                 if len(self._seen) > states or clock.is_over:
                     return Guess(Answer.UNDECIDED, len(self._seen), False)
             layer = _joined(following)
+        if perhaps is not None:
+            return Guess(Answer.TELLS_APART, len(self._seen), False, perhaps)
         return Guess(Answer.GUESSES, len(self._seen), not self._relevance.drawn, late)
 
     # -- at random --
@@ -248,7 +253,8 @@ class Guessing:
                 if looked_into == _LOOKED_INTO or self._effort.clock.is_over:
                     break
                 looked_into += 1
-                if self._may_know(reached.part(slice(number, number + 1)), _FEW_STATES, surely=True):
+                known = self._may_know(reached.part(slice(number, number + 1)), _FEW_STATES)
+                if known is Searched.SOLVABLE:
                     return Guess(Answer.TELLS_APART, step + 1, True, step + 1)
             kept = np.flatnonzero(hopeful & alike)
             if not len(kept):
@@ -259,21 +265,24 @@ class Guessing:
 
     # -- when rooms look different --
 
-    def _may_know(self, apart: _Together, states: int, surely: bool = False) -> bool:
-        """Whether more than a guess might get right can be solved, by who knows which room it is from here on; with
-        `surely` only what was seen to be solved counts.
+    def _may_know(self, apart: _Together, states: int) -> Searched:
+        """Whether more than a guess gets right can be solved, by who knows which room it is from here on; undecided
+        where searches gave up on rooms that would be needed for it.
         """
+        found = Searched.UNSOLVABLE
         for k in range(len(apart)):
-            best = int(apart.won[k])
+            best = perhaps = int(apart.won[k])
             for room in np.flatnonzero(apart.going[k]).tolist():
                 verdict = self._alone_in(apart.part(slice(k, k + 1)), room, states)
-                can = verdict is Verdict.SOLVABLE or (not surely and verdict is Verdict.UNDECIDED)
-                best += int(self._weights[room]) * can
+                best += int(self._weights[room]) * (verdict is Searched.SOLVABLE)
+                perhaps += int(self._weights[room]) * (verdict is not Searched.UNSOLVABLE)
             if best > self._level:
-                return True
-        return False
+                return Searched.SOLVABLE
+            if perhaps > self._level:
+                found = Searched.UNDECIDED
+        return found
 
-    def _alone_in(self, state: _Together, room: int, states: int) -> Verdict:
+    def _alone_in(self, state: _Together, room: int, states: int) -> Searched:
         """Whether a room can be solved from here on."""
         registers = state.registers[0, room]
         known = states, self._relevance.of_rows(registers).tobytes()

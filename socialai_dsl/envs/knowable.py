@@ -121,10 +121,10 @@ class Knowing:
         for name, tried in _by_name(others):
             for other in tried[:_TRIED]:
                 if played is not None and (known := played.known.get(other.row)) is not None:
-                    step = max(step or 0, known)
+                    step = max(step or 0, known) or None
                     continue
                 guess = self._pair.solve(*self._both(room, other), self._effort, plans)
-                if guess.answer in (Answer.KNOWS, Answer.TELLS_APART):
+                if guess.answer in (Answer.KNOWS, Answer.TELLS_APART) and guess.exact:
                     step = max(step or 0, guess.step or 0)
                     continue
                 alone = self._alone(other)

@@ -37,6 +37,7 @@ _HOLDS: Final = "the property holds"
 
 _AS_TRIED: Final = " (chance during the episode was tried only in part)"
 _SHOWN: Final = 5
+_OF_ITSELF: Final = "a success comes of itself, without the agent"
 _NO_TIME: Final = "there was no time to look at a room"
 
 
@@ -245,7 +246,9 @@ def _within(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     findings = list(trial.successes(effort, plan.text))
     tally = _Tally.empty()
     for room, finding in enumerate(findings):
-        if finding.verdict is Searched.UNDECIDED:
+        if trial.rooms.solved_by_idling[room]:
+            tally.void.setdefault(_OF_ITSELF, []).append(room)
+        elif finding.verdict is Searched.UNDECIDED:
             tally.undecided.append(room)
         elif finding.steps is not None and finding.steps <= plan.steps:
             tally.held.append(room)
@@ -352,8 +355,13 @@ def _searched_for(
     few = replace(effort, rooms=min(effort.rooms, _SEARCHED_ROOMS))
     for plan in few.each_room("only_through", find, lambda plan: plan is not None):
         if plan is not None:
-            yield twins().play(partial(_acting, plan, len(values)))
+            yield twins().play(partial(_repeated, plan, len(values)))
             return
+
+
+def _repeated(plan: Plan, pairs: int, step: int) -> NDArray[np.int64]:
+    """What a plan does in a step, in all pairs; after its end it goes on with its last action."""
+    return np.tile(plan[min(step, len(plan) - 1)], (pairs, 1))
 
 
 _SEARCHED_ROOMS: Final = 8
@@ -538,9 +546,13 @@ def _knowable(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     found = list(effort.each_room(plan.text, knowing.look_at, lambda one: one.known is not Known.UNDECIDED))
     tally = _Tally.empty()
     for room, one in enumerate(found):
-        missing = trial.rooms.missing(room, ("agent",))
-        if missing or one.known is Known.NO_SUCCESS:
-            tally.void.setdefault("the agent is absent" if missing else _NO_SUCCESS, []).append(room)
+        why = _NO_SUCCESS if one.known is Known.NO_SUCCESS else None
+        if trial.rooms.missing(room, ("agent",)):
+            why = "the agent is absent"
+        elif trial.rooms.solved_by_idling[room]:
+            why = _OF_ITSELF
+        if why is not None:
+            tally.void.setdefault(why, []).append(room)
         elif one.known is Known.UNDECIDED:
             tally.undecided.append(room)
         else:
@@ -574,8 +586,3 @@ def _until(steps: Sequence[int | None]) -> str:
     return (
         "to the end" if len(late) < len(steps) else f"until it is too late (step {min(late)} at the earliest)"
     )
-
-
-def _acting(plan: Plan, count: int, step: int) -> NDArray[np.int64]:
-    """The plan's action of a step in as many environments at once, (count, 4); the last one goes on."""
-    return np.tile(plan[min(step, len(plan) - 1)], (count, 1))

@@ -10,7 +10,7 @@ import pytest
 import socialai_dsl
 from socialai_dsl.checking import LoadedScenario
 from socialai_dsl.envs.effort import Effort
-from socialai_dsl.envs.properties import Report, Verdict, check_property
+from socialai_dsl.envs.properties import Report, Verdict, by_default, check_property
 
 # One of two doors is right. Ada tells which.
 TOLD = """
@@ -131,6 +131,8 @@ VOID = {
         ("{never: ada.next_to(agent) and t > 4}", "it ends at once", "in 5 rooms every episode ends"),
         ("{within: 20}", "no success exists", "no success can be reached in any of 5 rooms"),
         ("{within: 20, share: 0}", "no success exists", "no success can be reached in any of 5 rooms"),
+        ("{within: 20}", "success comes of itself", "in 5 rooms a success comes of itself"),
+        ("{knowable: true}", "success comes of itself", "in 5 rooms a success comes of itself"),
         ("{oracle: 0}", "no success exists", "solves 0 of 5 rooms"),
         ("{oracle: 1}", "success comes of itself", "in all of 5 rooms a success comes of itself"),
         ("{knowable: true}", "no success exists", "in 5 rooms no success is possible"),
@@ -144,3 +146,65 @@ def test_a_claim_about_nothing_fails(tried: Trying, entry: str, void: str, said:
     assert report.verdict is Verdict.FAILS, report
     assert said in report.said
     assert report.held == 0 or "oracle" in entry
+
+
+HEAD = """
+scenario: void
+horizon: 12
+earshot: EARSHOT
+actions: [left, right, forward]
+grammar: {templates: [It is <noun>, Where is <noun>], nouns: [it, red, blue]}
+room: {width: 9, height: 6, build: [{BUILT: column(4)}]}
+let: {answer: pick(n in nouns where n != "it")}
+"""
+BEHIND_LAVA = """
+objects: {gate: {type: door, state: open, place: wall(right)}}
+cast: {ada: {place: left_half}, agent: {place: left_half}}
+outcome: [{success: agent.at(gate) and agent.said("It is <answer>")}]
+"""
+OUT_OF_EARSHOT = """
+frames: {tell: {states: {a: {then: [{hears: Where is it, say: It is <answer>.}]}}}}
+cast: {ada: {frame: tell, place: left_half}, agent: {place: right_half}}
+outcome: [{success: agent.said("It is <answer>")}, {failure: agent.said("It is <noun>")}]
+"""
+FAILURE_FIRST = """
+frames: {tell: {states: {a: {then: [{hears: Where is it, say: It is <answer>.}]}}}}
+cast: {ada: {frame: tell}, agent: {place: anywhere}}
+outcome: [{failure: agent.said("It is <noun>")}, {success: agent.said("It is <answer>")}]
+"""
+TOO_LATE = """
+frames: {tell: {states: {a: {then: [{when: t > 5, say: It is <answer>.}]}}}}
+cast: {ada: {frame: tell}, agent: {place: anywhere}}
+outcome: [{success: agent.said("It is <answer>") and t < 4}, {failure: agent.spoke or t > 6}]
+"""
+UNSEEN_ARM = """
+objects: {boxes: {type: box, count: 2, color: [red, blue], at: [[1, 1], [1, 4]]}}
+define: {meant: first(b in boxes where b.color == red and answer == "red" or b.color == blue)}
+frames: {show: {states: {a: {do: point(meant)}}}}
+cast: {ada: {frame: show, at: [2, 2]}, agent: {place: left_half}}
+outcome: [{success: agent.said("It is <answer>")}, {failure: agent.spoke}]
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "built", "earshot", "said"),
+    [
+        (BEHIND_LAVA, "lava", "room", "in 5 rooms no success is possible"),
+        (OUT_OF_EARSHOT, "fence", "next_to", "`answer` stays hidden to the end in 5 rooms"),
+        (FAILURE_FIRST, "fence", "room", "in 5 rooms no success is possible"),
+        (TOO_LATE, "fence", "room", "`answer` stays hidden until it is too late (step 6 at the earliest)"),
+        (UNSEEN_ARM, "fence", "room", "`answer` stays hidden to the end in 5 rooms"),
+    ],
+    ids=["behind lava", "out of earshot", "failure first", "too late", "an arm nobody sees"],
+)
+def test_a_void_scenario_is_found_without_any_claim(
+    tmp_path: Path, text: str, built: str, earshot: str, said: str
+) -> None:
+    file = tmp_path / "void.yaml"
+    file.write_text(HEAD.replace("BUILT", built).replace("EARSHOT", earshot) + text)
+    loaded = socialai_dsl.load(file)
+    assert isinstance(loaded, LoadedScenario)
+    (plan,) = by_default(loaded, loaded.resolved.key_span(("outcome",)))
+    report = check_property(loaded, plan, Effort(ROOMS, 0, 20_000))
+    assert report.verdict is Verdict.FAILS
+    assert said in report.said
