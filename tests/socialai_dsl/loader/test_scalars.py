@@ -93,7 +93,7 @@ def test_refusals_say_what_to_write() -> None:
     plain = read_plain("yes")
     assert plain.code == "S003"
     assert plain.message == "`yes` is `true` for some YAML tools and text for others"
-    assert plain.hint == 'quote it if you mean the text: "yes"; else write `true`'
+    assert plain.hint == 'write `true`; if you mean the text, quote it: "yes"'
 
 
 WORD = st.text(alphabet="0123456789._-+:eExobnyNfaT~=<", min_size=1, max_size=8)
