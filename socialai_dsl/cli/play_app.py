@@ -163,9 +163,9 @@ class PlayApp(App[list[Played]]):
         try:
             self._game.act(movement, sentence)
         except ValueError:
-            phrases, typed = self._game.phrases, sentence or ""
-            hint = " Tab puts it in" if phrases.corrected(typed) is not None else ""
-            self.tell(phrases.problem(typed) + hint, "bad")
+            phrases, said = self._game.phrases, sentence or ""
+            hint = " Tab puts it in" if phrases.corrected(said) is not None else ""
+            self.tell(phrases.problem(said) + hint, "bad")
             return
         line = self.query_one(_Line)
         line.value = ""

@@ -69,11 +69,13 @@ class Phrases:
 
     def problem(self, line: str) -> str:
         """What is wrong with a line that can be neither done nor said."""
+        movement, said = split_line(line, self.actions)
+        sentence = movement is not None or line[:1].isupper()
+        what = f"{said!r} cannot be said" if sentence else f"{line!r} can be neither done nor said"
         near = self.corrected(line)
         if near is not None:
-            return f"{line!r} can be neither done nor said; did you mean {near!r}?"
-        movements = ", ".join((*self.actions, *STANDING))
-        return f"{line!r} can be neither done nor said; movements are {movements}"
+            return f"{what}; did you mean {near!r}?"
+        return what if sentence else f"{what}; movements are {', '.join((*self.actions, *STANDING))}"
 
     def _parts(self, line: str) -> tuple[str, str]:
         """What stands before the utterance, and the utterance as far as it is typed."""

@@ -37,28 +37,29 @@ class _Mender:
         self._repaired = repaired
         self._places = MovedPlaces(places, repaired.moved)
         self._bag = bag
+        self._quiet = False
 
     def mend(self, path: DataPath) -> None:
-        """Mend what stands at and below a path, the deepest first."""
+        """Mend what stands at and below a path, the outermost first."""
         part = part_at(self._repaired.data, path)
         if isinstance(part, list):
             for i in range(len(part)):
                 self.mend((*path, i))
-        if not isinstance(part, dict):
-            return
-        for key in list(part):
-            self.mend((*path, key))
-        if self._places.in_flow((*path, next(iter(part), ""))):
+        if not isinstance(part, dict) or self._places.in_flow((*path, next(iter(part), ""))):
             return
         self._indent(path, part)
         self._dedent(path, part)
+        for key in list(part):
+            if key in part:
+                self.mend((*path, key))
 
     def _indent(self, path: DataPath, part: dict[str, Any]) -> None:
         """Move keys that belong into the entry above them."""
         above: str | None = None
         moving = False
         for key in list(part):
-            if self._fits(path, key, part[key]):
+            emptied = above is not None and part[above] is None and key in self._words_of((*path, above))
+            if self._fits(path, key, part[key]) and not emptied:
                 above, moving = key, False
             elif above is not None and self._takes((*path, above), part[above], key, part[key]):
                 if not moving:
@@ -66,7 +67,7 @@ class _Mender:
                     self._report((*path, key), message, "indent it one level further")
                 moving = True
                 part[above] = {} if part[above] is None else part[above]
-                self._repaired.move((*path, key), (*path, above, key))
+                self._move((*path, key), (*path, above, key))
 
     def _dedent(self, path: DataPath, part: dict[str, Any]) -> None:
         """Move keys that belong beside the entry that they stand in, or further out."""
@@ -84,8 +85,14 @@ class _Mender:
                 message = f"`{key}` stands in {inside}, but belongs to {where}"
                 self._report((*path, key), message, "indent it less")
             moving = True
-            self._repaired.move((*path, key), (*home, key))
-            self.mend((*home, key))
+            self._move((*path, key), (*home, key))
+
+    def _move(self, path: DataPath, to: DataPath) -> None:
+        """Move an entry; what stands wrong in it does so for the same reason."""
+        self._repaired.move(path, to)
+        quiet, self._quiet = self._quiet, True
+        self.mend(to)
+        self._quiet = quiet
 
     def _home(self, path: DataPath, known: type[BaseModel] | None, key: str, value: Any) -> DataPath | None:
         """The mapping further out that lacks a key which does not fit at `path`."""
@@ -95,10 +102,10 @@ class _Mender:
             if not isinstance(around, dict) or key in around:
                 continue
             owner = model_at(self._model, outer)
-            if owner is not None and key in keys_of(owner) and (known is not None or _needs(owner, key)):
+            if owner is not None and key in keys_of(owner):
                 return outer
-            element = _element(annotation_at(self._model, outer))
-            if owner is None and element is not None and element is known and _looks_like(value, element):
+            elements = _elements(annotation_at(self._model, outer))
+            if owner is None and known in elements and (value == {} or _looks_like(value, elements)):
                 return outer
         return None
 
@@ -108,15 +115,24 @@ class _Mender:
         if known is not None:
             keys = [*keys_of(known), *([_BUILDING] if not path else [])]
             return key in keys or did_you_mean(key, keys) is not None
-        element = _element(annotation_at(self._model, path))
-        if element is None:
+        annotation = annotation_at(self._model, path)
+        elements = _elements(annotation)
+        held = _held(annotation)
+        if value == {} or _looks_like(value, elements) or any(get_origin(part) is dict for part in held):
             return True
-        return value == {} or _looks_like(value, element) or not self._is_word_of(path, element, key)
+        if not isinstance(value, dict | list) and len(elements) < len(held):
+            return True  # an expression, say
+        return not held or not self._is_word_of(path, elements, key)
 
-    def _is_word_of(self, path: DataPath, element: type[BaseModel], key: str) -> bool:
+    def _is_word_of(self, path: DataPath, elements: list[type[BaseModel]], key: str) -> bool:
         """Whether a key is a word of what is in a mapping of names, or of what is around it."""
-        owners = [element, *(model_at(self._model, path[:length]) for length in range(len(path)))]
+        owners = [*elements, *(model_at(self._model, path[:length]) for length in range(len(path)))]
         return any(owner is not None and key in keys_of(owner) for owner in owners)
+
+    def _words_of(self, path: DataPath) -> list[str]:
+        """The keys of the model at a path, if there is one."""
+        owner = model_at(self._model, path)
+        return keys_of(owner) if owner is not None else []
 
     def _takes(self, above: DataPath, value: Any, key: str, given: Any) -> bool:
         """Whether the entry above can have the key."""
@@ -126,38 +142,28 @@ class _Mender:
         if owner is not None:
             return key in keys_of(owner)
         annotation = annotation_at(self._model, above)
-        if _names(annotation) is None:
-            return False
-        element = _element(annotation)
-        return value is None if element is None else _looks_like(given, element)
+        return _looks_like(given, _elements(annotation)) or (value is None and bool(_held(annotation)))
 
     def _closed(self, path: DataPath, value: dict[str, Any]) -> bool:
         """Whether a mapping is written in braces, so that nothing on other lines can belong to it."""
         return not value or self._places.in_flow((*path, next(iter(value))))
 
     def _report(self, path: DataPath, message: str, hint: str) -> None:
-        self._bag.error("S101", message, self._places.key_span(path), hint=hint)
+        if not self._quiet:
+            self._bag.error("S101", message, self._places.key_span(path), hint=hint)
 
 
-def _names(annotation: Any) -> Any:
-    """What a mapping of names holds; None for anything else."""
-    return next((get_args(part)[1] for part in branches(annotation) if get_origin(part) is dict), None)
+def _held(annotation: Any) -> list[Any]:
+    """What an entry of a mapping of names can be; nothing for anything else."""
+    names = (get_args(part)[1] for part in branches(annotation) if get_origin(part) is dict)
+    return [held for entry in names for held in branches(entry)]
 
 
-def _element(annotation: Any) -> type[BaseModel] | None:
-    """The model of each entry of a mapping of names, if that is all an entry can be."""
-    held = list(branches(_names(annotation)))
-    return (
-        held[0] if len(held) == 1 and isinstance(held[0], type) and issubclass(held[0], BaseModel) else None
-    )
+def _elements(annotation: Any) -> list[type[BaseModel]]:
+    """The models that an entry of a mapping of names can be."""
+    return [held for held in _held(annotation) if isinstance(held, type) and issubclass(held, BaseModel)]
 
 
-def _looks_like(value: Any, model: type[BaseModel]) -> bool:
-    """Whether a mapping has keys of a model."""
-    return isinstance(value, dict) and any(key in keys_of(model) for key in value)
-
-
-def _needs(owner: type[BaseModel], key: str) -> bool:
-    return any(
-        (field.alias or name) == key and field.is_required() for name, field in owner.model_fields.items()
-    )
+def _looks_like(value: Any, models: list[type[BaseModel]]) -> bool:
+    """Whether a mapping has keys of one of some models."""
+    return isinstance(value, dict) and any(key in keys_of(model) for model in models for key in value)

@@ -256,10 +256,11 @@ def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: S
         (key for key, member in resolver.symbols.scenario.cast.items() if member.name == word), None
     )
     if called is not None:
-        goes = "in expressions a member of the cast goes by its key"
-        return resolver.fail(
-            "S201", f"`{word}` is what somebody is called", node, scope, suggestion=called, hint=goes
+        message, cure = (
+            f"`{word}` is what somebody is called",
+            "in expressions a member of the cast goes by its key",
         )
+        return resolver.fail("S201", message, node, scope, suggestion=called, hint=cure)
     near, place = suggestion(resolver, word, expected, scope)
     message = f"unknown name `{word}`"
     hint: str | None = None
@@ -271,11 +272,8 @@ def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: S
     whole = resolver.findings.part(scope.path)
     nouns = [noun for noun in resolver.symbols.nouns.words if normal(noun) == normal(word)]
     if nouns and (expected is None or expected.kind == "noun"):
-        near, place, hint = (
-            as_text(nouns[0], nouns[0] if whole == word else None),
-            None,
-            "a noun is quoted, as every text",
-        )
+        near, place = as_text(nouns[0], nouns[0] if whole == word else None), None
+        hint = "a noun is quoted, as every text"
     elif near is None and expected is not None and expected.kind == "int" and not expected.words:
         message = f"unknown name `{word}`, where a number is expected"
     elif near is None and expected is None:

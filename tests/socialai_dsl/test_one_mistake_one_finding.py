@@ -13,6 +13,7 @@ import pytest
 from socialai_dsl.frontend import check
 from socialai_dsl.loader.names import shipped_folder
 from socialai_dsl.schema.annotations import CALLED, keys_of
+from socialai_dsl.source import Source
 
 SCENARIOS = sorted(
     str(path.relative_to(shipped_folder()))
@@ -187,3 +188,42 @@ def test_another_word_for_a_key_of_a_register_gives_one_error(
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
 def test_one_mistake_anywhere_gives_one_error(scenarios: Path, kind: Callable[[str], Iterator[Site]]) -> None:
     assert check_mistakes(scenarios, kind, most=1000) >= 10
+
+
+@pytest.mark.parametrize(
+    "name", ["talkitout", "help", "cointhief", "novel/haggling", "novel/turn_taking", "novel/culprit"]
+)
+def test_one_wrong_indentation_is_one_finding(name: str) -> None:
+    """Every key of a file, with what belongs to it, one level too far left or right."""
+    path = (shipped_folder() / f"{name}.yaml").resolve()
+    lines = path.read_text(encoding="utf-8").splitlines()
+    known = {
+        ("novel/culprit", 39, 2)
+    }  # a cast with a group, which is written out before its place is looked at
+    several = []
+    for first, line in enumerate(lines):
+        key = re.match(r"( *)[A-Za-z_]\w*:", line)
+        for by in (-2, 2) if key else ():
+            if key is None or len(key[1]) + by < 0 or (name, first + 1, by) in known:
+                continue
+            end = _end_of_block(lines, first, len(key[1]))
+            moved = [
+                part[2:] if by < 0 else f"  {part}" if part.strip() else part for part in lines[first:end]
+            ]
+            text = "\n".join([*lines[:first], *moved, *lines[end:]]) + "\n"
+            found = check(str(path), texts={path: Source(path.name, text)}).diagnostics
+            if len(found) > 1:
+                several.append((first + 1, by, [str(d) for d in found]))
+    assert not several
+
+
+def _end_of_block(lines: list[str], first: int, indentation: int) -> int:
+    """Behind the last line that belongs to the key of a line."""
+    end = first + 1
+    while end < len(lines):
+        own = len(lines[end]) - len(lines[end].lstrip())
+        listed = own == indentation and lines[end].lstrip().startswith("- ")
+        if lines[end].strip() and own <= indentation and not listed:
+            break
+        end += 1
+    return end

@@ -71,7 +71,9 @@ def test_corrected(line: str, corrected: str | None) -> None:
 
 def test_what_is_wrong_with_a_line_names_what_was_meant_or_what_there_is() -> None:
     assert PHRASES.problem("frward") == "'frward' can be neither done nor said; did you mean 'forward'?"
-    assert PHRASES.problem("Sing") == (
-        "'Sing' can be neither done nor said; "
+    assert PHRASES.problem("Sing") == "'Sing' cannot be said"
+    assert PHRASES.problem("left Helo") == "'Helo' cannot be said; did you mean 'left Hello'?"
+    assert PHRASES.problem("sing") == (
+        "'sing' can be neither done nor said; "
         "movements are left, right, forward, pickup, drop, toggle, done, ., none"
     )

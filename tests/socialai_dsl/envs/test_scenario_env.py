@@ -264,7 +264,9 @@ def test_render_modes(capsys: pytest.CaptureFixture[str]) -> None:
     assert (frame.shape, frame.dtype) == ((7 * 32, 6 * 32, 3), np.uint8)
     text = sd.make("talkitout", render_mode="ansi")
     text.reset(seed=0, options=layout)
-    assert len(text.render().strip("\n").splitlines()) == 7
+    *room, wizard, honest, liar = text.render().splitlines()
+    assert len(room) == 7
+    assert [wizard[:6], honest[:6], liar[:6]] == ["Av 1,1", "Bv 4,4", "Bv 1,5"]
     human = sd.make("talkitout", render_mode="human")
     human.reset(seed=0, options=layout)
     assert capsys.readouterr().out.strip()
