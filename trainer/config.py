@@ -208,9 +208,14 @@ class RunConfig(BaseModel):
 
     @property
     def code_folder(self) -> Path:
-        """Where `mine:Net` is looked for first: the folder of the scenario's file."""
-        file = Path(self.scenario.partition("?")[0].partition("+")[0])
-        return file.parent if file.suffix in (".yaml", ".yml") else Path()
+        """See `code_folder`."""
+        return code_folder(self.scenario)
+
+
+def code_folder(scenario: str) -> Path:
+    """Where `mine:Net` is looked for first: the folder of the scenario's file; the present one if that is a name."""
+    file = Path(scenario.partition("?")[0].partition("+")[0])
+    return file.parent if file.suffix in (".yaml", ".yml") else Path()
 
 
 FLAGS: Final = tuple(n for n, f in RunConfig.model_fields.items() if f.json_schema_extra["role"] == "flag")  # type: ignore[index]

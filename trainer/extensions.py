@@ -38,6 +38,7 @@ def load_class(name: str, option: str, shipped: Sequence[str], methods: Sequence
     if not isinstance(found, type):
         raise ValueError(f"{option}: {file} has no class {class_name!r}")
     lacking = [method for method in methods if not callable(getattr(found, method, None))]
+    lacking += sorted(getattr(found, "__abstractmethods__", ()))
     if lacking:
         raise ValueError(f"{option}: {file}: {class_name} lacks the method {lacking[0]!r}")
     return found

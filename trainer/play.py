@@ -68,8 +68,8 @@ class CheckpointPolicy:
             CheckpointError: see `checkpoint.read` and `checkpoint.restore_net`.
         """
         path, program = Path(path), envs.unwrapped.program
-        folder = path / checkpoints.FOLDER
-        checkpoint = checkpoints.read(folder if folder.is_dir() else path)
+        saved = path / checkpoints.FOLDER
+        checkpoint = checkpoints.read(saved if saved.is_dir() else path)
         restored = checkpoints.restore_net(
             checkpoint, net_spec(envs.unwrapped), list(program.vocabulary), net, folder
         )

@@ -153,12 +153,13 @@ def ppo_loss(
     """
     log_probs, entropies = heads.log_probs_and_entropies(logits, batch.actions, sizes)  # (N, 4) each
     mask = heads.spoken_mask(batch.actions)  # (N, 4)
-    change = (log_probs - batch.log_probs) * mask  # (N, 4)
+    own = torch.ones_like(values) if batch.lead is None else (~batch.lead.led).to(values.dtype)  # (N,)
+    change = (log_probs - batch.log_probs) * mask * own[:, None]  # (N, 4)
     log_ratio = change.sum(-1, keepdim=True) if config.loss == "joint" else change  # (N, 1) or (N, 4)
     ratio = log_ratio.exp()
     advantage = batch.advantages[:, None]  # (N, 1)
     clipped = ratio.clamp(1 - config.clip, 1 + config.clip)
-    policy = -torch.minimum(ratio * advantage, clipped * advantage)  # (N, 1) or (N, 4)
+    policy = -torch.minimum(ratio * advantage, clipped * advantage) * own[:, None]  # (N, 1) or (N, 4)
     value = (values - batch.returns).square()  # (N,)
     if config.clip_value:
         near = batch.values + (values - batch.values).clamp(-config.clip, config.clip)
@@ -167,15 +168,9 @@ def ppo_loss(
         entropy = heads.joint_entropy(logits, entropies, sizes)  # (N,)
     else:
         entropy = (entropies * mask).sum(-1)  # (N,), of the heads that took part
+    entropy = entropy * own
     imitation = torch.zeros((), device=logits.device)
     if batch.lead is not None:
-        own = (~batch.lead.led).to(logits.dtype)  # (N,)
-        policy, log_ratio, ratio = (
-            policy * own[:, None],
-            log_ratio * own[:, None],
-            ratio.where(own[:, None] > 0, 1.0),
-        )
-        entropy = entropy * own
         imitation = imitation_loss(logits, batch.lead.actions, batch.lead.weights, sizes)
     if config.loss == "joint":
         policy_term, value_term, entropy_term = policy.mean(), value.mean(), entropy.mean()

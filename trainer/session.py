@@ -70,10 +70,13 @@ class Session:
         """Begin a run: fresh weights, environments reset with the run's seed.
 
         Raises:
-            ValueError: the environments do not fit the configuration, or are not of the form the trainer learns.
+            ValueError: the environments do not fit the configuration or the program, or are not of the form the
+                trainer learns.
         """
         if envs.num_envs != config.envs:
             raise ValueError(f"envs: got {envs.num_envs} environments, expected envs = {config.envs}")
+        if program is not None:
+            _check_alike(program, envs.program)
         folder = config.code_folder
         net = build_net(config.net, net_spec(envs), config.seed, config.precision, folder).to(config.device)
         tutor = None
@@ -188,8 +191,8 @@ class Session:
         stored = checkpoint.part("adam")
         state: dict[int, dict[str, Tensor]] = {}
         for index, (name, parameter) in enumerate(self.actor.net.named_parameters()):
-            if not stored:
-                break
+            if not any(f"{key}.{name}" in stored for key in _ADAM):
+                continue  # it had no gradient yet, as an encoder of words before the first word
             values = {key: stored[f"{key}.{name}"] for key in _ADAM}
             if values["step"].ndim or any(values[key].shape != parameter.shape for key in _ADAM[1:]):
                 raise ValueError(f"optimiser state of {name} has another shape")
@@ -216,6 +219,19 @@ class Session:
                 f"state.memory: got {tuple(stored['memory'].shape)}, expected {tuple(state.memory.shape)}"
             )
         state.memory = stored["memory"].to(state.memory)
+
+
+def _check_alike(program: Any, played: Any) -> None:
+    """Refuse a variant, played for its script, that says or does other things than the scenario itself."""
+    for name in ("actions", "templates", "nouns", "vocabulary"):
+        own, others = list(getattr(program, name)), list(getattr(played, name))
+        if own != others:
+            strange = sorted(set(own) ^ set(others))
+            raise ValueError(
+                f"guide: {played.name} with its script has other {name} than without it"
+                f"{': ' + ', '.join(strange) if strange else ', in another order'}; let both have the same, or train "
+                "without a guide"
+            )
 
 
 _STATE = ("image", "tokens", "starts", "returns", "lengths", "led")

@@ -113,28 +113,32 @@ def new_config(arguments: argparse.Namespace) -> RunConfig:
     given["device"] = resolve_device(given.get("device", "auto"))
     given["scenario"] = arguments.scenario
     if not trains:
-        return checked_config("plain", given | {"frames": 0})
+        return checked_config(given | {"frames": 0})
     given.setdefault("threads", automatic_threads())
     recipe = arguments.recipe or _usual_recipe(given | hyper, arguments.scenario)
     if "frames" not in given and given.get("net") not in NET_PRESETS:
         given["frames"] = frames_for(recipe, arguments.scenario)
-    return checked_config(recipe, given | hyper)
+    return checked_config({"recipe": recipe} | given | hyper)
 
 
-def checked_config(recipe: str, given: dict[str, Any]) -> RunConfig:
+def checked_config(given: dict[str, Any]) -> RunConfig:
     """`resolved_config`, with what is wrong said as the option was typed.
 
     Raises:
         UsageError: a value is out of bounds.
     """
     try:
-        return resolved_config(recipe, given)
+        options = dict(given)
+        return resolved_config(options.pop("recipe", "plain"), options)
     except ValidationError as error:
         first = error.errors()[0]
-        name = str(first["loc"][0]) if first["loc"] else ""
-        typed = f"--{name.replace('_', '-')}" if name in FLAGS else f"--hyper {name}" if name else "options"
-        got = f", got {first['input']!r}" if name else ""
-        raise UsageError(f"{typed}: {first['msg'].removeprefix('Value error, ')}{got}") from None
+        said = first["msg"].removeprefix("Value error, ")
+        if first["loc"]:
+            name, said = str(first["loc"][0]), f"{said}, got {first['input']!r}"
+        else:  # of options that contradict each other, the message begins with one
+            name, _, said = said.partition(": ")
+        typed = f"--{name.replace('_', '-')}" if name in FLAGS else f"--hyper {name}"
+        raise UsageError(f"{typed}: {said}") from None
 
 
 def _refuse_training_options(given: dict[str, Any], arguments: argparse.Namespace) -> None:

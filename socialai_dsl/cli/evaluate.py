@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from socialai_dsl.cli.arguments import natural, positive
 from socialai_dsl.cli.errors import Exit, UsageError
 from socialai_dsl.cli.run_folder import SETTINGS, read_json, versions, write_text
+from trainer.config import code_folder
 
 if TYPE_CHECKING:
     from socialai_dsl.cli.evaluation import Evaluation
@@ -43,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help="default: auto")
     parser.add_argument(
-        "--net", metavar="my.module:MyNet", help="import this code, for an agent with a network of your own"
+        "--net", metavar="mine:Net", help="import this code, for an agent with a network of your own"
     )
     parser.add_argument(
         "--out",
@@ -73,8 +74,14 @@ def execute(arguments: argparse.Namespace) -> Exit:
     if arguments.run == "human" and arguments.json:
         raise UsageError("--json: the agent 'human' plays on standard output")
     require_trainer()
+    has_own = arguments.on is None or (Path(arguments.run) / SETTINGS).is_file()
     player = Player(
-        arguments.run, resolve_device(arguments.device), arguments.greedy, arguments.seed, arguments.net
+        arguments.run,
+        resolve_device(arguments.device),
+        arguments.greedy,
+        arguments.seed,
+        arguments.net,
+        code_folder(_own_scenario(arguments.run) if has_own else arguments.on[0]),
     )
     results = []
     for scenario in arguments.on or [_own_scenario(arguments.run)]:

@@ -130,9 +130,10 @@ def _place(folder: Path) -> str:
 
 def _snippet(config: RunConfig, folder: Path) -> str:
     """Code that plays one episode; a test runs it."""
-    net = f", net={config.net!r}" if ":" in config.net else ""
+    own = ":" in config.net
+    net = f", net={config.net!r}, folder=Path({config.code_folder.as_posix()!r})" if own else ""
     return f"""\
-import socialai_dsl as sd
+{"from pathlib import Path" + chr(10) * 2 if own else ""}import socialai_dsl as sd
 from trainer.play import CheckpointPolicy
 
 env = sd.make({config.scenario!r})

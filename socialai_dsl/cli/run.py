@@ -147,7 +147,7 @@ def _started(arguments: argparse.Namespace) -> "RunConfig":
 
 def _resumed(arguments: argparse.Namespace) -> "RunConfig":
     """The configuration of a run that was stopped; `--frames` may be raised, and W&B be told from now on."""
-    from socialai_dsl.cli.agents import read_config
+    from socialai_dsl.cli.agents import checked_config, read_config
 
     folder: Path = arguments.resume
     if arguments.scenario is not None or arguments.out is not None:
@@ -160,8 +160,9 @@ def _resumed(arguments: argparse.Namespace) -> "RunConfig":
         raise UsageError(f"--resume: {error}") from None
     if not config.trains:
         raise UsageError(f"--resume: the agent {config.agent!r} of {folder} is not trained")
-    changes = {"frames": arguments.frames, "wandb": arguments.wandb}
-    return config.model_copy(update={name: value for name, value in changes.items() if value is not None})
+    asked = {"frames": arguments.frames, "wandb": arguments.wandb}
+    changes = {name: value for name, value in asked.items() if value is not None}
+    return checked_config(config.model_dump() | changes)
 
 
 def _draw_curve(config: "RunConfig", program: "Playable", folder: Path, result: dict[str, Any]) -> None:

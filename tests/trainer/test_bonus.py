@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
-from trainer.bonus import cell_codes
+from trainer.bonus import EpisodicBonus, cell_codes
 from trainer.config import RunConfig
 
 IMAGE = np.zeros((2, 7, 7, 4), np.uint8)

@@ -16,7 +16,7 @@ PLAYROOM = str(Path(__file__).parents[1] / "data" / "playroom.yaml")
 
 
 def config(net: str) -> RunConfig:
-    values: dict[str, Any] = {"frames": 64, "num_envs": 4, "horizon": 8, "minibatches": 2, "epochs": 1}
+    values: dict[str, Any] = {"frames": 64, "envs": 4, "horizon": 8, "minibatches": 2, "epochs": 1}
     return RunConfig(net=net, tensorboard=False, threads=1, **values)
 
 

@@ -18,7 +18,6 @@ import numpy as np
 import pytest
 import safetensors.torch
 import torch
-from trainer.crew import Crew
 
 from socialai_dsl.cli.main import main
 from tests.trainer.fake_envs import EchoEnvs
@@ -35,10 +34,7 @@ ROOT = Path(__file__).parents[2]
 @pytest.fixture
 def session(small_config: Any) -> Session:
     session = Session.start(small_config(bonus="lang"), EchoEnvs(8))
-    rollout = collect(
-        session.actor, session.envs, session.state, session.config, session.generator, session.bonus
-    )
-    update(session.actor, session.optimizer, rollout, session.config, session.generator, Crew(1))
+    update(session, collect(session))
     session.update = 1
     return session
 
@@ -64,13 +60,14 @@ def test_everything_a_run_has_to_remember_is_in_it(session: Session) -> None:
     assert len(adam) == 3 * len(list(session.actor.net.parameters()))
 
 
-def test_only_the_two_newest_are_kept_and_leftovers_swept(session: Session, tmp_path: Path) -> None:
+@pytest.mark.parametrize("keep", [1, 2, 3])
+def test_only_the_newest_are_kept_and_leftovers_swept(keep: int, session: Session, tmp_path: Path) -> None:
     for number in range(4):
         (tmp_path / "000000000000007.tmp").write_bytes(b"left by a killed process")
         session.update = number
-        write(tmp_path, session.checkpoint())
+        write(tmp_path, session.checkpoint(), keep)
     names = sorted(path.name for path in tmp_path.iterdir())
-    assert names == ["000000000000128.safetensors", "000000000000192.safetensors"]
+    assert names == [f"{64 * number:015d}.safetensors" for number in range(4 - keep, 4)]
     assert read(tmp_path).meta.update == 3
 
 
@@ -133,7 +130,7 @@ def meta_of(session: Session, **changes: Any) -> dict[str, str]:
 @pytest.mark.parametrize(
     "changes",
     [
-        {"format": 2},
+        {"format": 3},
         {"surprise": 1},
         {"frames": -1},
         {"vocabulary": 3},
@@ -148,6 +145,18 @@ def test_well_signed_files_of_another_form_are_refused(
     path.write_bytes(signed(dict(session.checkpoint().tensors), meta_of(session, **changes)))
     with pytest.raises(CheckpointError, match=r"x\.safetensors: made by another version"):
         read(path)
+
+
+def test_a_checkpoint_of_an_earlier_version_says_what_to_do(session: Session, tmp_path: Path) -> None:
+    path = tmp_path / "x.safetensors"
+    old = {"format": 1, "net": "fast", "config": {"num_envs": 256, "explo": "none"}}
+    path.write_bytes(signed(dict(session.checkpoint().tensors), {"meta": json.dumps(old)}))
+    with pytest.raises(CheckpointError) as caught:
+        read(path)
+    assert str(caught.value) == (
+        f"{path}: made by another version (format 1, this version reads 2); "
+        "train again, or use the version that made it"
+    )
 
 
 def tampered(session: Session, **changes: torch.Tensor | None) -> Checkpoint:
@@ -480,4 +489,14 @@ def test_a_run_resumes_only_with_the_same_settings_and_scenario(session: Session
     envs.program.sha256 = "1" * 64
     with pytest.raises(CheckpointError, match="scenario has changed"):
         Session.start(small_config(bonus="lang"), envs).load(good)
-    Session.start(small_config(bonus="lang", frames=10_000, checkpoint_every=9), EchoEnvs(8)).load(good)
+    free = small_config(bonus="lang", frames=10_000, checkpoint_every=9, keep_checkpoints=5)
+    Session.start(free, EchoEnvs(8)).load(good)
+
+
+@pytest.mark.parametrize("schedule", [{"lr_end": 1e-4}, {"entropy_coef_end": 0.0}, {"guide": "script"}])
+def test_more_frames_are_another_run_where_schedules_reach_to_the_last(
+    schedule: Any, small_config: Any
+) -> None:
+    good = Session.start(small_config(frames=640, **schedule), EchoEnvs(8)).checkpoint()
+    with pytest.raises(CheckpointError, match=r"changed: frames: 640 -> 704 \(guide and schedules reach"):
+        Session.start(small_config(frames=704, **schedule), EchoEnvs(8)).load(good)

@@ -8,28 +8,27 @@ import numpy as np
 import pytest
 import torch
 from torch import Tensor, nn
-from trainer.crew import Crew
 
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.plain import encode
 from trainer.chunks import acting_memories, chunk_starts, update_chunks
-from trainer.config import RunConfig, configure, paper_tuned_preset
+from trainer.config import RunConfig, configure
 from trainer.play import CheckpointPolicy
 from trainer.ppo import compute_gae
 from trainer.rollout import Rollout, collect
 from trainer.session import Session
 
 
-def small(**changes: Any) -> RunConfig:
+def small(net: str = "paper-reference", **changes: Any) -> RunConfig:
     values: dict[str, Any] = {
-        "num_envs": 6,
+        "envs": 6,
         "horizon": 8,
         "bptt": 4,
         "epochs": 2,
         "frames": 480,
         "threads": 1,
     }
-    return configure(net="paper-reference", **(values | changes))
+    return configure(net="paper-reference", **(values | changes)).model_copy(update={"net": net})
 
 
 def played(config: RunConfig) -> tuple[Session, Rollout]:
@@ -37,15 +36,9 @@ def played(config: RunConfig) -> tuple[Session, Rollout]:
     session = Session.start(config, EchoEnvs(config.envs, length=8, chatter=0.4))
     session.actor.net.train()
     for _ in range(2):
-        rollout = collect(session.actor, session.envs, session.state, config, session.generator, None)
+        rollout = collect(session)
     assert rollout.starts[1:].any(), "episodes must begin within the rollout"
     return session, rollout
-
-
-def learn(session: Session, rollout: Rollout) -> dict[str, float]:
-    return update_chunks(
-        session.actor, session.optimizer, rollout, session.config, session.generator, Crew(1, False)
-    )
 
 
 # -- chunks -------------------------------------------------------------------------------------------------------
@@ -61,9 +54,9 @@ def test_shifted_chunks_begin_half_a_chunk_later_and_the_last_is_dropped() -> No
     assert chunk_starts(1, 40, 10, shifted=True)[:, 1].tolist() == [5, 15, 25]
 
 
-@pytest.mark.parametrize(("preset", "kept"), [(paper_preset, 3 / 4), (paper_tuned_preset, 7 / 8)])
-def test_the_presets_keep_the_published_share_of_the_frames(preset: Any, kept: float) -> None:
-    config = preset()
+@pytest.mark.parametrize(("preset", "kept"), [("paper-reference", 3 / 4), ("paper-reference-tuned", 7 / 8)])
+def test_the_presets_keep_the_published_share_of_the_frames(preset: str, kept: float) -> None:
+    config = configure(net=preset)
     chunks = chunk_starts(config.envs, config.horizon, config.bptt, shifted=True)
     assert len(chunks) * config.bptt == kept * config.frames_per_update
     assert (chunks[:, 1] + config.bptt <= config.horizon).all()
@@ -79,17 +72,17 @@ class Steps:
         self.calls: list[tuple[Tensor, Tensor]] = []
         step = session.actor.net.memory.step
 
-        def noted(inputs: Tensor, memory: Tensor) -> Tensor:
-            result = step(inputs, memory)
-            self.calls.append((memory.detach().clone(), result.detach().clone()))
-            return result
+        def noted(inputs: Tensor, memory: Tensor) -> tuple[Tensor, Tensor]:
+            output, after = step(inputs, memory)
+            self.calls.append((memory.detach().clone(), after.detach().clone()))
+            return output, after
 
         monkeypatch.setattr(session.actor.net.memory, "step", noted)
 
 
 def rows(memories: Tensor) -> set[tuple[float, ...]]:
-    """Memories (2, C, M) as a set, since chunks come in any order."""
-    return {tuple(memories[:, c].flatten().tolist()) for c in range(memories.shape[1])}
+    """Memories (C, 2, M) as a set, since chunks come in any order."""
+    return {tuple(memory.flatten().tolist()) for memory in memories}
 
 
 def test_a_chunk_begins_with_the_memory_that_was_last_computed_for_its_first_step(
@@ -99,12 +92,10 @@ def test_a_chunk_begins_with_the_memory_that_was_last_computed_for_its_first_ste
     session, rollout = played(config)
     rollout = replace(rollout, starts=np.zeros_like(rollout.starts))  # memories go on for ever
     steps = Steps(session, monkeypatch)
-    learn(session, rollout)
+    update_chunks(session, rollout)
     first, second, third = (steps.calls[epoch * 4 : epoch * 4 + 4] for epoch in range(3))
     acting = acting_memories(rollout, 4)
-    assert rows(first[0][0]) == rows(acting[[0, 4]].flatten(0, 1).transpose(0, 1)), (
-        "those of the acting network"
-    )
+    assert rows(first[0][0]) == rows(acting[[0, 4]].flatten(0, 1)), "those of the acting network"
     # Unshifted chunks hold steps 0-3 and 4-7, shifted ones 2-5. What step 1 returned is the memory before step 2.
     before_2_or_6 = rows(first[1][1])
     assert rows(second[0][0]) < before_2_or_6, "shifted chunks begin with memories of the epoch before"
@@ -112,9 +103,7 @@ def test_a_chunk_begins_with_the_memory_that_was_last_computed_for_its_first_ste
     before_4 = rows(second[1][1])
     assert len(before_4) == 6
     began = rows(third[0][0])
-    assert began == rows(acting[0].transpose(0, 1)) | before_4, (
-        "step 0 is in no chunk but its own; 4 was met shifted"
-    )
+    assert began == rows(acting[0]) | before_4, "step 0 is in no chunk but its own; 4 was met shifted"
 
 
 def test_memories_do_not_reach_into_an_episode(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -124,8 +113,8 @@ def test_memories_do_not_reach_into_an_episode(monkeypatch: pytest.MonkeyPatch) 
     marks[6] = True  # the third step of each chunk that begins at 4
     rollout = replace(rollout, starts=marks)
     steps = Steps(session, monkeypatch)
-    learn(session, rollout)
-    empty = [(given == 0).flatten(2).all(2).all(0).sum().item() for given, _ in steps.calls]
+    update_chunks(session, rollout)
+    empty = [(given == 0).flatten(1).all(1).sum().item() for given, _ in steps.calls]
     assert empty[1:] == [0, 6, 0], "six environments, each emptied before the marked step only"
 
 
@@ -133,7 +122,7 @@ def test_memories_not_yet_known_are_not_numbers() -> None:
     _, rollout = played(small())
     memories = acting_memories(rollout, 4)
     assert memories.shape == (8, 6, 2, 128)
-    assert torch.equal(memories[4, 3], rollout.memories[1][:, 3])
+    assert torch.equal(memories[4, 3], rollout.memories[1][3])
     assert memories[[1, 2, 3, 5, 6, 7]].isnan().all()
 
 
@@ -148,12 +137,13 @@ def test_batch_norm_sees_the_environments_while_acting_and_one_step_of_all_chunk
     assert len(norms) == 6
     seen: list[int] = []
     norms[0].register_forward_hook(lambda _module, given, _result: seen.append(len(given[0])))
-    rollout = collect(session.actor, session.envs, session.state, config, session.generator, None)
+    rollout = collect(session)
     assert seen == [16] * 41, "each step's observations, and the one after the last for its value"
+    assert {int(norm.num_batches_tracked) for norm in norms} == {40}, "which counts in the next rollout"
     seen.clear()
-    learn(session, rollout)
+    update_chunks(session, rollout)
     assert seen == [64] * 10 + [48] * 10 + [64] * 10 + [48] * 10, "also in the running statistics"
-    assert {int(norm.num_batches_tracked) for norm in norms} == {41 + 40}
+    assert {int(norm.num_batches_tracked) for norm in norms} == {40 + 40}
     assert len(session.optimizer.state) == len(list(net.parameters()))
     assert {int(state["step"]) for state in session.optimizer.state.values()} == {4}, "one step an epoch"
 
@@ -164,7 +154,7 @@ def test_acting_normalises_by_the_batch_and_evaluation_by_the_running_statistics
     session.actor.net.train()
     image, tokens = session.state.image.copy(), session.state.tokens.copy()
     acting, playing = copy.deepcopy(session.actor.net), copy.deepcopy(session.actor.net)
-    rollout = collect(session.actor, session.envs, session.state, config, session.generator, None)
+    rollout = collect(session)
 
     by_batch = first_values(acting, image, tokens)
     assert torch.allclose(rollout.values[0], by_batch, atol=1e-5)
@@ -191,9 +181,9 @@ def first_values(net: Any, image: np.ndarray, tokens: np.ndarray) -> Tensor:
 
 def test_batch_statistics_make_the_first_ratios_differ_from_one() -> None:
     session, rollout = played(small(epochs=1))
-    assert learn(session, rollout)["approx_kl"] > 1e-6
+    assert update_chunks(session, rollout)["approx_kl"] > 1e-6
     session, rollout = played(small(epochs=1, net="paper"))
-    assert learn(session, rollout)["approx_kl"] == pytest.approx(0, abs=1e-6), (
+    assert update_chunks(session, rollout)["approx_kl"] == pytest.approx(0, abs=1e-6), (
         "without batch statistics they are one"
     )
 
@@ -216,7 +206,7 @@ def test_the_update_is_that_of_a_plain_loop_over_frames(net: str) -> None:
     )
     twin = copy.deepcopy(session.actor.net)
     expected = plain_update(twin, session, rollout, config)
-    statistics = learn(session, rollout)
+    statistics = update_chunks(session, rollout)
     assert statistics["loss"] == pytest.approx(expected, rel=1e-9)
     for (name, got), other in zip(
         session.actor.net.state_dict().items(), twin.state_dict().values(), strict=True
@@ -235,25 +225,25 @@ def plain_update(net: Any, session: Session, rollout: Rollout, config: RunConfig
     )  # fmt: skip
     returns = advantages + rollout.values
     memory_of = {
-        (t, e): rollout.memories[t // 4, :, e] for t in (0, 4) for e in range(config.envs)
+        (t, e): rollout.memories[t // 4, e] for t in (0, 4) for e in range(config.envs)
     }  # before step t of environment e
     optimizer = torch.optim.Adam(net.parameters(), lr=1e-4, eps=1e-5, foreach=False)
     losses = []
     for epoch in range(config.epochs):
         starts = [(2, e) for e in range(6)] if epoch % 2 else [(t, e) for t in (0, 4) for e in range(6)]
-        memory = torch.stack([memory_of[start] for start in starts], 1)
+        memory = torch.stack([memory_of[start] for start in starts])  # (C, 2, M)
         total = torch.zeros((), dtype=torch.float64)
         for step in range(4):
             frames = [(t + step, e) for t, e in starts]
-            kept = torch.tensor([not rollout.starts[frame] for frame in frames]).double()[None, :, None]
+            kept = torch.tensor([not rollout.starts[frame] for frame in frames]).double()[:, None, None]
             images = torch.from_numpy(np.stack([actor.images.data[pairs[frame][0]] for frame in frames]))
             texts = torch.stack(
                 [encode(net.dialogue, actor.histories.data[pairs[frame][1]]) for frame in frames]
             )
             each = torch.arange(len(frames))
             features = net.perceive(net.prepare(images), texts, each, each)
-            h, c = net.memory.cell(features, tuple(memory * kept))
-            memory = torch.stack((h, c))
+            h, c = net.memory.cell(features, (memory * kept).unbind(1))
+            memory = torch.stack((h, c), 1)
             logits, values = net.heads(h)
             for number, frame in enumerate(frames):
                 loss = plain_loss(
@@ -268,7 +258,7 @@ def plain_update(net: Any, session: Session, rollout: Rollout, config: RunConfig
                 total = total + loss / len(frames) / 4
                 t, e = frame
                 if step < 3:
-                    memory_of[t + 1, e] = memory[:, number].detach()
+                    memory_of[t + 1, e] = memory[number].detach()
         optimizer.zero_grad()
         total.backward()  # type: ignore[no-untyped-call]
         nn.utils.clip_grad_norm_(net.parameters(), config.max_grad_norm)
@@ -308,8 +298,8 @@ def test_minibatches_are_of_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     config = small(minibatches=3, epochs=2)
     session, rollout = played(config)
     steps = Steps(session, monkeypatch)
-    learn(session, rollout)
-    sizes = [given.shape[1] for given, _ in steps.calls]
+    update_chunks(session, rollout)
+    sizes = [len(given) for given, _ in steps.calls]
     assert sizes == [4] * 12 + [4] * 4 + [2] * 4, "12 chunks by four, then 6 shifted ones by four"
 
 

@@ -6,12 +6,7 @@ import pytest
 import yaml
 
 import trainer
-from trainer.config import (
-    PRESETS,
-    RESUMABLE_FIELDS,
-    RunConfig,
-    configure,
-)
+from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, RunConfig, configure
 
 
 def test_the_defaults_are_the_settings_that_worked() -> None:
@@ -19,7 +14,7 @@ def test_the_defaults_are_the_settings_that_worked() -> None:
     assert (config.envs, config.horizon, config.epochs, config.minibatches) == (256, 32, 4, 4)
     assert (config.lr, config.gamma, config.gae_lambda, config.clip) == (7e-4, 0.99, 0.95, 0.2)
     assert (config.entropy_coef, config.max_grad_norm, config.normalize_advantages) == (0.01, 0.5, True)
-    assert not config.bootstrap_timeouts
+    assert (config.precision, config.bootstrap_timeouts) == ("float32", True)
 
 
 # The paper's table of hyper-parameters, with what its released run scripts add.
@@ -28,7 +23,7 @@ PUBLISHED = {
     "update": "chunks",
     "loss": "per_head",
     "frames": 30_000_000,
-    "num_envs": 16,
+    "envs": 16,
     "horizon": 40,
     "bptt": 10,
     "epochs": 4,
@@ -52,27 +47,48 @@ PUBLISHED = {
 
 
 def test_the_paper_s_preset() -> None:
-    config = configure("paper-reference")
+    config = configure(net="paper-reference")
     assert {name: getattr(config, name) for name in PUBLISHED} == PUBLISHED
     assert config.frames_per_update == 640
     assert config.updates == 46_875
 
 
 def test_the_tuned_preset_differs_in_recurrence_and_epsilon_only() -> None:
-    tuned, paper = configure("paper-reference-tuned").model_dump(), configure("paper-reference").model_dump()
+    paper, tuned = (configure(net=net).model_dump() for net in NET_PRESETS)
     changed = {name: value for name, value in tuned.items() if value != paper[name]}
-    assert changed == {"bptt": 5, "adam_eps": 1e-8}
+    assert changed == {"net": "paper-reference-tuned", "bptt": 5, "adam_eps": 1e-8}
 
 
 def test_what_is_said_overrides_a_preset() -> None:
-    config = configure("paper-reference", envs=4, frames=100, seed=3, lr=1e-3)
-    assert config == configure(net="paper-reference", envs=4, frames=100, seed=3, lr=1e-3)
+    config = configure(net="paper-reference", envs=4, frames=100, seed=3, lr=1e-3)
     assert (config.envs, config.frames, config.seed, config.lr, config.horizon) == (4, 100, 3, 1e-3, 40)
 
 
 def test_other_names_are_networks_with_the_default_numbers() -> None:
-    assert configure("paper", seed=1) == RunConfig(net="paper", seed=1)
-    assert set(PRESETS) == {"paper-reference", "paper-reference-tuned"}
+    assert configure(net="paper", seed=1) == RunConfig(net="paper", seed=1)
+    assert set(NET_PRESETS) == {"paper-reference", "paper-reference-tuned"}
+
+
+@pytest.mark.parametrize("net", ["fast", "paper", *NET_PRESETS])
+def test_time_outs_are_terminal_for_the_paper_s_own_update_only(net: str) -> None:
+    assert configure(net=net).bootstrap_timeouts == (net not in NET_PRESETS)
+
+
+def test_a_recipe_brings_its_numbers_and_what_is_said_overrides_them() -> None:
+    guided = configure("guided")
+    assert (guided.recipe, guided.guide) == ("guided", "script")
+    assert guided.guide_share <= 0.6, "the last part is plain PPO on the task's own reward"
+    assert configure("guided", minibatches=2, guide="none").guide == "none"
+    assert configure("paper").model_dump() == RunConfig().model_dump() | {"recipe": "paper"}
+    with pytest.raises(ValueError, match="recipe: got 'secret', expected one of plain, paper, guided"):
+        configure("secret")
+    assert all(preset.source for preset in [*RECIPES.values(), *NET_PRESETS.values()])
+
+
+def test_few_environments_are_few_minibatches() -> None:
+    assert configure("guided", envs=8).minibatches == 8
+    with pytest.raises(ValueError, match="minibatches: got 16, expected at most envs = 8"):
+        configure("guided", envs=8, minibatches=16)
 
 
 def test_updates_are_rounded_up() -> None:
@@ -83,7 +99,7 @@ def test_updates_are_rounded_up() -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"num_envs": 2}, "minibatches: got 4, expected at most num_envs = 2"),
+        ({"envs": 2}, "minibatches: got 4, expected at most envs = 2"),
         ({"bptt": 5}, "bptt: got 5, expected a divisor of horizon = 32"),
         ({"update": "chunks"}, "bptt: got 0, expected less than horizon = 32 and not 0"),
         ({"update": "chunks", "bptt": 32}, "bptt: got 32, expected less than horizon = 32"),
@@ -91,7 +107,13 @@ def test_updates_are_rounded_up() -> None:
         ({"lr": float("nan")}, "lr"),
         ({"lr": 0}, "lr"),
         ({"seed": -1}, "seed"),
-        ({"bonus": "rnd"}, "bonus"),
+        ({"precision": "auto"}, "precision"),
+        ({"lr_end": 0.0}, "lr_end"),
+        ({"target_kl": -1.0}, "target_kl"),
+        ({"keep_checkpoints": 0}, "keep_checkpoints"),
+        ({"guide_share": 1.5}, "guide_share"),
+        ({"update": "chunks", "bptt": 8, "guide": "script"}, "guide: the update `chunks` is the paper's"),
+        ({"threads": 65}, "threads"),
         ({"learning_rate": 1e-3}, "learning_rate"),
         ({"frames": "many"}, "frames"),
     ],
@@ -108,7 +130,20 @@ def test_json_gives_it_back() -> None:
 
 def test_every_field_says_what_it_is() -> None:
     assert all(field.description for field in RunConfig.model_fields.values())
-    assert set(RunConfig.model_fields) >= RESUMABLE_FIELDS
+    kept = {"scenario", "recipe"}
+    assert sorted([*FLAGS, *HYPER, *kept]) == sorted(RunConfig.model_fields), "each is given in one way"
+
+
+@pytest.mark.parametrize(
+    ("scenario", "folder"),
+    [
+        ("/home/me/mine.yaml+unsocial?doors=3", "/home/me"),
+        ("mine.yml", "."),
+        ("talkitout+oracle", "."),
+    ],
+)
+def test_code_of_ones_own_is_looked_for_beside_the_scenario_s_file(scenario: str, folder: str) -> None:
+    assert RunConfig(scenario=scenario).code_folder == Path(folder)
 
 
 def test_the_exploration_table_is_the_published_one() -> None:

@@ -106,10 +106,10 @@ def test_files_that_are_wrong(tmp_path: Path, text: str, message: str) -> None:
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("expart", "expected expert, progress, reverse, a .yaml file"),
+        ("expart", "expected one of expert, progress, reverse, a .yaml file, or mine:Curriculum"),
         ("nowhere.yaml", "nowhere.yaml cannot be read"),
-        ("no_such_module:Mine", "cannot load"),
-        ("json:dumps", "has not all of observe, weights, state and load_state"),
+        ("no_such_module:Mine", "there is no module 'no_such_module'"),
+        ("json:JSONDecoder", "JSONDecoder lacks the method 'observe'"),
     ],
 )
 def test_names_that_are_wrong(name: str, message: str) -> None:

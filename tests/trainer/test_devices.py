@@ -22,7 +22,7 @@ from trainer.ppo import train
 @pytest.mark.parametrize("net", ["fast", "paper", "paper-reference"])
 def test_training_on_a_card_moves_everything_there(net: str, tmp_path: Path, small_config: Any) -> None:
     """It also does the same arithmetic as on the CPU, because the pretended card computes there."""
-    settings = {"net": net, "bonus": "lang", "bootstrap_timeouts": True, "bptt": 4, "frames": 64 * 2}
+    settings = {"net": net, "bonus": "lang", "bptt": 4, "frames": 64 * 2}
     here = read(train(small_config(**settings), EchoEnvs(8, chatter=0.3), tmp_path / "here"))
     # PyTorch for CPUs has no cuDNN, which it would look for.
     with torch.backends.cudnn.flags(enabled=False), PretendedCard() as card:

@@ -10,10 +10,11 @@ from torch import Tensor
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.plain import encode
 from trainer.config import RunConfig
-from trainer.features import Actor, make_minibatch
-from trainer.nets import ActorCritic, build_net
-from trainer.rollout import Rollout, RolloutState, collect
-from trainer.session import net_spec
+from trainer.features import make_minibatch
+from trainer.nets import ActorCritic
+from trainer.nets.memory import emptied
+from trainer.rollout import Rollout, collect
+from trainer.session import Session
 
 STEPS, ENVS, STRETCH = 12, 6, 4
 
@@ -25,18 +26,14 @@ def double() -> Iterator[None]:
     torch.set_default_dtype(torch.float32)
 
 
-def play(net_name: str, distinct: bool) -> tuple[Actor, Rollout, list[dict[str, np.ndarray]]]:
+def play(net_name: str, distinct: bool) -> tuple[Session, Rollout, list[dict[str, np.ndarray]]]:
     """A rollout with a network of doubles, and what was observed (T items)."""
     envs = EchoEnvs(ENVS, length=12, chatter=0.7, pictures=3, lethal=False, limit=9)
     config = RunConfig(envs=ENVS, horizon=STEPS, bptt=STRETCH, minibatches=1, net=net_name, threads=1)
-    net = build_net(net_name, net_spec(envs), 0)
-    net.distinct = distinct
-    observation, _ = envs.reset(seed=3)
-    state = RolloutState.initial(observation, net.memory.initial(ENVS))
-    actor, generator = Actor(net, 12), torch.Generator().manual_seed(0)
-    collect(
-        actor, envs, state, config, generator, None
-    )  # so that the next one begins in the middle of episodes
+    session = Session.start(config, envs)
+    session.actor.net.distinct = distinct
+    collect(session)  # so that the next one begins in the middle of episodes
+    state = session.state
     seen = [{"image": state.image.copy(), "tokens": state.tokens.copy()}]
     step = envs.step
 
@@ -46,8 +43,7 @@ def play(net_name: str, distinct: bool) -> tuple[Actor, Rollout, list[dict[str, 
         return result
 
     envs.step = note  # type: ignore[method-assign]
-    rollout = collect(actor, envs, state, config, generator, None)
-    return actor, rollout, seen[:-1]
+    return session, collect(session), seen[:-1]
 
 
 def reference(net: ActorCritic, rollout: Rollout, seen: list[dict[str, np.ndarray]]) -> tuple[Tensor, Tensor]:
@@ -57,15 +53,15 @@ def reference(net: ActorCritic, rollout: Rollout, seen: list[dict[str, np.ndarra
     for t, observation in enumerate(seen):
         if t % STRETCH == 0:
             memory = rollout.memories[t // STRETCH]
-        memory = memory * torch.from_numpy(~rollout.starts[t])[:, None]
+        memory = emptied(memory, torch.from_numpy(rollout.starts[t]))
         features = [
             net.perceive(
                 net.prepare(torch.from_numpy(image[None])), encode(net.dialogue, tokens)[None], only, only
             )
             for image, tokens in zip(observation["image"], observation["tokens"], strict=True)
         ]
-        memory = net.memory.step(torch.cat(features), memory)
-        for results, result in zip((logits, values), net.heads(memory[0]), strict=True):
+        output, memory = net.memory.step(torch.cat(features), memory)
+        for results, result in zip((logits, values), net.heads(output), strict=True):
             results.append(result)
     return torch.stack(logits), torch.stack(values)
 
@@ -83,12 +79,12 @@ def furthest(one: Tensor, other: Tensor) -> float:
 @pytest.mark.parametrize("distinct", [True, False], ids=["duplicates removed", "duplicates kept"])
 @pytest.mark.parametrize("net_name", ["fast", "paper"])
 def test_agrees_with_reencoding_every_frame(net_name: str, distinct: bool) -> None:
-    actor, rollout, seen = play(net_name, distinct)
-    net = actor.net
+    session, rollout, seen = play(net_name, distinct)
+    net = session.actor.net
     assert rollout.starts.any(), "episodes must begin within the rollout"
     assert max(np.count_nonzero(o["tokens"], axis=1).max() for o in seen) > 8, "histories must be long"
     zeros = torch.zeros(STEPS, ENVS)
-    minibatch = make_minibatch(actor, rollout, zeros, zeros, torch.arange(ENVS), STRETCH)
+    minibatch = make_minibatch(session.actor, rollout, zeros, zeros, torch.arange(ENVS), STRETCH)
     shared = len(minibatch.image_index) < STEPS * ENVS
     assert shared == distinct, "duplicates must be removed exactly where that was asked for"
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import torch
 from torch import Tensor
-from trainer.crew import Crew
 
 from tests.trainer.fake_envs import EchoEnvs
 from trainer.config import RunConfig
@@ -19,6 +18,7 @@ from trainer.rollout import collect
 from trainer.session import Session
 
 SIZES = (2, 2, 2, 2)
+ENTROPY = 0.01
 
 
 def column(*numbers: float) -> Tensor:
@@ -86,41 +86,68 @@ def entropy_of(p: float) -> float:
 
 
 def config(**changes: Any) -> RunConfig:
-    return RunConfig(**({"value_coef": 0.5, "entropy_coef": 0.01, "clip": 0.2} | changes))
+    return RunConfig(**({"value_coef": 0.5, "clip": 0.2} | changes))
 
 
 def test_joint_loss_of_a_spoken_action() -> None:
     batch, logits = one_frame(True, advantage=-2.0, acting=0.5, now=0.6)
-    parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config())
+    parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config(), ENTROPY)
     ratio = 1.2**4
     assert parts.policy.item() == pytest.approx(2 * ratio, rel=1e-5), (
         "a bad action's growing ratio is not clipped"
     )
     assert parts.value.item() == pytest.approx(1.5**2)
-    assert parts.entropy.item() == pytest.approx(4 * entropy_of(0.6), rel=1e-5)
-    assert parts.total.item() == pytest.approx(2 * ratio + 0.5 * 2.25 - 0.01 * 4 * entropy_of(0.6), rel=1e-5)
+    entropy = (2 + 0.6 * 2) * entropy_of(
+        0.6
+    )  # template and noun count where something is said, in 0.6 of the cases
+    assert parts.entropy.item() == pytest.approx(entropy, rel=1e-5)
+    assert parts.total.item() == pytest.approx(2 * ratio + 0.5 * 2.25 - ENTROPY * entropy, rel=1e-5)
     assert parts.clip_fraction.item() == 1
     assert parts.approx_kl.item() == pytest.approx(ratio - 1 - log(ratio), rel=1e-4)
 
 
 def test_joint_loss_clips_a_good_action_s_ratio() -> None:
     batch, logits = one_frame(True, advantage=2.0, acting=0.5, now=0.6)
-    assert ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config()).policy.item() == pytest.approx(
-        -2 * 1.2
-    )
+    assert ppo_loss(
+        batch, logits, torch.tensor([1.5]), SIZES, config(), ENTROPY
+    ).policy.item() == pytest.approx(-2 * 1.2)
 
 
 def test_silence_leaves_template_and_noun_out() -> None:
     batch, _ = one_frame(False, advantage=-2.0, acting=0.5, now=0.6)
     logits = torch.tensor([[log(0.4), log(0.6), log(0.6), log(0.4), log(0.2), log(0.8), log(0.9), log(0.1)]])
     logits.requires_grad_()
-    parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config())
-    assert parts.policy.item() == pytest.approx(2 * 1.2 * 1.2, rel=1e-5)
-    assert parts.entropy.item() == pytest.approx(2 * entropy_of(0.6), rel=1e-5)
+    parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config(), 0.0)
+    assert parts.policy.item() == pytest.approx(2 * (0.6 / 0.5) ** 2, rel=1e-5)
     parts.total.backward()  # type: ignore[no-untyped-call]
     assert logits.grad is not None
     assert (logits.grad[0, 4:] == 0).all(), "what was not said must not be learnt from"
     assert (logits.grad[0, :4] != 0).all()
+
+
+@pytest.mark.parametrize("sizes", [(3, 2, 2, 4), (2, 2, 1, 1)])
+def test_the_entropy_is_that_of_all_actions_and_so_is_its_gradient(sizes: tuple[int, int, int, int]) -> None:
+    """Every action is enumerated; where nothing is said, all templates and nouns are one action."""
+    generator = torch.Generator().manual_seed(0)
+    logits = torch.randn(5, sum(sizes), generator=generator, dtype=torch.float64).requires_grad_()
+    batch = Batch(
+        torch.ones(5, 4, dtype=torch.int64).minimum(torch.tensor(sizes) - 1),
+        torch.zeros(5, 4, dtype=torch.float64),
+        *torch.zeros(3, 5, dtype=torch.float64),
+    )
+    settings = config(value_coef=0.0)
+    parts = ppo_loss(batch, logits, torch.zeros(5, dtype=torch.float64), sizes, settings, entropy_coef=1.0)
+    first, speak, template, noun = (part.softmax(1) for part in logits.split(list(sizes), 1))
+    silent = first * speak[:, :1]
+    spoken = torch.einsum("na,nb,nc->nabc", first * speak[:, 1:], template, noun)
+    joint = torch.cat((silent, spoken.flatten(1)), 1)  # (N, actions)
+    assert torch.allclose(joint.sum(1), torch.ones(5, dtype=torch.float64))
+    expected = -(joint * joint.log()).sum(1).mean()
+    assert parts.entropy.item() == pytest.approx(expected.item(), rel=1e-12)
+    (got,) = torch.autograd.grad(parts.total, logits)
+    (wanted,) = torch.autograd.grad(-expected, logits)
+    assert torch.allclose(got, wanted, rtol=0, atol=1e-12)
+    assert wanted[:, sizes[0] : sizes[0] + 2].abs().min() > 1e-4, "p(speak) matters"
 
 
 def test_per_head_loss_masks_and_averages_each_head() -> None:
@@ -129,7 +156,7 @@ def test_per_head_loss_masks_and_averages_each_head() -> None:
         [[log(0.4), log(0.6), log(0.45), log(0.55), log(0.2), log(0.8), log(0.9), log(0.1)]]
     )
     batch = replace(batch, log_probs=torch.tensor([[log(0.5), log(0.5), log(0.5), log(0.5)]]))
-    parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config(loss="per_head"))
+    parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config(loss="per_head"), ENTROPY)
     primitive, speak = -2 * min(1.2, 1.2), -2 * (0.45 / 0.5)
     entropies = entropy_of(0.6) + entropy_of(0.55)
     expected = (primitive + speak) / 4 + 0.5 * 2.25 * 2 / 4 - 0.01 * entropies / 4
@@ -138,7 +165,7 @@ def test_per_head_loss_masks_and_averages_each_head() -> None:
 
 def test_clipped_value_loss_takes_the_worse_of_the_two() -> None:
     batch, logits = one_frame(True, advantage=0.0, acting=0.5, now=0.5)
-    parts = ppo_loss(batch, logits, torch.tensor([2.5]), SIZES, config(clip_value=True))
+    parts = ppo_loss(batch, logits, torch.tensor([2.5]), SIZES, config(clip_value=True), ENTROPY)
     assert parts.value.item() == pytest.approx((1.2 - 3) ** 2), (
         "acting value 1, change clipped to 0.2, return 3"
     )
@@ -156,7 +183,7 @@ def test_per_head_value_loss_weighs_frames_by_the_heads_that_took_part() -> None
         returns=torch.tensor([3.0, 1.5]),
     )
     settings = config(loss="per_head", clip_value=True)
-    parts = ppo_loss(batch, logits.expand(2, -1), torch.tensor([2.5, 0.5]), SIZES, settings)
+    parts = ppo_loss(batch, logits.expand(2, -1), torch.tensor([2.5, 0.5]), SIZES, settings, ENTROPY)
     clipped = (1.2 - 3) ** 2  # worse than (2.5 - 3) ** 2
     plain = (0.5 - 1.5) ** 2  # worse than (0.8 - 1.5) ** 2
     assert parts.value.item() == pytest.approx((4 * clipped + 2 * plain) / 8)
@@ -175,7 +202,7 @@ def test_per_head_value_loss_weighs_frames_by_the_heads_that_took_part() -> None
 )
 def test_each_head_clips_its_own_ratio(advantage: float, now: float, expected: float) -> None:
     batch, logits = one_frame(True, advantage, acting=0.5, now=now)
-    parts = ppo_loss(batch, logits, torch.tensor([3.0]), SIZES, config(loss="per_head"))
+    parts = ppo_loss(batch, logits, torch.tensor([3.0]), SIZES, config(loss="per_head"), ENTROPY)
     assert parts.policy.item() == pytest.approx(expected, rel=1e-5), "the mean of four equal heads"
 
 
@@ -183,7 +210,7 @@ def played(config: RunConfig) -> tuple[Session, Any]:
     envs = EchoEnvs(config.envs, length=8, chatter=0.4)
     session = Session.start(config, envs)
     for _ in range(2):
-        rollout = collect(session.actor, envs, session.state, config, session.generator, None)
+        rollout = collect(session)
     return session, rollout
 
 
@@ -200,7 +227,9 @@ def test_the_update_sees_the_policy_that_acted(net: str, bptt: int, small_config
         )
         logits, values = minibatch.evaluate(session.actor.net)
         assert torch.allclose(values, minibatch.batch.values, atol=1e-5)
-        parts = ppo_loss(minibatch.batch, logits, values, session.actor.net.spec.action_sizes, config)
+        parts = ppo_loss(
+            minibatch.batch, logits, values, session.actor.net.spec.action_sizes, config, ENTROPY
+        )
         assert parts.approx_kl.item() == pytest.approx(0, abs=1e-6)
         assert parts.clip_fraction.item() == 0
 
@@ -214,8 +243,8 @@ def test_minibatches_hold_whole_environments_in_time_order(small_config: Any) ->
     assert got.tolist() == [
         [t * 100.0 + 5, t * 100.0 + 2, (t + 4) * 100.0 + 5, (t + 4) * 100.0 + 2] for t in range(4)
     ]
-    assert torch.equal(minibatch.memory[:, :2], rollout.memories[0][:, [5, 2]])
-    assert torch.equal(minibatch.memory[:, 2:], rollout.memories[1][:, [5, 2]])
+    assert torch.equal(minibatch.memory[:2], rollout.memories[0][[5, 2]])
+    assert torch.equal(minibatch.memory[2:], rollout.memories[1][[5, 2]])
 
 
 def test_an_update_makes_the_better_action_likelier(small_config: Any) -> None:
@@ -227,7 +256,7 @@ def test_an_update_makes_the_better_action_likelier(small_config: Any) -> None:
     rollout.next_value.zero_()
     rollout.terminated[:], rollout.truncated[:] = True, False
     before = rollout.log_probs[..., 0][favoured].mean().item()
-    update(session.actor, session.optimizer, rollout, config, session.generator, Crew(1))
+    update(session, rollout)
     group = torch.arange(config.envs)
     minibatch = make_minibatch(session.actor, rollout, rollout.values, rollout.values, group, config.horizon)
     logits, _ = minibatch.evaluate(session.actor.net)
@@ -243,16 +272,17 @@ def test_a_step_is_adam_s_on_the_clipped_gradient(net: str, small_config: Any) -
     model = session.actor.net
     twin = copy.deepcopy(model)
     optimizer = torch.optim.Adam(twin.parameters(), lr=config.lr, eps=config.adam_eps, foreach=False)
-    statistics = update(session.actor, session.optimizer, rollout, config, session.generator, Crew(1))
+    statistics = update(session, rollout)
 
     gains = compute_gae(
         torch.from_numpy(rollout.rewards).float(), rollout.values, rollout.next_value,
-        torch.from_numpy(rollout.terminated), torch.from_numpy(rollout.truncated), torch.zeros(8, 8), 0.99, 0.95,
+        torch.from_numpy(rollout.terminated), torch.from_numpy(rollout.truncated),
+        torch.from_numpy(rollout.bootstrap).float(), 0.99, 0.95,
     )  # fmt: skip
     scaled = (gains - gains.mean()) / (gains.std(correction=0) + 1e-8)
     everything = make_minibatch(session.actor, rollout, scaled, gains + rollout.values, torch.arange(8), 8)
     logits, values = everything.evaluate(twin)
-    loss = ppo_loss(everything.batch, logits, values, model.spec.action_sizes, config)
+    loss = ppo_loss(everything.batch, logits, values, model.spec.action_sizes, config, ENTROPY)
     loss.total.backward()  # type: ignore[no-untyped-call]
     norm = torch.nn.utils.clip_grad_norm_(twin.parameters(), config.max_grad_norm)
     optimizer.step()
@@ -271,10 +301,21 @@ def test_a_step_is_adam_s_on_the_clipped_gradient(net: str, small_config: Any) -
 def test_statistics_are_finite_and_complete(small_config: Any) -> None:
     config = small_config()
     session, rollout = played(config)
-    statistics = update(session.actor, session.optimizer, rollout, config, session.generator, Crew(1))
+    statistics = update(session, rollout)
     assert set(statistics) == {
-        "loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "grad_norm", "explained_variance"
+        "loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "imitation_loss", "grad_norm",
+        "explained_variance",
     }  # fmt: skip
     assert np.isfinite(list(statistics.values())).all()
     assert 0 < statistics["entropy"] <= log(4) + log(2) + log(2) + log(4) + 1e-6
     assert exp(statistics["approx_kl"]) < 2
+
+
+@pytest.mark.parametrize(("target", "epochs"), [(None, 3), (1e-12, 1), (1e6, 3)])
+def test_a_divergence_above_the_target_ends_the_epochs(
+    target: float | None, epochs: int, small_config: Any
+) -> None:
+    session, rollout = played(small_config(epochs=3, target_kl=target))
+    update(session, rollout)
+    (steps,) = {int(state["step"]) for state in session.optimizer.state.values()}
+    assert steps == epochs * session.config.minibatches

@@ -12,6 +12,7 @@ from tests.trainer.plain import encode
 from trainer.errors import ObservationError, TrainingStopped
 from trainer.features import Actor
 from trainer.nets import build_net
+from trainer.nets.memory import emptied
 from trainer.rollout import Rollout, collect, ended_info, final_observation
 from trainer.session import Session, net_spec
 
@@ -39,8 +40,7 @@ class Witness(EchoEnvs):
 def play(config: Any, envs: EchoEnvs, rollouts: int = 1) -> tuple[Session, Rollout]:
     session = Session.start(config, envs)
     for _ in range(rollouts):
-        bonus = session.bonus
-        rollout = collect(session.actor, envs, session.state, config, session.generator, bonus)
+        rollout = collect(session)
     return session, rollout
 
 
@@ -77,9 +77,9 @@ def test_values_equal_those_of_a_plain_recurrent_loop(net: str, length: int, sma
     with torch.no_grad():
         for t in range(24):
             features = torch.stack([plain_features(model, envs.seen[t], e) for e in range(8)])
-            memory = memory * torch.from_numpy(~rollout.starts[t])[:, None]
-            memory = model.memory.step(features, memory)
-            logits, values = model.heads(memory[0])
+            memory = emptied(memory, torch.from_numpy(rollout.starts[t]))
+            output, memory = model.memory.step(features, memory)
+            logits, values = model.heads(output)
             assert torch.allclose(values, rollout.values[t], atol=1e-5), f"step {t}"
             first = torch.log_softmax(logits[:, :4], 1).gather(1, rollout.actions[t][:, :1])
             assert torch.allclose(first, rollout.log_probs[t][:, :1], atol=1e-5), f"step {t}"
@@ -94,25 +94,33 @@ def plain_features(model: Any, observation: dict[str, np.ndarray], e: int) -> to
 
 def test_time_outs_are_bootstrapped_with_the_value_of_their_last_observation(small_config: Any) -> None:
     envs = Witness(8, limit=4)
-    config = small_config(bootstrap_timeouts=True)
+    config = small_config()
     session, rollout = play(config, envs)
     model, memory = session.actor.net, session.actor.net.memory.initial(8)
     checked = 0
     with torch.no_grad():
         for t in range(config.horizon):
-            memory = memory * torch.from_numpy(~rollout.starts[t])[:, None]
+            memory = emptied(memory, torch.from_numpy(rollout.starts[t]))
             features = torch.stack([plain_features(model, envs.seen[t], e) for e in range(8)])
-            memory = model.memory.step(features, memory)
+            _, memory = model.memory.step(features, memory)
             for e in np.flatnonzero(rollout.truncated[t]):
                 final = plain_features(model, envs.steps[t][4]["final_obs"], int(e))
-                _, value = model.heads(model.memory.step(final[None], memory[:, e : e + 1])[0])
+                _, value = model.heads(model.memory.step(final[None], memory[e : e + 1])[0])
                 assert rollout.bootstrap[t, e] == pytest.approx(value.item(), abs=1e-5)
                 checked += 1
     assert checked > 0
     assert (rollout.bootstrap[~rollout.truncated] == 0).all()
-    _, terminal = play(small_config(), EchoEnvs(8, limit=4))
+    _, terminal = play(small_config(bootstrap_timeouts=False), EchoEnvs(8, limit=4))
     assert terminal.truncated.any()
     assert (terminal.bootstrap == 0).all()
+
+
+def test_batch_normalisation_counts_each_observation_once(small_config: Any) -> None:
+    """Neither the value after a rollout's last step nor that of a time-out's last observation counts again."""
+    session, rollout = play(small_config(net="paper-reference"), EchoEnvs(8, limit=4), rollouts=2)
+    assert rollout.bootstrap.any()
+    norms = [part for part in session.actor.net.modules() if isinstance(part, torch.nn.BatchNorm2d)]
+    assert {int(norm.num_batches_tracked) for norm in norms} == {16}, "two rollouts of eight steps"
 
 
 def test_the_bonus_is_paid_on_top_and_does_not_count_as_return(small_config: Any) -> None:
@@ -132,7 +140,7 @@ def test_observations_outside_their_bounds_are_refused(poison: str, small_config
     session = Session.start(small_config(), envs)
     envs.poison = poison
     with pytest.raises(ObservationError, match=poison):
-        collect(session.actor, envs, session.state, session.config, session.generator, None)
+        collect(session)
 
 
 def test_a_reward_that_is_not_finite_stops_the_run(small_config: Any) -> None:
@@ -140,7 +148,7 @@ def test_a_reward_that_is_not_finite_stops_the_run(small_config: Any) -> None:
     session = Session.start(small_config(), envs)
     envs.poison = "reward"
     with pytest.raises(TrainingStopped, match="reward"):
-        collect(session.actor, envs, session.state, session.config, session.generator, None)
+        collect(session)
 
 
 def test_ids_may_be_left_to_the_actor() -> None:

@@ -16,8 +16,7 @@ from gymnasium.vector import AutoresetMode
 
 from socialai_dsl.evaluation import evaluate
 from tests.trainer.fake_envs import EchoEnvs
-from trainer import checkpoint as checkpoints
-from trainer import train as training
+from trainer import ppo as training
 from trainer.checkpoint import read
 from trainer.config import RunConfig
 from trainer.errors import CheckpointError, TrainingStopped
@@ -68,17 +67,16 @@ def test_it_learns_to_repeat_a_word_it_heard(tmp_path: Path) -> None:
     ],
 )
 def test_a_run_stopped_three_times_ends_with_the_same_bits(
-    net: str, explo: str, threads: int, update: str, tmp_path: Path, small_config: Any
+    net: str, bonus: str, threads: int, update: str, tmp_path: Path, small_config: Any
 ) -> None:
     updates = 9 if net == "fast" else 4
     config = small_config(
         net=net,
-        bonus=explo,
+        bonus=bonus,
         threads=threads,
         update=update,
         bptt=4,
         frames=64 * updates,
-        bootstrap_timeouts=True,
     )
     whole = read(train(config, EchoEnvs(8, chatter=0.3), tmp_path / "whole"))
     stops = np.sort(np.random.default_rng(0).choice(np.arange(1, updates), 3, replace=False)).tolist()
@@ -92,11 +90,46 @@ def test_a_run_stopped_three_times_ends_with_the_same_bits(
     assert rows(tmp_path / "parts") == rows(tmp_path / "whole")
 
 
+def test_a_run_that_has_heard_nothing_yet_resumes(tmp_path: Path, small_config: Any) -> None:
+    """What encodes words has had no gradient, so that Adam knows nothing of it."""
+    whole = read(train(small_config(frames=64 * 4), EchoEnvs(8, limit=1), tmp_path / "whole"))
+    assert "adam.step.dialogue.embedding.weight" not in whole.tensors
+    train(small_config(frames=64 * 2), EchoEnvs(8, limit=1), tmp_path / "parts")
+    longer = read(train(small_config(frames=64 * 4), EchoEnvs(8, limit=1), tmp_path / "parts", resume=True))
+    assert all(torch.equal(longer.tensors[name], value) for name, value in whole.tensors.items())
+
+
 def test_a_finished_run_can_be_resumed_for_longer(tmp_path: Path, small_config: Any) -> None:
     whole = read(train(small_config(frames=64 * 5), EchoEnvs(8), tmp_path / "whole"))
     train(small_config(frames=64 * 3), EchoEnvs(8), tmp_path / "parts")
     longer = read(train(small_config(frames=64 * 5), EchoEnvs(8), tmp_path / "parts", resume=True))
     assert all(torch.equal(longer.tensors[name], value) for name, value in whole.tensors.items())
+
+
+def test_schedules_fall_evenly_to_their_ends(
+    tmp_path: Path, small_config: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    used: list[tuple[float, float]] = []
+    real = training.update
+
+    def note(session: Any, *rest: Any) -> Any:
+        (group,) = session.optimizer.param_groups
+        used.append((group["lr"], session.entropy_coef))
+        return real(session, *rest)
+
+    monkeypatch.setattr(training, "update", note)
+    config = small_config(frames=64 * 4, lr=8e-4, lr_end=4e-4, entropy_coef=0.04, entropy_coef_end=0.0)
+    train(config, EchoEnvs(8), tmp_path)
+    assert used == [pytest.approx((8e-4 - k * 1e-4, 0.04 - k * 0.01)) for k in range(4)]
+    used.clear()
+    train(small_config(frames=64 * 2, lr=8e-4, entropy_coef=0.04), EchoEnvs(8), tmp_path / "flat")
+    assert used == [(8e-4, 0.04)] * 2
+
+
+def test_as_many_checkpoints_are_kept_as_were_asked_for(tmp_path: Path, small_config: Any) -> None:
+    train(small_config(keep_checkpoints=3, checkpoint_every=1), EchoEnvs(8), tmp_path)
+    kept = sorted(path.stem for path in (tmp_path / "checkpoints").iterdir())
+    assert kept == [f"{64 * update:015d}" for update in (4, 5, 6)]
 
 
 def test_progress_and_metrics_are_complete(tmp_path: Path, small_config: Any) -> None:
@@ -165,9 +198,7 @@ def test_bad_environments_stop_the_run_at_once(
 def test_numbers_that_are_not_finite_stop_the_run_at_once(
     place: str, message: str, tmp_path: Path, small_config: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from trainer import ppo
-
-    real, calls = ppo.ppo_loss, 0
+    real, calls = training.ppo_loss, 0
 
     def poisoned(batch: Any, logits: torch.Tensor, values: torch.Tensor, *rest: Any) -> Any:
         nonlocal calls
@@ -188,7 +219,7 @@ def test_numbers_that_are_not_finite_stop_the_run_at_once(
 
     sessions: list[Any] = []
     start = training.Session.start
-    monkeypatch.setattr(ppo, "ppo_loss", poisoned)
+    monkeypatch.setattr(training, "ppo_loss", poisoned)
     monkeypatch.setattr(
         training.Session, "start", lambda *rest: sessions.append(start(*rest)) or sessions[-1]
     )
@@ -207,10 +238,10 @@ def test_weights_that_a_step_spoils_are_not_saved(
     )
     real = training.update
 
-    def spoiling(actor: Any, optimizer: Any, *rest: Any) -> Any:
-        losses = real(actor, optimizer, *rest)
-        if next(iter(optimizer.state.values()))["step"] == 3 * config.minibatches:
-            actor.net.state_dict()[name][0] = torch.inf
+    def spoiling(session: Any, *rest: Any) -> Any:
+        losses = real(session, *rest)
+        if session.update == 2:
+            session.actor.net.state_dict()[name][0] = torch.inf
         return losses
 
     monkeypatch.setattr(training, "update", spoiling)
@@ -246,8 +277,7 @@ from trainer.config import RunConfig
 from trainer.errors import TrainingStopped
 from trainer.ppo import train
 
-config = RunConfig(envs=8, horizon=8, minibatches=2, epochs=1, frames=1000, threads=1, tensorboard=False,
-                     checkpoint_every=3)
+config = RunConfig(envs=8, horizon=8, minibatches=2, epochs=1, frames=1000, tensorboard=False, checkpoint_every=3)
 
 def fill(progress):
     if progress.update == 4:
@@ -301,7 +331,7 @@ train(config, EchoEnvs(8), run_dir, lambda progress: print(progress.update, flus
     killed = read(tmp_path / "killed" / "checkpoints")
     assert all(torch.equal(killed.tensors[name], value) for name, value in whole.tensors.items())
     assert rows(tmp_path / "killed") == rows(tmp_path / "whole")
-    assert len(list((tmp_path / "killed" / "checkpoints").iterdir())) == checkpoints.KEPT
+    assert len(list((tmp_path / "killed" / "checkpoints").iterdir())) == config.keep_checkpoints
 
 
 def test_resuming_nothing_is_an_error(tmp_path: Path, small_config: Any) -> None:
@@ -310,7 +340,7 @@ def test_resuming_nothing_is_an_error(tmp_path: Path, small_config: Any) -> None
 
 
 def test_the_number_of_environments_has_to_fit(tmp_path: Path, small_config: Any) -> None:
-    with pytest.raises(ValueError, match="got 4 environments, expected num_envs = 8"):
+    with pytest.raises(ValueError, match="got 4 environments, expected envs = 8"):
         train(small_config(), EchoEnvs(4), tmp_path)
 
 

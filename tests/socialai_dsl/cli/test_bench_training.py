@@ -8,16 +8,13 @@ from dataclasses import replace
 
 import pytest
 import torch
-from torch.utils.flop_counter import FlopCounterMode
 
 import socialai_dsl
 from socialai_dsl.cli import training_speed
 from socialai_dsl.cli.main import main
-from socialai_dsl.cli.roofline import Work, convolution_limit, every_frame
 from socialai_dsl.cli.training_entries import Entry, entries, own_updates
 from socialai_dsl.cli.training_report import training_table
-from trainer.config import paper_preset
-from trainer.nets import NetSpec, build_net
+from trainer.config import configure
 
 Capture = pytest.CaptureFixture[str]
 
@@ -26,7 +23,6 @@ Capture = pytest.CaptureFixture[str]
 def quick(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """What takes seconds and is not asked about."""
     monkeypatch.setattr(training_speed, "reference_speed", lambda _: 1e8)
-    monkeypatch.setattr(training_speed, "convolution_limit", lambda dtype, _: 1e11 * torch.finfo(dtype).bits)
     before = torch.get_num_threads()
     yield
     torch.set_num_threads(before)
@@ -73,26 +69,24 @@ def test_the_report_is_json(capsys: Capture) -> None:
     assert row["wall"] > 0 < row["cpu"]
     assert 0 < row["distinct"] < 1
     assert 0 < row["rollout_share"] < 1
-    assert row["gflops"] is None
     assert report["threads"] == 1
     assert "torch" in report["versions"]
 
 
 def test_duplicates_are_counted_and_kept_if_asked() -> None:
-    config = paper_preset(net="paper", update="environments", num_envs=4, horizon=20, threads=1)
+    config = configure(net="paper", envs=4, horizon=20, minibatches=1)
     frames = config.frames_per_update * config.epochs
     for alone, low, high in ((False, 0.1, 0.95), (True, 1.0, 1.0)):
         envs = socialai_dsl.make_vec("talkitout", num_envs=4, copy=False, autoreset_mode="SameStep")
         update = next(own_updates(config, envs, alone))
-        assert low <= update.work.learnt_pairs / frames <= high
-        assert low <= update.work.learnt_images / frames <= high
+        assert low <= update.learnt_frames / frames <= high
         assert update.rollout_seconds > 0
 
 
 def test_peers_are_left_out_where_they_are_not(monkeypatch: pytest.MonkeyPatch) -> None:
     assert {"plain-loop", "clean-paper", "clean-fast", "fast-long"} < {entry.name for entry in entries()}
     monkeypatch.setitem(sys.modules, "benchmarks.training", None)
-    names = ["fast", "paper", "paper-wide", "paper-every-frame", "paper-reference"]
+    names = ["fast", "paper", "paper-bfloat16", "paper-wide", "paper-every-frame", "paper-reference"]
     assert [entry.name for entry in entries()] == names
 
 
@@ -111,23 +105,3 @@ def test_peers_are_left_out_where_they_are_not(monkeypatch: pytest.MonkeyPatch) 
 def test_wrong_usage(options: list[str], message: str, capsys: Capture) -> None:
     assert main(["bench", *options]) == 2
     assert message in capsys.readouterr().err
-
-
-def test_operations_are_those_of_the_network() -> None:
-    spec = NetSpec((8, 2, 4, 16), (7, 7, 4), (12, 5, 3, 3), tuple(map(str, range(40))))
-    net = build_net("paper", spec, 0)
-    frames = 8  # a number that the network need not round up
-    images, pairs = torch.zeros(frames, 7, 7, 4, dtype=torch.uint8), torch.arange(frames)
-    with FlopCounterMode(display=False) as counter:
-        text = torch.zeros(1, 128)
-        features = net.perceive(net.prepare(images), text, pairs, torch.zeros_like(pairs))
-        net.heads(net.memory.step(features, net.memory.initial(frames))[0])
-    counted = counter.get_total_flops() / frames
-    assert Work(1, 1, 0, 0).flops(1, 0) == pytest.approx(counted, rel=0.003)
-    assert every_frame(1, 4).flops(1, 4) == pytest.approx(951e6, rel=0.002)
-    assert Work(2, 4, 0, 0).flops(0, 4) < 4 * Work(1, 1, 0, 0).flops(0, 4)
-
-
-def test_the_limit_is_a_speed_of_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("socialai_dsl.cli.roofline._SECONDS", 0.02)
-    assert 1e8 < convolution_limit(torch.float32, 1) < 1e14

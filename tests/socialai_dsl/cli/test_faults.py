@@ -16,7 +16,7 @@ from socialai_dsl.cli import run as run_command
 from socialai_dsl.cli.errors import UsageError
 from socialai_dsl.cli.main import run_main
 from trainer import checkpoint as checkpoints
-from trainer import train as training
+from trainer import ppo as training
 from trainer.checkpoint import read
 
 Capture = pytest.CaptureFixture[str]
@@ -121,13 +121,13 @@ def test_numbers_that_are_not_finite(
 ) -> None:
     run, real, calls = tmp_path / "run", training.update, 0
 
-    def spoiling(actor: Any, *rest: Any) -> Any:
+    def spoiling(session: Any, *rest: Any) -> Any:
         nonlocal calls
         calls += 1
-        losses = real(actor, *rest)
+        losses = real(session, *rest)
         if calls == 4:
             with torch.no_grad():
-                actor.net.heads.hidden.bias[0] = torch.nan
+                session.actor.net.heads.hidden.bias[0] = torch.nan
         return losses
 
     monkeypatch.setattr(training, "update", spoiling)

@@ -15,15 +15,16 @@ import numpy as np
 import pytest
 import torch
 
-from trainer.checkpoint import KEPT, read
+from trainer.checkpoint import read
 
 ROOT = Path(__file__).parents[3]
 HORIZONS = {"fast": 32, "paper-reference": 40}  # steps of each environment in an update
 TIMES = ("frames_per_second", "train_seconds")
 
 FAST = ["--net", "fast", "--threads", "2", "--envs", "8", "--checkpoint-every", "2"]
-SUITE = [str(ROOT / "tests/data/suites/school.yaml"), "--explo", "lang", "--curriculum", "progress", *FAST]
-CELLS = ["help", "--explo", "cell", *FAST]
+SUITE = [str(ROOT / "tests/data/suites/school.yaml"), "--bonus", "lang", "--curriculum", "progress", *FAST]
+CELLS = ["help", "--bonus", "cell", "--recipe", "plain", *FAST]
+GUIDED = ["help", *FAST]
 BATCH_NORM = ["help", "--net", "paper-reference", "--threads", "1", "--envs", "2", "--checkpoint-every", "1"]
 Process = subprocess.Popen[str]
 LONG = [pytest.mark.slow, pytest.mark.timeout(7200)]
@@ -84,6 +85,7 @@ def without_times(content: dict[str, Any]) -> dict[str, Any]:
         pytest.param(SUITE, 6, 2, id="suite-2", marks=pytest.mark.timeout(900)),
         pytest.param(SUITE, 40, 20, id="suite-20", marks=LONG),
         pytest.param(CELLS, 40, 20, id="cells-20", marks=LONG),
+        pytest.param(GUIDED, 40, 20, id="guided-20", marks=LONG),
         pytest.param(BATCH_NORM, 22, 20, id="batch_norm-20", marks=LONG),
     ],
 )
@@ -126,4 +128,4 @@ def test_a_killed_run_ends_as_one_that_never_stopped(
     ]
     assert results[0] == results[1]
     assert (whole / "transcript.txt").read_bytes() == (killed / "transcript.txt").read_bytes()
-    assert len(list((killed / "checkpoints").iterdir())) == KEPT
+    assert len(list((killed / "checkpoints").iterdir())) == 2

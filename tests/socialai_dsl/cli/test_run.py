@@ -9,11 +9,10 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from socialai_dsl.cli.agents import train_config
+import socialai_dsl
 from socialai_dsl.cli.errors import UsageError
 from socialai_dsl.cli.main import main, run_main
-from socialai_dsl.cli.settings import Settings
-from trainer.config import configure, paper_preset
+from trainer.config import RunConfig, configure
 
 DATA = Path(__file__).parents[2] / "data"
 
@@ -58,6 +57,8 @@ def test_a_run_leaves_everything_it_promises(capsys: Capture) -> None:
         "scenario",
         "agent",
         "seed",
+        "recipe",
+        "guide",
         "frames",
         "train_seconds",
         "frames_per_second",
@@ -115,9 +116,15 @@ def test_a_preset_brings_its_numbers_and_options_override_them() -> None:
     ]
     assert run_main(["corridor.yaml", *few, "--seed", "5", "--out", "here"]) == 0
     written = json.loads(Path("here", "config.json").read_text())
-    assert (
-        written["trainer"] == paper_preset(frames=80, num_envs=2, seed=5, explo_c=0.0, threads=1).model_dump()
-    )
+    given = {
+        "frames": 80,
+        "envs": 2,
+        "seed": 5,
+        "threads": 1,
+        "eval_episodes": 4,
+        "scenario": "corridor.yaml",
+    }
+    assert written == configure("paper", net="paper-reference", **given).model_dump()
     assert run_main(["--resume", "here", "--frames", "160"]) == 0
     assert result_of("here")["frames"] == 160
     assert main(["evaluate", "here", "--on", "corridor.yaml", "--episodes", "4", "--device", "cpu"]) == 0
@@ -129,21 +136,20 @@ def test_a_preset_brings_its_numbers_and_options_override_them() -> None:
 def test_the_number_of_environments_is_the_preset_s_unless_given(
     net: str, envs: int, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    trained: list[Settings] = []
+    trained: list[RunConfig] = []
 
-    def train_agent(settings: Settings, *_: object) -> None:
-        trained.append(settings)
+    def train_agent(config: RunConfig, *_: object) -> None:
+        trained.append(config)
         raise UsageError("far enough")
 
     monkeypatch.setattr("socialai_dsl.cli.agents.train_agent", train_agent)
     assert run_main(["corridor.yaml", "--net", net, "--explo", "cell"]) == 2
-    (settings,) = trained
-    assert settings.envs == envs
-    config = train_config(settings)
-    assert config == configure(
-        net, frames=settings.frames, num_envs=envs, explo="cell", explo_c=3.0, threads=settings.threads
-    )
-    assert settings.threads >= 1
+    (config,) = trained
+    usual = configure(config.recipe, net=net)
+    changed = {"scenario": "corridor.yaml", "bonus": "cell", "bonus_c": 3.0, "threads": config.threads}
+    assert config == usual.model_copy(update=changed)
+    assert config.envs == envs
+    assert config.threads >= 1
 
 
 def test_hyper_parameters_are_the_trainer_s_and_stay_with_the_run() -> None:
@@ -151,15 +157,15 @@ def test_hyper_parameters_are_the_trainer_s_and_stay_with_the_run() -> None:
         "--hyper",
         "entropy_coef=0.02",
         "--hyper",
-        "explo_formula=as_printed",
+        "bonus_formula=as_printed",
         "--hyper",
         "clip_value=true",
     ]
     assert run_main(["corridor.yaml", *QUICK, *given, "--out", "here"]) == 0
     assert run_main(["--resume", "here", "--frames", "4000"]) == 0
-    used = json.loads(Path("here", "config.json").read_text())["trainer"]
+    used = json.loads(Path("here", "config.json").read_text())
     assert used["frames"] == 4000
-    assert (used["entropy_coef"], used["explo_formula"], used["clip_value"]) == (0.02, "as_printed", True)
+    assert (used["entropy_coef"], used["bonus_formula"], used["clip_value"]) == (0.02, "as_printed", True)
 
 
 def test_random_play_is_the_same_every_time() -> None:
@@ -203,16 +209,39 @@ def test_a_trained_agent_is_evaluated_elsewhere(capsys: Capture) -> None:
             "--hyper: the agent 'random' is not trained",
         ),
         (
-            ["corridor.yaml", "--agent", "random", "--compile"],
-            "--compile: the agent 'random' is not trained",
+            ["corridor.yaml", "--agent", "random", "--recipe", "guided"],
+            "--recipe: the agent 'random' is not trained",
         ),
         (["corridor.yaml", "--hyper", "lr"], "--hyper: got 'lr', expected NAME=VALUE"),
         (["corridor.yaml", "--hyper", "entropy_coeff=1"], "'entropy_coeff'; did you mean entropy_coef?"),
-        (["corridor.yaml", "--hyper", "banana=1"], "'banana'; expected one of horizon, bptt,"),
-        (["corridor.yaml", "--hyper", "num_envs=3"], "num_envs has an option of its own, --envs"),
+        (
+            ["corridor.yaml", "--hyper", "banana=1"],
+            "'banana'; expected one of guide_share, imitation_coef, horizon,",
+        ),
+        (["corridor.yaml", "--hyper", "envs=3"], "envs has an option of its own, --envs"),
         (["corridor.yaml", "--hyper", "lr=1", "--hyper", "lr=2"], "--hyper: lr is given twice"),
-        (["corridor.yaml", "--hyper", "lr=[1]"], "expected a number, a word, true or false"),
-        (["corridor.yaml", "--hyper", "lr=-1"], "lr: Input should be greater than 0, got -1"),
+        (["corridor.yaml", "--hyper", "lr=[1]"], "expected a number, a word, true, false or null"),
+        (["corridor.yaml", "--hyper", "lr=-1"], "--hyper lr: Input should be greater than 0, got -1"),
+        (["corridor.yaml", "--hyper", "bptt=5"], "--hyper bptt: got 5, expected a divisor of horizon = 32"),
+        (
+            ["corridor.yaml", "--checkpoint-every", "0"],
+            "--checkpoint-every: Input should be greater than or equal to 1",
+        ),
+        (
+            ["corridor.yaml", "--keep-checkpoints", "0"],
+            "--keep-checkpoints: Input should be greater than or equal to 1",
+        ),
+        (["corridor.yaml", "--seed", "-1"], "--seed: Input should be greater than or equal to 0, got -1"),
+        (
+            ["corridor.yaml", "--guide", "script"],
+            "corridor.yaml: the agent has no frame, and there is no variant",
+        ),
+        (
+            ["corridor.yaml", "--recipe", "guided"],
+            "corridor.yaml: the agent has no frame, and there is no variant",
+        ),
+        (["corridor.yaml", "--net", "nowhere:Net"], "net: there is no module 'nowhere': looked for "),
+        (["corridor.yaml", "--bonus", "mine:Bonus"], "bonus: there is no module 'mine': looked for "),
         (["nowhere.yaml"], "there is no such file"),
         (["corridor.yaml", "--agent", "corridor.yaml"], "corridor.yaml"),
     ],
@@ -236,19 +265,107 @@ def test_wandb_that_is_not_installed(capsys: Capture, monkeypatch: pytest.Monkey
     assert not Path("here").exists(), "the same command can be given again"
 
 
-def test_a_network_of_ones_own_is_evaluated(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
-    Path("narrow_nets.py").write_text(
-        "from trainer.nets.fast import FastNet\nclass NarrowNet(FastNet):\n    kind_size = 4\n"
-    )
-    monkeypatch.syspath_prepend(str(Path.cwd()))
-    assert run_main(["corridor.yaml", *QUICK, "--net", "narrow_nets:NarrowNet", "--out", "here"]) == 0
-    own = result_of("here")["eval"]
+MINE = """
+import numpy as np
+from trainer.guides import Lead
+from trainer.nets import FastNet
+
+class Net(FastNet):
+    kind_size = 4
+
+class Bonus:
+    def __init__(self, config, num_envs):
+        self.paid = np.zeros(1)
+
+    def step(self, envs, image, ended):
+        self.paid += len(ended)
+        return np.full(len(ended), 0.125)
+
+    def state(self):
+        return {"paid": self.paid}
+
+    def load_state(self, state):
+        self.paid = np.array(state["paid"])
+
+class Guide:
+    def __init__(self, config, envs):
+        pass
+
+    def lead(self, envs, starts, progress):
+        with open("asked.txt", "a") as file:
+            file.write("x")
+        count = len(starts)
+        return Lead(np.ones((count, 4), np.int64), np.ones(count, bool), np.ones(count, np.float32))
+
+    def state(self):
+        return {}
+
+    def load_state(self, state):
+        pass
+"""
+
+
+def test_parts_of_ones_own_work_from_the_scenario_s_folder(capsys: Capture) -> None:
+    """Nothing is on Python's path; the command is given elsewhere."""
+    Path("project").mkdir()
+    shutil.move("corridor.yaml", "project/corridor.yaml")
+    Path("project/mine.py").write_text(MINE)
+    own = ["--net", "mine:Net", "--bonus", "mine:Bonus", "--guide", "mine:Guide"]
+    assert run_main(["project/corridor.yaml", *QUICK, *own, "--out", "here"]) == 0
+    rows = [json.loads(line) for line in Path("here/metrics.jsonl").read_text().splitlines()]
+    assert [(row["bonus"], row["led"]) for row in rows] == [(0.125, 1)] * 2
+    evaluated = result_of("here")["eval"]
+    assert len(Path("asked.txt").read_text()) == 2 * 32, "once a step of training, never in evaluation"
+    assert run_main(["--resume", "here"]) == 0
     capsys.readouterr()
     command = ["evaluate", "here", "--episodes", "30", "--device", "cpu", "--json"]
-    assert main([*command, "--net", "narrow_nets:NarrowNet"]) == 0
-    assert json.loads(capsys.readouterr().out)[0]["eval"] == own
+    assert main([*command, "--net", "mine:Net"]) == 0
+    assert json.loads(capsys.readouterr().out)[0]["eval"] == evaluated
     assert main(command) == 2
-    assert "name it (--net narrow_nets:NarrowNet)" in capsys.readouterr().err
+    assert "name it (--net mine:Net)" in capsys.readouterr().err
+    (code,) = [
+        part.partition("```")[0] for part in Path("here/model_card.md").read_text().split("```python\n")[1:]
+    ]
+    exec(compile(code, "model_card.md", "exec"), {})
+    assert capsys.readouterr().out.strip() in evaluated["outcomes"]
+
+
+@pytest.mark.parametrize("option", ["net", "bonus", "curriculum", "guide"])
+def test_parts_of_ones_own_that_are_wrong_are_said_in_one_line(option: str, capsys: Capture) -> None:
+    Path("wrong.py").write_text("class Part:\n    pass\n")
+    scenario = str(DATA / "suites" / "school.yaml") if option == "curriculum" else "corridor.yaml"
+    folder = Path(scenario).resolve().parent
+    name = "wrong:Part" if option != "curriculum" else "wrong_here:Part"
+    assert run_main([scenario, *QUICK, f"--{option}", name, "--out", "here"]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    if option == "curriculum":
+        assert f"curriculum: there is no module 'wrong_here': looked for {folder}/wrong_here.py" in said
+    else:
+        assert f"{option}: {folder}/wrong.py: Part lacks the method " in said
+    assert not Path("here").exists(), "the same command can be given again"
+
+
+def test_a_scripted_scenario_is_guided_unless_another_recipe_is_asked_for(capsys: Capture) -> None:
+    few = ["--frames", "1024", "--envs", "8", "--threads", "1", "--eval-episodes", "5", "--device", "cpu"]
+    assert run_main(["help", *few, "--out", "here"]) == 0
+    result, config = result_of("here"), json.loads(Path("here/config.json").read_text())
+    assert (result["scenario"], result["recipe"], result["guide"]) == ("help", "guided", "script")
+    assert result["program_sha256"] == socialai_dsl.compile(socialai_dsl.load("help")).sha256, (
+        "the plain scenario"
+    )
+    assert (config["recipe"], config["guide"]) == ("guided", "script")
+    rows = [json.loads(line) for line in Path("here/metrics.jsonl").read_text().splitlines()]
+    assert rows[0]["led"] == 1 > rows[-1]["led"]
+    capsys.readouterr()
+    assert run_main(["--resume", "here", "--frames", "2048"]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    assert (
+        "changed: frames: 1024 -> 2048 (guide and schedules reach from the first frame to the last)" in said
+    )
+    assert run_main(["--resume", "here", "--frames", "-1"]) == 2
+    assert "--frames: Input should be greater than or equal to 0, got -1" in capsys.readouterr().err
+    assert run_main(["help", "--recipe", "plain", *few, "--out", "plain"]) == 0
+    assert (result_of("plain")["recipe"], result_of("plain")["guide"]) == ("plain", "none")
 
 
 def test_unwritable_output(capsys: Capture) -> None:

@@ -1,19 +1,21 @@
-"""Metrics are rates per episode, and a log is cut back to where a run resumes."""
+"""Metrics are rates per episode, a log is cut back to where a run resumes, and every start is recorded."""
 
 import json
 import time
+import warnings
 from pathlib import Path
 
 import pytest
 
-from trainer.logging import MetricsLog, episode_metrics
+from trainer.config import RunConfig
+from trainer.logging import MetricsLog, episode_metrics, record_start
 from trainer.rollout import EpisodeTally
 
 
 def test_rates_are_per_episode_that_ended() -> None:
     before = {"outcomes": {"won": 3, "lost": 5}, "rules": {"asked": 10}, "episodes": 8}
     after = {"outcomes": {"won": 4, "lost": 8}, "rules": {"asked": 22, "told": 2}, "episodes": 12}
-    got = episode_metrics(EpisodeTally(4, 1, 2, 3.0, 40), before, after)
+    got = episode_metrics(EpisodeTally(4, 1, 2, 3.0, 40, all_episodes=4), before, after)
     assert got == {
         "episodes": 4,
         "success": 0.25,
@@ -89,3 +91,32 @@ def test_what_was_synced_is_in_tensorboard_though_nothing_was_closed(tmp_path: P
         log.write(1, {"frames": 64, "loss": 0.5})
         log.sync()
         assert points(tmp_path, "loss") == [(64, 0.5)]
+
+
+def test_success_is_of_the_agent_s_own_episodes_and_rates_are_of_all() -> None:
+    before = {"outcomes": {"won": 0}, "rules": {"asked": 0}, "episodes": 0}
+    after = {"outcomes": {"won": 3}, "rules": {"asked": 8}, "episodes": 4}
+    got = episode_metrics(EpisodeTally(2, 1, 0, 1.0, 10, all_episodes=4), before, after)
+    assert (got["episodes"], got["success"], got["mean_length"]) == (2, 0.5, 5.0)
+    assert (got["outcomes"], got["rules"]) == ({"won": 0.75}, {"asked": 2.0})
+
+
+def test_starts_are_appended_and_never_cut_back(tmp_path: Path) -> None:
+    config = RunConfig(threads=2)
+    record_start(tmp_path, 0, 0, config)
+    with (tmp_path / "starts.jsonl").open("a") as file:
+        file.write('{"time": "20')  # killed while writing
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        record_start(tmp_path, 4, 1024, config)
+    first, torn, second = (tmp_path / "starts.jsonl").read_text().splitlines()
+    assert torn == '{"time": "20'
+    assert json.loads(first).items() >= {"update": 0, "frames": 0, "device": "cpu", "threads": 2}.items()
+    assert set(json.loads(second)) == {"time", "update", "frames", "torch", "cpu", "device", "threads"}
+    assert json.loads(second)["frames"] == 1024
+
+
+def test_other_surroundings_are_worth_a_warning(tmp_path: Path) -> None:
+    record_start(tmp_path, 0, 0, RunConfig(threads=2))
+    with pytest.warns(UserWarning, match=r"other conditions \(threads 2 -> 4\)"):
+        record_start(tmp_path, 4, 1024, RunConfig(threads=4))

@@ -1,0 +1,213 @@
+"""A network, bonus, curriculum or guide of one's own works from a file beside the scenario; mistakes are named."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from gymnasium.vector import AutoresetMode
+
+from tests.trainer.fake_envs import EchoEnvs
+from trainer.bonus import build_bonus
+from trainer.checkpoint import read
+from trainer.config import RunConfig
+from trainer.curricula import Leaves, build_curriculum
+from trainer.guides import build_guide
+from trainer.nets import NetSpec, build_net
+from trainer.play import CheckpointPolicy
+from trainer.ppo import Progress, train
+
+SPEC = NetSpec((4, 2, 2, 4), (7, 7, 4), (12, 5, 3, 3), ("<pad>", "<unk>", "hello"))
+LEAVES = Leaves(("a", "b"), ({}, {}), (1, 1))
+
+MINE = '''
+import numpy as np
+from torch import nn
+from trainer.guides import ScriptGuide
+from trainer.nets import FastNet, Memory
+
+
+class GruMemory(Memory):
+    def __init__(self, inputs, size):
+        super().__init__((size,), size)
+        self.cell = nn.GRUCell(inputs, size)
+
+    def step(self, inputs, memory):
+        memory = self.cell(inputs, memory)
+        return memory, memory
+
+
+class Net(FastNet):
+    def __init__(self, spec):
+        super().__init__(spec)
+        self.memory = GruMemory(self.features, self.memory.size)
+
+
+class Bonus:
+    """Pays for each kind of utterance less, the more often it was heard in all episodes."""
+
+    def __init__(self, config, num_envs):
+        self.counts = np.zeros(1000, np.int64)
+
+    def step(self, envs, image, ended):
+        heard = envs.utterance_ids()
+        np.add.at(self.counts, heard, 1)
+        return 0.1 / np.sqrt(self.counts[heard])
+
+    def state(self):
+        return {"counts": self.counts}
+
+    def load_state(self, state):
+        self.counts = np.array(state["counts"])
+
+
+class Curriculum:
+    def __init__(self, leaves):
+        self.count = len(leaves.names)
+
+    def observe(self, member, success):
+        pass
+
+    def weights(self):
+        return [1] * self.count
+
+    def state(self):
+        return {}
+
+    def load_state(self, state):
+        pass
+
+
+class Guide(ScriptGuide):
+    """The script plays one episode of every environment."""
+
+    def __init__(self, config, envs):
+        super().__init__(config, envs)
+        self.begun = 0
+
+    def lead(self, envs, starts, progress):
+        lead = super().lead(envs, starts, float(self.begun >= len(starts)))
+        self.begun += int(starts.sum())
+        return lead
+
+    def state(self):
+        return super().state() | {"begun": self.begun}
+
+    def load_state(self, state):
+        super().load_state(state)
+        self.begun = state["begun"]
+'''
+
+BUILDERS: dict[str, Callable[[str, Path], Any]] = {
+    "net": lambda name, folder: build_net(name, SPEC, 0, folder=folder),
+    "bonus": lambda name, folder: build_bonus(RunConfig(bonus=name, scenario=str(folder / "x.yaml")), 4),
+    "curriculum": lambda name, folder: build_curriculum(name, LEAVES, folder),
+    "guide": lambda name, folder: build_guide(
+        RunConfig(guide=name, scenario=str(folder / "x.yaml")), EchoEnvs(4)
+    ),
+}
+
+
+@pytest.mark.parametrize("option", BUILDERS)
+def test_a_class_is_found_beside_the_scenario(option: str, tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(MINE)
+    made = BUILDERS[option](f"mine:{option.title()}", tmp_path)
+    assert type(made).__name__ == option.title()
+    assert type(made).__module__ != "mine"
+
+
+@pytest.mark.parametrize("option", BUILDERS)
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("nothing", "", "got 'nothing', expected one of "),
+        ("mine:", "", "got 'mine:', expected one of "),
+        (
+            "not_there:Mine",
+            "",
+            "there is no module 'not_there': looked for {folder}/not_there.py, then for an instal",
+        ),
+        ("mine:Mine", "Mine = 3", "{folder}/mine.py has no class 'Mine'"),
+        ("mine:Other", "class Mine: pass", "{folder}/mine.py has no class 'Other'"),
+        ("mine:Mine", "class Mine: pass", "{folder}/mine.py: Mine lacks the method '{first}'"),
+        ("mine:Mine", "import nowhere_at_all", "{folder}/mine.py: No module named 'nowhere_at_all'"),
+        ("mine:Mine", "class Mine", "{folder}/mine.py cannot be imported: SyntaxError: "),
+        ("mine:Mine", "1 / 0", "{folder}/mine.py cannot be imported: ZeroDivisionError: division by zero"),
+    ],
+)
+def test_a_mistake_is_one_line(option: str, name: str, text: str, message: str, tmp_path: Path) -> None:
+    if text:
+        (tmp_path / "mine.py").write_text(text)
+    first = {"net": "prepare", "bonus": "step", "curriculum": "observe", "guide": "lead"}[option]
+    with pytest.raises(ValueError, match=f"^{option}: ") as caught:
+        BUILDERS[option](name, tmp_path)
+    said = str(caught.value)
+    assert message.format(folder=tmp_path, first=first) in said
+    assert "\n" not in said
+
+
+def test_a_network_lacks_what_it_does_not_implement(tmp_path: Path) -> None:
+    text = "from trainer.nets import ActorCritic\nclass Mine(ActorCritic):\n    def prepare(self, images): pass\n"
+    (tmp_path / "mine.py").write_text(text)
+    with pytest.raises(ValueError, match=r"net: .*/mine\.py: Mine lacks the method 'perceive'"):
+        build_net("mine:Mine", SPEC, 0, folder=tmp_path)
+    (tmp_path / "other.py").write_text(
+        "class Mine:\n    def prepare(self): pass\n    def perceive(self): pass\n"
+    )
+    with pytest.raises(
+        ValueError, match=r"net: got 'other:Mine', expected a subclass of trainer\.nets\.ActorCritic"
+    ):
+        build_net("other:Mine", SPEC, 0, folder=tmp_path)
+
+
+def test_equally_named_files_of_two_folders_do_not_meet(tmp_path: Path) -> None:
+    for number in (1, 2):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        (folder / "mine.py").write_text(
+            f"from trainer.nets import FastNet\nclass Net(FastNet):\n    kind_size = {4 * number}\n"
+        )
+    sizes = [build_net("mine:Net", SPEC, 0, folder=tmp_path / str(n)).kind_size for n in (1, 2, 1)]
+    assert sizes == [4, 8, 4]
+
+
+def test_what_lies_beside_the_file_can_be_imported(tmp_path: Path) -> None:
+    (tmp_path / "beside_the_file.py").write_text("SIZE = 12\n")
+    text = "from beside_the_file import SIZE\nfrom trainer.nets import FastNet\n"
+    (tmp_path / "mine.py").write_text(text + "class Net(FastNet):\n    kind_size = SIZE\n")
+    assert build_net("mine:Net", SPEC, 0, folder=tmp_path).kind_size == 12
+
+
+def test_a_run_with_everything_of_ones_own_resumes_to_the_same_bits(
+    tmp_path: Path, small_config: Any
+) -> None:
+    """A memory that is one vector instead of an LSTM's two, a bonus and a guide with state; nothing else is said."""
+    (tmp_path / "mine.py").write_text(MINE)
+    own = {
+        "net": "mine:Net",
+        "bonus": "mine:Bonus",
+        "guide": "mine:Guide",
+        "scenario": str(tmp_path / "x.yaml"),
+    }
+    config = small_config(**own, bptt=4, checkpoint_every=1)
+
+    def stop(seen: Progress) -> None:
+        if seen.update == 1:
+            raise KeyboardInterrupt
+
+    whole = read(train(config, EchoEnvs(8), tmp_path / "whole"))
+    with pytest.raises(KeyboardInterrupt):
+        train(config, EchoEnvs(8), tmp_path / "parts", stop)
+    path = train(config, EchoEnvs(8), tmp_path / "parts", resume=True)
+    parts = read(path)
+    assert parts.tensors["state.memory"].shape == (8, 128)
+    for name, value in whole.tensors.items():
+        assert torch.equal(parts.tensors[name], value), name
+    before = read(sorted((tmp_path / "parts" / "checkpoints").iterdir())[0]).part("net")
+    moved = [name for name, value in parts.part("net").items() if not torch.equal(value, before[name])]
+    assert {"memory.cell.weight_ih", "memory.cell.weight_hh"} <= set(moved), "it learns"
+
+    there = EchoEnvs(4, mode=AutoresetMode.DISABLED)
+    policy = CheckpointPolicy.load(path, there, net="mine:Net", folder=tmp_path)
+    assert policy.act(there.reset(seed=0)[0]).shape == (4, 4)

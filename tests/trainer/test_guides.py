@@ -1,0 +1,248 @@
+"""A guide leads and is imitated; led steps give PPO nothing, and without a guide nothing is different."""
+
+import json
+from math import log
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from gymnasium.vector import AutoresetMode
+
+from socialai_dsl.evaluation import evaluate
+from tests.trainer.fake_envs import EchoEnvs
+from trainer.checkpoint import read
+from trainer.config import RunConfig
+from trainer.features import Batch, LeadBatch
+from trainer.guides import ScriptGuide
+from trainer.play import CheckpointPolicy
+from trainer.ppo import Progress, estimate_advantages, ppo_loss, train
+from trainer.rollout import collect
+from trainer.session import Session
+
+
+def mixed_batch() -> tuple[Batch, torch.Tensor]:
+    """Led and speaking, led and silent, own: each head now chooses option 1 with probability 0.6, it was 0.5."""
+    logits = torch.tensor([[log(0.4), log(0.6)] * 4] * 3, requires_grad=True)
+    actions = torch.tensor([[1, 1, 1, 1], [1, 0, 1, 1], [1, 1, 1, 1]])
+    batch = Batch(
+        actions,
+        # The script may do what the policy never would; then the ratio is beyond all numbers.
+        log_probs=torch.tensor([[-1000.0] * 4, [log(0.5)] * 4, [log(0.5)] * 4]),
+        values=torch.zeros(3),
+        advantages=torch.tensor([1e6, -1e6, 2.0]),
+        returns=torch.tensor([3.0, 2.0, 3.0]),
+        lead=LeadBatch(actions, torch.tensor([True, True, False]), torch.tensor([1.0, 0.5, 0.0])),
+    )
+    return batch, logits
+
+
+def test_the_loss_of_led_and_own_frames_together() -> None:
+    batch, logits = mixed_batch()
+    config = RunConfig(imitation_coef=0.7)
+    parts = ppo_loss(batch, logits, torch.full((3,), 1.5), (2, 2, 2, 2), config, entropy_coef=0.01)
+    policy = -2 * 1.2 / 3  # of the own frame alone, whose ratio 1.2 ** 4 is clipped
+    value = (1.5**2 + 0.5**2 + 1.5**2) / 3
+    entropy = -(2 + 0.6 * 2) * (0.6 * log(0.6) + 0.4 * log(0.4)) / 3
+    imitation = -(1.0 * 4 * log(0.6) + 0.5 * (log(0.6) + log(0.4))) / 3  # silent: no template, no noun
+    assert parts.policy.item() == pytest.approx(policy)
+    assert parts.value.item() == pytest.approx(value)
+    assert parts.entropy.item() == pytest.approx(entropy)
+    assert parts.imitation.item() == pytest.approx(imitation)
+    assert parts.total.item() == pytest.approx(policy + 0.5 * value - 0.01 * entropy + 0.7 * imitation)
+    assert parts.approx_kl.item() == pytest.approx((1.2**4 - 1 - 4 * log(1.2)) / 3, rel=1e-5)
+
+    parts.total.backward()  # type: ignore[no-untyped-call]
+    assert logits.grad is not None
+    # Cross-entropy: probability minus what was shown; nothing of advantage, ratio or entropy.
+    assert logits.grad[0].tolist() == pytest.approx([0.7 * 0.4 / 3, -0.7 * 0.4 / 3] * 4)
+    shown = [0.35 * 0.4 / 3, -0.35 * 0.4 / 3, -0.35 * 0.6 / 3, 0.35 * 0.6 / 3]
+    assert logits.grad[1].tolist() == pytest.approx([*shown, 0, 0, 0, 0])
+
+
+def guided(small_config: Any, **changes: Any) -> RunConfig:
+    config: RunConfig = small_config(**({"guide": "script", "guide_share": 0.5} | changes))
+    return config
+
+
+def envs(count: int = 8, **options: Any) -> EchoEnvs:
+    return EchoEnvs(count, delay=3, limit=7, chatter=0.3, **options)
+
+
+def test_advantages_are_normalised_over_the_agent_s_own_steps(small_config: Any) -> None:
+    session = Session.start(guided(small_config, horizon=6, frames=48 * 4), envs())
+    session.update = 1
+    collect(session)
+    session.update = 2  # half of the frames: episodes that have begun are led to their end
+    rollout = collect(session)
+    assert rollout.lead is not None
+    led = rollout.lead.led
+    assert 0 < led.sum() < led.numel()
+    advantages, _ = estimate_advantages(session, rollout)
+    own = advantages[~led]
+    assert own.mean().item() == pytest.approx(0, abs=1e-6)
+    assert own.std(correction=0).item() == pytest.approx(1, abs=1e-3)
+
+
+def test_what_the_script_has_begun_it_plays_to_the_end() -> None:
+    playing = EchoEnvs(3)
+    playing.reset(seed=0)
+    guide = ScriptGuide(RunConfig(guide="script", guide_share=0.5), playing)
+
+    def led(starts: list[bool], progress: float) -> list[bool]:
+        lead = guide.lead(playing, np.array(starts), progress)
+        assert (lead.weights == lead.led).all(), "what is led is imitated"
+        assert (lead.actions[lead.led] == playing.scripted_actions()[lead.led]).all()
+        return lead.led.tolist()  # type: ignore[no-any-return]
+
+    assert led([True, True, True], 0.0) == [True, True, True]
+    assert led([False, True, False], 0.5) == [True, False, True]
+    assert led([False, False, True], 0.9) == [True, False, False]
+    again = ScriptGuide(RunConfig(guide="script", guide_share=0.5), playing)
+    again.load_state(json.loads(json.dumps(guide.state())))
+    assert again.lead(playing, np.zeros(3, np.bool_), 0.9).led.tolist() == [True, False, False]
+
+
+def test_led_steps_are_the_script_s_and_not_counted_as_the_agent_s(small_config: Any) -> None:
+    session = Session.start(guided(small_config, frames=64 * 4), envs())
+    rollout = collect(session)
+    assert rollout.lead is not None
+    assert rollout.lead.led.all()
+    assert torch.equal(rollout.actions, rollout.lead.actions)
+    tally = rollout.tally
+    assert (tally.episodes, tally.successes, tally.led_steps) == (0, 0, 64)
+    assert tally.all_episodes == session.envs.counters()["outcomes"]["right"] > 0, "the script succeeds"
+    assert 0 < tally.agreed_steps < 64
+    session.update = 2
+    played = [collect(session) for _ in range(3)]
+    assert played[-1].lead is None
+    assert sum(rollout.tally.episodes for rollout in played) > 0
+
+
+@pytest.mark.parametrize("update", ["share 0", "handed over"])
+def test_without_a_lead_nothing_is_different(update: str, tmp_path: Path, small_config: Any) -> None:
+    """A guide that does not lead leaves the same weights, to the bit, as no guide."""
+    plain = read(train(small_config(), envs(), tmp_path / "plain"))
+    if update == "share 0":
+        path = train(guided(small_config, guide_share=0.0), envs(), tmp_path / "guided")
+    else:
+        (tmp_path / "mine.py").write_text(NOBODY)
+        settings = {"guide": "mine:Guide", "scenario": str(tmp_path / "any.yaml")}
+        path = train(guided(small_config, **settings), envs(), tmp_path / "guided")
+    other = read(path)
+    assert other.tensors.keys() == plain.tensors.keys() | {"guide"}
+    for name, value in plain.tensors.items():
+        assert torch.equal(other.tensors[name], value), name
+
+
+NOBODY = """
+import numpy as np
+from trainer.guides import Lead
+
+class Guide:
+    def __init__(self, config, envs):
+        pass
+
+    def lead(self, envs, starts, progress):
+        count = len(starts)
+        return Lead(np.zeros((count, 4), np.int64), np.zeros(count, bool), np.zeros(count, np.float32))
+
+    def state(self):
+        return {}
+
+    def load_state(self, state):
+        pass
+"""
+
+
+def test_a_guided_run_stopped_and_resumed_ends_with_the_same_bits(tmp_path: Path, small_config: Any) -> None:
+    class Stop(Exception):  # noqa: N818 - it interrupts, as KeyboardInterrupt does
+        pass
+
+    def stop_after(update: int) -> Any:
+        def progress(seen: Progress) -> None:
+            if seen.update == update:
+                raise Stop
+
+        return progress
+
+    config = guided(
+        small_config, lr_end=1e-4, entropy_coef_end=0.0, checkpoint_every=1, horizon=9, frames=72 * 6
+    )
+    whole = read(train(config, envs(), tmp_path / "whole"))
+    for number, stop in enumerate((2, 4, 5)):  # led, some still led, nobody led any more
+        with pytest.raises(Stop):
+            train(config, envs(), tmp_path / "parts", stop_after(stop), resume=number > 0)
+    parts = read(train(config, envs(), tmp_path / "parts", resume=True))
+    for name, value in whole.tensors.items():
+        assert torch.equal(parts.tensors[name], value), name
+    rows = [
+        [json.loads(line) for line in (tmp_path / run / "metrics.jsonl").read_text().splitlines()]
+        for run in ("whole", "parts")
+    ]
+    for row in (*rows[0], *rows[1]):
+        del row["frames_per_second"]
+    assert rows[0] == rows[1]
+
+
+def test_imitation_alone_teaches_what_the_script_does(tmp_path: Path) -> None:
+    config = RunConfig(
+        guide="script",
+        guide_share=1.0,
+        frames=128 * 16 * 14,
+        envs=128,
+        horizon=16,
+        lr=2e-3,
+        tensorboard=False,
+    )
+    path = train(config, EchoEnvs(128), tmp_path)
+    rows = [json.loads(line) for line in (tmp_path / "metrics.jsonl").read_text().splitlines()]
+    assert all((row["led"], row["success"], row["episodes"]) == (1, None, 0) for row in rows)
+    assert rows[0]["agreement"] < 0.3
+    assert rows[-1]["agreement"] > 0.9
+    assert rows[-1]["imitation_loss"] < 0.3 * rows[0]["imitation_loss"]
+
+    class Scriptless(EchoEnvs):
+        def scripted_actions(self) -> Any:
+            raise AssertionError("nobody may be asked what to do while the agent is evaluated")
+
+    there = Scriptless(64, mode=AutoresetMode.DISABLED)
+    result = evaluate(CheckpointPolicy.load(path, there, seed=1), there, 200)
+    assert result.success_rate > 0.9
+
+
+def test_the_figures_show_the_phases(tmp_path: Path, small_config: Any) -> None:
+    train(guided(small_config, frames=64 * 8), envs(), tmp_path)
+    rows = [json.loads(line) for line in (tmp_path / "metrics.jsonl").read_text().splitlines()]
+    assert [row["led"] == 1 for row in rows[:4]] == [True] * 4
+    assert [row["led"] for row in rows[-2:]] == [0, 0]
+    assert rows[-1]["agreement"] is None
+    assert rows[-1]["imitation_loss"] == 0
+    assert rows[-1]["success"] is not None
+    train(small_config(), envs(), tmp_path / "alone")
+    (first, *_) = (tmp_path / "alone" / "metrics.jsonl").read_text().splitlines()
+    assert not {"led", "agreement", "imitation_loss"} & set(json.loads(first))
+
+
+def test_a_scenario_without_a_script_is_refused(small_config: Any) -> None:
+    class Scriptless(EchoEnvs):
+        def scripted_actions(self) -> Any:
+            raise ValueError("echo: the agent has no frame")
+
+    with pytest.raises(
+        ValueError, match="guide: the scenario has no script to imitate: echo: the agent has no fra"
+    ):
+        Session.start(guided(small_config), Scriptless(8))
+
+
+def test_a_script_that_says_other_things_than_the_scenario_is_refused(small_config: Any) -> None:
+    """Its words would have other numbers, and the agent could not play the scenario it is for."""
+    plain = EchoEnvs(8).program
+    playing = EchoEnvs(8)
+    Session.start(guided(small_config), playing, plain)
+    playing.program.vocabulary = [*plain.vocabulary, "psst"]
+    with pytest.raises(
+        ValueError, match="guide: echo with its script has other vocabulary than without it: psst; let"
+    ):
+        Session.start(guided(small_config), playing, plain)
