@@ -88,6 +88,10 @@ def test_an_example_trains_and_resumes_exactly(
     resumed = weights(Path("whole"))
     assert resumed.keys() == whole.keys()
     assert [name for name in whole if not whole[name].equal(resumed[name])] == []
+    if "--guide" in options:
+        assert main.main(["run", "--resume", "whole", "--frames", "9000"]) == 2
+        assert "--frames: got 9000, expected 2000" in capsys.readouterr().err
+        run("--resume", "whole")
     capsys.readouterr()
 
 
