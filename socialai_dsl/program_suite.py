@@ -100,10 +100,18 @@ Playable = Program | ProgramSuite
 """What environments are made of."""
 
 
+def unscripted(playable: Playable) -> tuple[str, ...]:
+    """The members of a suite, or the scenario, in which the agent follows no frame."""
+    if isinstance(playable, ProgramSuite):
+        programs = list(zip(playable.members, playable.programs, strict=True))
+    else:
+        programs = [(playable.name, playable)]
+    return tuple(name for name, program in programs if not program.header(Header.FLAGS) & Flag.AGENT_FRAME)
+
+
 def is_scripted(playable: Playable) -> bool:
     """Whether the agent follows a frame, in every member of a suite."""
-    programs = playable.programs if isinstance(playable, ProgramSuite) else (playable,)
-    return all(program.header(Header.FLAGS) & Flag.AGENT_FRAME for program in programs)
+    return not unscripted(playable)
 
 
 def prefixed(member: str, name: str) -> str:

@@ -44,8 +44,19 @@ def load_class(name: str, option: str, shipped: Sequence[str], methods: Sequence
     return found
 
 
+def own_file(name: str, folder: Path) -> Path | None:
+    """The file in `folder` that `module:Class` is read from; None where it is read from elsewhere, or ships."""
+    module, colon, _ = name.partition(":")
+    file = _file_of(module, folder)
+    return file if colon and file.is_file() else None
+
+
+def _file_of(module: str, folder: Path) -> Path:
+    return folder.resolve() / (module.replace(".", "/") + ".py")
+
+
 def _load_module(name: str, option: str, folder: Path) -> ModuleType:
-    file = folder.resolve() / (name.replace(".", "/") + ".py")
+    file = _file_of(name, folder)
     try:
         return _load_file(file) if file.is_file() else importlib.import_module(name)
     except ModuleNotFoundError as error:

@@ -235,20 +235,8 @@ def scripted_name(scenario: str) -> str | None:
     Raises:
         ScenarioError: the scenario, or its variant, has mistakes.
     """
-    import socialai_dsl
-    from socialai_dsl.program_suite import is_scripted
-
-    if is_scripted(socialai_dsl.compile(socialai_dsl.load(scenario))):
-        return scenario
-    name, mark, parameters = scenario.partition("?")
-    scripted = f"{name}+oracle{mark}{parameters}"
-    try:
-        socialai_dsl.load(scripted)
-    except socialai_dsl.ScenarioError as error:
-        if all(diagnostic.code == "S503" for diagnostic in error.diagnostics):
-            return None
-        raise
-    return scripted
+    name, lacking = _closest_script(scenario)
+    return None if lacking else name
 
 
 def with_script(scenario: str) -> str:
@@ -257,10 +245,31 @@ def with_script(scenario: str) -> str:
     Raises:
         UsageError: there is no script.
     """
-    scripted = scripted_name(scenario)
-    if scripted is None:
-        raise UsageError(f"{scenario}: the agent has no frame, and there is no variant `oracle`")
-    return scripted
+    name, lacking = _closest_script(scenario)
+    if lacking:
+        raise UsageError(
+            f"{scenario}: the agent of {lacking[0]} has no frame, and there is no variant `oracle`"
+        )
+    return name
+
+
+def _closest_script(scenario: str) -> tuple[str, Sequence[str]]:
+    """The scenario itself or its variant `oracle`, and which of its members have no script even there."""
+    import socialai_dsl
+    from socialai_dsl.program_suite import unscripted
+
+    lacking = unscripted(socialai_dsl.compile(socialai_dsl.load(scenario)))
+    if not lacking:
+        return scenario, ()
+    name, mark, parameters = scenario.partition("?")
+    scripted = f"{name}+oracle{mark}{parameters}"
+    try:
+        loaded = socialai_dsl.load(scripted)
+    except socialai_dsl.ScenarioError as error:
+        if all(diagnostic.code == "S503" for diagnostic in error.diagnostics):
+            return scenario, lacking
+        raise
+    return scripted, unscripted(socialai_dsl.compile(loaded))
 
 
 # -- training -----------------------------------------------------------------------------------------------------

@@ -3,9 +3,7 @@
 from pathlib import Path
 
 import pytest
-import yaml
 
-import trainer
 from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, RunConfig, configure
 
 
@@ -144,20 +142,3 @@ def test_every_field_says_what_it_is() -> None:
 )
 def test_code_of_ones_own_is_looked_for_beside_the_scenario_s_file(scenario: str, folder: str) -> None:
     assert RunConfig(scenario=scenario).code_folder == Path(folder)
-
-
-def test_the_exploration_table_is_the_published_one() -> None:
-    table = yaml.safe_load(Path(trainer.__file__).with_name("exploration.yaml").read_text())
-    assert {name: (settings["kind"], settings["c"]) for name, settings in table.items()} == {
-        "talkitout": ("lang", 7),
-        "talkitout_no_liar": ("lang", 7),
-        "diverse_exit": ("lang", 20),
-        "dance": ("cell", 3),
-        "showme": ("cell", 3),
-        "showme_no_social": ("cell", 3),
-        "help": ("cell", 3),
-        "help_as_helper": ("cell", 3),
-        "cointhief": ("cell", 2),
-        "cointhief_tags": ("cell", 2),
-        "social_env": ("cell", 2),
-    }

@@ -16,18 +16,31 @@ from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.pretend import DevicesMixed, PretendedCard
 from trainer.checkpoint import read
 from trainer.play import CheckpointPolicy
-from trainer.ppo import train
+from trainer.ppo import Progress, train
 
 
 @pytest.mark.parametrize("net", ["fast", "paper", "paper-reference"])
 def test_training_on_a_card_moves_everything_there(net: str, tmp_path: Path, small_config: Any) -> None:
     """It also does the same arithmetic as on the CPU, because the pretended card computes there."""
-    settings = {"net": net, "bonus": "lang", "bptt": 4, "frames": 64 * 2}
+    settings = {
+        "net": net,
+        "bonus": "lang",
+        "guide": "script",
+        "bptt": 4,
+        "frames": 64 * 3,
+        "checkpoint_every": 1,
+    }
+
+    def stop(seen: Progress) -> None:
+        if seen.update == 2:
+            raise KeyboardInterrupt
+
     here = read(train(small_config(**settings), EchoEnvs(8, chatter=0.3), tmp_path / "here"))
     # PyTorch for CPUs has no cuDNN, which it would look for.
     with torch.backends.cudnn.flags(enabled=False), PretendedCard() as card:
         config = small_config(**settings, device="cuda")
-        train(config.model_copy(update={"frames": 64}), EchoEnvs(8, chatter=0.3), tmp_path / "there")
+        with pytest.raises(KeyboardInterrupt):
+            train(config, EchoEnvs(8, chatter=0.3), tmp_path / "there", stop)
         path = train(config, EchoEnvs(8, chatter=0.3), tmp_path / "there", resume=True)
         envs = EchoEnvs(8, mode=AutoresetMode.DISABLED)
         evaluate(CheckpointPolicy.load(path, envs, device="cuda"), envs, 8)

@@ -120,6 +120,25 @@ def test_all_files_of_a_scenario_go_along(place: Path, tmp_path: Path) -> None:
     )
 
 
+def test_a_network_of_ones_own_goes_along(
+    place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    project = tmp_path / "project"
+    project.mkdir()
+    shutil.copy(place / "corridor.yaml", project)
+    (project / "mine.py").write_text(
+        "from trainer.nets import FastNet\nclass Net(FastNet):\n    kind_size = 4\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    assert run_main(["project/corridor.yaml", *QUICK, "--net", "mine:Net", "--out", "run"]) == 0
+    here = evaluated(capsys, "run", "--net", "mine:Net")
+    assert main(["export", "run", "--out", "given"]) == 0
+    shutil.rmtree(project)
+    there = evaluated(capsys, "given", "--net", "mine:Net")
+    assert there["eval"]["success_rate"] == here["eval"]["success_rate"]
+    assert "net='mine:Net', folder=Path('scenario')" in (tmp_path / "given" / "README.md").read_text()
+
+
 def test_what_cannot_be_exported_is_said(place: Path, tmp_path: Path, capsys: Capture) -> None:
     def refused(*arguments: str) -> str:
         assert main(["export", *arguments]) == 2

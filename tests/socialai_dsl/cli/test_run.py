@@ -1,5 +1,6 @@
 """`socialai-run` and `socialai evaluate` from end to end, on a scenario that trains in seconds."""
 
+import argparse
 import json
 import shutil
 import sys
@@ -10,8 +11,10 @@ import pytest
 from PIL import Image
 
 import socialai_dsl
+from socialai_dsl.cli.agents import new_config
 from socialai_dsl.cli.errors import UsageError
 from socialai_dsl.cli.main import main, run_main
+from socialai_dsl.cli.run import add_arguments
 from trainer.config import RunConfig, configure
 
 DATA = Path(__file__).parents[2] / "data"
@@ -152,6 +155,32 @@ def test_the_number_of_environments_is_the_preset_s_unless_given(
     assert config.threads >= 1
 
 
+def test_the_automatic_bonus_is_the_paper_s() -> None:
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    found = {}
+    for name in BONUSES:
+        typed = [name, "--bonus", "auto", "--recipe", "plain", "--device", "cpu"]
+        config = new_config(parser.parse_args(typed))
+        found[name] = (config.bonus, config.bonus_c)
+    assert found == BONUSES
+
+
+BONUSES = {
+    "talkitout": ("lang", 7),
+    "talkitout_no_liar": ("lang", 7),
+    "diverse_exit": ("lang", 20),
+    "dance": ("cell", 3),
+    "showme": ("cell", 3),
+    "showme_no_social": ("cell", 3),
+    "help": ("cell", 3),
+    "help_as_helper": ("cell", 3),
+    "cointhief": ("cell", 2),
+    "cointhief_tags": ("cell", 2),
+    "social_env": ("cell", 2),
+}
+
+
 def test_hyper_parameters_are_the_trainer_s_and_stay_with_the_run() -> None:
     given = [
         "--hyper",
@@ -234,11 +263,11 @@ def test_a_trained_agent_is_evaluated_elsewhere(capsys: Capture) -> None:
         (["corridor.yaml", "--seed", "-1"], "--seed: Input should be greater than or equal to 0, got -1"),
         (
             ["corridor.yaml", "--guide", "script"],
-            "corridor.yaml: the agent has no frame, and there is no variant",
+            "corridor.yaml: the agent of corridor has no frame, and there is no variant",
         ),
         (
             ["corridor.yaml", "--recipe", "guided"],
-            "corridor.yaml: the agent has no frame, and there is no variant",
+            "corridor.yaml: the agent of corridor has no frame, and there is no variant",
         ),
         (["corridor.yaml", "--net", "nowhere:Net"], "net: there is no module 'nowhere': looked for "),
         (["corridor.yaml", "--bonus", "mine:Bonus"], "bonus: there is no module 'mine': looked for "),
@@ -366,6 +395,15 @@ def test_a_scripted_scenario_is_guided_unless_another_recipe_is_asked_for(capsys
     assert "--frames: Input should be greater than or equal to 0, got -1" in capsys.readouterr().err
     assert run_main(["help", "--recipe", "plain", *few, "--out", "plain"]) == 0
     assert (result_of("plain")["recipe"], result_of("plain")["guide"]) == ("plain", "none")
+
+
+def test_a_suite_of_which_one_member_has_no_script(capsys: Capture) -> None:
+    Path("two.yaml").write_text("suite: two\nabout: One has a script.\nmembers: [corridor.yaml, help]\n")
+    assert run_main(["two.yaml", *QUICK, "--recipe", "guided", "--out", "here"]) == 2
+    assert "two.yaml: the agent of corridor has no frame" in capsys.readouterr().err
+    assert not Path("here").exists()
+    assert run_main(["two.yaml", *QUICK, "--out", "here"]) == 0
+    assert (result_of("here")["recipe"], result_of("here")["guide"]) == ("plain", "none")
 
 
 def test_unwritable_output(capsys: Capture) -> None:
