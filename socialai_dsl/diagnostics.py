@@ -22,6 +22,7 @@ CODES: Final[dict[str, str]] = {
     "S006": "encoding or control character",
     "S007": "a file that cannot be read",
     "W008": "a comment that ignores nothing",
+    "W009": "a text that a comment cuts short",
     # S1xx: the shape of the document
     "S101": "unknown key",
     "S102": "a comma inside { } ends the value",
@@ -45,6 +46,7 @@ CODES: Final[dict[str, str]] = {
     "S211": "wrong number or kind of arguments",
     "S212": "an expression that is too long or too deep",
     "S213": "a name that is already taken",
+    "S214": "a number too large to compute",
     # S3xx: frames, states, objects
     "S301": "unknown state",
     "S302": "a slot that is not filled",
@@ -59,7 +61,10 @@ CODES: Final[dict[str, str]] = {
     "W311": "a rule that never fires",
     "S312": "states that go round within one step",
     "S313": "two frames that move one body",
+    "W314": "something that can never hold",
     "S315": "files of `one_of` that differ where they must not",
+    "S316": "no success or no room is possible",
+    "W317": "a definition that nothing uses",
     # S4xx: what can be said
     "S401": "an utterance that nobody can say",
     "S402": "a value that cannot be said",
@@ -74,6 +79,8 @@ CODES: Final[dict[str, str]] = {
     "S508": "not a scenario name",
     # S6xx: the room
     "S601": "a placement without a free cell",
+    "S602": "a place outside of the room",
+    "W603": "somebody or something that is absent in some rooms",
     # S7xx: experiments
     "S701": "settings for a condition that does not exist",
     "S702": "a seed given twice",

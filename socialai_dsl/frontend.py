@@ -21,6 +21,7 @@ from socialai_dsl.checking import (
     of_other_values,
     said_once,
     sift,
+    swallowed,
 )
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity, bounded_suggestions
 from socialai_dsl.loader import Resolved, resolve
@@ -146,6 +147,8 @@ def _check(name: str, texts: Mapping[Path, Source] | None, every_value: bool) ->
     except ScenarioError as error:
         return CheckResult(name, None, None, tuple(DiagnosticBag(error.diagnostics)), error.sources, None)
     bag = DiagnosticBag()
+    if resolved.kind in ("scenario", "npc", "library"):
+        bag.extend(swallowed(resolved))
     if resolved.kind == "suite":
         suite = check_suite(resolved, bag)
         return _sifted(

@@ -9,7 +9,6 @@ from socialai_dsl.program import (
     ENTITY_FIELDS,
     FIRST_ENTITY,
     TEMPORARY,
-    TESTS,
     Field,
     FrameColumn,
     Header,
@@ -17,60 +16,11 @@ from socialai_dsl.program import (
     Program,
     Register,
 )
+from socialai_dsl.program.instructions import TABLE, Kind, OpClass, Operand
 
-_ENTITIES = frozenset({*range(Op.IF_SAME_CELL, Op.IF_UNOBSTRUCTED + 1), Op.GO_TO, Op.GO_NEXT_TO, Op.FACE})
-_FIRST_IS_ENTITY = _ENTITIES | {
-    Op.PUT,
-    Op.SAY,
-    Op.TURN_TO,
-    Op.POINT,
-    Op.BECOME,
-    Op.VANISH,
-    Op.SET_FIELD,
-    Op.PLACE,
-}
-_SECOND_IS_ENTITY = _ENTITIES | {
-    Op.FIELD,
-    Op.DISTANCE,
-    Op.NEAREST,
-    Op.QUADRANT,
-    Op.SEES,
-    Op.CELL_OF,
-    Op.CELL_BESIDE,
-    Op.PLACE,
-    Op.B_NEXT_TO,
-    Op.B_IN_FRONT_OF,
-}
-_THIRD_IS_ENTITY = frozenset({Op.DISTANCE, Op.QUADRANT, Op.SEES, Op.NEAREST_CELL})
-_LITERALS: dict[Op, tuple[int, ...]] = {
-    Op.IF_UNPINNED: (),
-    Op.IF_CHANCE: (0, 1),
-    Op.IF_HEARD: (1,),
-    Op.FIELD: (2,),
-    Op.NEAREST: (2,),
-    Op.DRAW: (2,),
-    Op.DRAW_OTHER: (2,),
-    Op.PICK_BIT: (2,),
-    Op.SET_FIELD: (1,),
-    Op.GOTO: (0, 1),
-    Op.COUNT: (0,),
-    Op.ANSWER: (0, 2),
-    Op.END: (0, 1),
-    Op.END_GRADED: (0,),
-    **dict.fromkeys((Op.HEARD_FROM, Op.HEARD_NOUN), (1, 2)),
-    Op.CHOOSE: (0, 1, 2),
-    Op.TURN_TO: (2,),
-    Op.GO_TO: (2,),
-    Op.GO_NEXT_TO: (2,),
-    Op.FACE: (2,),
-    Op.PICK_CELL: (1, 2),
-    **dict.fromkeys((Op.FIRST_CELL, Op.NEAREST_CELL, Op.B_COUNT), (1,)),
-    **dict.fromkeys(map(Op, range(Op.B_FLOOR, Op.B_FREE + 1)), (0,)),
-    Op.B_WALL: (0, 1, 2),
-    **dict.fromkeys((Op.B_AND, Op.B_OR, Op.B_WITHOUT, Op.B_COPY), (0, 1)),
-    Op.EACH_CELL: (0,),
-    Op.DRAW_ROOM: (0,),
-}
+_AS_WRITTEN = frozenset((Kind.LITERAL, Kind.SITE, Kind.BOARD, Kind.FILLED, Kind.CHANGED))
+"""Operands whose word is shown as it is."""
+
 _ENTRIES = {
     Header.RESET_PC: "reset",
     Header.REQUIRE_PC: "require",
@@ -169,43 +119,41 @@ class _Names:
 
     def operands(self, op: Op, pc: int, words: list[int]) -> str:
         """The operands of one instruction; skips as the address they lead to."""
-        if op in (Op.HALT, Op.DROP_CELL, Op.END_EACH):
-            return ""
-        skip = op in TESTS or op in (Op.SKIP, Op.EACH_CELL)
-        shown = (
-            []
-            if op == Op.SKIP
-            else [self._operand(op, i, word, words[1]) for i, word in enumerate(words[: 2 if skip else 3])]
-        )
-        while shown and shown[-1] == "0" and len(shown) > _least_operands(op):
-            shown.pop()
-        if skip:
+        entry = TABLE[op]
+        shown = [
+            self._operand(op, position, word, words[1])
+            for position, word in enumerate(words)
+            if entry.operands[position].kind not in (Kind.UNUSED, Kind.SKIP)
+        ]
+        if entry.skips:
             shown.append(f"-> {pc + 1 + words[2]}")
         return ", ".join(shown)
 
     def _operand(self, op: Op, position: int, word: int, count: int) -> str:
-        if op == Op.COUNT:
-            return self.program.rules[word] if position == 0 else "0"
-        if op == Op.ANSWER and position != 1:
-            return self.program.rules[word] if position == 0 else _goal(word)
-        if op == Op.NEAREST and position == 2:
-            return f"{self._place(word >> 8)}..{self._place(word & 255)}"
-        if op == Op.DRAW_OTHER and position == 2:
-            return f"{word >> 16 & 255}..{(word >> 16 & 255) + (word >> 24) - 1}, {word & 65535}"
-        if op in (Op.END, Op.END_GRADED) and position == 0:
-            return self.program.outcomes[word]
-        if op == Op.CHOOSE and position == 0:
-            return "|".join(BODY_WORDS[word >> 4 * k & 15] for k in range(count))
-        if position in _LITERALS.get(op, ()):
-            return Field(word).name.lower() if op in (Op.FIELD, Op.SET_FIELD) else str(word)
+        operand = TABLE[op].operands[position]
+        match operand.meaning:
+            case "rule":
+                return self.program.rules[word]
+            case "outcome":
+                return self.program.outcomes[word]
+            case "goal":
+                return _goal(word)
+            case "field":
+                return Field(word).name.lower()
+            case "first and last entity":
+                return f"{self._place(word >> 8)}..{self._place(word & 255)}"
+            case "packed":
+                return f"{word >> 16 & 255}..{(word >> 16 & 255) + (word >> 24) - 1}, {word & 65535}"
+            case "actions":
+                return "|".join(BODY_WORDS[word >> 4 * k & 15] for k in range(count))
+        if operand.kind in _AS_WRITTEN:
+            return str(word)
         if word >= CONSTANT // 2:
             value = word - CONSTANT
-            entity = (op in _FIRST_IS_ENTITY, op in _SECOND_IS_ENTITY, op in _THIRD_IS_ENTITY)[position]
-            return self._place(value) if entity else f"#{value}"
+            is_place = operand.kind in (Kind.ENTITY, Kind.PLACE)
+            return self._place(value) if is_place else f"#{value}"
         if word >= TEMPORARY:
             return f"%{word - TEMPORARY}"
-        if word == 0 and position >= _least_operands(op):
-            return "0"
         return self.registers.get(word, f"r{word}")
 
     def _place(self, number: int) -> str:
@@ -220,22 +168,47 @@ def _goal(word: int) -> str:
     return f"{word >> 8}, {(word & 255) - 1}" if word else "0"
 
 
-def _least_operands(op: Op) -> int:
-    one = (Op.COUNT, Op.BODY, Op.VANISH, Op.REWARD, Op.IF_UNPINNED, Op.B_FLOOR, Op.B_FREE, Op.DRAW_ROOM)
-    three = (
-        *range(Op.ADD, Op.ABS),
-        Op.FIELD,
-        Op.DISTANCE,
-        Op.NEAREST,
-        Op.QUADRANT,
-        Op.DRAW,
-        Op.DRAW_OTHER,
-        Op.PICK_BIT,
-        Op.SEES,
-        Op.NEAREST_CELL,
-        Op.SET_FIELD,
-        Op.CELL_BESIDE,
-        Op.HEARD_FROM,
-        Op.HEARD_NOUN,
-    )
-    return 1 if op in one else 3 if op in three else 2
+def instructions_page() -> str:
+    """The page of the documentation that lists all instructions."""
+    rows = [
+        "# Instructions",
+        "",
+        "What a compiled scenario is made of: `socialai show FILE --program` prints a program with these instructions,",
+        "and [constructs](constructs.md) says what becomes which. An instruction is four words, an op and its operands",
+        "a, b, c; v(x) is the value of an operand: a constant, a register, or a temporary. This page is made from the",
+        "table in `socialai_dsl/program/instructions.py`, with which programs are checked before they run.",
+    ]
+    for op_class in OpClass:
+        rows += ["", f"## {_CLASSES[op_class][0]}", "", _CLASSES[op_class][1], ""]
+        rows += ["| op | number | a | b | c | |", "|---|---|---|---|---|---|"]
+        for entry in TABLE.values():
+            if entry.op_class is op_class:
+                operands = " | ".join(map(_described, entry.operands))
+                says = entry.says + (" Reset code only." if entry.setup else "")
+                rows.append(
+                    f"| `{entry.op.name}` | {int(entry.op)} | {operands} | {says} |".replace("|  |", "| |")
+                )
+    return "\n".join(rows) + "\n"
+
+
+_CLASSES = {
+    OpClass.CONTROL: (
+        "Control",
+        "Where code goes on. Nothing ever jumps backward but the loop over the cells of a board.",
+    ),
+    OpClass.TEST: (
+        "Tests",
+        "Code goes on with the next instruction if they hold, else c instructions later. A test of places is false "
+        "unless both are in the room.",
+    ),
+    OpClass.VALUE: ("Values", "They compute a number and write it to a."),
+    OpClass.EFFECT: ("Effects", "They change the world, what is said, or how the episode ends."),
+    OpClass.ACTIVITY: ("Activities", "They choose the body action of the entity on turn."),
+    OpClass.BOARD: ("Boards", "Sets of cells, what is found in them, and the room that a reset makes."),
+}
+
+
+def _described(operand: Operand) -> str:
+    if operand.kind is Kind.UNUSED:
+        return ""
+    return operand.meaning if operand.kind is Kind.LITERAL else operand.kind.value

@@ -1,6 +1,7 @@
 """Every recipe of the cookbook is valid, is on the page, and is solved by the script in it."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,42 @@ def test_the_script_of_a_recipe_solves_it(path: Path) -> None:
             done = terminated or truncated
         solved += bool(info["success"])
     assert solved >= 0.85 * EPISODES
+
+
+def told(heard: list[str], sally_looks: bool) -> str | None:
+    """Where Sally takes the ball to be, by what was said and which way she faces."""
+    boxes = re.findall(r"in the (red|blue) box", " ".join(heard))
+    return None if len(boxes) < 2 else boxes[1 if sally_looks else 0]
+
+
+@pytest.mark.parametrize(
+    ("policy", "least", "most"),
+    [
+        (lambda heard, sally_looks: "red", 0.25, 0.75),
+        (lambda heard, sally_looks: told(heard, True), 0.25, 0.75),  # where the ball is
+        (lambda heard, sally_looks: told(heard, False), 0.25, 0.75),  # where it was
+        (told, 1.0, 1.0),
+    ],
+    ids=["blind guesser", "where it is", "where it was", "believer"],
+)
+def test_the_false_belief_takes_somebody_who_follows_it(
+    policy: Callable[[list[str], bool], str | None], least: float, most: float
+) -> None:
+    env = socialai_dsl.make(str(DOCS / "cookbook" / "false_belief.yaml"))
+    solved, up = 0, 3
+    for seed in range(60):
+        observation, info = env.reset(seed=seed)
+        heard, done = [], False
+        while not done:
+            heard.append(info["utterance"])
+            ahead = observation["image"][3, 5]  # Sally stands there
+            box = policy(heard, ahead[3] == up) if len(heard) > 8 else None
+            said = None if box is None else f"She looks in the {box} box"
+            action = env.unwrapped.encode_action((None, said))  # type: ignore[attr-defined]
+            observation, _, terminated, truncated, info = env.step(action)
+            done = terminated or truncated
+        solved += bool(info["success"])
+    assert least <= solved / 60 <= most
 
 
 def test_the_page_shows_every_file() -> None:

@@ -14,6 +14,7 @@ TEXT_SIDE = {
     "source",
     "diagnostics",
     "draws",
+    "vocabulary",
     "grammar",
     "schema",
     "semantics",
@@ -24,16 +25,19 @@ TEXT_SIDE = {
     "frontend",
 }
 
-# layer -> (layers of socialai_dsl it may import, packages and modules of others it may import)
+CONFIG = "trainer.config"
+"""The options of a run: pydantic models without anything of the trainer behind them."""
+
+# layer -> (layers of socialai_dsl it may import, third-party packages it may import)
 MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "atomic": (set(), set()),
     "source": (set(), set()),
     "diagnostics": ({"source"}, set()),
     "draws": (set(), {"numpy", "numba"}),
+    "vocabulary": (set(), set()),
     "grammar": ({"source", "diagnostics"}, {"lark"}),
-    # The options of a run are declared in trainer.config, which imports pydantic alone.
-    "schema": ({"source", "diagnostics", "grammar"}, {"pydantic", "pydantic_core", "trainer.config"}),
-    "semantics": ({"source", "diagnostics", "draws", "grammar", "schema"}, set()),
+    "schema": ({"source", "diagnostics", "grammar"}, {"pydantic", "pydantic_core", CONFIG}),
+    "semantics": ({"source", "diagnostics", "draws", "vocabulary", "grammar", "schema"}, set()),
     "loader": (
         TEXT_SIDE - {"frontend", "checking", "library", "parameters"},
         {"yaml", "pydantic", "pydantic_core"},
@@ -57,10 +61,10 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"numpy", "gymnasium", "PIL"},
     ),
     "evaluation": (set(), {"numpy", "gymnasium"}),
-    "experiments": (TEXT_SIDE | {"atomic", "compilation"}, {"yaml", "ray", "submitit", "trainer.config"}),
+    "experiments": (TEXT_SIDE | {"atomic", "compilation"}, {"ray", "submitit", "yaml", CONFIG}),
     "reporting": (
         {"experiments"},
-        {"numpy", "scipy", "matplotlib", "pydantic", "jinja2", "markupsafe", "pyarrow", "trainer.config"},
+        {"numpy", "scipy", "matplotlib", "pydantic", "jinja2", "markupsafe", "pyarrow", CONFIG},
     ),
     "sb3": (set(), {"numpy", "gymnasium", "stable_baselines3"}),
     "_gymnasium_hook": ({"envs"}, set()),

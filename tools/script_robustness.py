@@ -20,6 +20,7 @@ from __future__ import annotations
 import argparse
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -42,6 +43,8 @@ def play(name: str, episodes: int, seed: int, noise: float) -> Played:
 
     Args:
         name: of a scenario whose agent follows a frame.
+        episodes: how many to play.
+        seed: of the rooms and of the random moves.
         noise: probability with which an action is replaced, 0 to 1.
     """
     envs = sd.make_vec(name, episodes, autoreset_mode="Disabled")
@@ -69,10 +72,24 @@ def play(name: str, episodes: int, seed: int, noise: float) -> Played:
 
 
 def shipped() -> list[str]:
-    """The shipped scenarios that have a variant `oracle`."""
-    from socialai_dsl.library import shipped_scenarios, variants_of
+    """The shipped scenarios that have a variant `oracle`, by name."""
+    folder = Path(__file__).parents[1] / "scenarios"
+    names = []
+    for path in sorted(folder.rglob("*.yaml")):
+        name = path.relative_to(folder).with_suffix("").as_posix()
+        if name.endswith("_asocial_oracle"):
+            names.append(name.removesuffix("_asocial_oracle") + "+asocial")
+        elif not name.endswith("_oracle"):
+            names.append(name)
+    return [name for name in dict.fromkeys(names) if _has_script(name)]
 
-    return [name for name in shipped_scenarios() if "oracle" in variants_of(name)]
+
+def _has_script(name: str) -> bool:
+    try:
+        sd.load(f"{name}+oracle")
+    except sd.ScenarioError:
+        return False
+    return True
 
 
 def main() -> int:

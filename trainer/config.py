@@ -88,7 +88,7 @@ class RunConfig(BaseModel):
         min_length=1,
     )
     guide_share: float = _option(
-        0.4, "share of the frames, from the first on, in which the guide leads (measured)", ge=0, le=1
+        0.5, "share of the frames, from the first on, in which the guide leads (measured)", ge=0, le=1
     )
     imitation_coef: float = _option(
         1.0, "weight of the cross-entropy to the guide's actions (measured)", ge=0
@@ -278,6 +278,8 @@ RECIPES: Final[Mapping[str, Preset]] = {
     "guided": Preset(
         {
             "guide": "script",
+            "envs": 128,
+            "horizon": 64,
             "minibatches": 16,
             "lr_end": 1e-4,
             "entropy_coef_end": 0.002,

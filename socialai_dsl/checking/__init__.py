@@ -8,6 +8,7 @@ from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite, St
 from socialai_dsl.checking.repetitions import said_once
 from socialai_dsl.checking.scenarios import check_scenario, naming_the_patch
 from socialai_dsl.checking.suites import check_suite
+from socialai_dsl.checking.swallowed import swallowed
 
 __all__ = [
     "Loaded",
@@ -24,4 +25,5 @@ __all__ = [
     "of_other_values",
     "said_once",
     "sift",
+    "swallowed",
 ]

@@ -17,6 +17,9 @@ from socialai_dsl.semantics.terms import Checked
 _OF_THE_GRAMMAR = frozenset({"S401", "S402"})
 """What may be wrong because a patch changed the grammar."""
 
+_OF_ALL_VARIANTS = frozenset({"W314", "W317"})
+"""What a variant may leave without a use in parts that are there for the others."""
+
 _MAY_FOLLOW = frozenset(
     {
         "S105",
@@ -28,6 +31,7 @@ _MAY_FOLLOW = frozenset(
         "S301",
         "S302",
         "S303",
+        "S304",
         "S305",
         "S310",
         "S315",
@@ -44,13 +48,14 @@ class Draft:
 
     Attributes:
         scenario: its models. name: with variants.
-        shaped: the data the models were made of. filled: its parameters.
+        shaped: the data the models were made of. filled: its parameters. patched: whether a variant changed it.
     """
 
     scenario: Scenario
     name: str
     shaped: Shaped[Scenario]
     filled: Substituted
+    patched: bool = False
 
     def with_actions(self, actions: tuple[str, ...]) -> Draft:
         """The same with other body actions, as a suite gives them to all its members."""
@@ -88,7 +93,7 @@ def draft_of(resolved: Resolved, bag: DiagnosticBag) -> Draft | None:
     shaped = model_of(Scenario, groups.data, groups.places, bag, partial=abstract)
     if shaped.model is None or abstract or failed:
         return None
-    return Draft(shaped.model, resolved.name, shaped, filled)
+    return Draft(shaped.model, resolved.name, shaped, filled, bool(resolved.edits))
 
 
 def meaning_of(draft: Draft, bag: DiagnosticBag) -> Checked | None:
@@ -103,6 +108,8 @@ def meaning_of(draft: Draft, bag: DiagnosticBag) -> Checked | None:
     checked = check_meaning(
         draft.scenario, draft.name, shaped.places, found, prelude(), shaped.data, filled.values, filled.paths
     )
+    if draft.patched:
+        found = DiagnosticBag(d for d in found if d.code not in _OF_ALL_VARIANTS)
     if not bag.has_errors:
         bag.extend(found)
         return checked

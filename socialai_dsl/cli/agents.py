@@ -17,6 +17,7 @@ from socialai_dsl.experiments.settings import resolved_config
 from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, RunConfig
 
 if TYPE_CHECKING:
+    from socialai_dsl.checking import Loaded
     from socialai_dsl.program_suite import Playable
     from trainer.logging import Tracker
 
@@ -128,8 +129,7 @@ def checked_config(given: dict[str, Any]) -> RunConfig:
         UsageError: a value is out of bounds.
     """
     try:
-        options = dict(given)
-        return resolved_config(options.pop("recipe", "plain"), options)
+        return resolved_config(given)
     except ValidationError as error:
         first = error.errors()[0]
         said = first["msg"].removeprefix("Value error, ")
@@ -292,12 +292,15 @@ def read_config(folder: Path) -> RunConfig:
         raise UsageError(f"{folder / SETTINGS}: {place}: {first['msg']}") from None
 
 
-def train_agent(config: RunConfig, program: "Playable", folder: Path, resume: bool, stream: IO[str]) -> Path:
+def train_agent(
+    config: RunConfig, loaded: "Loaded", program: "Playable", folder: Path, resume: bool, stream: IO[str]
+) -> Path:
     """Train, show the progress on `stream`, and return the path of the final checkpoint.
 
     Args:
         config: of the run.
-        program: of its scenario.
+        loaded: its scenario.
+        program: the same, compiled.
         folder: of the run.
         resume: go on where the run was stopped.
         stream: where the progress is shown.
@@ -308,6 +311,8 @@ def train_agent(config: RunConfig, program: "Playable", folder: Path, resume: bo
         KeyboardInterrupt: with a message that says how to go on.
     """
     import socialai_dsl
+    from socialai_dsl.cli.endings import endings_of
+    from socialai_dsl.cli.learnt import Learnt
     from socialai_dsl.cli.progress import TrainingProgress
     from trainer.errors import TrainingStopped
     from trainer.ppo import Progress, train
@@ -315,11 +320,13 @@ def train_agent(config: RunConfig, program: "Playable", folder: Path, resume: bo
     played = with_script(config.scenario) if config.guide == "script" else config.scenario
     envs = socialai_dsl.make_vec(played, num_envs=config.envs, copy=False, autoreset_mode="SameStep")
     total = config.updates * config.frames_per_update
+    learnt = Learnt(loaded, endings_of(loaded, program))
     try:
         with TrainingProgress(total, stream) as shown:
 
             def report(progress: Progress) -> None:
-                shown.update(progress.frames, progress.success_rate, progress.frames_per_second)
+                said = learnt.sentence(progress.row)
+                shown.update(progress.frames, progress.success_rate, progress.frames_per_second, said)
 
             return train(config, envs, folder, report, resume, _tracker(config, folder), program)
     except TrainingStopped as error:

@@ -103,7 +103,7 @@ def _alone(loaded: "Loaded") -> "Level | None":
     """None where there is no NPC."""
     from socialai_dsl.checking import LoadedScenario
     from socialai_dsl.envs.depth import without_npcs
-    from socialai_dsl.envs.properties import Effort
+    from socialai_dsl.envs.effort import Effort
     from socialai_dsl.reporting.analysis import Level
 
     assert isinstance(loaded, LoadedScenario), "internal: a suite is no room"

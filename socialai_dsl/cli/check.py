@@ -2,21 +2,27 @@
 
 import argparse
 import json
+import sys
+from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.check_report import ScenarioReport
 from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.terminal import ProgressLine
 
 if TYPE_CHECKING:
     from socialai_dsl.checking import LoadedScenario
-    from socialai_dsl.envs.properties import Effort
+    from socialai_dsl.envs.effort import Effort
 
-SUMMARY: Final = (
-    "verify the properties that scenarios claim in `check`, or that everything in them can happen"
-)
+SUMMARY: Final = "verify the properties that scenarios claim in `check`, and that everything in them can happen and be known"
 
-ROOMS: Final = 200
+ROOMS: Final = 100
 STATES: Final = 50_000
+SECONDS: Final = 20.0
+
+Say = Callable[[str], None]
+"""Takes a line of the report."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,9 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SCENARIO",
         help="a path or a name; of a suite every member is checked",
     )
-    parser.add_argument(
-        "--rooms", type=int, default=ROOMS, metavar="N", help=f"rooms to try (default: {ROOMS})"
-    )
+    add_effort(parser)
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the rooms (default: 0)")
     parser.add_argument(
         "--states",
@@ -41,8 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--deep",
         action="store_true",
-        help="try all there is: the properties, whether everything can happen, how long a success takes, whether the "
-        "script succeeds, and what an agent gets that neither sees nor hears the NPCs",
+        help="also tell how long a success takes, whether the script succeeds, and what an agent gets that neither "
+        "sees nor hears the NPCs",
     )
     parser.add_argument("--format", choices=("text", "json"), default="text", help="default: text")
     parser.add_argument(
@@ -50,50 +54,108 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_effort(parser: argparse.ArgumentParser) -> None:
+    """Declare how much is tried, and for how long."""
+    parser.add_argument(
+        "--rooms", type=int, default=ROOMS, metavar="N", help=f"rooms to try (default: {ROOMS})"
+    )
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        default=SECONDS,
+        metavar="S",
+        help=f"how long to try each scenario; 0 takes as long as it needs (default: {SECONDS:g})",
+    )
+
+
 def execute(arguments: argparse.Namespace) -> Exit:
-    """Check every scenario that was named; what fails is a finding."""
-    for option in ("rooms", "states"):
-        if getattr(arguments, option) < 1:
-            raise UsageError(f"--{option}: got {getattr(arguments, option)}, expected at least 1")
+    """Check every scenario that was named; what fails is a finding. Ctrl-C ends with what is known."""
+    check_effort(arguments)
+    if arguments.states < 1:
+        raise UsageError(f"--states: got {arguments.states}, expected at least 1")
     if arguments.seed < 0:
         raise UsageError(f"--seed: got {arguments.seed}, expected at least 0")
-    from socialai_dsl.envs.properties import Effort
+    from socialai_dsl.envs.effort import Clock, Effort
 
-    effort = Effort(arguments.rooms, arguments.seed, arguments.states)
-    reports = []
-    for name in arguments.scenarios:
-        for scenario, called in scenarios_of(name):
-            reports.append(check_scenario(scenario, called, effort, arguments.deep))
-            if arguments.format == "text":
-                print("\n".join(reports[-1].lines()), flush=True)
+    progress = ProgressLine(sys.stderr)
+    reports: list[ScenarioReport] = []
+    say = progress.above(sys.stdout) if arguments.format == "text" else None
+    for scenario, called in (pair for name in arguments.scenarios for pair in scenarios_of(name)):
+        clock = Clock(arguments.seconds or None, progress.show)
+        effort = Effort(arguments.rooms, arguments.seed, arguments.states, clock)
+        reports.append(check_scenario(scenario, called, effort, arguments.deep, say))
+        if clock.interrupted:
+            break
+    progress.clear()
     if arguments.format == "json":
         print(json.dumps([report.as_object() for report in reports], indent=2))
+    if any(report.interrupted for report in reports):
+        return Exit.INTERRUPTED
     failed = any(report.fails(arguments.strict) for report in reports)
     return Exit.FINDINGS if failed else Exit.GOOD
 
 
+def check_effort(arguments: argparse.Namespace) -> None:
+    """Raise UsageError for numbers of rooms or seconds that make no sense."""
+    if arguments.rooms < 1:
+        raise UsageError(f"--rooms: got {arguments.rooms}, expected at least 1")
+    if not 0 <= arguments.seconds < float("inf"):
+        raise UsageError(f"--seconds: got {arguments.seconds:g}, expected at least 0")
+
+
 def check_scenario(
-    loaded: "LoadedScenario", called: str, effort: "Effort", deep: bool = False
+    loaded: "LoadedScenario", called: str, effort: "Effort", deep: bool = False, say: Say | None = None
 ) -> ScenarioReport:
-    """Try what a scenario claims; if it claims nothing, whether everything in it can happen.
+    """Try what a scenario claims, whether it can be known, and whether everything in it can happen.
 
     Args:
         loaded: the scenario.
         called: its name, to which `+oracle` can be added.
-        effort: how much to try.
-        deep: try both, and what success takes.
+        effort: how much to try, and for how long.
+        deep: also try what success takes.
+        say: takes the lines of the report as they come.
     """
     from socialai_dsl.envs.coverage import coverage
     from socialai_dsl.envs.depth import depth
-    from socialai_dsl.envs.properties import check_property
+    from socialai_dsl.envs.properties import Trial, by_default
 
-    scripted = _scripted(loaded, called)
-    plans = loaded.checked.properties
-    tried = tuple((plan, check_property(loaded, plan, effort, scripted)) for plan in plans)
-    happening = coverage(loaded, effort, scripted) if deep or not plans else None
-    success = depth(loaded, effort, scripted) if deep else None
     place = loaded.resolved.key_span(("outcome",))
-    return ScenarioReport(called, effort.rooms, effort.seed, tried, happening, success, place)
+    report = ScenarioReport(called, effort.rooms, effort.seed, place)
+    said = 0
+
+    def part(tasks: int) -> "Effort":
+        return replace(effort, clock=effort.clock.part(tasks))
+
+    def tell() -> None:
+        nonlocal said
+        lines = list(report.lines())
+        for line in lines[said:] if say is not None else ():
+            say(line)  # type: ignore[misc]
+        said = len(lines)
+
+    tell()
+    try:
+        scripted = _scripted(loaded, called)
+        trial = Trial(loaded, effort, scripted)
+        plans = by_default(loaded, place)
+        for number, plan in enumerate(plans):
+            found = trial.check(plan, part(len(plans) - number + 1 + 2 * deep))
+            report.tried += ((plan, found),)
+            tell()
+            if effort.clock.interrupted:
+                break
+        if not effort.clock.interrupted:
+            report.coverage = coverage(loaded, part(1 + 2 * deep), scripted)
+            tell()
+        if deep and not effort.clock.interrupted:
+            report.depth = depth(trial, part(1))
+            tell()
+    except KeyboardInterrupt:
+        effort.clock.interrupt()
+    report.interrupted, report.in_time = effort.clock.interrupted, not effort.clock.is_over
+    report.complete = True
+    tell()
+    return report
 
 
 def scenarios_of(name: str) -> "list[tuple[LoadedScenario, str]]":

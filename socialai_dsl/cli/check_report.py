@@ -16,23 +16,28 @@ if TYPE_CHECKING:
     from socialai_dsl.source import Span
 
 
-@dataclass(frozen=True)
+@dataclass
 class ScenarioReport:
-    """What was found out about one scenario.
+    """What was found out about one scenario, so far.
 
     Attributes:
-        scenario: its name. rooms, seed: what was tried: rooms 0 to rooms - 1 of the seed.
+        scenario: its name. rooms, seed: what was to be tried: rooms 0 to rooms - 1 of the seed.
+        outcomes: where the outcomes are written.
         tried: its properties with what was found. coverage: what of it never happens, if that was tried.
-        depth: what success takes, if that was tried. outcomes: where the outcomes are written.
+        depth: what success takes, if that was tried.
+        complete: whether nothing more comes. interrupted: whether somebody stopped it. in_time: whether time was left.
     """
 
     scenario: str
     rooms: int
     seed: int
-    tried: "tuple[tuple[PropertyPlan, Report], ...]"
-    coverage: "Coverage | None"
-    depth: "Depth | None" = None
     outcomes: "Span | None" = None
+    tried: "tuple[tuple[PropertyPlan, Report], ...]" = ()
+    coverage: "Coverage | None" = None
+    depth: "Depth | None" = None
+    complete: bool = False
+    interrupted: bool = False
+    in_time: bool = True
 
     def findings(self) -> Iterator[Diagnostic]:
         """What fails as errors, what is undecided or never happens as warnings, each at its place."""
@@ -48,13 +53,15 @@ class ScenarioReport:
             message = f"the {part.kind} `{part.name}` happens in none of {self.rooms} rooms"
             yield Diagnostic("W802", message, part.span, Severity.WARNING)
         if self._is_hopeless and self.outcomes is not None:
-            message = f"no success can be reached in any of {self.rooms} rooms"
+            message = f"no success can be reached in any of {self.depth.rooms if self.depth else 0} rooms"
             yield Diagnostic("S801", message, self.outcomes)
 
     @property
     def _is_hopeless(self) -> bool:
         """Whether no room can be solved."""
-        return self.depth is not None and not (self.depth.steps or self.depth.undecided)
+        if self.depth is None or not self.depth.rooms:
+            return False
+        return not (self.depth.steps or self.depth.undecided)
 
     def fails(self, strict: bool) -> bool:
         """Whether a property fails or no room can be solved; with `strict` also what is undecided or never happens."""
@@ -74,6 +81,29 @@ class ScenarioReport:
             yield from _coverage(self.coverage)
         if self.depth is not None:
             yield from _depth(self.depth, self.rooms)
+        if self.complete:
+            yield from self._sufficed()
+
+    def _sufficed(self) -> Iterator[str]:
+        """What there was time for, where there was not for all."""
+        counts = [(f"`{plan.text}`", report.rooms) for plan, report in self.tried]
+        if self.depth is not None:
+            counts.append(("shortest successes", self.depth.rooms))
+            if self.depth.alone is not None:
+                counts.append(("success without NPCs", self.depth.alone.rooms))
+        short = [
+            (what, count) for what, count in counts if count < self.rooms and not self._is_for_nothing(what)
+        ]
+        if short:
+            listed = ", ".join(f"{count} for {what}" for what, count in short)
+            why = "it was interrupted" if self.interrupted else "`--seconds` gives more time"
+            yield f"  of {self.rooms} rooms there was time for {listed}; {why}"
+        elif self.interrupted:
+            yield "  it was interrupted before all was tried"
+
+    def _is_for_nothing(self, what: str) -> bool:
+        """Whether a property looks at no room at all, such as that of a script that is not there."""
+        return any(f"`{plan.text}`" == what and plan.kind == "oracle" for plan, _ in self.tried)
 
     def as_object(self) -> dict[str, Any]:
         """The report for JSON."""
@@ -88,6 +118,8 @@ class ScenarioReport:
                     **_place_as_object(plan.span),
                     "verdict": report.verdict.value,
                     "rooms": report.rooms,
+                    "rests": report.rests,
+                    "pairs": report.pairs,
                     "held": report.held,
                     "undecided": report.undecided,
                     "against": list(report.against),
@@ -98,6 +130,7 @@ class ScenarioReport:
             "never_happens": [
                 {"kind": part.kind, "name": part.name, **_place_as_object(part.span)} for part in missing
             ],
+            "interrupted": self.interrupted,
             "success": None if self.depth is None else asdict(self.depth),
         }
 
@@ -112,7 +145,7 @@ def _coverage(found: "Coverage") -> Iterator[str]:
 
 def _depth(found: "Depth", rooms: int) -> Iterator[str]:
     solvable = len(found.steps)
-    line = f"  a success can be reached in {solvable} of {rooms} rooms"
+    line = f"  a success can be reached in {solvable} of {found.rooms} rooms"
     if found.steps:
         middle, longest = median_high(found.steps), found.steps[-1]
         line += f", in {middle} steps in the median and {longest} at most"

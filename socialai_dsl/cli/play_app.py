@@ -15,7 +15,7 @@ from textual.suggester import Suggester
 from textual.widgets import Input, OptionList, Static
 
 from socialai_dsl.cli.play_game import Game, Played
-from socialai_dsl.cli.play_words import ahead, view_text
+from socialai_dsl.cli.play_words import ahead
 from socialai_dsl.cli.typed import Phrases, split_line
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.engine.errors import RoomError
@@ -163,9 +163,9 @@ class PlayApp(App[list[Played]]):
         try:
             self._game.act(movement, sentence)
         except ValueError:
-            near = self._game.phrases.corrected(sentence or "")
-            hint = f"; did you mean {near!r}? Tab puts it in" if near is not None else ""
-            self.tell(f"{sentence!r} cannot be said{hint}", "bad")
+            phrases, typed = self._game.phrases, sentence or ""
+            hint = " Tab puts it in" if phrases.corrected(typed) is not None else ""
+            self.tell(phrases.problem(typed) + hint, "bad")
             return
         line = self.query_one(_Line)
         line.value = ""
@@ -270,8 +270,12 @@ class PlayApp(App[list[Played]]):
             Text(printable(f"{game.title}{member} · step {game.steps} · reward {now.reward:.3f}"))
         )
         self.query_one("#room", Static).update(Text.from_ansi(game.room()))
-        self.query_one("#view", Static).update(Text.from_ansi(view_text(now.view)))
-        facts = Text.assemble("ahead: ", (ahead(now.view), "bold"), "\n\n", (printable(game.about), "dim"))
+        view = game.view()
+        self.query_one("#view", Static).update(Text.from_ansi(view.text))
+        shown = "".join(f"\n{line}" for line in view.figures)
+        facts = Text.assemble(
+            "ahead: ", (ahead(now.view), "bold"), shown, "\n\n", (printable(game.about), "dim")
+        )
         self.query_one("#facts", Static).update(facts)
         self._show_told()
         if self.query_one("#right").has_class("behind"):
@@ -467,7 +471,8 @@ def _help(actions: Sequence[str], practice: bool) -> str:
     lines = [
         ", ".join([*moves, ". stand still"]),
         "",
-        "/ or Enter   type a sentence, a movement, or both: forward How are you",
+        "/ or Enter   type a sentence, a movement, or both: forward How are you;",
+        "             . or none stands still",
         "             Tab completes what is begun, or puts in what was meant",
         "c            choose a sentence from lists",
         "PgUp PgDn    what was said before",

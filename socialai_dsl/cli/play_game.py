@@ -10,10 +10,12 @@ import socialai_dsl
 from socialai_dsl.checking import Loaded, LoadedSuite
 from socialai_dsl.cli.endings import Ending, endings_of
 from socialai_dsl.cli.episode import describe_step
+from socialai_dsl.cli.play_words import View
 from socialai_dsl.cli.trace_episode import cast_of, played
 from socialai_dsl.cli.trace_text import present
 from socialai_dsl.cli.typed import Phrases
 from socialai_dsl.envs.panel import DialogueLine
+from socialai_dsl.program import DIRECTIONS, Flag, Header
 from socialai_dsl.program_suite import Playable, ProgramSuite, outcome_name
 
 _UNTOLD: Final = ("clock", "at", "color", "facing", "last", "poked", "state")
@@ -162,6 +164,12 @@ class Game:
     def room(self) -> str:
         """The room as text with escape codes for colours."""
         return str(self._env.coloured_text())
+
+    def view(self) -> View:
+        """What the agent sees."""
+        program = played(self._program, {"member": self.now.member})
+        egocentric = bool(program.header(Header.FLAGS) & Flag.EGOCENTRIC)
+        return View(self.now.view, DIRECTIONS.index(self._env.describe()["agent"]["facing"]), egocentric)
 
     def place(self) -> tuple[int, int] | None:
         """X and y of the agent; None if it has left."""

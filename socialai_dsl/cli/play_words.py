@@ -1,5 +1,6 @@
 """This module puts what the agent sees into words and pictures of letters."""
 
+from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
@@ -7,18 +8,72 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.envs import tiles
-from socialai_dsl.envs.render import draw_ansi
+from socialai_dsl.envs.gestures import Gesture, gesture_shown
+from socialai_dsl.envs.render import draw_ansi, letters
 from socialai_dsl.library import prelude
 from socialai_dsl.program import COLORS, VIEW
 from socialai_dsl.semantics.terms import ObjectType
 
 _UP: Final = 3
+_LOOKS: Final = 4
+"""Channels that say what things look like; those behind them are gestures."""
 
 
-def view_text(view: NDArray[np.uint8]) -> str:
-    """The view, uint8 (7, 7, C), as text with escape codes; the agent stands at the bottom and looks up."""
-    codes = np.ascontiguousarray(view[..., :4].transpose(1, 0, 2))
-    return draw_ansi(codes, (VIEW // 2, VIEW - 1, _UP), colour=True)
+@dataclass(frozen=True)
+class View:
+    """The view as a player sees it: the agent stands at the bottom and looks up.
+
+    Args:
+        image: uint8 (7, 7, C), as in the observation.
+        facing: where the agent looks, 0 right, 1 down, 2 left, 3 up.
+        egocentric: whether directions of NPCs are given as seen from the agent.
+    """
+
+    image: NDArray[np.uint8]
+    facing: int
+    egocentric: bool
+
+    @property
+    def text(self) -> str:
+        """The view as text with escape codes."""
+        return draw_ansi(self._codes, (VIEW // 2, VIEW - 1, _UP), colour=True)
+
+    @property
+    def figures(self) -> list[str]:
+        """One line for each NPC in view that points or has done something, as `Av 2 ahead, 1 left: did toggle`."""
+        lines = []
+        for (column, row), gesture in self._gestures().items():
+            if not gesture.words:
+                continue
+            aside, before = column - VIEW // 2, VIEW - 1 - row
+            side = f", {abs(aside)} {'right' if aside > 0 else 'left'}" if aside else ""
+            lines.append(f"{letters(self._codes, row, column)} {before} ahead{side}: {gesture.words}")
+        return lines
+
+    @property
+    def _codes(self) -> NDArray[np.uint8]:
+        """The cells by row and column, with directions as they are on the screen."""
+        codes = np.ascontiguousarray(self.image[..., :_LOOKS].transpose(1, 0, 2))
+        npcs, marbles = (codes[..., 0] == kind for kind in (tiles.NPC, tiles.MARBLE))
+        codes[npcs, 3] = (codes[npcs, 3] + self._turn) % 4
+        codes[marbles, 3] = (codes[marbles, 3] + _UP - self.facing) % 4
+        return codes
+
+    def _gestures(self) -> dict[tuple[int, int], Gesture]:
+        """(column, row) -> what the NPC there shows, with directions as they are on the screen."""
+        if self.image.shape[-1] <= _LOOKS:
+            return {}
+        found = {}
+        for row, column in np.argwhere(self.image[..., 0].T == tiles.NPC).tolist():
+            gesture = gesture_shown(*map(int, self.image[column, row, _LOOKS:]))
+            pointing = None if gesture.pointing is None else (gesture.pointing + self._turn) % 4
+            found[column, row] = gesture._replace(pointing=pointing)
+        return found
+
+    @property
+    def _turn(self) -> int:
+        """What is added to the direction of an NPC to have it as on the screen."""
+        return 1 if self.egocentric else _UP - self.facing
 
 
 def ahead(view: NDArray[np.uint8]) -> str:

@@ -1,4 +1,4 @@
-"""This module shows how far a training run has come: a live bar on a terminal, plain lines elsewhere."""
+"""How far a training run has come: a live bar on a terminal, plain lines elsewhere."""
 
 import time
 from collections import deque
@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
 _SECONDS_BETWEEN_LINES = 5.0
+_SECONDS_BETWEEN_SENTENCES = 15.0
 _REMEMBERED_UPDATES = 20
 
 
@@ -22,7 +23,7 @@ class TrainingProgress:
         """Report on a run of `total` frames, writing to `stream`."""
         self._total = total
         self._stream = stream
-        self._last_line = time.monotonic()
+        self._last_line = self._last_sentence = time.monotonic()
         self._success: deque[float] = deque(maxlen=_REMEMBERED_UPDATES)
         self._speed: deque[float] = deque(maxlen=_REMEMBERED_UPDATES)
         self._bar: Progress | None = None
@@ -47,13 +48,14 @@ class TrainingProgress:
         if self._bar is not None:
             self._bar.stop()
 
-    def update(self, frames: int, success: float | None, speed: float) -> None:
+    def update(self, frames: int, success: float | None, speed: float, said: str = "") -> None:
         """Report one update.
 
         Args:
             frames: frames trained so far, earlier parts of a resumed run included.
             success: share of the episodes ended in this update that succeeded; None if none ended.
             speed: frames per second of this update.
+            said: what the agent has learnt so far, in words; shown now and then.
         """
         if success is not None:
             self._success.append(success)
@@ -64,6 +66,16 @@ class TrainingProgress:
         elif time.monotonic() - self._last_line > _SECONDS_BETWEEN_LINES or frames >= self._total:
             self._last_line = time.monotonic()
             print(f"{frames:>12,} of {self._total:,} frames  {text}", file=self._stream, flush=True)
+        now = time.monotonic()
+        if said and (now - self._last_sentence > _SECONDS_BETWEEN_SENTENCES or frames >= self._total):
+            self._last_sentence = now
+            self._say(said)
+
+    def _say(self, sentence: str) -> None:
+        if self._bar is not None:
+            self._bar.console.print(f"  {sentence}", highlight=False, markup=False)
+        else:
+            print(f"    {sentence}", file=self._stream, flush=True)
 
     def _text(self, frames: int) -> str:
         # The mean time of a frame, not the mean speed: a slow update counts for as long as it took.

@@ -61,7 +61,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     write_json(folder / SETTINGS, config.model_dump())
     print(f"{config.scenario}: {_size(program)}; writing to {folder}", file=stream, flush=True)
     if config.trains:
-        agent = _train(config, program, folder, bool(arguments.resume), stream)
+        agent = _train(config, loaded, program, folder, bool(arguments.resume), stream)
         training = _training_figures(folder)
     # What is trained differs by its training; what is not, by what it draws.
     drawn = 0 if config.trains else config.seed
@@ -79,9 +79,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
         "program_sha256": program.sha256,
         "versions": versions(),
     }
-    episode = evaluation.record(_shown(evaluation), f"agent {config.agent}, seed {config.seed}")
-    write_text(folder / "transcript.txt", episode.transcript())
-    episode.save_film(folder / "episode.gif")
+    _record(evaluation, folder, f"agent {config.agent}, seed {config.seed}")
     if config.trains:
         _draw_curve(config, program, folder, result)
         _write_card(config, loaded, folder, Path(agent), result)
@@ -90,12 +88,14 @@ def execute(arguments: argparse.Namespace) -> Exit:
     return Exit.GOOD
 
 
-def _train(config: "RunConfig", program: "Playable", folder: Path, resume: bool, stream: IO[str]) -> str:
+def _train(
+    config: "RunConfig", loaded: "Loaded", program: "Playable", folder: Path, resume: bool, stream: IO[str]
+) -> str:
     """Train in the run's folder and return the path of the final checkpoint."""
     from socialai_dsl.cli.agents import train_agent
 
     try:
-        return str(train_agent(config, program, folder, resume, stream))
+        return str(train_agent(config, loaded, program, folder, resume, stream))
     except UsageError:
         _discard_unstarted(folder)
         raise
@@ -196,9 +196,16 @@ def _size(program: "Playable") -> str:
     return f"{len(program.actions)} actions, {said} utterances, {len(program.vocabulary)} words"
 
 
-def _shown(evaluation: "Evaluation") -> int:
-    """The episode whose film is made: the first success, or the first of all if there is none."""
-    return int(evaluation.result.success.argmax())
+def _record(evaluation: "Evaluation", folder: Path, label: str) -> None:
+    """Film the first success, or the first episode if there is none, and where there are both, the first failure."""
+    success = evaluation.result.success
+    shown = {"episode": int(success.argmax())}
+    if success.any() and not success.all():
+        shown["failure"] = int(success.argmin())
+    for name, number in shown.items():
+        episode = evaluation.record(number, label)
+        write_text(folder / ("transcript.txt" if name == "episode" else f"{name}.txt"), episode.transcript())
+        episode.save_film(folder / f"{name}.gif")
 
 
 def _table(result: dict[str, Any], folder: Path) -> str:

@@ -25,6 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--test-episode", type=int, metavar="N", help="episode N of the fixed test set instead of a seed"
     )
     parser.add_argument(
+        "--index",
+        type=int,
+        metavar="N",
+        help="room N of the seed, counted from 0, as `check` and `validate` name rooms (default: 0)",
+    )
+    parser.add_argument(
         "--layout",
         type=Path,
         metavar="FILE",
@@ -65,6 +71,14 @@ def execute(arguments: argparse.Namespace) -> Exit:
     options: dict[str, Any] = {}
     if arguments.test_episode is not None:
         reset, options["test_episode"] = {}, arguments.test_episode
+    if arguments.index is not None:
+        if arguments.test_episode is not None:
+            raise UsageError(
+                "--index: the test set has rooms of its own; leave out --index or --test-episode"
+            )
+        if arguments.index < 0:
+            raise UsageError(f"--index: got {arguments.index}, expected at least 0")
+        options["index"] = arguments.index
     if arguments.layout is not None:
         options["layout"] = _layout(arguments.layout)
     traced = Traced(arguments.scenario, arguments.agent, arguments.do, arguments.seed)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.errors import UsageError
-from socialai_dsl.cli.typed import split_line
+from socialai_dsl.cli.typed import Phrases, split_line
 from socialai_dsl.diagnostics import printable
 
 if TYPE_CHECKING:
@@ -146,15 +146,11 @@ class Traced:
         except ValueError as error:
             raise UsageError(str(error)) from None
         options = reset["options"] or {}
-        origin = (
-            f"test episode {options['test_episode']}"
-            if "test_episode" in options
-            else f"seed {reset['seed']}"
-        )
+        origin = _origin(reset.get("seed"), options)
         member, cast = info.get("member"), self._cast(info)
         return Trace(
             *(self.scenario, self.agent, origin, member, cast, self._names()),
-            picture=env.render(),
+            picture=env.plain_text(),
             state=env.describe(),
         )
 
@@ -179,7 +175,7 @@ class Traced:
                 done["action"],
                 None if done["said"] is None else str(done["said"]),
                 () if info["utterance"] == "NA" else tuple(info["utterance"].splitlines()),
-                env.render(),
+                env.plain_text(),
                 after,
                 self._cast(info),
                 changes(before, after),
@@ -222,10 +218,11 @@ class Traced:
 
     def _typed(self, line: str) -> "NDArray[np.int64]":
         env = self._env.unwrapped
+        phrases = Phrases(env.program.actions, env.program.templates, env.program.nouns)
         try:
-            action: NDArray[np.int64] = env.encode_action(split_line(line.strip(), env.program.actions))
-        except ValueError as error:
-            raise UsageError(f"--do: {error}") from None
+            action: NDArray[np.int64] = env.encode_action(split_line(line.strip(), phrases.actions))
+        except ValueError:
+            raise UsageError(f"--do: {phrases.problem(line.strip())}") from None
         return action
 
     def _policy(self) -> Any:
@@ -240,6 +237,14 @@ class Traced:
         for warning in told:
             print(f"socialai: {printable(warning)}", file=sys.stderr)
         return policy
+
+
+def _origin(seed: int | None, options: dict[str, Any]) -> str:
+    """Which episode it is, in words."""
+    if "test_episode" in options:
+        return f"test episode {options['test_episode']}"
+    room = f", room {options['index']}" if "index" in options else ""
+    return f"seed {seed}{room}"
 
 
 def played(program: "Playable", info: dict[str, Any]) -> "Program":

@@ -11,6 +11,7 @@ from socialai_dsl.diagnostics import printable
 _WIDTH: Final = 100
 _GAP: Final = "    "
 _BOLD, _DIM, _GREEN, _RESET = "\x1b[1m", "\x1b[2m", "\x1b[32m", "\x1b[0m"
+_AGENT: Final = "agent"
 _QUIET: Final = ("facing", "at", "clock", "poked", "last")
 """Ends of addresses that the picture or the list of those present shows already, or that only count."""
 
@@ -109,7 +110,7 @@ class Text:
 
 
 def present(cast: Sequence[str], state: dict[str, Any]) -> list[str]:
-    """Where everybody of the cast is, where they look, and in which state their frames are."""
+    """Where everybody of the cast is, where they look, the state of their frames, their colour, and what they show."""
     width = max(map(len, cast), default=0)
     lines = []
     for name in cast:
@@ -117,8 +118,11 @@ def present(cast: Sequence[str], state: dict[str, Any]) -> list[str]:
         if found is None:
             continue
         place = "gone" if found.get("at") is None else f"{found['at'][0]},{found['at'][1]}"
-        frame = f"  {found['state']}" if "state" in found else ""
-        lines.append(f"{name:<{width}}  {place:<5} {found.get('facing', ''):<5}{frame}".rstrip())
+        told = [str(found["state"])] if "state" in found else []
+        told += [found["color"]] if name != _AGENT else []
+        told += [f"points {found['pointing']}"] if "pointing" in found else []
+        told += [f"did {found['last']}"] if found.get("last") not in (None, "none") else []
+        lines.append(f"{name:<{width}}  {place:<5} {found.get('facing', ''):<5}  {', '.join(told)}".rstrip())
     return lines
 
 

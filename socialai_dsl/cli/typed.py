@@ -2,13 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from socialai_dsl.diagnostics import did_you_mean
+
+STANDING: Final = (".", "none")
+"""What is typed for standing still."""
 
 
 def split_line(line: str, actions: Sequence[str]) -> tuple[str | None, str | None]:
     """Split what was typed into movement and utterance; a movement may be shortened while it is clear."""
     first, _, rest = line.partition(" ")
+    if first in STANDING:
+        return None, rest.strip() or None
     meant = [action for action in actions if first and action.startswith(first.lower())]
     if first.lower() in actions:
         meant = [first.lower()]
@@ -47,10 +53,27 @@ class Phrases:
         return None if found is None else before + found
 
     def corrected(self, line: str) -> str | None:
-        """The line with the sentence that was probably meant; None where none is near."""
+        """The line with the movement or the sentence that was probably meant; None where none is near."""
         before, begun = self._parts(line)
         near = did_you_mean(begun, self.sentences())
-        return None if near is None else before + near
+        if near is not None:
+            return before + near
+        first, _, rest = begun.partition(" ")
+        movement = None if before.strip() else did_you_mean(first, (*self.actions, "none"))
+        said = (
+            rest.strip() if rest.strip() in self.sentences() else did_you_mean(rest.strip(), self.sentences())
+        )
+        if movement is None or (rest.strip() and said is None):
+            return None
+        return f"{movement} {said}" if said else movement
+
+    def problem(self, line: str) -> str:
+        """What is wrong with a line that can be neither done nor said."""
+        near = self.corrected(line)
+        if near is not None:
+            return f"{line!r} can be neither done nor said; did you mean {near!r}?"
+        movements = ", ".join((*self.actions, *STANDING))
+        return f"{line!r} can be neither done nor said; movements are {movements}"
 
     def _parts(self, line: str) -> tuple[str, str]:
         """What stands before the utterance, and the utterance as far as it is typed."""

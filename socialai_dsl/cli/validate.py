@@ -7,10 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from socialai_dsl.cli.check import add_effort, check_effort
 from socialai_dsl.cli.errors import Exit, UsageError, is_usage
 from socialai_dsl.cli.files import STDIN, standard_input, yaml_files
 from socialai_dsl.cli.reporters import REPORTERS, Checked, limited
-from socialai_dsl.cli.terminal import shows_color
+from socialai_dsl.cli.terminal import ProgressLine, shows_color
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError
 
 if TYPE_CHECKING:
@@ -37,8 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--deep",
         action="store_true",
-        help="also try every scenario that has no errors out, as `socialai check --deep` does; takes minutes",
+        help="also try every scenario that has no errors out, as `socialai check --deep` does",
     )
+    add_effort(parser)
     parser.add_argument(
         "--max-errors", type=int, metavar="N", help="report at most N errors; the exit code stays the same"
     )
@@ -54,11 +56,12 @@ def execute(arguments: argparse.Namespace) -> Exit:
     """Check everything that was named, then print one report."""
     if arguments.max_errors is not None and arguments.max_errors < 1:
         raise UsageError(f"--max-errors: expected a positive number, got {arguments.max_errors}")
+    check_effort(arguments)
     results = [_checked(name, arguments.stdin_filename) for name in _expand(arguments.paths)]
     checked = _without_used(results)
     if arguments.deep:
         right = [result for (_, result), c in zip(results, checked, strict=True) if not c.errors]
-        tried = {result.name: _tried(result, arguments.format == "text") for result in right}
+        tried = {result.name: _tried(result, arguments) for result in right}
         checked = [
             replace(c, diagnostics=c.diagnostics + tried.get(result.name, ()))
             for c, (_, result) in zip(checked, results, strict=True)
@@ -118,19 +121,24 @@ def _without_used(results: Iterable[tuple[Checked, "CheckResult"]]) -> list[Chec
     ]
 
 
-def _tried(result: "CheckResult", told: bool) -> tuple[Diagnostic, ...]:
+def _tried(result: "CheckResult", arguments: argparse.Namespace) -> tuple[Diagnostic, ...]:
     """What trying the scenario of a file out shows, or the members of a suite; told to people as it goes."""
     if result.checked is None and result.suite is None:
         return ()
-    from socialai_dsl.cli.check import ROOMS, STATES, check_scenario, scenarios_of
-    from socialai_dsl.envs.properties import Effort
+    from socialai_dsl.cli.check import STATES, check_scenario, scenarios_of
+    from socialai_dsl.envs.effort import Clock, Effort
 
     found: list[Diagnostic] = []
+    progress = ProgressLine(sys.stderr)
+    say = progress.above(sys.stdout) if arguments.format == "text" else None
     for scenario, called in scenarios_of(result.name):
-        report = check_scenario(scenario, called, Effort(ROOMS, 0, STATES), deep=True)
+        clock = Clock(arguments.seconds or None, progress.show)
+        effort = Effort(arguments.rooms, 0, STATES, clock)
+        report = check_scenario(scenario, called, effort, deep=True, say=say)
+        progress.clear()
         found += report.findings()
-        if told:
-            print("\n".join(report.lines()), flush=True)
+        if report.interrupted:
+            raise KeyboardInterrupt
     return tuple(found)
 
 

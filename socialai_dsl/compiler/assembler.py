@@ -6,9 +6,11 @@ from dataclasses import dataclass, field
 
 from socialai_dsl.draws import site as site_number
 from socialai_dsl.program import BOARDS, CONSTANT, TEMPORARIES, TEMPORARY, TESTS, Op
+from socialai_dsl.program.instructions import TABLE
 from socialai_dsl.source import Span
 
 LARGEST = CONSTANT // 2 - 1
+"""Greatest magnitude of a value that an operand word can hold."""
 _STATES_OF_AN_ANSWER = 255
 """States that `Op.ANSWER` has room for."""
 
@@ -57,6 +59,7 @@ class Block:
 
     def emit(self, op: Op, a: int = 0, b: int = 0, c: int = 0) -> None:
         """Append an instruction, attributed to `self.span`."""
+        assert op in TABLE, f"internal: the instruction table has no {op!r}"
         self.instructions.append([int(op), a, b, c])
         self.spans.append(self.span)
 

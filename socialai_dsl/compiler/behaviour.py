@@ -83,7 +83,7 @@ class _FrameCompiler:
                 f"{frame.member}.aim[{k}]", self._range_of_aim(step.activity), fleeting=True
             )
             for k, step in enumerate(frame.steps)
-            if has_aim(step.activity) and step.until is None and step.duration is None
+            if has_aim(step.activity) and step.ends_with_its_activity
         }
         self.speaker = shared.checked.entities[frame.entity]
         self._is_agents = frame.entity == AGENT
@@ -323,9 +323,7 @@ class _FrameCompiler:
     @staticmethod
     def _skippable(step: StepPlan) -> bool:
         has_effects = step.sets or step.causes or step.say is not None
-        return (
-            step.activity.name in GOING and not has_effects and step.until is None and step.duration is None
-        )
+        return step.activity.name in GOING and not has_effects and step.ends_with_its_activity
 
     def _end_step(self, to: Expressions, k: int) -> None:
         """The entry's effects and the next entry, once it has ended."""
@@ -337,12 +335,18 @@ class _FrameCompiler:
         if step.duration is not None and step.duration > 0:
             unless = asked.unless("for", running) if step.until is None else None
             self._after(step.duration, to, ended, unless)
+        if step.lasted is not None:
+            not_yet = Label()
+            last = step.until is None
+            to.sited_condition(step.lasted, asked.unless("for", running) if last else not_yet)
+            block.skip(ended)
+            block.bind(not_yet)
         if step.until is not None:
             asked.condition(to, "until", step.until, running)
         elif step.duration == FOR_EVER:
             block.halt()
             return
-        elif step.duration is None:
+        elif step.ends_with_its_activity:
             unfinished = asked.unless("do", running)
             self._activities(to, self.aims.get(k)).unless_finished(step.activity, unfinished, ended)
         block.bind(ended)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import fields
 from enum import IntEnum
+from typing import assert_never
 
 from socialai_dsl.compiler.folding import substitute
 from socialai_dsl.compiler.mobility import Mobility, numbers_of, plans
@@ -85,7 +86,12 @@ class Changes:
                 return self._items(term)
             case terms.Quantified() if term.to is not None:
                 return max(self._parts(term), self._place(term.to))
-        return self._parts(term)
+            case terms.Operation() | terms.Compare() | terms.Logic() | terms.Not() | terms.Select():
+                return self._parts(term)
+            case terms.Quantified():
+                return self._parts(term)
+            case _:
+                assert_never(term)
 
     def _parts(self, term: Term) -> When:
         """Of a term that only combines others."""

@@ -7,6 +7,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar
 
 from socialai_dsl.semantics.terms import Activity, Checked, HeardNoun, Pattern, Speaker
+from socialai_dsl.vocabulary import normal
 
 _Kind = TypeVar("_Kind")
 
@@ -14,11 +15,6 @@ SILENCE = 0
 OTHER = 1
 NO_NOUN = -1
 _WORD = 32
-
-
-def normal(text: str) -> str:
-    """A text as hearing compares it: without case and a final mark."""
-    return text.strip().casefold().rstrip(".!?").rstrip()
 
 
 class Classes:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from socialai_dsl.compiler.instruction_checks import problem_of, written_temporaries
-from socialai_dsl.compiler.intervals import ANYTHING, Known, Ranges
+from socialai_dsl.compiler.intervals import Known, Ranges
 from socialai_dsl.compiler.invalid import InvalidProgramError
 from socialai_dsl.program import (
     ENTITY_FIELDS,
@@ -20,8 +20,9 @@ from socialai_dsl.program import (
     Program,
     Register,
 )
+from socialai_dsl.program.instructions import TABLE
+from socialai_dsl.program.ranges import ANYTHING
 
-_RESET_OPS = frozenset((Op.B_FREE, Op.PUT, Op.MAKE_ROOM, Op.DRAW_ROOM))
 _ENTRIES = (
     Header.RESET_PC,
     Header.SETTLE_PC,
@@ -115,9 +116,9 @@ class _Code:
     def _next(self, pc: int, path: _Path, entry: Header) -> Iterator[tuple[int, Known, _Loop | None]]:
         op, a, b, c = self.code[pc]
         known, loop = path.known, path.loop
-        if op not in Op._value2member_map_:
-            raise InvalidProgramError(f"at {pc}: unknown op {op}")
-        if op in _RESET_OPS and entry != Header.RESET_PC:
+        if op not in TABLE:
+            raise InvalidProgramError(f"at {pc}: op {op} is not in the instruction table")
+        if TABLE[op].setup and entry != Header.RESET_PC:
             raise InvalidProgramError(f"at {pc}: {Op(op).name} outside of reset code")
         if loop is not None and pc > loop.end:
             raise InvalidProgramError(f"at {pc}: a loop is left past its end")
@@ -127,7 +128,7 @@ class _Code:
             return
         before = known.copy()
         writable = self.writable.get(entry, self.named)
-        problem = problem_of((Op(op), a, b, c), self.program, known, writable, self.is_agents)
+        problem = problem_of((op, a, b, c), self.program, known, writable, self.is_agents)
         if problem:
             raise InvalidProgramError(f"at {pc}, {Op(op).name} {a} {b} {c}: {problem}")
         if op == Op.SKIP or op in TESTS:
@@ -153,14 +154,17 @@ class _Code:
         if outer is not None or length < 1 or end >= len(self.code) or self.code[end][0] != Op.END_EACH:
             raise InvalidProgramError(f"at {pc}: a loop without its own end, or inside another")
         inside = {
-            temporary
-            for op, a, b, _ in self.code[pc + 1 : end]
-            for temporary in written_temporaries(op, a, b)
+            temporary for instruction in self.code[pc + 1 : end] for temporary in self._written(instruction)
         }
         for temporary in inside & known.temporaries.keys():
             known.temporaries[temporary] = ANYTHING
-        own = written_temporaries(*self.code[pc][:3])
+        own = self._written(self.code[pc])
         return _Loop(end, frozenset(inside.union(own)), before)
+
+    @staticmethod
+    def _written(instruction: list[int]) -> range:
+        """What an op that is in no table writes is not asked: it is refused when it is reached."""
+        return written_temporaries(*instruction) if instruction[0] in TABLE else range(0)
 
 
 def _of_frames(program: Program) -> Iterator[int]:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from functools import cached_property
 
-from socialai_dsl.compiler.assembler import Block, Label, Sites, constant
+from socialai_dsl.compiler.assembler import LARGEST, Block, Label, Sites, constant
 from socialai_dsl.compiler.cells import LoopCell, coordinate, count_cells, one_cell
 from socialai_dsl.compiler.classes import SILENCE, Classes
 from socialai_dsl.compiler.folding import TRUE, Facts, fold, fold_whole, substitute
@@ -269,7 +269,7 @@ class Expressions:
         """Emit what computes the term; the operand it is in afterwards."""
         match term:
             case Const():
-                return constant(term.value)
+                return self.number(term.value)
             case terms.Read():
                 return self._read(term.path)
             case terms.World(name="noun"):
@@ -355,8 +355,16 @@ class Expressions:
         value = self.value(term)
         if term.type.kind != "int" or isinstance(term, Const | terms.Read | terms.World):
             return value
-        value = self.into_temporary(Op.MAX, value, constant(term.type.low))
-        return self.into_temporary(Op.MIN, value, constant(term.type.high))
+        value = self.into_temporary(Op.MAX, value, self.number(term.type.low))
+        return self.into_temporary(Op.MIN, value, self.number(term.type.high))
+
+    def number(self, value: int) -> int:
+        """The operand of a known value: a constant, or computed where it is too large for one."""
+        if -LARGEST <= value <= LARGEST:
+            return constant(value)
+        quotient, rest = divmod(value, LARGEST)
+        product = self.into_temporary(Op.MUL, self.number(quotient), constant(LARGEST))
+        return self.into_temporary(Op.ADD, product, constant(rest))
 
     def sited_copy(self, sited: terms.Sited) -> int:
         """The same in a temporary that nothing else changes or reads."""

@@ -1,11 +1,11 @@
-"""What each instruction asks of its operands, and the range of what it writes."""
+"""Checks one instruction against its entry in the instruction table, and notes the ranges of what it writes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Final
 
-from socialai_dsl.compiler.interval_arithmetic import ARITHMETIC
-from socialai_dsl.compiler.intervals import ANYTHING, Interval, Known, inbox_registers
+from socialai_dsl.compiler.intervals import Known, inbox_registers
 from socialai_dsl.program import (
     BOARDS,
     CELL,
@@ -15,7 +15,6 @@ from socialai_dsl.program import (
     TEMPORARIES,
     TEMPORARY,
     Body,
-    Counting,
     Field,
     Flag,
     FrameColumn,
@@ -24,15 +23,16 @@ from socialai_dsl.program import (
     Program,
     room_words,
 )
+from socialai_dsl.program.instructions import TABLE, Instruction, Kind, Operand
+from socialai_dsl.program.ranges import ANYTHING, Interval
 
-_TWO_PLACES = range(Op.IF_SAME_CELL, Op.IF_UNOBSTRUCTED + 1)
-_BOUNDS = 64
-_WHOLE_REWARD = 100
-_NOWHERE = CELL - 1
+_SETTABLE: Final = (Field.DIR, Field.COLOR, Field.POKED, Field.LAST, Field.POINTING, Field.INSIDE)
+_FREE: Final = frozenset((Kind.UNUSED, Kind.SKIP, Kind.TARGET))
+"""Operands that need no look: nothing, what the code's shape proves, and what is checked when it is written."""
 
 
 def problem_of(
-    instruction: tuple[Op, int, int, int],
+    instruction: tuple[int, int, int, int],
     program: Program,
     known: Known,
     writable: frozenset[int],
@@ -42,413 +42,289 @@ def problem_of(
 
     `is_agents`: it belongs to the frame of the agent, who can do less than NPCs.
     """
-    op, a, b, c = instruction
-    return _Instruction(program, known, writable, is_agents).problem(op, a, b, c)
+    op, *words = instruction
+    entry = TABLE.get(op)  # type: ignore[call-overload]
+    if entry is None:
+        return "the instruction table has no such op"
+    return _Checked(entry, words, program, known, writable, is_agents).problem()
 
 
-class _Instruction:
-    """Checks one instruction and notes what it writes."""
+def written_temporaries(op: int, a: int, b: int, c: int) -> range:
+    """Indices of the temporaries that an instruction writes, should its operands name temporaries."""
+    written = TABLE[Op(op)].written((a, b, c))
+    if not TEMPORARY <= written.start < TEMPORARY + TEMPORARIES:
+        return range(0)
+    return range(written.start - TEMPORARY, written.stop - TEMPORARY)
 
-    def __init__(self, program: Program, known: Known, writable: frozenset[int], is_agents: bool) -> None:
-        self.program, self.known, self.writable, self.is_agents = program, known, writable, is_agents
-        self.entities = program.header(Header.ENTITIES)
 
-    def problem(self, op: Op, a: int, b: int, c: int) -> str | None:
+class _Checked:
+    """One instruction where so much is known."""
+
+    def __init__(
+        self,
+        entry: Instruction,
+        words: list[int],
+        program: Program,
+        known: Known,
+        writable: frozenset[int],
+        is_agents: bool,
+    ) -> None:
+        self.entry, self.words, self.program, self.known = entry, words, program, known
+        self.writable, self.is_agents = writable, is_agents
+        self.h = program.header
+
+    def problem(self) -> str | None:
         """What is wrong with it, or None."""
-        if op in _CHECKS:
-            return _CHECKS[op](self, a, b, c)
-        if op in _TWO_PLACES:
-            return self.place(a) or self.place(b)
-        if op in ARITHMETIC:
-            return self._arithmetic(op, a, b, c)
-        return None
+        for operand, word in zip(self.entry.operands, self.words, strict=True):
+            if problem := self._operand(operand, word):
+                return problem
+        own = _OWN_CHECKS.get(self.entry.op)
+        return (own(self) if own is not None else None) or self._fill() or self._write()
 
     # --- operands ---
 
-    def value(self, operand: int, low: int = ANYTHING[0], high: int = ANYTHING[1]) -> str | None:
-        interval = self.known.value(operand)
+    def _operand(self, operand: Operand, word: int) -> str | None:
+        kind = operand.kind
+        if kind in _FREE:
+            return None
+        check = _KINDS.get(kind)
+        assert check is not None, f"internal: operands of kind {kind.name} are not checked"
+        return check(self, operand, word)
+
+    def _value(self, operand: Operand, word: int) -> str | None:
+        return self.within(word, operand.low, operand.high)
+
+    def within(self, word: int, low: int = ANYTHING[0], high: int = ANYTHING[1]) -> str | None:
+        """Whether a value can be read and is in a range."""
+        interval = self.known.value(word)
         if interval is None:
-            return f"operand {operand} is nothing that can be read here"
+            return f"operand {word} is nothing that can be read here"
         if interval[0] < low or interval[1] > high:
-            return f"operand {operand} is {interval[0]}..{interval[1]}, not within {low}..{high}"
+            return f"operand {word} is {interval[0]}..{interval[1]}, not within {low}..{high}"
         return None
 
-    def entity(self, operand: int) -> str | None:
-        return self.value(operand, 0, self.entities - 1)
+    def _entity(self, _: Operand, word: int) -> str | None:
+        return self.within(word, 0, self.h(Header.ENTITIES) - 1)
 
-    def place(self, operand: int) -> str | None:
+    def _place(self, _: Operand, word: int) -> str | None:
         """An entity, or a cell or none; never something that may be either an entity or a cell."""
-        return (
-            self.value(operand, _NOWHERE, self._last_cell())
-            if self._is_cell(operand)
-            else self.entity(operand)
-        )
+        interval = self.known.value(word)
+        if interval is not None and interval[0] >= CELL - 1:
+            return self.within(word, CELL - 1, self.known.ranges.last_cell)
+        return self._entity(_, word)
 
-    def _is_cell(self, operand: int) -> bool:
-        interval = self.known.value(operand)
-        return interval is not None and interval[0] >= _NOWHERE
+    def _updated(self, operand: Operand, word: int) -> str | None:
+        return self._temporaries(operand, word) or self._value(operand, word)
 
-    def write(self, target: int, interval: Interval) -> str | None:
-        """A temporary, or a register that this code may write."""
-        if target < TEMPORARY and target not in self.writable:
-            return f"writes to {target}, which is neither a temporary nor a register for it to write"
-        return self.known.write(target, interval)
+    def _temporaries(self, operand: Operand, word: int) -> str | None:
+        """Temporaries one behind the other."""
+        count = len(self.entry.results) if operand.kind is Kind.TEMPORARIES else operand.count
+        return self.literal(word, TEMPORARY, TEMPORARY + TEMPORARIES - count)
+
+    def _coordinates(self, operand: Operand, word: int) -> str | None:
+        values = (self.within(word + k, operand.low, operand.high) for k in range(operand.count))
+        return self._temporaries(operand, word) or next(filter(None, values), None)
+
+    def _board(self, operand: Operand, word: int) -> str | None:
+        if problem := self.literal(word, 0, BOARDS - 1):
+            return problem
+        filled = operand.kind is Kind.FILLED or word in self.known.boards
+        return None if filled else f"board {word} was never filled"
+
+    def _site(self, operand: Operand, word: int) -> str | None:
+        row = word & 65535 if operand.meaning == "packed" else word
+        return self.literal(row, 0, self.h(Header.SITES) - 1)
+
+    def _inbox(self, _: Operand, word: int) -> str | None:
+        size = inbox_registers(self.program)
+        inboxes = range(self.h(Header.INBOX), self.h(Header.INBOX) + self.h(Header.FRAMES) * size)
+        return None if word in inboxes[::size] else f"{word} is not the first register of an inbox"
+
+    def _register(self, _: Operand, word: int) -> str | None:
+        return self.literal(word, 0, self.h(Header.REGISTERS) - 1)
+
+    def _literal(self, operand: Operand, word: int) -> str | None:
+        return self.literal(word, operand.low, operand.high)
 
     @staticmethod
     def literal(value: int, low: int, high: int) -> str | None:
+        """Whether a literal word is in a range."""
         return None if low <= value <= high else f"{value} is not within {low}..{high}"
 
-    def temporaries(self, operand: int, count: int) -> str | None:
-        """Temporaries one behind the other."""
-        return self.literal(operand, TEMPORARY, TEMPORARY + TEMPORARIES - count)
-
-    def site(self, row: int) -> str | None:
-        return self.literal(row, 0, self.program.header(Header.SITES) - 1)
-
-    def _interval(self, operand: int) -> Interval:
-        interval = self.known.value(operand)
+    def interval(self, word: int) -> Interval:
+        """The range of an operand that can be read."""
+        interval = self.known.value(word)
         assert interval is not None, "internal: an operand is used before it is checked"
         return interval
 
-    # --- values ---
+    # --- what it writes ---
 
-    def _arithmetic(self, op: Op, a: int, b: int, c: int) -> str | None:
-        problem = self.value(b) or self.value(c)
-        return problem or self.write(a, ARITHMETIC[op](self._interval(b), self._interval(c)))
-
-    def load(self, a: int, b: int, _c: int) -> str | None:
-        return self.value(b) or self.write(a, self._interval(b))
-
-    def absolute(self, a: int, b: int, _c: int) -> str | None:
-        if problem := self.value(b):
-            return problem
-        low, high = self._interval(b)
-        least = 0 if low <= 0 <= high else min(abs(low), abs(high))
-        return self.write(a, (least, max(abs(low), abs(high))))
-
-    def field(self, a: int, b: int, c: int) -> str | None:
-        if problem := self.place(b) or self.literal(c, 0, ENTITY_FIELDS - 1):
-            return problem
-        if self._is_cell(b):
-            return self.write(a, (-1, 31))
-        return self.write(a, self.known.ranges.of_field(self._interval(b), c))
-
-    def distance(self, a: int, b: int, c: int) -> str | None:
-        return self.place(b) or self.place(c) or self.write(a, (0, 128))
-
-    def nearest(self, a: int, b: int, c: int) -> str | None:
-        first, last = c >> 8, c & 255
-        problem = self.place(b) or self.literal(last, 0, self.entities - 1) or self.literal(first, 0, last)
-        return problem or self.write(a, (-1, last))
-
-    def quadrant(self, a: int, b: int, c: int) -> str | None:
-        return self.place(b) or self.place(c) or self.write(a, (0, 3))
-
-    def sees(self, a: int, b: int, c: int) -> str | None:
-        """The direction is read from where the answer goes."""
-        problem = self.temporaries(a, 1) or self.value(a, 0, 3) or self.entity(b) or self.place(c)
-        return problem or self.write(a, (0, 1))
-
-    def cell_of(self, a: int, b: int, _c: int) -> str | None:
-        return self.place(b) or self.write(a, (_NOWHERE, self._last_cell()))
-
-    def _last_cell(self) -> int:
-        h = self.program.header
-        return CELL + 32 * (h(Header.CANVAS_HEIGHT) - 1) + h(Header.CANVAS_WIDTH) - 1
-
-    def cell_beside(self, a: int, b: int, c: int) -> str | None:
-        return self.value(c, 0, 3) or self.cell_of(a, b, c)
-
-    def heard_from(self, a: int, b: int, c: int) -> str | None:
-        return self._about_heard(b, c) or self.write(a, (-1, self.program.header(Header.NPCS)))
-
-    def heard_noun(self, a: int, b: int, c: int) -> str | None:
-        return self._about_heard(b, c) or self.write(a, (-1, self.program.header(Header.NOUNS) - 1))
-
-    def _about_heard(self, inbox: int, classes: int) -> str | None:
-        h = self.program.header
-        if not h(Header.FLAGS) & Flag.HEARD_BY:
-            return "nobody notes who said what"
-        return self.inbox(inbox) or self.literal(classes, 0, h(Header.CLASS_SETS) - 1)
-
-    def draw(self, a: int, b: int, c: int) -> str | None:
-        problem = self.value(b, 1, 1 << 30) or self.site(c)
-        return problem or self.write(a, (0, self._interval(b)[1] - 1))
-
-    def draw_other(self, a: int, b: int, c: int) -> str | None:
-        first, count = c >> 16 & 255, c >> 24
-        problem = self.value(b) or self.site(c & 65535) or self.literal(count, 2, 127)
-        return problem or self.write(a, (first, first + count - 1))
-
-    def set_bit(self, a: int, b: int, _c: int) -> str | None:
-        if problem := self.value(b, 0, 62) or self.value(a, 0):
-            return problem
-        bits = max(self._interval(a)[1].bit_length(), self._interval(b)[1] + 1)
-        return self.write(a, (0, (1 << bits) - 1))
-
-    def count_bits(self, a: int, b: int, _c: int) -> str | None:
-        return self.value(b) or self.write(a, (0, self._interval(b)[1].bit_length()))
-
-    def lowest_bit(self, a: int, b: int, _c: int) -> str | None:
-        return self.value(b, 0) or self.write(a, (0, max(0, self._interval(b)[1].bit_length() - 1)))
-
-    def pick_bit(self, a: int, b: int, c: int) -> str | None:
-        return self.site(c) or self.lowest_bit(a, b, c)
-
-    # --- tests ---
-
-    def compare(self, a: int, b: int, _c: int) -> str | None:
-        return self.value(a) or self.value(b)
-
-    def bit(self, a: int, b: int, _c: int) -> str | None:
-        return self.value(a) or self.value(b, 0, 62)
-
-    def unpinned(self, a: int, _b: int, _c: int) -> str | None:
-        return self.literal(a, 0, self.program.header(Header.REGISTERS) - 1)
-
-    def chance(self, a: int, b: int, _c: int) -> str | None:
-        return self.literal(a, 0, 65536) or self.site(b)
-
-    def heard(self, a: int, b: int, _c: int) -> str | None:
-        h = self.program.header
-        return self.inbox(a) or self.literal(b, 1, h(Header.CLASSES) - 1)
-
-    def inbox(self, register: int) -> str | None:
-        h, size = self.program.header, inbox_registers(self.program)
-        inboxes = range(h(Header.INBOX), h(Header.INBOX) + h(Header.FRAMES) * size)
-        return None if register in inboxes[::size] else f"{register} is not the first register of an inbox"
-
-    # --- effects and activities ---
-
-    def set_field(self, a: int, b: int, c: int) -> str | None:
-        if b not in (Field.DIR, Field.COLOR, Field.POKED, Field.LAST, Field.POINTING, Field.INSIDE):
-            return f"field {b} is not to be set like this"
-        if problem := self.entity(a) or self.value(c):
-            return problem
-        first, last = self._interval(a)
-        return next(
-            filter(
-                None,
-                (
-                    self.known.write(FIRST_ENTITY + ENTITY_FIELDS * entity + b, self._interval(c))
-                    for entity in range(first, last + 1)
-                ),
-            ),
-            None,
-        )
-
-    def become(self, a: int, b: int, _c: int) -> str | None:
-        if problem := self.entity(a):
-            return problem
-        first, last = self._interval(a)
-        statuses = min(max(1, len(self.program.entities[entity].states)) for entity in range(first, last + 1))
-        return self.value(b, 0, statuses - 1)
-
-    def vanish(self, a: int, _b: int, _c: int) -> str | None:
-        return self.entity(a)
-
-    def say(self, a: int, b: int, _c: int) -> str | None:
-        return self.entity(a) or self.value(b, 0, self.program.header(Header.LINES) - 1)
-
-    def goto(self, a: int, b: int, _c: int) -> str | None:
-        h = self.program.header
-        if problem := self.literal(a, 0, h(Header.FRAMES) - 1):
-            return problem
-        at = h(Header.FRAME_AT) + FrameColumn.COLUMNS * a + FrameColumn.STATES
-        return self.literal(b, 0, int(self.program.words[at]) - 1)
-
-    def count(self, a: int, _b: int, _c: int) -> str | None:
-        return self.literal(a, 0, len(self.program.rules) - 1)
-
-    def answer(self, a: int, b: int, c: int) -> str | None:
-        problem = self.count(a, 0, 0) or self.value(b, 0, self.program.header(Header.LINES) - 1)
-        return problem or (self.goto(c >> 8, (c & 255) - 1, 0) if c != 0 else None)
-
-    def end(self, a: int, b: int, _c: int) -> str | None:
-        return self.literal(a, 0, len(self.program.outcome_table) - 3) or self.literal(b, 0, 100)
-
-    def end_graded(self, a: int, b: int, _c: int) -> str | None:
-        return self.literal(a, 0, len(self.program.outcome_table) - 3) or self.value(b)
-
-    def reward(self, a: int, _b: int, _c: int) -> str | None:
-        return self.value(a, -_WHOLE_REWARD, _WHOLE_REWARD)
-
-    def put_on(self, a: int, b: int, _c: int) -> str | None:
-        return self.entity(a) or self.place(b)
-
-    def body(self, a: int, _b: int, _c: int) -> str | None:
-        if self.is_agents:
-            return self.value(a, 0, Body.NONE)
-        if self.known.value(a) == (Body.STOP_POINTING, Body.STOP_POINTING):
-            return None
-        return self.value(a, 0, Body.NONE)
-
-    def choose(self, a: int, b: int, c: int) -> str | None:
-        if problem := self.literal(b, 1, MOST_CHOICES) or self.literal(a, 0, (1 << 4 * MOST_CHOICES) - 1):
-            return problem
-        if any(a >> 4 * k & 15 > Body.NONE for k in range(b)):
-            return f"{a} holds what is no action"
-        return self.site(c)
-
-    def point(self, a: int, b: int, _c: int) -> str | None:
-        if self.is_agents:
-            return "the agent cannot point"
-        return self.value(a, 1, self.program.header(Header.NPCS)) or self.value(b, 0, 3)
-
-    def turn_to(self, a: int, b: int, c: int) -> str | None:
-        return self.entity(a) or self.value(b, 0, 3) or self.site(c)
-
-    def go(self, a: int, b: int, c: int) -> str | None:
-        return self.entity(a) or self.place(b) or self.site(c)
-
-    # --- boards ---
-
-    def board(self, a: int) -> str | None:
-        """A board that is filled."""
-        problem = self.literal(a, 0, BOARDS - 1)
-        return problem or (None if a in self.known.boards else f"board {a} was never filled")
-
-    def fill(self, a: int, _b: int = 0, _c: int = 0) -> str | None:
-        if problem := self.literal(a, 0, BOARDS - 1):
-            return problem
-        self.known.boards.add(a)
+    def _fill(self) -> str | None:
+        for operand, word in zip(self.entry.operands, self.words, strict=True):
+            if operand.kind is Kind.FILLED:
+                self.known.boards.add(word)
         return None
 
-    def free(self, a: int, _b: int, _c: int) -> str | None:
-        return self.board(a)
+    def _write(self) -> str | None:
+        position = self.entry.writes
+        if position is None:
+            return None
+        target = self.words[position]
+        if target < TEMPORARY and target not in self.writable:
+            return f"writes to {target}, which is neither a temporary nor a register for it to write"
+        operands = [
+            self.interval(word) if k in self.entry.reads and operand.kind is not Kind.INBOX else (word, word)
+            for k, (operand, word) in enumerate(zip(self.entry.operands, self.words, strict=True))
+        ]
+        results = [rule(self.known.ranges, operands) for rule in self.entry.results]
+        writes = (self.known.write(target + k, result) for k, result in enumerate(results))
+        return next(filter(None, writes), None)
 
-    def two_boards(self, a: int, b: int, _c: int) -> str | None:
-        return self.board(a) or self.board(b)
+    # --- what single instructions ask besides ---
 
-    def copy_board(self, a: int, b: int, _c: int) -> str | None:
-        return self.board(b) or self.fill(a)
+    def _field(self) -> str | None:
+        return self.literal(self.words[2], 0, ENTITY_FIELDS - 1)
 
-    def wall(self, a: int, b: int, c: int) -> str | None:
-        return self.literal(b, 0, 3) or self.literal(c, 0, _BOUNDS) or self.fill(a)
+    def _nearest(self) -> str | None:
+        first, last = self.words[2] >> 8, self.words[2] & 255
+        return self.literal(last, 0, self.h(Header.ENTITIES) - 1) or self.literal(first, 0, last)
 
-    def rectangle(self, a: int, b: int, c: int) -> str | None:
-        corners = range(b, b + 4)
-        problem = next(filter(None, (self.value(t, -_BOUNDS, _BOUNDS) for t in corners)), None)
-        return self.literal(c, 0, Counting.ALL) or self.temporaries(b, 4) or problem or self.fill(a)
+    def _draw_other(self) -> str | None:
+        return self.literal(self.words[2] >> 24, 2, 127)
 
-    def near_place(self, a: int, b: int, _c: int) -> str | None:
-        return self.place(b) or self.fill(a)
+    def _not_negative(self) -> str | None:
+        return self.within(self.words[1], 0)
 
-    def each_cell(self, a: int, b: int, _c: int) -> str | None:
-        problem = self.board(a) or self.temporaries(b, 3) or self._cell(b, 0)
-        return problem or self.write(b + 2, (CELL, self._last_cell()))
+    def _heard(self) -> str | None:
+        if not self.h(Header.FLAGS) & Flag.HEARD_BY:
+            return "nobody notes who said what"
+        return self.literal(self.words[2], 0, self.h(Header.CLASS_SETS) - 1)
 
-    def count_cells(self, a: int, b: int, _c: int) -> str | None:
-        h = self.program.header
-        most = h(Header.CANVAS_WIDTH) * h(Header.CANVAS_HEIGHT)
-        return self.board(b) or self.temporaries(a, 1) or self.write(a, (0, most))
+    def _if_heard(self) -> str | None:
+        return self.literal(self.words[1], 1, self.h(Header.CLASSES) - 1)
 
-    def pick_cell(self, a: int, b: int, c: int) -> str | None:
-        return self.site(c) or self.first_cell(a, b)
+    def _set_field(self) -> str | None:
+        a, which, c = self.words
+        if which not in _SETTABLE:
+            return f"field {which} is not to be set like this"
+        first, last = self.interval(a)
+        for entity in range(first, last + 1):
+            register = FIRST_ENTITY + ENTITY_FIELDS * entity + which
+            if problem := self.known.write(register, self.interval(c)):
+                return problem
+        return None
 
-    def first_cell(self, a: int, b: int, _c: int = 0) -> str | None:
-        return self.board(b) or self.temporaries(a, 2) or self._cell(a, -1)
+    def _become(self) -> str | None:
+        first, last = self.interval(self.words[0])
+        statuses = min(max(1, len(self.program.entities[entity].states)) for entity in range(first, last + 1))
+        return self.within(self.words[1], 0, statuses - 1)
 
-    def nearest_cell(self, a: int, b: int, c: int) -> str | None:
-        return self.place(c) or self.first_cell(a, b)
+    def _line(self) -> str | None:
+        return self.within(self.words[1], 0, self.h(Header.LINES) - 1)
 
-    def _cell(self, pair: int, least: int) -> str | None:
-        h = self.program.header
-        self.known.write(pair, (least, h(Header.CANVAS_WIDTH) - 1))
-        return self.known.write(pair + 1, (least, h(Header.CANVAS_HEIGHT) - 1))
+    def _goto(self) -> str | None:
+        return self._state(self.words[0], self.words[1])
 
-    def put(self, a: int, b: int, _c: int) -> str | None:
-        h = self.program.header
-        problem = self.entity(a) or self.temporaries(b, 2) or self.value(b, -1, h(Header.CANVAS_WIDTH) - 1)
-        return problem or self.value(b + 1, -1, h(Header.CANVAS_HEIGHT) - 1)
+    def _state(self, frame: int, state: int) -> str | None:
+        if problem := self.literal(frame, 0, self.h(Header.FRAMES) - 1):
+            return problem
+        at = self.h(Header.FRAME_AT) + FrameColumn.COLUMNS * frame + FrameColumn.STATES
+        return self.literal(state, 0, int(self.program.words[at]) - 1)
 
-    def make_room(self, a: int, b: int, _c: int) -> str | None:
-        h = self.program.header
+    def _count(self) -> str | None:
+        return self.literal(self.words[0], 0, len(self.program.rules) - 1)
+
+    def _answer(self) -> str | None:
+        goal = self.words[2]
+        return (
+            self._count() or self._line() or (self._state(goal >> 8, (goal & 255) - 1) if goal != 0 else None)
+        )
+
+    def _outcome(self) -> str | None:
+        return self.literal(self.words[0], 0, len(self.program.outcome_table) - 3)
+
+    def _body(self) -> str | None:
+        stop = (Body.STOP_POINTING, Body.STOP_POINTING)
+        if not self.is_agents and self.known.value(self.words[0]) == stop:
+            return None
+        return self.within(self.words[0], 0, Body.NONE)
+
+    def _choose(self) -> str | None:
+        actions, count, _ = self.words
+        problem = self.literal(count, 1, MOST_CHOICES) or self.literal(
+            actions, 0, (1 << 4 * MOST_CHOICES) - 1
+        )
+        if problem:
+            return problem
+        if any(actions >> 4 * k & 15 > Body.NONE for k in range(count)):
+            return f"{actions} holds what is no action"
+        return None
+
+    def _point(self) -> str | None:
+        if self.is_agents:
+            return "the agent cannot point"
+        return self.within(self.words[0], 1, self.h(Header.NPCS))
+
+    def _put(self) -> str | None:
+        x = self.words[1]
+        return self.within(x, -1, self.h(Header.CANVAS_WIDTH) - 1) or self.within(
+            x + 1, -1, self.h(Header.CANVAS_HEIGHT) - 1
+        )
+
+    def _make_room(self) -> str | None:
+        h, (width, height, _) = self.h, self.words
         low, high = h(Header.MIN_HEIGHT), h(Header.MIN_HEIGHT) + h(Header.HEIGHTS) - 1
-        if problem := self.value(a, h(Header.MIN_WIDTH), h(Header.CANVAS_WIDTH)) or self.value(b, low, high):
+        problem = self.within(width, h(Header.MIN_WIDTH), h(Header.CANVAS_WIDTH))
+        if problem := problem or self.within(height, low, high):
             return problem
         size = room_words(h(Header.CANVAS_WIDTH), h(Header.CANVAS_HEIGHT))
-        templates = (self._interval(a)[1] - h(Header.MIN_WIDTH) + 1) * h(Header.HEIGHTS)
-        fits = h(Header.ROOM_AT) + templates * size <= len(self.program.words)
+        templates = (self.interval(width)[1] - h(Header.MIN_WIDTH) + 1) * h(Header.HEIGHTS)
         self.known.has_room = True
+        fits = h(Header.ROOM_AT) + templates * size <= len(self.program.words)
         return None if fits else "a room without a template"
 
-    def draw_room(self, a: int, _b: int, _c: int) -> str | None:
-        return self.literal(a, 0, 1) or (None if self.known.has_room else "there is no room yet")
+    def _draw_room(self) -> str | None:
+        return None if self.known.has_room else "there is no room yet"
 
 
-_CHECKS: dict[Op, Callable[[_Instruction, int, int, int], str | None]] = {
-    **dict.fromkeys((Op.IF_EQ, Op.IF_NE, Op.IF_LT, Op.IF_LE), _Instruction.compare),
-    Op.IF_BIT: _Instruction.bit,
-    Op.IF_UNPINNED: _Instruction.unpinned,
-    Op.IF_CHANCE: _Instruction.chance,
-    Op.IF_HEARD: _Instruction.heard,
-    Op.LOAD: _Instruction.load,
-    Op.ABS: _Instruction.absolute,
-    Op.FIELD: _Instruction.field,
-    Op.DISTANCE: _Instruction.distance,
-    Op.NEAREST: _Instruction.nearest,
-    Op.QUADRANT: _Instruction.quadrant,
-    Op.DRAW: _Instruction.draw,
-    Op.DRAW_OTHER: _Instruction.draw_other,
-    Op.SET_BIT: _Instruction.set_bit,
-    Op.COUNT_BITS: _Instruction.count_bits,
-    Op.LOWEST_BIT: _Instruction.lowest_bit,
-    Op.PICK_BIT: _Instruction.pick_bit,
-    Op.SEES: _Instruction.sees,
-    Op.CELL_OF: _Instruction.cell_of,
-    Op.CELL_BESIDE: _Instruction.cell_beside,
-    Op.HEARD_FROM: _Instruction.heard_from,
-    Op.HEARD_NOUN: _Instruction.heard_noun,
-    Op.SET_FIELD: _Instruction.set_field,
-    Op.BECOME: _Instruction.become,
-    Op.VANISH: _Instruction.vanish,
-    Op.SAY: _Instruction.say,
-    Op.GOTO: _Instruction.goto,
-    Op.COUNT: _Instruction.count,
-    Op.ANSWER: _Instruction.answer,
-    Op.END: _Instruction.end,
-    Op.END_GRADED: _Instruction.end_graded,
-    Op.REWARD: _Instruction.reward,
-    Op.PLACE: _Instruction.put_on,
-    Op.POINT: _Instruction.point,
-    Op.BODY: _Instruction.body,
-    Op.CHOOSE: _Instruction.choose,
-    Op.FACE: _Instruction.go,
-    Op.TURN_TO: _Instruction.turn_to,
-    **dict.fromkeys((Op.GO_TO, Op.GO_NEXT_TO), _Instruction.go),
-    Op.B_FLOOR: _Instruction.fill,
-    Op.B_FREE: _Instruction.free,
-    Op.B_WALL: _Instruction.wall,
-    Op.B_RECT: _Instruction.rectangle,
-    **dict.fromkeys((Op.B_NEXT_TO, Op.B_IN_FRONT_OF), _Instruction.near_place),
-    **dict.fromkeys((Op.B_AND, Op.B_OR, Op.B_WITHOUT), _Instruction.two_boards),
-    Op.EACH_CELL: _Instruction.each_cell,
-    Op.PICK_CELL: _Instruction.pick_cell,
-    Op.FIRST_CELL: _Instruction.first_cell,
-    Op.NEAREST_CELL: _Instruction.nearest_cell,
-    Op.B_COPY: _Instruction.copy_board,
-    Op.B_COUNT: _Instruction.count_cells,
-    Op.PUT: _Instruction.put,
-    Op.MAKE_ROOM: _Instruction.make_room,
-    Op.DRAW_ROOM: _Instruction.draw_room,
+_KINDS: Final[dict[Kind, Callable[[_Checked, Operand, int], str | None]]] = {
+    Kind.VALUE: _Checked._value,
+    Kind.ENTITY: _Checked._entity,
+    Kind.PLACE: _Checked._place,
+    Kind.UPDATED: _Checked._updated,
+    Kind.TEMPORARIES: _Checked._temporaries,
+    Kind.COORDINATES: _Checked._coordinates,
+    Kind.BOARD: _Checked._board,
+    Kind.FILLED: _Checked._board,
+    Kind.CHANGED: _Checked._board,
+    Kind.SITE: _Checked._site,
+    Kind.INBOX: _Checked._inbox,
+    Kind.REGISTER: _Checked._register,
+    Kind.LITERAL: _Checked._literal,
 }
 
-_ONE_TEMPORARY = frozenset(
-    (*ARITHMETIC, *range(Op.LOAD, Op.CELL_BESIDE + 1), Op.B_COUNT, Op.HEARD_FROM, Op.HEARD_NOUN)
-)
-_TWO_TEMPORARIES = frozenset((Op.PICK_CELL, Op.FIRST_CELL, Op.NEAREST_CELL))
-
-
-def written_temporaries(op: int, a: int, b: int) -> range:
-    """Indices of the temporaries that an instruction writes, should its operands name temporaries."""
-    first, count = a, 0
-    if op in _ONE_TEMPORARY:
-        count = 1
-    elif op in _TWO_TEMPORARIES:
-        count = 2
-    elif op == Op.EACH_CELL:
-        first, count = b, 3
-    if not TEMPORARY <= first < TEMPORARY + TEMPORARIES:
-        return range(0)
-    return range(first - TEMPORARY, first - TEMPORARY + count)
+_OWN_CHECKS: Final[dict[Op, Callable[[_Checked], str | None]]] = {
+    Op.IF_HEARD: _Checked._if_heard,
+    Op.FIELD: _Checked._field,
+    Op.NEAREST: _Checked._nearest,
+    Op.DRAW_OTHER: _Checked._draw_other,
+    Op.LOWEST_BIT: _Checked._not_negative,
+    Op.PICK_BIT: _Checked._not_negative,
+    Op.HEARD_FROM: _Checked._heard,
+    Op.HEARD_NOUN: _Checked._heard,
+    Op.SET_FIELD: _Checked._set_field,
+    Op.BECOME: _Checked._become,
+    Op.SAY: _Checked._line,
+    Op.GOTO: _Checked._goto,
+    Op.COUNT: _Checked._count,
+    Op.ANSWER: _Checked._answer,
+    Op.END: _Checked._outcome,
+    Op.END_GRADED: _Checked._outcome,
+    Op.BODY: _Checked._body,
+    Op.CHOOSE: _Checked._choose,
+    Op.POINT: _Checked._point,
+    Op.PUT: _Checked._put,
+    Op.MAKE_ROOM: _Checked._make_room,
+    Op.DRAW_ROOM: _Checked._draw_room,
+}
+"""What the kinds of an instruction's operands do not say."""

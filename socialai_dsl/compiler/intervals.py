@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from socialai_dsl.program import (
+    CELL,
     CONSTANT,
     ENTITY_FIELDS,
     FIRST_ENTITY,
@@ -19,29 +20,27 @@ from socialai_dsl.program import (
     Program,
     Register,
 )
+from socialai_dsl.program.ranges import ANYTHING, Interval, hull
 
-Interval = tuple[int, int]
 WHOLE_REGISTER: Interval = (-32768, 32767)
-WIDEST = 1 << 62
-ANYTHING: Interval = (-WIDEST, WIDEST)
 LAST_BODY = Body.STOP_POINTING
-
-
-def hull(a: Interval, b: Interval) -> Interval:
-    """The least interval around both."""
-    return min(a[0], b[0]), max(a[1], b[1])
-
-
-def clamp(low: int, high: int) -> Interval:
-    """An interval cut to what 64 bits hold with room to spare."""
-    return max(low, -WIDEST), min(high, WIDEST)
 
 
 @dataclass(frozen=True)
 class Ranges:
-    """What every register may hold at any time: each write is proven to keep it so."""
+    """What every register may hold at any time, which each write is proven to keep; the `Bounds` of a program."""
 
     of_register: tuple[Interval, ...]
+    width: int
+    height: int
+    npcs: int
+    nouns: int
+    first_cell: int = CELL
+
+    @property
+    def last_cell(self) -> int:
+        """The last cell of the canvas as an operand."""
+        return CELL + 32 * (self.height - 1) + self.width - 1
 
     @classmethod
     def of(cls, program: Program) -> Ranges:
@@ -66,11 +65,13 @@ class Ranges:
                 ranges[FIRST_ENTITY + ENTITY_FIELDS * entity + which] = interval
         for name in program.registers:
             ranges[name.register] = (name.low, name.high)
-        return cls(tuple(ranges))
+        return cls(tuple(ranges), width, height, header(Header.NPCS), header(Header.NOUNS))
 
-    def of_field(self, entities: Interval, which: int) -> Interval:
-        """The range of a field over several entities."""
-        first, last = (FIRST_ENTITY + ENTITY_FIELDS * entity + which for entity in entities)
+    def field(self, things: Interval, which: int) -> Interval:
+        """The range of a field over several entities, or over cells."""
+        if things[0] >= self.first_cell - 1:
+            return -1, max(self.width, self.height, 32) - 1
+        first, last = (FIRST_ENTITY + ENTITY_FIELDS * entity + which for entity in things)
         result = self.of_register[first]
         for register in range(first, last + 1, ENTITY_FIELDS):
             result = hull(result, self.of_register[register])
@@ -124,7 +125,7 @@ class Known:
     def write(self, target: int, interval: Interval) -> str | None:
         """Note a write; what is wrong with it, or None."""
         if TEMPORARY <= target < TEMPORARY + TEMPORARIES:
-            self.temporaries[target - TEMPORARY] = clamp(*interval)
+            self.temporaries[target - TEMPORARY] = interval
             return None
         if not 0 <= target < len(self.ranges.of_register):
             return f"writes to {target}, which is neither a register nor a temporary"

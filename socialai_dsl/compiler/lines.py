@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from math import prod
 
 from socialai_dsl.compiler.assembler import Label, constant
-from socialai_dsl.compiler.classes import Classes, normal, parts, texts_of_pairs
+from socialai_dsl.compiler.classes import Classes, parts, texts_of_pairs
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.kept_lines import KeptLines, factors
 from socialai_dsl.compiler.registers import Registers, said_path
@@ -26,14 +25,10 @@ from socialai_dsl.semantics.terms import (
     Type,
     Variable,
 )
+from socialai_dsl.vocabulary import normal, words
 
 UNKNOWN = 1
 MAX_TOKENS = 256
-
-
-def words_of(text: str) -> list[str]:
-    """The words of a line: lower-cased maximal runs of letters, digits and apostrophes."""
-    return re.findall(r"(?:[^\W_]|')+", text.lower())
 
 
 @dataclass
@@ -80,7 +75,7 @@ class Lines:
         self.classes.append(self.classes_of.of_text(text))
         self.nouns.append(self.classes_of.noun_in(text))
         # A text without a single word still has to be heard as something.
-        self.tokens.append([self._ids.get(word, UNKNOWN) for word in words_of(heard)] or [UNKNOWN])
+        self.tokens.append([self._ids.get(word, UNKNOWN) for word in words(heard)] or [UNKNOWN])
         self.speakers.setdefault(speaker.number, set()).add(line)
         return line
 

@@ -224,7 +224,10 @@ class _Noting(Asked):
         for term, reading in _conjuncts(sited, self._recorder.readings):
             words = "" if reading is None else unparse(reading.node)
             shown = list(_asked_about(term, reading, to.checked))[:_MOST_VALUES]
-            number = self._number(key, words, shown)
+            # What is heard with values in it has become a part of the condition, which nobody has written there.
+            hears = reading is None and key == "when" and mentions(term, terms.Heard)
+            shown = self._aside.get("hears", []) if hears else shown
+            number = self._number("hears" if hears else key, words, shown)
             to.failed = self._pad(-number)
             mark = to.block.taken
             to.condition(fold(term, to.facts, to.classes), self._pad(number, shown))

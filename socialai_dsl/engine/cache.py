@@ -50,7 +50,11 @@ def cache_folder() -> Path | None:
 def fingerprint() -> str:
     """Digest of everything that compiled code depends on."""
     package = Path(__file__).parents[1]
-    sources = [*sorted((package / "engine").glob("*.py")), package / "program.py", package / "draws.py"]
+    sources = [
+        *sorted((package / "engine").glob("*.py")),
+        *sorted((package / "program").glob("*.py")),
+        package / "draws.py",
+    ]
     digest = hashlib.sha256()
     for source in sources:
         digest.update(source.name.encode())

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.engine.jit import inline
-from socialai_dsl.engine.state import Row
+from socialai_dsl.engine.state import AGENT, Row
 from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, EntityColumn, Field, Header, Register
 
 
@@ -97,6 +97,8 @@ def _quadrants() -> NDArray[np.uint8]:
 
 _QUADRANTS = _quadrants()
 _NEITHER = 13
+_FIRST_OF = np.array([next((k for k in (1, 3, 0, 2) if ways >> k & 1), 0) for ways in range(16)])
+_TURNS = (0, 3, 1, 2)
 
 
 @inline
@@ -112,6 +114,22 @@ def quadrant(dx: int, dy: int) -> int:
     Looked up, because branches that go one way as often as the other cost most.
     """
     return np.int64(_QUADRANTS[9 * sign(dx) + 3 * sign(dy) + sign(abs(dx) - abs(dy)) + _NEITHER])
+
+
+@inline
+def preferred(row: Row, mover: int, ways: int) -> int:
+    """Of several directions (bit k for direction k, at least one) the one that a mover takes.
+
+    NPCs prefer down, up, right, left. The agent goes straight ahead, else left, right, back: it does not perceive which
+    way is down.
+    """
+    if mover != AGENT:
+        return _FIRST_OF[ways]
+    ahead = field(row, mover, Field.DIR)
+    for turn in _TURNS:
+        if ways >> (ahead + turn & 3) & 1:
+            return ahead + turn & 3
+    return ahead
 
 
 @inline

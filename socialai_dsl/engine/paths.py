@@ -4,7 +4,7 @@ import numpy as np
 
 from socialai_dsl.engine import small_paths
 from socialai_dsl.engine.boards import is_deadly, npcs_are_hidden, solid_line
-from socialai_dsl.engine.entities import field, is_present, quadrant
+from socialai_dsl.engine.entities import field, is_present, preferred, quadrant
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.operands import draw_below
 from socialai_dsl.engine.sets import add_cell, clear, drop_cell, fill_next_to, get_line, has_cell, set_line
@@ -19,8 +19,8 @@ _SIDES = np.int64(2)
 def find_way(row: Row, mover: int, target: int, beside: bool) -> int:
     """Direction of the next cell of a shortest path to the cell of `target`, or to a free cell `beside` it.
 
-    NO_PATH if there is none, and also for who is there already. Among equally good cells the order is down, up, right,
-    left. The target may be a cell itself.
+    NO_PATH if there is none, and also for who is there already. `preferred` chooses among equally good cells. The
+    target may be a cell itself.
     """
     stay_outline()
     if mover >= NO_CELL or not (is_present(row, mover) and is_somewhere(row, target)):
@@ -72,14 +72,12 @@ def _first_direction(row: Row, mover: int) -> int:
     y = field(row, mover, Field.Y)
     clear(row, SEEN)
     while True:
-        if has_cell(row, FRONT, x, y + 1):
-            return 1
-        if has_cell(row, FRONT, x, y - 1):
-            return 3
-        if has_cell(row, FRONT, x + 1, y):
-            return 0
-        if has_cell(row, FRONT, x - 1, y):
-            return 2
+        right = has_cell(row, FRONT, x + 1, y)
+        down = has_cell(row, FRONT, x, y + 1)
+        left = has_cell(row, FRONT, x - 1, y)
+        up = has_cell(row, FRONT, x, y - 1)
+        if right or down or left or up:
+            return preferred(row, mover, right + 2 * down + 4 * left + 8 * up)
         if not _grow(row):
             return NO_PATH
 
@@ -111,15 +109,15 @@ def face(row: Row, mover: int, thing: int, site: int) -> int:
     x = field(row, mover, Field.X)
     y = field(row, mover, Field.Y)
     wanted = quadrant(x_of(row, thing) - x, y_of(row, thing) - y) if is_present(row, mover) else ONE
-    return turn_towards(row, field(row, mover, Field.DIR), wanted, site)
+    return turn_towards(row, mover, wanted, site)
 
 
 @inline
-def turn_towards(row: Row, direction: int, wanted: int, site: int) -> int:
-    """The quarter turn towards a direction; what is drawn at a site decides if it lies behind."""
-    turn = (wanted - direction) & 3
+def turn_towards(row: Row, mover: int, wanted: int, site: int) -> int:
+    """The quarter turn towards a direction; if it lies behind, the agent turns left and an NPC draws at a site."""
+    turn = (wanted - field(row, mover, Field.DIR)) & 3
     if turn == 0:
         return STILL
-    if turn == 2:
+    if turn == 2 and mover != AGENT:
         return Body.LEFT + draw_below(row, site, _SIDES)
     return np.int64(Body.RIGHT) if turn == 1 else np.int64(Body.LEFT)

@@ -6,9 +6,8 @@ from socialai_dsl.engine.bits import count_bits, lowest_bit, nth_bit
 from socialai_dsl.engine.boards import copy_room, draw_all, room_table
 from socialai_dsl.engine.entities import field, front_direction, is_present, set_field, step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.operands import assign, draw_below, value
+from socialai_dsl.engine.operands import draw_below, value
 from socialai_dsl.engine.sets import add_cell, clear, count_cells, fill_next_to, get_line, set_line
-from socialai_dsl.engine.speech import first_heard
 from socialai_dsl.engine.state import NO_CELL, NOTHING, OCCUPIED, ONE, ZERO, Row
 from socialai_dsl.engine.whereabouts import is_somewhere, x_of, y_of
 from socialai_dsl.program import TEMPORARY, Counting, Field, Header, Op, Register, Side
@@ -34,8 +33,6 @@ def place(row: Row, op: int, a: int, b: int, c: int) -> None:
         copy_room(row)
         if a == 1:
             draw_all(row)
-    elif op >= Op.HEARD_FROM:
-        assign(row, a, first_heard(row, b, c, op - Op.HEARD_FROM + 1))
     elif op == Op.B_FLOOR:
         _fill_floor(row, a)
     elif op == Op.B_RECT:

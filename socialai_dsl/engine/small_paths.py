@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from socialai_dsl.engine.boards import npcs_are_hidden, solid_line
-from socialai_dsl.engine.entities import field, is_present
+from socialai_dsl.engine.entities import field, is_present, preferred
 from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.state import AGENT, NO_PATH, Row
 from socialai_dsl.program import Field, Header
@@ -33,13 +33,11 @@ def find_way(row: Row, mover: int, target: int, beside: bool) -> int:
         if front == _NONE:
             return NO_PATH
     good = front & near
-    if good & (start << width) != _NONE:
-        return 1
-    if good & (start >> width) != _NONE:
-        return 3
-    if good & (start << _ONE) != _NONE:
-        return 0
-    return 2
+    ways = np.int64(good & (start << _ONE) != _NONE)
+    ways += 2 * (good & (start << width) != _NONE)
+    ways += 4 * (good & (start >> _ONE) != _NONE)
+    ways += 8 * (good & (start >> width) != _NONE)
+    return preferred(row, mover, ways)
 
 
 @inline

@@ -19,9 +19,20 @@ from socialai_dsl.engine.pushing import put_on
 from socialai_dsl.engine.separate import Separate
 from socialai_dsl.engine.sets import drop_cell
 from socialai_dsl.engine.sight import is_in_view
+from socialai_dsl.engine.speech import first_heard
 from socialai_dsl.engine.state import NO_PATH, NOTHING, ONE, RESETTING, STILL, ZERO, Row
 from socialai_dsl.engine.whereabouts import attribute, cell_beside, cell_of, is_somewhere, nearest, x_of, y_of
-from socialai_dsl.program import CELL, Body, Field, FrameColumn, Header, Op, Register
+from socialai_dsl.program import (
+    CELL,
+    CLASS_SIZE,
+    Body,
+    Field,
+    FrameColumn,
+    Header,
+    Op,
+    OpClass,
+    Register,
+)
 
 _NO_CELL = -1
 
@@ -50,6 +61,8 @@ def _compute(row: Row, op: int, a: int, b: int, c: int) -> None:
         result = cell_of(row, result)
     elif op == Op.CELL_BESIDE:
         result = cell_beside(row, result, value(row, c))
+    elif op >= Op.HEARD_FROM:
+        result = first_heard(row, b, c, op - Op.HEARD_FROM + 1)
     elif op == Op.SET_BIT:
         result = value(row, a) | (np.int64(1) << (result & 63))
     else:
@@ -82,6 +95,8 @@ def _combine(op: int, left: int, right: int) -> int:
         return left if left > right else right
     if right == 0:
         return 0
+    if right == -1:  # of the least number the processor refuses to divide
+        return 0 - left if op == Op.DIV else 0
     return left // right if op == Op.DIV else left % right
 
 
@@ -139,7 +154,7 @@ def _effect(row: Row, op: int, a: int, b: int, c: int) -> None:
     elif op == Op.END:
         registers[Register.OUTCOME] = a
         registers[Register.PERCENT] = b
-    elif op >= Op.PLACE:
+    elif op == Op.PLACE or op == Op.REWARD or op == Op.END_GRADED:
         _rare_effect(row, op, a, b)
     else:
         entity = value(row, a)
@@ -181,15 +196,14 @@ def _choose(row: Row, op: int, a: int, b: int, c: int) -> int:
     if op == Op.POINT:
         set_field(row, mover, Field.POINTING, 1 + (target & 3))
         return np.int64(Body.POINT)
-    direction = field(row, mover, Field.DIR)
     if op == Op.TURN_TO:
-        return paths.turn_towards(row, direction, target, c)
+        return paths.turn_towards(row, mover, target, c)
     way = paths.find_way(row, mover, target, op == Op.GO_NEXT_TO)
     if way == NO_PATH:
         return STILL
-    if way == direction:
+    if way == field(row, mover, Field.DIR):
         return np.int64(Body.FORWARD)
-    return paths.turn_towards(row, direction, way, c)
+    return paths.turn_towards(row, mover, way, c)
 
 
 def _run(
@@ -220,19 +234,22 @@ def _run(
         b = row.program[word + 2]
         c = row.program[word + 3]
         pc += 1
-        if op < Op.LOAD:
-            if op == Op.HALT:
-                return
-            if op == Op.SKIP or not holds(row, op, a, b):
+        kind = op // CLASS_SIZE
+        if kind == OpClass.TEST:
+            if not holds(row, op, a, b):
                 pc += c
-        elif op < Op.SET_FIELD:
+        elif kind == OpClass.VALUE:
             _compute(row, op, a, b, c)
-        elif op < Op.BODY:
+        elif kind == OpClass.EFFECT:
             _effect(row, op, a, b, c)
-        elif op < Op.B_FLOOR:
+        elif kind == OpClass.ACTIVITY:
             row.registers[Register.LAST_TURN] = _choose(row, op, a, b, c)
-        elif op < Op.EACH_CELL or op > Op.END_EACH:
+        elif kind == OpClass.BOARD:
             place(row, op, a, b, c)
+        elif op == Op.HALT:
+            return
+        elif op == Op.SKIP:
+            pc += c
         elif op == Op.DROP_CELL:
             if cell != _NO_CELL:
                 drop_cell(row, loop_board, cell & 31, cell >> 5)

@@ -19,14 +19,15 @@ looks and stays as it is. Draws during the episode are made anew in every twin, 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.draws import GOLDEN, mix
 from socialai_dsl.engine.calls import Task
+from socialai_dsl.envs.effort import Effort
+from socialai_dsl.envs.redrawn import redrawn, sites_of
 from socialai_dsl.envs.relevance import Relevance
 from socialai_dsl.envs.search import Search, Verdict
 from socialai_dsl.envs.table import Table
@@ -49,7 +50,6 @@ _FEWEST: Final = 8
 """With fewer twins nothing is known about a room, which then counts as never solved."""
 
 _ROOMS_PER_SITE: Final = 32
-_SITE_MASK: Final = (1 << 31) - 1
 
 
 @dataclass(frozen=True)
@@ -69,27 +69,27 @@ class Alone:
     undecided: int
 
 
-def success_alone(hidden: Program, rooms: int, seed: int, states: int) -> Alone:
+def success_alone(hidden: Program, effort: Effort) -> Alone:
     """Bound from below what is possible without the NPCs.
 
     Args:
         hidden: the program of the scenario with its NPCs neither seen nor heard.
-        rooms: how many are drawn: rooms 0, 1, ... of the seed.
-        seed: of the rooms.
-        states: how many states of each twin may be searched.
+        effort: which rooms are drawn, and how many states of each twin may be searched.
     """
-    twins = _Twins(hidden, seed)
-    search, solved, undecided = Search(hidden), [], 0
-    for room in range(rooms):
+    twins, search = _Twins(hidden, effort.seed), Search(hidden)
+
+    def solved(room: int) -> float | None:
         count = twins.draw(room, LEARNT_FROM + TRIED_ON)
-        plans = _plans(twins, search, count // 4, states) if count >= _FEWEST else None
-        undecided += plans is None
-        solved.append(_share(plans or [], count // 4))
-    values = np.array(solved)
-    return Alone(float(values.mean()), float(values.std() / np.sqrt(rooms)), rooms, undecided)
+        plans = _plans(twins, search, count // 4, effort) if count >= _FEWEST else None
+        return None if plans is None else _share(plans, count // 4)
+
+    found = list(effort.each_room("without NPCs", solved, lambda share: share is not None))
+    values = np.array([share or 0.0 for share in found] or [0.0])
+    undecided = sum(share is None for share in found)
+    return Alone(float(values.mean()), float(values.std() / np.sqrt(len(values))), len(found), undecided)
 
 
-def _plans(twins: _Twins, search: Search, learnt: int, states: int) -> list[NDArray[np.bool_]] | None:
+def _plans(twins: _Twins, search: Search, learnt: int, effort: Effort) -> list[NDArray[np.bool_]] | None:
     """Of plans that together solve the first twins, `learnt` of them, as far as they can be: whom each solves, (K,).
 
     None if a search gave up and nothing was found.
@@ -99,7 +99,7 @@ def _plans(twins: _Twins, search: Search, learnt: int, states: int) -> list[NDAr
     for _ in range(_SEARCHES):
         if not left:
             break
-        finding = search.solve(*twins.start_of(left[0]), states)
+        finding = search.solve(*twins.start_of(left[0]), effort.states, effort.clock)
         gave_up |= finding.verdict is Verdict.UNDECIDED
         wins = np.zeros(len(twins), np.bool_) if finding.plan is None else twins.play(finding.plan)
         if wins.any():
@@ -134,7 +134,8 @@ class _Twins:
         canvas = program.header(Header.CANVAS_WIDTH) * program.header(Header.CANVAS_HEIGHT)
         self._cells = slice(0, canvas)
         self._wins = np.array([outcome.success for outcome in program.outcome_table] + [False])
-        self._redrawn = ~self._showing()
+        showing = self._showing()
+        self._hidden = {site for site, shows in zip(sites_of(program), showing, strict=True) if not shows}
         self._tables: list[Table] = []
         self._starts: list[_Start] = []
 
@@ -183,7 +184,7 @@ class _Twins:
         """The table of a block; the first row of the first block plays the program as it is."""
         if number == len(self._tables):
             first = number * _BLOCK
-            copies = [_salted(self._program, self._redrawn, first + k) for k in range(_BLOCK)]
+            copies = [redrawn(self._program, self._hidden, first + k) for k in range(_BLOCK)]
             self._tables.append(Table(copies, _BLOCK, 1))
         return self._tables[number]
 
@@ -196,8 +197,7 @@ class _Twins:
     def _showing(self) -> NDArray[np.bool_]:
         """Which sites show whenever they change anything, (sites,)."""
         sites = self._program.header(Header.SITES)
-        only = np.eye(sites, dtype=np.bool_)
-        copies = [self._program, *(_salted(self._program, one, 1) for one in only)]
+        copies = [self._program, *(redrawn(self._program, [one], 1) for one in sites_of(self._program))]
         table = Table(copies, len(copies), 1)
         relevant = Relevance.of(self._program).registers
         shows, hides = np.zeros(sites, np.bool_), np.zeros(sites, np.bool_)
@@ -208,14 +208,3 @@ class _Twins:
             shows |= seen
             hides |= (registers[1:] != registers[0]).any(axis=1) & ~seen
         return shows & ~hides
-
-
-def _salted(program: Program, sites: NDArray[np.bool_], salt: int) -> Program:
-    """The program with other draws at some sites, (sites,); salt 0 changes nothing."""
-    if salt == 0:
-        return program
-    words = program.words.copy()
-    table = words[program.header(Header.SITE_AT) :][: 2 * len(sites)].reshape(-1, 2)
-    for row in np.flatnonzero(sites).tolist():
-        table[row, 0] = mix(int(table[row, 0]) + salt * GOLDEN) & _SITE_MASK
-    return replace(program, words=words)

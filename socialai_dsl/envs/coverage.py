@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from socialai_dsl.checking import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.engine.calls import Task
-from socialai_dsl.envs.properties import Effort
+from socialai_dsl.envs.effort import Effort
 from socialai_dsl.envs.search import Search
 from socialai_dsl.envs.search import Verdict as Searched
 from socialai_dsl.envs.table import Table
@@ -118,13 +118,17 @@ def _parts(checked: Checked) -> Iterator[tuple[_Key, Part]]:
 
 def _missing(parts: list[tuple[_Key, Part]], seen: _Seen) -> list[Part]:
     """What has not happened; what several members have in common has happened if it did with one of them."""
-    happened = {
-        part.span
-        for key, part in parts
-        if (key in seen.names if isinstance(key, str) else key[1] in seen.states.get(key[0], ()))
-    }
+    happened = {part.span for key, part in parts if _has_happened(key, part, seen)}
     missing = {part.span: part for _, part in reversed(parts) if part.span not in happened}
     return sorted(missing.values(), key=lambda part: (part.span.file, part.span.line, part.span.column))
+
+
+def _has_happened(key: _Key, part: Part, seen: _Seen) -> bool:
+    if isinstance(key, str):
+        return key in seen.names
+    states = seen.states.get(key[0], set())
+    # Entries of `steps` follow each other, and one that ends in the turn in which it begins is not seen in between.
+    return max(states, default=-1) >= key[1] if part.kind == "step" else key[1] in states
 
 
 def _play_at_random(program: Program, seen: _Seen, effort: Effort) -> None:
@@ -155,11 +159,16 @@ def _search(program: Program, parts: list[tuple[_Key, Part]], seen: _Seen, effor
     table = Table([program], effort.rooms, 1)
     table.reset(effort.seed, None)
     search, state = Search(program, (), seen.watch), table.state
-    proven = True
-    for row in range(effort.rooms):
-        finding = search.solve(state.registers[row], state.boards[row], state.keys[row], effort.states)
+
+    def find(row: int) -> bool:
+        start = state.registers[row], state.boards[row], state.keys[row]
+        finding = search.solve(*start, effort.states, effort.clock)
         seen.count(search.counters())
-        proven &= finding.verdict is Searched.UNSOLVABLE and finding.exact
+        return finding.verdict is Searched.UNSOLVABLE and finding.exact
+
+    ends = []
+    for ended in effort.each_room("whether everything can happen", find, bool):
+        ends.append(ended)
         if not _missing(parts, seen):
             break
-    return proven
+    return len(ends) == effort.rooms and all(ends)

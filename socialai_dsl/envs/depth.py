@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from socialai_dsl.checking import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.envs.alone import Alone, success_alone
-from socialai_dsl.envs.properties import Effort, search_rooms_of, solved_by_script
+from socialai_dsl.envs.effort import Effort
+from socialai_dsl.envs.properties import Trial
 from socialai_dsl.envs.search import Finding, Verdict
 
 
@@ -17,12 +18,14 @@ class Depth:
     """What is known about success in the rooms that were tried.
 
     Attributes:
+        rooms: how many rooms were searched.
         steps: length of a shortest success in each room that can be solved, ascending.
         unsolvable: rooms without any success. undecided: rooms whose search gave up.
         unsolved: rooms that the script does not solve; None without a script.
         alone: what is possible where no NPC is seen or heard; None if there is none.
     """
 
+    rooms: int
     steps: tuple[int, ...]
     unsolvable: tuple[int, ...]
     undecided: tuple[int, ...]
@@ -30,24 +33,20 @@ class Depth:
     alone: Alone | None
 
 
-def depth(loaded: LoadedScenario, effort: Effort, scripted: LoadedScenario | None) -> Depth:
-    """Search rooms, let the script play them, and try what a policy gets that knows of no NPC.
-
-    Args:
-        loaded: the scenario.
-        effort: how much to try.
-        scripted: the same scenario with a frame for the agent, if there is one.
-    """
-    findings = list(search_rooms_of(compile_loaded(loaded), None, effort))
+def depth(trial: Trial, effort: Effort) -> Depth:
+    """Search rooms, let the script play them, and try what a policy gets that knows of no NPC."""
+    searching = replace(effort, clock=effort.clock.part(2))
+    findings = list(trial.successes(searching, "shortest successes"))
     unsolved = None
-    if scripted is not None:
-        unsolved = tuple((~solved_by_script(compile_loaded(scripted), effort)).nonzero()[0].tolist())
+    if trial.scripted is not None:
+        unsolved = tuple((~trial.solved).nonzero()[0].tolist())
     return Depth(
+        len(findings),
         tuple(sorted(finding.steps for finding in findings if finding.steps is not None)),
         _rooms(findings, Verdict.UNSOLVABLE),
         _rooms(findings, Verdict.UNDECIDED),
         unsolved,
-        without_npcs(loaded, effort),
+        without_npcs(trial.loaded, effort),
     )
 
 
@@ -56,7 +55,7 @@ def without_npcs(loaded: LoadedScenario, effort: Effort) -> Alone | None:
     if all(entity.role != "npc" for entity in loaded.checked.entities):
         return None
     hidden = replace(loaded, checked=replace(loaded.checked, npcs_hidden=True))
-    return success_alone(compile_loaded(hidden), effort.rooms, effort.seed, effort.states)
+    return success_alone(compile_loaded(hidden), effort)
 
 
 def _rooms(findings: Sequence[Finding], verdict: Verdict) -> tuple[int, ...]:

@@ -19,13 +19,25 @@ from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.recording import Recording
 from socialai_dsl.envs.table import Table
 from socialai_dsl.envs.values import shown, utterance_text
+from socialai_dsl.envs.ways import Moment
 from socialai_dsl.program import EntityColumn, Header, LineColumn, Program, Register
 from socialai_dsl.program_suite import ProgramSuite
 from socialai_dsl.schema.base import Model
 from socialai_dsl.semantics.readings import Readings
-from socialai_dsl.semantics.terms import Checked, FramePlan, OutcomePlan, RulePlan, StepPlan
+from socialai_dsl.semantics.terms import (
+    Checked,
+    Const,
+    FramePlan,
+    OutcomePlan,
+    Read,
+    RulePlan,
+    StepPlan,
+    Term,
+)
 from socialai_dsl.source import Span
 
+_TO_IT: Final = ("go_to", "enter")
+_BESIDE_IT: Final = ("go_next_to", "use")
 _ORDER: Final = ("hears", "until", "for", "when", "after", "chance", "once", "success", "failure", "do", "set",
                  "reward", "cause", "say", "goto", "goto_now")  # fmt: skip
 """In which order the keys of a rule are shown."""
@@ -57,7 +69,7 @@ class Explainer:
         known = self._probed.first
         same = reached is None or np.array_equal(registers[:known], reached[:known])
         assert same, "internal: the step that was explained went another way"
-        notes = _Notes(self._probed.program, self._program, registers)
+        notes = _Notes(self._probed.program, self._program, registers, self._table.state.boards[0])
         story = _Story(self._checked, self._probed.rules, self._probed.outcomes, notes, fired)
         entries = list(story.entries())
         return {
@@ -109,6 +121,7 @@ class _Notes:
     probed: Program
     program: Program
     registers: NDArray[np.int16]
+    board: NDArray[Any]
 
     def number(self, probe: Probe) -> int:
         """What `Probe.register` says."""
@@ -135,9 +148,31 @@ class _Notes:
             case "chance":
                 return f"{words}: not drawn"
             case "do":
-                return f"{words} is not finished"
+                hindered = self._hindered(probe.plan)
+                return f"{words} is not finished" + (f": {hindered}" if hindered else "")
         values = ", ".join(f"{name} is {_spoken(value)}" for name, value in self.values(part).items())
         return f"{written} is false" + (f": {values}" if values else "")
+
+    def _hindered(self, plan: RulePlan | StepPlan | OutcomePlan) -> str | None:
+        """What keeps a member from getting where an entry of `steps` lets it go."""
+        if not isinstance(plan, StepPlan) or plan.activity.name not in (*_TO_IT, *_BESIDE_IT):
+            return None
+        member, number = plan.name.partition(".")[0], plan.name.rpartition("[")[2].rstrip("]")
+        goal = self._goal(plan.activity.args[0], f"{member}.aim[{number}]")
+        mover = [str(entity) for entity in self.program.entities].index(member)
+        if goal is None or goal < 0:
+            return None
+        moment = Moment(self.program, self.registers, self.board)
+        return moment.obstruction(mover, goal, plan.activity.name in _BESIDE_IT)
+
+    def _goal(self, term: Term, noted: str) -> int | None:
+        """The entity or cell that an activity is about, if a register or the scenario says it."""
+        if isinstance(term, Const):
+            return term.value
+        wanted = (term.path, noted) if isinstance(term, Read) else (noted,)
+        found = {name.path: name.register for name in self.probed.registers}
+        register = next((found[path] for path in wanted if path in found), None)
+        return None if register is None else int(self.registers[register])
 
     def _plain(self, part: Part) -> list[int]:
         return [int(self.registers[value.name.register]) for value in part.values]

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Final
 
 from socialai_dsl.envs.canvas import INK, WHITE, Canvas, Rgb, mix
+from socialai_dsl.envs.gestures import Gesture
 
 _FACE: Final = (0.5, 0.565)
 _FORWARD: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
@@ -34,9 +35,97 @@ def draw_npc(canvas: Canvas, colour: Rgb, status: int, orientation: int) -> None
     canvas.circle(x, y, 0.315, fill=colour)
     _draw_eyes(canvas, orientation)
     _draw_hat(canvas, status)
-    # The arrow comes last: it must be seen over the hat of an NPC that looks up.
+    _draw_gaze(canvas, orientation)
+
+
+def _draw_gaze(canvas: Canvas, orientation: int) -> None:
+    """The arrow at the edge; it comes last, since it must be seen over a hat or an arm."""
     canvas.polygon(turn([(1.0, 0.5), (0.80, 0.30), (0.80, 0.70)], orientation), fill=WHITE)
     canvas.polygon(turn([(0.97, 0.5), (0.83, 0.36), (0.83, 0.64)], orientation), fill=INK)
+
+
+def draw_gesture(canvas: Canvas, colour: Rgb, orientation: int, gesture: Gesture) -> None:
+    """Draw an arm with a pointing hand, and in the upper left corner a sign for what an NPC did last."""
+    if gesture.pointing is not None:
+        _draw_arm(canvas, colour, gesture.pointing)
+        _draw_gaze(canvas, orientation)
+    sign = _SIGNS.get(gesture.act)
+    if sign is not None:
+        fill, draw = sign
+        canvas.circle(*_SIGN, 0.19, fill=fill, outline=WHITE, width=0.035)
+        draw(canvas)
+
+
+def _draw_arm(canvas: Canvas, colour: Rgb, direction: int) -> None:
+    """An arm along the edge of the cell that the arrow of the gaze leaves free, a finger at its end."""
+    shoulder, hand, tip = _ARMS[direction % 4]
+    canvas.line([shoulder, hand], fill=WHITE, width=0.22)
+    canvas.line([hand, tip], fill=INK, width=0.13)
+    canvas.line([shoulder, hand], fill=mix(colour, INK, 0.6), width=0.15)
+    canvas.circle(*hand, 0.11, fill=_SKIN, outline=INK, width=0.035)
+    canvas.line([hand, tip], fill=_SKIN, width=0.07)
+
+
+def _turn_sign(side: int) -> Callable[[Canvas], None]:
+    """An arrow bent to the left (-1) or to the right (1)."""
+
+    def draw(canvas: Canvas) -> None:
+        x, y = _SIGN
+        foot, bend, neck = (
+            (x - side * 0.07, y + 0.1),
+            (x - side * 0.07, y - 0.03),
+            (x + side * 0.03, y - 0.03),
+        )
+        canvas.line([foot, bend, neck], fill=WHITE, width=0.05)
+        canvas.polygon(
+            [(x + side * 0.14, y - 0.03), (x + side * 0.02, y - 0.12), (x + side * 0.02, y + 0.06)], WHITE
+        )
+
+    return draw
+
+
+def _forward_sign(canvas: Canvas) -> None:
+    x, y = _SIGN
+    canvas.polygon([(x, y - 0.13), (x + 0.11, y + 0.0), (x - 0.11, y + 0.0)], fill=WHITE)
+    canvas.rectangle(x - 0.045, y - 0.02, x + 0.045, y + 0.12, fill=WHITE)
+
+
+def _toggle_sign(canvas: Canvas) -> None:
+    x, y = _SIGN
+    for dx, dy in ((0.12, 0.0), (0.06, 0.104), (0.06, -0.104)):
+        canvas.line([(x - dx, y - dy), (x + dx, y + dy)], fill=INK, width=0.045)
+
+
+def _point_sign(canvas: Canvas) -> None:
+    x, y = _SIGN
+    canvas.rectangle(x - 0.035, y - 0.12, x + 0.035, y + 0.04, fill=INK)
+    canvas.circle(x, y + 0.1, 0.04, fill=INK)
+
+
+def _stop_sign(canvas: Canvas) -> None:
+    x, y = _SIGN
+    for side in (-1, 1):
+        canvas.line([(x - 0.08, y - side * 0.08), (x + 0.08, y + side * 0.08)], fill=WHITE, width=0.055)
+
+
+_SIGN: Final = (0.2, 0.2)
+_SKIN: Final[Rgb] = (252, 206, 160)
+_ARMS: Final = (
+    ((0.46, 0.85), (0.74, 0.85), (0.93, 0.85)),
+    ((0.85, 0.42), (0.85, 0.74), (0.85, 0.93)),
+    ((0.54, 0.85), (0.26, 0.85), (0.07, 0.85)),
+    ((0.85, 0.62), (0.85, 0.26), (0.85, 0.07)),
+)
+"""Shoulder, hand and finger-tip of an arm to the right, down, left and up."""
+
+_SIGNS: Final[dict[str, tuple[Rgb, Callable[[Canvas], None]]]] = {
+    "forward": ((34, 122, 62), _forward_sign),
+    "left": ((44, 82, 178), _turn_sign(-1)),
+    "right": ((44, 82, 178), _turn_sign(1)),
+    "toggle": ((255, 166, 40), _toggle_sign),
+    "point": ((252, 220, 90), _point_sign),
+    "stop": ((150, 40, 44), _stop_sign),
+}
 
 
 def _draw_eyes(canvas: Canvas, orientation: int) -> None:

@@ -2,10 +2,12 @@
 
 The rooms are played in lockstep: as long as everything that the agent sees and hears is the same in all of them, it
 cannot but do the same in all. So a search over the states of all rooms together finds the most that any policy solves.
+Where there are many states, sequences of actions are tried at random before: they find quickly what tells rooms apart.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final
@@ -15,12 +17,39 @@ from numpy.typing import NDArray
 
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
+from socialai_dsl.envs.effort import Effort
 from socialai_dsl.envs.relevance import Relevance
-from socialai_dsl.envs.search import CHANCES, Search, Verdict, marks, multipliers, useful_actions
+from socialai_dsl.envs.rooms import wins_of
+from socialai_dsl.envs.search import (
+    CHANCES,
+    Search,
+    Verdict,
+    digests_of,
+    marks,
+    multipliers,
+    useful_actions,
+)
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Header, Program, Register
 
 _ROWS: Final = 4096
+_WALKS: Final = 256
+"""How many sequences of actions are tried at random, at most."""
+
+_SPEECH: Final = (0.0, 0.05, 0.3)
+"""How often something is said in them."""
+
+_NEAR: Final = 3_000
+"""So many states are searched before anything is tried at random."""
+
+_LOOKED_INTO: Final = 6
+_FEW_STATES: Final = 2_000
+"""Of so many of the sequences that tell rooms apart it is found out whether they can be solved then, and in so many
+states."""
+
+
+Plan = Sequence[NDArray[np.int64]]
+"""Actions, int64 (4,) each, one after the other."""
 
 
 class Answer(Enum):
@@ -29,7 +58,7 @@ class Answer(Enum):
     GUESSES = "guesses"  # no policy solves more of the rooms than a guess does
     KNOWS = "knows"  # some sequence of actions solves more of them
     TELLS_APART = "tells apart"  # the rooms come to look different while more of them can be solved
-    UNDECIDED = "undecided"  # too many states
+    UNDECIDED = "undecided"  # too many states, or no time
 
 
 @dataclass(frozen=True)
@@ -40,11 +69,13 @@ class Guess:
         answer: what a policy can do at most.
         states: how many different states of all rooms together were looked at.
         exact: False where chance during the episode was tried only in part.
+        step: after which they are known; of a guess that after which the rooms look different when it is too late.
     """
 
     answer: Answer
     states: int
     exact: bool
+    step: int | None = None
 
 
 @dataclass
@@ -63,6 +94,9 @@ class _Together:
     def part(self, rows: slice | NDArray[np.intp]) -> _Together:
         return _Together(*(array[rows] for array in vars(self).values()))
 
+    def repeated(self, times: int) -> _Together:
+        return _Together(*(np.repeat(array, times, axis=0) for array in vars(self).values()))
+
 
 class Guessing:
     """Plays as many rooms of a program together as there are weights.
@@ -73,20 +107,20 @@ class Guessing:
     """
 
     def __init__(self, program: Program, weights: NDArray[np.int64]) -> None:
+        self._program = program
         self._weights, self._level = weights, int(weights.max())
         self._relevance = Relevance.of(program)
-        actions = useful_actions(program, self._relevance.whole_utterance)
+        self._useful = useful_actions(program, self._relevance.whole_utterance)
         chances = CHANCES if self._relevance.drawn else 1  # which line is said may tell something, too
-        self._actions = np.repeat(actions, chances, axis=0)
-        self._marks = np.tile(marks(chances), len(actions))
+        self._actions = np.repeat(self._useful, chances, axis=0)
+        self._marks = np.tile(marks(chances), len(self._useful))
         rooms = len(weights)
         self._at_once = max(1, _ROWS // (len(self._actions) * rooms))
         self._table = Table([program], self._at_once * len(self._actions) * rooms, 1)
         self._table.reset(0, None)
         self._alone = Search(program)
-        self._solvable: dict[bytes, bool] = {}
-        self._wins = np.array([outcome.success for outcome in program.outcome_table] + [False])
-        self._multipliers = multipliers(len(self._relevance.registers) * rooms + rooms + 1)
+        self._solvable: dict[tuple[int, bytes], Verdict] = {}
+        self._wins = wins_of(program)
         self._heard = slice(
             program.header(Header.HEARD), program.header(Header.HEARD) + program.header(Header.HEARD_SIZE)
         )
@@ -98,125 +132,239 @@ class Guessing:
         registers: NDArray[np.int16],
         boards: NDArray[np.uint32],
         keys: NDArray[np.uint64],
-        states: int,
+        effort: Effort,
+        plans: Sequence[Plan] = (),
     ) -> Guess:
-        """Play from rooms that look alike: registers (rooms, R), boards (rooms, C), keys (rooms, Key.WORDS)."""
+        """Play from rooms that look alike: registers (rooms, R), boards (rooms, C), keys (rooms, Key.WORDS).
+
+        `plans` are sequences of actions that are tried first.
+        """
+        start = self._start(registers, boards, keys)
+        self._solvable.clear()
+        self._effort = effort
+        if plans and (known := self._walked(start, plans, len(plans))) is not None:
+            return known
+        few = _NEAR * len(self._useful) // len(self._actions)
+        near = self._searched(start, min(few, effort.states))
+        if near.answer is not Answer.UNDECIDED or effort.states <= few:
+            return near
+        return self._walked(start, (), _WALKS) or self._searched(start, effort.states)
+
+    def _start(
+        self, registers: NDArray[np.int16], boards: NDArray[np.uint32], keys: NDArray[np.uint64]
+    ) -> _Together:
+        """The rooms as they begin."""
         state = self._table.state
         keys = keys.copy()
         keys[:, [Key.PROGRAM, Key.POOL]] = state.keys[0, [Key.PROGRAM, Key.POOL]]
-        layer = _Together(
+        return _Together(
             registers[None, :, : state.registers.shape[1]],
             boards[None, :, : state.boards.shape[1]],
             keys[None],
             np.ones((1, len(registers)), np.bool_),
             np.zeros(1, np.int64),
         )
-        self._solvable.clear()
+
+    def first_difference(
+        self,
+        registers: NDArray[np.int16],
+        boards: NDArray[np.uint32],
+        keys: NDArray[np.uint64],
+        effort: Effort,
+    ) -> Plan | None:
+        """The shortest sequence of actions after which rooms look different that looked alike; None if none is found.
+
+        The rooms have to go on till then.
+        """
+        layer = self._start(registers, boards, keys)
         self._seen = set(self._digests(layer).tolist())
-        told_apart, exact = False, not self._relevance.drawn
+        plans: list[list[NDArray[np.int64]]] = [[]]
         while len(layer):
+            following, longer = [], []
+            for first in range(0, len(layer), self._at_once):
+                part = slice(first, first + self._at_once)
+                reached, alike = self._step(layer.part(part))
+                made = [[*plan, action] for plan in plans[part] for action in self._actions]
+                exact = np.tile(self._marks == 0, len(made) // len(self._actions))
+                apart = np.flatnonzero(~alike & reached.going.all(axis=1) & exact)
+                if len(apart):
+                    return made[int(apart[0])]
+                kept = self._new(reached, alike & reached.going.all(axis=1) & exact)
+                following.append(reached.part(kept))
+                longer += [made[number] for number in kept.tolist()]
+                if len(self._seen) > effort.states or effort.clock.is_over:
+                    return None
+            layer, plans = _joined(following), longer
+        return None
+
+    def _searched(self, layer: _Together, states: int) -> Guess:
+        """Everything that can be done, breadth first, as far as so many states."""
+        self._seen = set(self._digests(layer).tolist())
+        clock = self._effort.clock
+        step, late = 0, None
+        while len(layer):
+            step += 1
             following = []
             for first in range(0, len(layer), self._at_once):
                 reached, alike = self._step(layer.part(slice(first, first + self._at_once)))
                 if (reached.won > self._level).any():
-                    return Guess(Answer.KNOWS, len(self._seen), True)
+                    return Guess(Answer.KNOWS, len(self._seen), True, step)
                 hopeful = reached.won + reached.going @ self._weights > self._level
-                following.append(self._new(reached.part(np.flatnonzero(hopeful & alike))))
-                apart = reached.part(np.flatnonzero(hopeful & ~alike))
-                told_apart = told_apart or self._may_know(apart, states)
-                if len(self._seen) > states:
+                following.append(reached.part(self._new(reached, hopeful & alike)))
+                if late is None and (~alike).any():
+                    late = step
+                if self._may_know(reached.part(np.flatnonzero(hopeful & ~alike)), states):
+                    return Guess(Answer.TELLS_APART, len(self._seen), True, step)
+                if len(self._seen) > states or clock.is_over:
                     return Guess(Answer.UNDECIDED, len(self._seen), False)
-            layer = _Together(
-                *(
-                    np.concatenate(arrays)
-                    for arrays in zip(*(vars(f).values() for f in following), strict=True)
-                )
-            )
-        return Guess(Answer.TELLS_APART if told_apart else Answer.GUESSES, len(self._seen), exact)
+            layer = _joined(following)
+        return Guess(Answer.GUESSES, len(self._seen), not self._relevance.drawn, late)
 
-    def _may_know(self, apart: _Together, states: int) -> bool:
-        """Whether more than a guess might get right can be solved, by who knows which room it is from here on."""
+    # -- at random --
+
+    def _walked(self, start: _Together, plans: Sequence[Plan], walks: int) -> Guess | None:
+        """What sequences of actions find, those that are given and others at random; None where they find nothing."""
+        walks = min(walks, self._table.rows // len(self._weights))
+        plans = plans[:walks]
+        together, generator = start.repeated(walks), np.random.default_rng(0)
+        spoken = np.array(_SPEECH)[np.arange(walks) % len(_SPEECH)]
+        silent, said = (np.flatnonzero(self._useful[:, 1] == speaks) for speaks in (0, 1))
+        looked_into = 0
+        for step in range(self._program.header(Header.HORIZON)):
+            bodies = self._useful[generator.choice(silent, len(together))]
+            actions = bodies.copy()
+            if len(said):
+                words = self._useful[generator.choice(said, len(together)), 1:]
+                speaks = generator.random(len(together)) < spoken
+                actions[speaks, 1:] = words[speaks]
+            for number, plan in enumerate(plans):
+                if number < len(together) and step < len(plan):
+                    actions[number] = plan[step]
+            reached, alike = self._advance(together, actions, np.zeros(len(together), np.uint64))
+            if (reached.won > self._level).any():
+                return Guess(Answer.KNOWS, step + 1, True, step + 1)
+            hopeful = reached.won + reached.going @ self._weights > self._level
+            for number in np.flatnonzero(hopeful & ~alike).tolist():
+                if looked_into == _LOOKED_INTO or self._effort.clock.is_over:
+                    break
+                looked_into += 1
+                if self._may_know(reached.part(slice(number, number + 1)), _FEW_STATES, surely=True):
+                    return Guess(Answer.TELLS_APART, step + 1, True, step + 1)
+            kept = np.flatnonzero(hopeful & alike)
+            if not len(kept):
+                return None
+            plans = [plan for number, plan in enumerate(plans) if number in kept]
+            together, spoken = reached.part(kept), spoken[kept]
+        return None
+
+    # -- when rooms look different --
+
+    def _may_know(self, apart: _Together, states: int, surely: bool = False) -> bool:
+        """Whether more than a guess might get right can be solved, by who knows which room it is from here on; with
+        `surely` only what was seen to be solved counts.
+        """
         for k in range(len(apart)):
             best = int(apart.won[k])
             for room in np.flatnonzero(apart.going[k]).tolist():
-                best += int(self._weights[room]) * self._may_be_solved(
-                    apart.part(slice(k, k + 1)), room, states
-                )
+                verdict = self._alone_in(apart.part(slice(k, k + 1)), room, states)
+                can = verdict is Verdict.SOLVABLE or (not surely and verdict is Verdict.UNDECIDED)
+                best += int(self._weights[room]) * can
             if best > self._level:
                 return True
         return False
 
-    def _may_be_solved(self, state: _Together, room: int, states: int) -> bool:
-        """Whether nothing is known to keep a room from being solved."""
+    def _alone_in(self, state: _Together, room: int, states: int) -> Verdict:
+        """Whether a room can be solved from here on."""
         registers = state.registers[0, room]
-        relevant = np.minimum(registers[self._relevance.registers], self._relevance.limits)
-        known = relevant.tobytes()
+        known = states, self._relevance.of_rows(registers).tobytes()
         if known not in self._solvable:
-            found = self._alone.solve(registers, state.boards[0, room], state.keys[0, room], states)
-            self._solvable[known] = found.verdict is not Verdict.UNSOLVABLE
+            clock = self._effort.clock
+            found = self._alone.solve(registers, state.boards[0, room], state.keys[0, room], states, clock)
+            self._solvable[known] = found.verdict
         return self._solvable[known]
+
+    # -- steps --
 
     def _step(self, layer: _Together) -> tuple[_Together, NDArray[np.bool_]]:
         """Do everything in these states; what follows, and whether the rooms that go on still look alike."""
-        state, ports = self._table.state, self._table.batch.ports
-        count, rooms, choices = *layer.going.shape, len(self._actions)
-        shape, used = (count, choices, rooms), count * choices * rooms
-        before = _Together(*(np.repeat(array, choices, axis=0) for array in vars(layer).values()))
-        state.registers[:used] = before.registers.reshape(used, -1)
-        state.registers[used:, Register.ENDED] = 1
-        state.registers[:used, Register.ENDED] = ~before.going.reshape(used)
-        state.boards[:used] = before.boards.reshape(used, -1)
-        keys = before.keys.reshape(used, -1).copy()
-        own = keys[:, Key.KEY].copy()
-        keys[:, Key.KEY] ^= np.repeat(np.tile(self._marks, count), rooms)
-        state.keys[:used] = keys
-        ports.actions[:used] = np.repeat(np.tile(self._actions, (count, 1)), rooms, axis=0)
-        self._table.batch.step(Task.STEP_ONLY)
+        count = len(layer)
+        return self._advance(layer, np.tile(self._actions, (count, 1)), np.tile(self._marks, count))
 
-        registers, keys = state.registers[:used].copy(), state.keys[:used].copy()
-        keys[:, Key.KEY] = own
+    def _advance(
+        self, layer: _Together, actions: NDArray[np.int64], chance: NDArray[np.uint64]
+    ) -> tuple[_Together, NDArray[np.bool_]]:
+        """Do actions in each of S states, equally many, int64 (S times k, 4), with other draws of this step, uint64.
+
+        What follows are views of the table, until the next step.
+        """
+        state, ports = self._table.state, self._table.batch.ports
+        count, rooms = layer.going.shape
+        times = len(actions) // count
+        used = count * times * rooms
+        going, won = np.repeat(layer.going, times, axis=0), np.repeat(layer.won, times)
+        for own, given in (
+            (state.registers, layer.registers),
+            (state.boards, layer.boards),
+            (state.keys, layer.keys),
+        ):
+            own[:used].reshape(count, times, rooms, -1)[...] = given[:, None]
+        state.registers[used:, Register.ENDED] = 1
+        state.registers[:used, Register.ENDED] = ~going.reshape(used)
+        changed = np.repeat(chance, rooms)
+        state.keys[:used, Key.KEY] ^= changed
+        ports.actions[:used] = np.repeat(actions, rooms, axis=0)
+        self._table.batch.step(Task.STEP_ONLY)
+        state.keys[:used, Key.KEY] ^= changed
+
+        registers = state.registers[:used]
         ended = (registers[:, Register.ENDED] != 0).reshape(-1, rooms)
-        wins = self._wins[registers[:, Register.OUTCOME]].reshape(-1, rooms) & ended & before.going
+        wins = self._wins[registers[:, Register.OUTCOME]].reshape(-1, rooms) & ended & going
         reached = _Together(
             registers.reshape(-1, rooms, registers.shape[1]),
-            state.boards[:used].copy().reshape(-1, rooms, state.boards.shape[1]),
-            keys.reshape(-1, rooms, keys.shape[1]),
-            before.going & ~ended,
-            before.won + wins @ self._weights,
+            state.boards[:used].reshape(-1, rooms, state.boards.shape[1]),
+            state.keys[:used].reshape(-1, rooms, state.keys.shape[1]),
+            going & ~ended,
+            won + wins @ self._weights,
         )
-        assert reached.won.shape == (shape[0] * shape[1],), "internal: one sum for each state and action"
         return reached, self._look_alike(reached.going, self._observed(registers).reshape(-1, rooms))
 
-    def _observed(self, registers: NDArray[np.int16]) -> NDArray[np.uint64]:
+    def _observed(self, registers: NDArray[np.int16]) -> NDArray[np.int64]:
         """A number for what the agent sees and has just heard, (rows,)."""
-        used, size = len(registers), self._heard.stop - self._heard.start
-        images = self._table.state.image[:used].astype(np.uint64)
-        extra = self._table.state.extra[:used].reshape(used, -1).astype(np.uint64)
+        size = self._heard.stop - self._heard.start
         spoken = np.arange(size) < registers[:, [Register.HEARD]]
-        texts = self._texts[np.where(spoken, registers[:, self._heard], -1)].view(np.uint64)
-        parts = np.concatenate([images, extra, texts], axis=1)
-        digests: NDArray[np.uint64] = parts @ multipliers(parts.shape[1])
+        texts = self._texts[np.where(spoken, registers[:, self._heard], -1)]
+        images = self._table.image_ids()[: len(registers)]
+        digests: NDArray[np.int64] = images + texts @ multipliers(size).view(np.int64)
         return digests
 
     @staticmethod
-    def _look_alike(going: NDArray[np.bool_], observed: NDArray[np.uint64]) -> NDArray[np.bool_]:
+    def _look_alike(going: NDArray[np.bool_], observed: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Whether all rooms that go on show the same, (S,)."""
         first = np.take_along_axis(observed, going.argmax(axis=1)[:, None], axis=1)
         return np.asarray(~(going & (observed != first)).any(axis=1))
 
-    def _new(self, reached: _Together) -> _Together:
-        """Those states that were not seen before."""
-        digests = self._digests(reached)
+    def _new(self, reached: _Together, wanted: NDArray[np.bool_]) -> NDArray[np.intp]:
+        """The numbers of those wanted states, (S,), that were not seen before."""
+        rows = np.flatnonzero(wanted)
+        digests = self._digests(reached)[rows]
         _, firsts = np.unique(digests, return_index=True)
         new = [k for k in np.sort(firsts).tolist() if int(digests[k]) not in self._seen]
         self._seen.update(digests[new].tolist())
-        return reached.part(np.array(new, np.intp))
+        return rows[new]
 
     def _digests(self, layer: _Together) -> NDArray[np.uint64]:
-        relevant = np.minimum(layer.registers[:, :, self._relevance.registers], self._relevance.limits)
+        count, rooms = layer.going.shape
+        relevant = self._relevance.of_rows(layer.registers.reshape(count * rooms, layer.registers.shape[2]))
         # Of a room that has ended nothing matters any more.
-        relevant = np.where(layer.going[:, :, None], relevant, 0)
-        flat = relevant.reshape(len(layer), relevant.shape[1] * relevant.shape[2])
-        parts = np.concatenate([flat, layer.going, layer.won[:, None]], axis=1)
-        digests: NDArray[np.uint64] = parts.astype(np.int64).view(np.uint64) @ self._multipliers
+        each = np.where(layer.going, digests_of(relevant).reshape(count, rooms), np.uint64(0))
+        each *= multipliers(rooms + 1)[:-1]
+        each ^= each >> np.uint64(31)
+        won = layer.won.astype(np.uint64) * multipliers(rooms + 1)[-1]
+        digests: NDArray[np.uint64] = each.sum(axis=1, dtype=np.uint64) + won
         return digests
+
+
+def _joined(layers: Sequence[_Together]) -> _Together:
+    """States of several layers in one; there is one layer at least."""
+    columns = zip(*(vars(layer).values() for layer in layers), strict=True)
+    return _Together(*(np.concatenate(arrays) for arrays in columns))

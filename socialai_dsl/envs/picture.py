@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.envs.gestures import gestures_of
 from socialai_dsl.envs.panel import Face
-from socialai_dsl.envs.render import draw_ansi, draw_grid
+from socialai_dsl.envs.render import draw_ansi, draw_grid, figures
 from socialai_dsl.envs.table import Table
 from socialai_dsl.envs.tiles import NPC, Code, draw_tile
 from socialai_dsl.program import (
@@ -30,18 +31,32 @@ def frame(table: Table, row: int, mode: str, tile: int = 32) -> Any:
     """uint8 (H * tile, W * tile, 3) for rgb_array, a text for ansi."""
     codes, agent = table.cells(row)
     width, height = table.room(row)
+    gestures = gestures_of(table.program(row), table.state.registers[row])
     if mode == "ansi":
-        return draw_ansi(codes[:height, :width], agent)
+        return "\n".join([plain_text(table, row), *figures(codes[:height, :width], gestures)])
     seen = _seen(table, row, agent)[:height, :width]
-    return draw_grid(codes[:height, :width], agent, seen, tile, _under_npcs(table, row))
+    return draw_grid(codes[:height, :width], agent, seen, tile, _under_npcs(table, row), gestures)
+
+
+def plain_text(table: Table, row: int) -> str:
+    """The room as text, without a word on what the letters do not say."""
+    codes, agent = table.cells(row)
+    width, height = table.room(row)
+    return draw_ansi(codes[:height, :width], agent)
 
 
 def coloured_text(table: Table, row: int) -> str:
-    """The room as text with escape codes for colours, what the agent has in view on a lighter ground."""
+    """The room as text with escape codes for colours, what the agent has in view on a lighter ground.
+
+    Where the scenario shows its agent gestures, lines below the room say who points and who did what last.
+    """
     codes, agent = table.cells(row)
     width, height = table.room(row)
     seen = _seen(table, row, agent)[:height, :width]
-    return draw_ansi(codes[:height, :width], agent, colour=True, seen=seen)
+    gestures = gestures_of(table.program(row), table.state.registers[row])
+    shown = {place: gesture for place, gesture in gestures.items() if gesture.words}
+    told = figures(codes[:height, :width], shown, shown)
+    return "\n".join([draw_ansi(codes[:height, :width], agent, colour=True, seen=seen), *told])
 
 
 def cast_of(table: Table, row: int, tile: int = 32) -> list[Face]:

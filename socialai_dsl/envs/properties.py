@@ -1,11 +1,15 @@
-"""Whether what a scenario claims about itself is so: each entry of `check`, tried in rooms that are drawn."""
+"""Whether what a scenario claims about itself is so: each entry of `check`, tried in rooms that are drawn.
+
+A claim rests on the rooms in which it says anything. One that rests on none fails, and says what there was nothing of.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -14,20 +18,26 @@ from numpy.typing import NDArray
 from socialai_dsl.checking import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.engine.calls import Task
-from socialai_dsl.envs.guessing import Answer, Guess, Guessing
+from socialai_dsl.envs.effort import Effort
+from socialai_dsl.envs.guessing import Answer, Guess, Guessing, Plan
+from socialai_dsl.envs.knowable import Knowing, Known, RoomKnown, followed
 from socialai_dsl.envs.muting import muted
+from socialai_dsl.envs.rooms import Rooms, name_of, wins_of
 from socialai_dsl.envs.search import Finding, Search
 from socialai_dsl.envs.search import Verdict as Searched
 from socialai_dsl.envs.table import Table
 from socialai_dsl.envs.twins import Compared, Script, Twins, alike, layouts, random_actions
 from socialai_dsl.program import Program, Register
-from socialai_dsl.semantics.terms import OutcomePlan, PropertyPlan
+from socialai_dsl.semantics.build import walk
+from socialai_dsl.semantics.terms import Const, InState, OutcomePlan, PropertyPlan, SaidBy
+from socialai_dsl.source import Span
 
 _HOLDS: Final = "the property holds"
 """Name of the outcome that ends an episode of the copy in which a condition is looked for."""
 
 _AS_TRIED: Final = " (chance during the episode was tried only in part)"
 _SHOWN: Final = 5
+_NO_TIME: Final = "there was no time to look at a room"
 
 
 class Verdict(Enum):
@@ -47,6 +57,8 @@ class Report:
         rooms: how many were tried. held: in how many it is so. undecided: in how many nothing was decided.
         against: numbers of the first rooms that speak against it: `reset(seed=..., options={"index": number})`.
         said: what was found, in words.
+        rests: on how many of the rooms it rests; the others say nothing about it.
+        pairs: on how many pairs of episodes, where pairs are compared.
     """
 
     verdict: Verdict
@@ -55,89 +67,203 @@ class Report:
     undecided: int
     against: tuple[int, ...]
     said: str
+    rests: int
+    pairs: int = 0
 
 
-@dataclass(frozen=True)
-class Effort:
-    """How much is tried: rooms 0, 1, ... of a seed, and so many states of each."""
+class Trial:
+    """A scenario whose claims are tried.
 
-    rooms: int = 200
-    seed: int = 0
-    states: int = 50_000
+    Args:
+        loaded: the scenario.
+        effort: how much to try; each claim may have an effort of its own.
+        scripted: the same scenario with a frame for the agent, if there is one.
+    """
+
+    def __init__(
+        self, loaded: LoadedScenario, effort: Effort, scripted: LoadedScenario | None = None
+    ) -> None:
+        self.loaded, self.effort = loaded, effort
+        self.program = compile_loaded(loaded)
+        self.scripted = None if scripted is None else compile_loaded(scripted)
+
+    @cached_property
+    def rooms(self) -> Rooms:
+        """The rooms, with what is known of each."""
+        return Rooms(self.loaded.checked, self.program, self.effort)
+
+    @cached_property
+    def solved(self) -> NDArray[np.bool_]:
+        """In which rooms the script succeeds, (rooms,); in none if there is no script."""
+        if self.scripted is None:
+            return np.zeros(self.effort.rooms, np.bool_)
+        return solved_by_script(self.scripted, self.effort)
+
+    def successes(self, effort: Effort, what: str) -> Iterator[Finding]:
+        """A shortest success of room after room."""
+        return effort.each_room(what, lambda room: self.rooms.success(room, effort), _is_decided)
+
+    def check(self, plan: PropertyPlan, effort: Effort) -> Report:
+        """Try one property, with the same rooms, for as long as the clock of the effort says."""
+        match plan.kind:
+            case "reachable" | "never":
+                return _reaching(self, plan, effort)
+            case "within":
+                return _within(self, plan, effort)
+            case "oracle":
+                return _oracle(self, plan, effort)
+            case "needs":
+                return _needs(self, plan, effort)
+            case "only_through":
+                return _only_through(self, plan, effort)
+            case "knowable":
+                return _knowable(self, plan, effort)
 
 
 def check_property(
     loaded: LoadedScenario, plan: PropertyPlan, effort: Effort, scripted: LoadedScenario | None = None
 ) -> Report:
-    """Try one property.
+    """Try one property of a scenario; see `Trial`."""
+    return Trial(loaded, effort, scripted).check(plan, effort)
 
-    Args:
-        loaded: the scenario.
-        plan: one of its `checked.properties`.
-        effort: how much to try.
-        scripted: the same scenario with a frame for the agent, if there is one.
+
+def by_default(loaded: LoadedScenario, span: Span) -> tuple[PropertyPlan, ...]:
+    """The properties that are tried of a scenario: what it claims, and that its success is knowable.
+
+    An agent that is not to perceive the NPCs is a control: of it nothing is tried that is not claimed.
     """
-    match plan.kind:
-        case "reachable" | "never":
-            return _reaching(loaded, plan, effort)
-        case "within":
-            return _within(loaded, plan, effort)
-        case "oracle":
-            return _oracle(plan, effort, scripted)
-        case "needs":
-            return _needs(loaded, plan, effort)
-        case "only_through":
-            return _only_through(loaded, plan, effort, scripted)
+    plans = loaded.checked.properties
+    if loaded.checked.npcs_hidden or any(plan.kind == "knowable" for plan in plans):
+        return plans
+    return (*plans, PropertyPlan("knowable", "knowable: true", "", span))
+
+
+@dataclass
+class _Tally:
+    """What was found in room after room: the numbers of the rooms, and why some say nothing."""
+
+    held: list[int]
+    against: list[int]
+    undecided: list[int]
+    void: dict[str, list[int]]
+
+    @classmethod
+    def empty(cls) -> _Tally:
+        return cls([], [], [], {})
+
+    @property
+    def rests(self) -> int:
+        return len(self.held) + len(self.against) + len(self.undecided)
+
+    @property
+    def rooms(self) -> int:
+        return self.rests + sum(map(len, self.void.values()))
+
+    def report(self, said: str, share: float | None) -> Report:
+        """How it stands with a claim about this share of the rooms that it rests on; None: about one."""
+        if not self.rooms:
+            return Report(Verdict.UNDECIDED, 0, 0, 0, (), _NO_TIME, 0)
+        if not self.rests:
+            silent = tuple(sorted(room for rooms in self.void.values() for room in rooms))[:_SHOWN]
+            return Report(Verdict.FAILS, self.rooms, 0, 0, silent, f"it rests on nothing: {self._why()}", 0)
+        if self.void:
+            said += f"; the others say nothing: {self._why()}"
+        held, undecided = len(self.held), len(self.undecided)
+        verdict = _by_share(held, undecided, self.rests, share)
+        against = tuple(sorted((*self.against, *self.undecided)))[:_SHOWN]
+        return Report(verdict, self.rooms, held, undecided, against, said, self.rests)
+
+    def _why(self) -> str:
+        return ", ".join(f"in {_rooms(len(rooms))} {why}" for why, rooms in self.void.items())
+
+
+def _by_share(held: int, undecided: int, rooms: int, share: float | None) -> Verdict:
+    """Whether enough rooms are as they should be; one at least, and without a share one is enough."""
+    needed = 1 if share is None else max(1, share * rooms - 1e-9)
+    if held >= needed:
+        return Verdict.HOLDS
+    return Verdict.UNDECIDED if held + undecided >= needed else Verdict.FAILS
+
+
+def _rooms(count: int) -> str:
+    return f"{count} room" if count == 1 else f"{count} rooms"
+
+
+def _steps(count: int | None) -> str:
+    return f"{count} step" if count == 1 else f"{count} steps"
 
 
 # --- by search ---
 
 
-def _reaching(loaded: LoadedScenario, plan: PropertyPlan, effort: Effort) -> Report:
+def _reaching(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     """Of `reachable` and `never`: in which rooms something can be made true."""
-    program, goals = compile_loaded(loaded), plan.goals
+    program, goals = trial.program, plan.goals
     if plan.condition is not None:
-        program, goals = _with_goal(loaded, plan), (_HOLDS,)
-    findings = list(search_rooms_of(program, goals, effort))
+        program, goals = _with_goal(trial.loaded, plan), (_HOLDS,)
+    findings = list(search_rooms_of(program, goals, effort, plan.text))
+    tally = _Tally.empty()
+    named = {"agent", *_named(trial, plan)}
+    for room, finding in enumerate(findings):
+        missing = trial.rooms.missing(room, named)
+        if missing and finding.verdict is not Searched.SOLVABLE:
+            tally.void.setdefault(f"`{missing[0]}` is absent", []).append(room)
+            continue
+        if plan.kind == "never" and finding.verdict is Searched.UNSOLVABLE and finding.states == 1:
+            tally.void.setdefault("every episode ends at once, or nothing in it changes", []).append(room)
+            continue
+        came = finding.verdict is Searched.SOLVABLE
+        rooms = tally.held if came is (plan.kind == "reachable") else tally.against
+        (tally.undecided if finding.verdict is Searched.UNDECIDED else rooms).append(room)
     reached = [k for k, finding in enumerate(findings) if finding.verdict is Searched.SOLVABLE]
-    undecided = sum(finding.verdict is Searched.UNDECIDED for finding in findings)
-    exact = (
-        ""
-        if all(finding.exact or finding.verdict is Searched.UNDECIDED for finding in findings)
-        else _AS_TRIED
-    )
-    said = f"it can come about in {len(reached)} of {effort.rooms} rooms"
-    if undecided:
-        said += f", {undecided} undecided"
+    exact = all(finding.exact or finding.verdict is Searched.UNDECIDED for finding in findings)
+    said = f"it can come about in {len(reached)} of {_rooms(tally.rests)}"
+    if tally.undecided:
+        said += f", {len(tally.undecided)} undecided"
     if plan.kind == "reachable":
-        against = [k for k, finding in enumerate(findings) if finding.verdict is Searched.UNSOLVABLE]
-        verdict = _by_share(len(reached), undecided, effort.rooms, plan.share)
-        return Report(verdict, effort.rooms, len(reached), undecided, tuple(against[:_SHOWN]), said + exact)
+        return tally.report(said + ("" if exact else _AS_TRIED), plan.share)
     if reached:
         said += f"; in room {reached[0]} after {_steps(findings[reached[0]].steps)}"
-        exact = ""
-    verdict = Verdict.FAILS if reached else Verdict.UNDECIDED if undecided else Verdict.HOLDS
-    held = effort.rooms - len(reached) - undecided
-    return Report(verdict, effort.rooms, held, undecided, tuple(reached[:_SHOWN]), said + exact)
+        return replace(tally.report(said, 1.0), verdict=Verdict.FAILS, against=tuple(reached[:_SHOWN]))
+    return tally.report(said + ("" if exact else _AS_TRIED), 1.0)
 
 
-def _within(loaded: LoadedScenario, plan: PropertyPlan, effort: Effort) -> Report:
-    findings = list(search_rooms_of(compile_loaded(loaded), None, effort))
-    lengths = [finding.steps for finding in findings]
-    held = sum(length is not None and length <= plan.steps for length in lengths)
-    undecided = sum(finding.verdict is Searched.UNDECIDED for finding in findings)
-    against = [
-        k
-        for k, finding in enumerate(findings)
-        if finding.verdict is Searched.UNSOLVABLE or (finding.steps or 0) > plan.steps
-    ]
-    known = [length for length in lengths if length is not None]
-    said = f"a shortest success takes at most {_steps(plan.steps)} in {held} of {effort.rooms} rooms"
+def _named(trial: Trial, plan: PropertyPlan) -> Iterator[str]:
+    """The members of the cast and objects that a condition is about by name."""
+    checked = trial.loaded.checked
+    for part in walk(plan.condition) if plan.condition is not None else ():
+        match part:
+            case Const() if part.type.kind == "entity" and 0 <= part.value < len(checked.entities):
+                yield name_of(checked, part.value)
+            case InState(member=member):
+                yield member
+            case SaidBy(entity=number):
+                yield name_of(checked, number)
+
+
+def _within(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
+    findings = list(trial.successes(effort, plan.text))
+    tally = _Tally.empty()
+    for room, finding in enumerate(findings):
+        if finding.verdict is Searched.UNDECIDED:
+            tally.undecided.append(room)
+        elif finding.steps is not None and finding.steps <= plan.steps:
+            tally.held.append(room)
+        else:
+            tally.against.append(room)
+    known = [finding.steps for finding in findings if finding.steps is not None]
+    said = (
+        f"a shortest success takes at most {_steps(plan.steps)} in {len(tally.held)} of {_rooms(tally.rests)}"
+    )
     if known:
         said += f", {max(known)} in the longest that can be solved"
-    share = 1.0 if plan.share is None else plan.share
-    verdict = _by_share(held, undecided, effort.rooms, share)
-    return Report(verdict, effort.rooms, held, undecided, tuple(against[:_SHOWN]), said)
+    elif tally.rests and not tally.undecided:
+        said = f"no success can be reached in any of {_rooms(tally.rests)}"
+    return tally.report(said, 1.0 if plan.share is None else plan.share)
+
+
+def _is_decided(finding: Finding) -> bool:
+    return finding.verdict is not Searched.UNDECIDED
 
 
 def _with_goal(loaded: LoadedScenario, plan: PropertyPlan) -> Program:
@@ -150,40 +276,40 @@ def _with_goal(loaded: LoadedScenario, plan: PropertyPlan) -> Program:
     return compile_loaded(replace(loaded, checked=copy))
 
 
-def search_rooms_of(program: Program, goals: Sequence[str] | None, effort: Effort) -> Iterator[Finding]:
+def search_rooms_of(
+    program: Program, goals: Sequence[str] | None, effort: Effort, what: str
+) -> Iterator[Finding]:
     """Search each room of the effort for one of the goals, names of outcomes; None: for a success."""
     table = Table([program], effort.rooms, 1)
     table.reset(effort.seed, None)
     search, state = Search(program, goals), table.state
-    for row in range(effort.rooms):
-        yield search.solve(state.registers[row], state.boards[row], state.keys[row], effort.states)
 
+    def find(row: int) -> Finding:
+        start = state.registers[row], state.boards[row], state.keys[row]
+        return search.solve(*start, effort.states, effort.clock)
 
-def _steps(count: int | None) -> str:
-    return f"{count} step" if count == 1 else f"{count} steps"
-
-
-def _by_share(held: int, undecided: int, rooms: int, share: float | None) -> Verdict:
-    """Whether enough rooms are as they should be; without a share one is enough."""
-    needed = 1 if share is None else share * rooms - 1e-9
-    if held >= needed:
-        return Verdict.HOLDS
-    return Verdict.UNDECIDED if held + undecided >= needed else Verdict.FAILS
+    return effort.each_room(what, find, _is_decided)
 
 
 # --- by playing ---
 
 
-def _oracle(plan: PropertyPlan, effort: Effort, scripted: LoadedScenario | None) -> Report:
+def _oracle(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     assert plan.share is not None, "internal: an oracle has a share"
-    if scripted is None:
+    if trial.scripted is None:
         said = "nobody plays: the agent has no frame, and there is no variant `oracle`"
-        return Report(Verdict.FAILS, 0, 0, 0, (), said)
-    won = solved_by_script(compile_loaded(scripted), effort)
-    against = np.flatnonzero(~won).tolist()
-    said = f"its own script solves {won.sum()} of {effort.rooms} rooms"
-    verdict = Verdict.HOLDS if won.mean() >= plan.share - 1e-9 else Verdict.FAILS
-    return Report(verdict, effort.rooms, int(won.sum()), 0, tuple(against[:_SHOWN]), said)
+        return Report(Verdict.FAILS, 0, 0, 0, (), said, 0)
+    won, idle = trial.solved, trial.rooms.solved_by_idling
+    said = f"its own script solves {won.sum()} of {_rooms(effort.rooms)}"
+    against = tuple(np.flatnonzero(~won).tolist()[:_SHOWN])
+    verdict = Verdict.HOLDS if won.mean() >= max(plan.share, 1 / len(won)) - 1e-9 else Verdict.FAILS
+    rests = int((~idle).sum())
+    if not rests:
+        said = f"it rests on nothing: in all of {_rooms(effort.rooms)} a success comes of itself, without the agent"
+        return Report(Verdict.FAILS, effort.rooms, int(won.sum()), 0, against, said, 0)
+    if idle.any():
+        said += f"; in {int(idle.sum())} of them a success comes of itself"
+    return Report(verdict, effort.rooms, int(won.sum()), 0, against, said, rests)
 
 
 def solved_by_script(program: Program, effort: Effort) -> NDArray[np.bool_]:
@@ -194,30 +320,46 @@ def solved_by_script(program: Program, effort: Effort) -> NDArray[np.bool_]:
     while not registers[:, Register.ENDED].all():
         table.batch.ports.actions[:] = table.scripted_actions()
         table.batch.step(Task.STEP_ONLY)
-    wins = np.array([outcome.success for outcome in program.outcome_table])
-    won: NDArray[np.bool_] = wins[registers[:, Register.OUTCOME]]
-    return won
+    return wins_of(program)[registers[:, Register.OUTCOME]]
 
 
-def _only_through(
-    loaded: LoadedScenario, plan: PropertyPlan, effort: Effort, scripted: LoadedScenario | None
-) -> Report:
-    program = compile_loaded(loaded)
+def _only_through(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
+    program = trial.program
     ((path, weighted),) = plan.draws
     values = _pairs_of(sorted(set(weighted)), effort)
-    compared = [
-        _twins(program, loaded, plan, values, effort).play(random_actions(program, effort.rooms, effort.seed))
-    ]
-    if scripted is not None:
-        script = Script(compile_loaded(scripted), path, values[:, 0].tolist(), effort.seed)
-        compared.append(_twins(program, loaded, plan, values, effort).play(script))
-    return _told(compared, effort)
+
+    def twins() -> Twins:
+        return Twins(program, trial.loaded.checked, path, values, plan.members, effort.seed)
+
+    compared = [twins().play(random_actions(program, effort.rooms, effort.seed))]
+    if trial.scripted is not None:
+        script = Script(trial.scripted, path, values[:, 0].tolist(), effort.seed)
+        compared.append(twins().play(script))
+    if not any(one.rooms for one in compared):
+        compared += _searched_for(twins, trial, values, effort)
+    return _told(compared, trial, plan, effort)
 
 
-def _twins(
-    program: Program, loaded: LoadedScenario, plan: PropertyPlan, values: NDArray[np.int64], effort: Effort
-) -> Twins:
-    return Twins(program, loaded.checked, plan.draws[0][0], values, plan.members, effort.seed)
+def _searched_for(
+    twins: Callable[[], Twins], trial: Trial, values: NDArray[np.int64], effort: Effort
+) -> Iterator[Compared]:
+    """Pairs of episodes in which a search finds a difference that neither chance nor a script came upon."""
+    pair = Guessing(trial.program, np.ones(2, np.int64))
+
+    def find(room: int) -> Plan | None:
+        return pair.first_difference(*twins().start(room), replace(effort, states=_SEARCHED_STATES))
+
+    few = replace(effort, rooms=min(effort.rooms, _SEARCHED_ROOMS))
+    for plan in few.each_room("only_through", find, lambda plan: plan is not None):
+        if plan is not None:
+            yield twins().play(
+                lambda step, plan=plan: np.tile(plan[min(step, len(plan) - 1)], (len(values), 1))
+            )
+            return
+
+
+_SEARCHED_ROOMS: Final = 8
+_SEARCHED_STATES: Final = 5_000
 
 
 def _pairs_of(values: Sequence[int], effort: Effort) -> NDArray[np.int64]:
@@ -226,7 +368,7 @@ def _pairs_of(values: Sequence[int], effort: Effort) -> NDArray[np.int64]:
     return np.array([generator.choice(values, 2, replace=False) for _ in range(effort.rooms)], np.int64)
 
 
-def _told(compared: Sequence[Compared], effort: Effort) -> Report:
+def _told(compared: Sequence[Compared], trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     pairs = sum(one.pairs for one in compared)
     leaks = [leak for one in compared for leak in one.leaks]
     cued = sum(one.cued for one in compared)
@@ -235,54 +377,126 @@ def _told(compared: Sequence[Compared], effort: Effort) -> Report:
     if leaks:
         leak = min(leaks, key=lambda one: one.step)
         said += f"; room {leak.index} differs after {_steps(leak.step)} between {leak.values[0]} and {leak.values[1]}"
-    verdict = Verdict.FAILS if leaks else Verdict.HOLDS
-    return Report(verdict, effort.rooms, effort.rooms - len(against), 0, against[:_SHOWN], said)
+    elif not cued:
+        absent = [
+            k for k in range(effort.rooms) if len(trial.rooms.missing(k, plan.members)) == len(plan.members)
+        ]
+        said = f"it rests on nothing: none of {pairs} pairs of episodes differ in anything"
+        said += f"; in {_rooms(len(absent))} none of the members is there" if absent else ""
+    verdict = Verdict.FAILS if leaks or not cued else Verdict.HOLDS
+    held = effort.rooms - len(against) if verdict is Verdict.HOLDS or leaks else 0
+    rests = len({index for one in compared for index in one.rooms})
+    return Report(verdict, effort.rooms, held, 0, against[:_SHOWN], said, rests, cued + len(leaks))
 
 
 # --- without some of the cast ---
 
 _KNOWN: Final = {
-    Answer.GUESSES: "{} leave nothing but a guess",
+    Answer.GUESSES: "{} {} nothing but a guess",
     Answer.KNOWS: "in {} it can be known without",
     Answer.TELLS_APART: "in {} something else tells, and more may be made of it",
-    Answer.UNDECIDED: "{} are undecided",
+    Answer.UNDECIDED: "in {} it is undecided",
 }
+_NO_SUCCESS: Final = "no success is possible"
+_NEAR: Final = 15_000
+"""In so many states a success without the members is looked for before anything else."""
+
+_ALWAYS_A_GUESS: Final = "there is nothing but a guess with them, too"
 
 
-def _needs(loaded: LoadedScenario, plan: PropertyPlan, effort: Effort) -> Report:
-    silent = compile_loaded(replace(loaded, checked=muted(loaded.checked, plan.members)))
-    guesses = list(_guesses(silent, plan, effort))
-    counted = Counter(guess.answer for guess in guesses)
-    held = counted[Answer.GUESSES]
-    open_ = counted[Answer.UNDECIDED] + counted[Answer.TELLS_APART]
-    against = [k for k, guess in enumerate(guesses) if guess.answer is not Answer.GUESSES]
-    said = ", ".join(
-        words.format(f"{counted[answer]} rooms") for answer, words in _KNOWN.items() if counted[answer]
-    )
-    exact = "" if all(guess.exact for guess in guesses if guess.answer is Answer.GUESSES) else _AS_TRIED
-    verdict = _by_share(held, open_, effort.rooms, 1.0 if plan.share is None else plan.share)
-    return Report(verdict, effort.rooms, held, open_, tuple(against[:_SHOWN]), said + exact)
-
-
-def _guesses(silent: Program, plan: PropertyPlan, effort: Effort) -> Iterator[Guess]:
-    """For each room the best answer that any of the draws gives."""
-    search = Search(silent)
-    alone = Table([silent], effort.rooms, 1)
-    alone.reset(effort.seed, None)
-    tried = [_Draw(silent, path, weighted) for path, weighted in plan.draws]
-    for room in range(effort.rooms):
-        finding = search.solve(
-            alone.state.registers[room], alone.state.boards[room], alone.state.keys[room], effort.states
-        )
-        if finding.verdict is Searched.UNSOLVABLE:
-            yield Guess(Answer.GUESSES, finding.states, finding.exact)
+def _needs(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
+    needing = _Needing(trial, plan, effort)
+    tally, counted, exact = _Tally.empty(), Counter[Answer](), True
+    found = effort.each_room(plan.text, needing.in_room, lambda one: one[0] is not Answer.UNDECIDED)
+    for room, (answer, is_exact) in enumerate(found):
+        if isinstance(answer, str):
+            tally.void.setdefault(answer, []).append(room)
             continue
-        found = [draw.guess(room, effort) for draw in tried]
+        counted[answer] += 1
+        exact = exact and (is_exact or answer is not Answer.GUESSES)
+        open_ = answer in (Answer.UNDECIDED, Answer.TELLS_APART)
+        (tally.held if answer is Answer.GUESSES else tally.undecided if open_ else tally.against).append(room)
+    said = ", ".join(
+        words.format(_rooms(counted[answer]), "leaves" if counted[answer] == 1 else "leave")
+        for answer, words in _KNOWN.items()
+        if counted[answer]
+    )
+    return tally.report(said + ("" if exact else _AS_TRIED), 1.0 if plan.share is None else plan.share)
+
+
+class _Needing:
+    """What is left without some members, in room after room, and whether there is more with them."""
+
+    def __init__(self, trial: Trial, plan: PropertyPlan, effort: Effort) -> None:
+        self._trial, self._plan, self._effort = trial, plan, effort
+        silent = compile_loaded(replace(trial.loaded, checked=muted(trial.loaded.checked, plan.members)))
+        self._search = Search(silent)
+        self._alone = Table([silent], effort.rooms, 1)
+        self._alone.reset(effort.seed, None)
+        self._without = [_Draw(silent, path, weighted) for path, weighted in plan.draws]
+        self._with: dict[int, _Draw] = {}
+        self._scripted: dict[int, _Draw | None] = {}
+
+    def in_room(self, room: int) -> tuple[Answer | str, bool]:
+        """The best answer that any of the draws gives, and whether it is exact; in words why a room says nothing."""
+        missing = self._trial.rooms.missing(room, ("agent", *self._plan.members))
+        if missing:
+            return f"`{missing[0]}` is absent", True
+        finding = self._alone_in(room, min(_NEAR, self._effort.states))
+        if finding.verdict is Searched.UNSOLVABLE:
+            return self._with_them(room, finding)
+        found = [draw.guess(room, self._effort) for draw in self._without]
         # Without anything to be guessed a success is known by heart.
-        yield min(found, key=lambda guess: _ORDER.index(guess.answer), default=Guess(Answer.KNOWS, 0, True))
+        best = min(found, key=lambda guess: _ORDER.index(guess.answer), default=Guess(Answer.KNOWS, 0, True))
+        if best.answer is Answer.GUESSES:
+            return self._better_than_a_guess(room, found.index(best)), best.exact
+        if finding.verdict is Searched.UNDECIDED and (best.answer is Answer.UNDECIDED or not found):
+            finding = self._alone_in(room, self._effort.states)
+            if finding.verdict is Searched.UNSOLVABLE:
+                return self._with_them(room, finding)
+            if finding.verdict is Searched.UNDECIDED:
+                return Answer.UNDECIDED, False
+        return best.answer, best.exact
+
+    def _alone_in(self, room: int, states: int) -> Finding:
+        """Whether a success can be reached without them."""
+        state = self._alone.state
+        start = state.registers[room], state.boards[room], state.keys[room]
+        return self._search.solve(*start, states, self._effort.clock)
+
+    def _with_them(self, room: int, alone: Finding) -> tuple[Answer | str, bool]:
+        """Nobody succeeds without them; with them?"""
+        if self._trial.solved[room]:
+            return Answer.GUESSES, alone.exact
+        verdict = self._trial.rooms.success(room, self._effort).verdict
+        if verdict is Searched.UNSOLVABLE:
+            return _NO_SUCCESS, True
+        return (Answer.GUESSES if verdict is Searched.SOLVABLE else Answer.UNDECIDED), alone.exact
+
+    def _better_than_a_guess(self, room: int, number: int) -> Answer | str:
+        """A guess without them says something only if there is more than that with them."""
+        path, weighted = self._plan.draws[number]
+        if number not in self._with:
+            self._with[number] = _Draw(self._trial.program, path, weighted)
+            scripted = self._trial.scripted
+            self._scripted[number] = None if scripted is None else _Draw(scripted, path, weighted)
+        script = self._scripted[number]
+        if script is not None and script.is_told(room, self._effort):
+            return Answer.GUESSES
+        guess = self._with[number].guess(room, self._effort)
+        if guess.answer is Answer.UNDECIDED:
+            return Answer.UNDECIDED
+        if guess.answer is not Answer.GUESSES:
+            return Answer.GUESSES
+        solvable = self._trial.rooms.success(room, self._effort).verdict is not Searched.UNSOLVABLE
+        return _ALWAYS_A_GUESS if solvable else _NO_SUCCESS
 
 
 _ORDER: Final = (Answer.GUESSES, Answer.UNDECIDED, Answer.TELLS_APART, Answer.KNOWS)
+
+
+_TURNS: Final = 4
+"""So many values of a draw are compared with the others."""
 
 
 class _Draw:
@@ -292,7 +506,22 @@ class _Draw:
         weights = Counter(weighted)
         self._layouts = layouts(program, path, list(weights))
         self._table = Table([program], len(weights), 1)
-        self._guessing = Guessing(program, np.array(list(weights.values()), np.int64))
+        self._program, self._weights = program, list(weights.values())
+
+    @cached_property
+    def _guessing(self) -> Guessing:
+        return Guessing(self._program, np.array(self._weights, np.int64))
+
+    def is_told(self, room: int, effort: Effort) -> bool:
+        """Whether the agent's own frame solves more than a guess, and does nothing that it could not know is right."""
+        for first in range(min(len(self._layouts), _TURNS)):
+            layouts = [*self._layouts[first:], *self._layouts[:first]]
+            weights = [*self._weights[first:], *self._weights[:first]]
+            self._table.reset(effort.seed, {"index": room, "layout": layouts})
+            known = followed(self._table, self._program).known
+            if any(weights[0] + weights[row] > max(weights) for row in known):
+                return True
+        return False
 
     def guess(self, room: int, effort: Effort) -> Guess:
         """How well a room can be solved, whatever its draw."""
@@ -300,4 +529,50 @@ class _Draw:
         state = self._table.state
         if not alike(self._table, slice(None)):
             return Guess(Answer.TELLS_APART, 0, True)
-        return self._guessing.solve(state.registers, state.boards, state.keys, effort.states)
+        return self._guessing.solve(state.registers, state.boards, state.keys, effort)
+
+
+# --- what can be known ---
+
+
+def _knowable(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
+    knowing = Knowing(trial.rooms, effort, trial.scripted)
+    found = list(effort.each_room(plan.text, knowing.look_at, lambda one: one.known is not Known.UNDECIDED))
+    tally = _Tally.empty()
+    for room, one in enumerate(found):
+        missing = trial.rooms.missing(room, ("agent",))
+        if missing or one.known is Known.NO_SUCCESS:
+            tally.void.setdefault("the agent is absent" if missing else _NO_SUCCESS, []).append(room)
+        elif one.known is Known.UNDECIDED:
+            tally.undecided.append(room)
+        else:
+            is_so = (one.known is not Known.HIDDEN) is plan.expected
+            (tally.held if is_so else tally.against).append(room)
+    return tally.report(_said_of(found), 1.0 if plan.share is None else plan.share)
+
+
+def _said_of(found: Collection[RoomKnown]) -> str:
+    """What can be known, by when, and what stays hidden."""
+    known = [one.step for one in found if one.known is Known.ALL]
+    nothing = sum(one.known is Known.NOTHING_TO_KNOW for one in found)
+    hidden: dict[str, list[int | None]] = {}
+    for one in found:
+        for name, step in (one.hidden or {}).items():
+            hidden.setdefault(name, []).append(step)
+    parts = [f"{name} stays hidden {_until(steps)} in {_rooms(len(steps))}" for name, steps in hidden.items()]
+    if known:
+        parts.append(f"in {_rooms(len(known))} all can be known, within {_steps(max(known))}")
+    if nothing:
+        parts.append(f"in {_rooms(nothing)} success depends on nothing hidden")
+    undecided = sum(one.known is Known.UNDECIDED for one in found)
+    if undecided:
+        parts.append(f"in {_rooms(undecided)} it is undecided")
+    return ", ".join(parts)
+
+
+def _until(steps: Sequence[int | None]) -> str:
+    """When something shows that was to be known before."""
+    late = [step for step in steps if step is not None]
+    return (
+        "to the end" if len(late) < len(steps) else f"until it is too late (step {min(late)} at the earliest)"
+    )

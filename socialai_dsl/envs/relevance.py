@@ -24,9 +24,11 @@ from socialai_dsl.program import (
     Header,
     LineColumn,
     Op,
+    OpClass,
     Program,
     Register,
 )
+from socialai_dsl.program.instructions import TABLE
 
 _UNLIMITED = np.iinfo(np.int16).max
 _ADDRESSES = (Header.SETTLE_PC, Header.RULES_PC, Header.BEFORE_PC, Header.LINKS_PC, Header.TICK_PC)
@@ -52,33 +54,13 @@ _RECORDS = (
 
 _WHOLE_UTTERANCE = (Register.TEMPLATE, Register.NOUN, Register.UTTERANCE)
 
-_READ: dict[Op, tuple[int, ...]] = {
-    **dict.fromkeys((Op.HALT, Op.SKIP, Op.IF_UNPINNED, Op.IF_CHANCE, Op.CHOOSE, Op.GOTO, Op.COUNT), ()),
-    Op.END: (),
-    **dict.fromkeys((Op.IF_EQ, Op.IF_NE, Op.IF_LT, Op.IF_LE, Op.IF_BIT), (0, 1)),
-    Op.IF_HEARD: (0,),
-    **dict.fromkeys(map(Op, range(Op.IF_SAME_CELL, Op.IF_UNOBSTRUCTED + 1)), (0, 1)),
-    **dict.fromkeys((Op.LOAD, Op.ABS, Op.FIELD, Op.NEAREST, Op.DRAW, Op.DRAW_OTHER, Op.CELL_OF), (1,)),
-    **dict.fromkeys((Op.COUNT_BITS, Op.LOWEST_BIT, Op.PICK_BIT), (1,)),
-    **dict.fromkeys((Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.MOD, Op.MIN, Op.MAX), (1, 2)),
-    **dict.fromkeys((Op.DISTANCE, Op.QUADRANT, Op.CELL_BESIDE), (1, 2)),
-    **dict.fromkeys((Op.HEARD_FROM, Op.HEARD_NOUN, Op.END_GRADED, Op.ANSWER), (1,)),
-    Op.SET_BIT: (0, 1),
-    Op.SEES: (0, 1, 2),
-    Op.SET_FIELD: (0, 2),
-    **dict.fromkeys(
-        (Op.BECOME, Op.SAY, Op.TURN_TO, Op.FACE, Op.GO_TO, Op.GO_NEXT_TO, Op.POINT, Op.PLACE), (0, 1)
-    ),
-    **dict.fromkeys((Op.VANISH, Op.BODY, Op.REWARD), (0,)),
-}
-"""Positions of the operands that are read; of other instructions all may be."""
-
 _LAST_TURN = (Field.LAST, Field.TOGGLED)
 _COMPARISONS = (Op.IF_EQ, Op.IF_NE, Op.IF_LT, Op.IF_LE)
-_DRAWS = (Op.DRAW, Op.DRAW_OTHER, Op.PICK_BIT, Op.PICK_CELL)
-_CHANCY = (Op.IF_CHANCE, Op.CHOOSE, Op.TURN_TO, Op.FACE, Op.GO_TO, Op.GO_NEXT_TO)
-_VALUES = (*map(Op, range(Op.LOAD, Op.ABS + 1)), Op.FIELD, Op.DISTANCE, Op.NEAREST, Op.QUADRANT, Op.SET_BIT,
-           Op.COUNT_BITS, Op.LOWEST_BIT, Op.SEES, Op.CELL_OF, Op.CELL_BESIDE)  # fmt: skip
+_DRAWS = frozenset(op for op, entry in TABLE.items() if entry.draws and entry.results)
+"""They write what they draw."""
+
+_CHANCY = frozenset(op for op, entry in TABLE.items() if entry.draws and not entry.results)
+_VALUES = frozenset(op for op, entry in TABLE.items() if entry.op_class is OpClass.VALUE and not entry.draws)
 
 Instruction = tuple[Op, tuple[int, int, int]]
 
@@ -100,6 +82,10 @@ class Relevance:
     whole_utterance: bool
     chance: bool
     drawn: bool
+
+    def of_rows(self, registers: NDArray[np.int16]) -> NDArray[np.int16]:
+        """What matters of registers, int16 (..., R), as int16 (..., N)."""
+        return np.minimum(np.take(registers, self.registers, axis=-1), self.limits)
 
     @classmethod
     def of(cls, program: Program) -> Relevance:
@@ -168,7 +154,7 @@ def _limits(blocks: list[list[Instruction]]) -> dict[int, int]:
     limits: dict[int, int] = {}
     for block in blocks:
         for op, operands in block:
-            for position in _READ.get(op, (0, 1, 2)):
+            for position in TABLE[op].reads:
                 register = operands[position]
                 if not 0 <= register < TEMPORARY:
                     continue
@@ -207,7 +193,7 @@ def _draws_matter(program: Program, block: list[Instruction]) -> bool:
     if any(op in _CHANCY for op, _ in block):
         return True
     selected = _selected(block)
-    drawn = {operands[0] for op, operands in block if op in _DRAWS}
+    drawn = {word for op, operands in block if op in _DRAWS for word in TABLE[op].written(operands)}
     while True:
         more = {
             operands[0]
@@ -222,7 +208,7 @@ def _draws_matter(program: Program, block: list[Instruction]) -> bool:
     for number, (op, operands) in enumerate(block):
         if op in _VALUES or op in _DRAWS or number + 1 in selected:
             continue
-        used = [position for position in _READ.get(op, (0, 1, 2)) if operands[position] in drawn]
+        used = [position for position in TABLE[op].reads if _reads_at(drawn, op, position, operands)]
         if used and not (op in (Op.SAY, Op.ANSWER) and used == [1] and not _lines_are_triggers(program)):
             return True
     return False
@@ -238,7 +224,15 @@ def _selected(block: list[Instruction]) -> set[int]:
 
 
 def _reads(drawn: set[int], instructions: list[Instruction]) -> bool:
-    return any(operands[position] in drawn for op, operands in instructions for position in _READ[op])
+    return any(
+        _reads_at(drawn, op, position, operands)
+        for op, operands in instructions
+        for position in TABLE[op].reads
+    )
+
+
+def _reads_at(drawn: set[int], op: Op, position: int, operands: tuple[int, int, int]) -> bool:
+    return not drawn.isdisjoint(TABLE[op].read_at(position, operands))
 
 
 def _lines_are_triggers(program: Program) -> bool:

@@ -1,20 +1,23 @@
 """This module turns what a room looks like now into pictures and text, without a display."""
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.envs import tiles
+from socialai_dsl.envs.gestures import Gesture
 from socialai_dsl.envs.tiles import SEEN_LINE, Code, draw_tile
+from socialai_dsl.program import COLORS
 
 _ARROWS: Final = ">v<^"
 _ANSI_COLOURS: Final = (31, 32, 34, 35, 33, 37)
 _SEEN_GROUND: Final = ";48;5;237"
 _RESET: Final = "\x1b[0m"
 _COLOUR_LETTERS: Final = "rgbpye"
-_COLOURLESS: Final = frozenset({tiles.UNSEEN, tiles.LAVA})
+_USUAL: Final = {tiles.UNSEEN: (0, " "), tiles.LAVA: (0, " "), tiles.WALL: (5, "#")}
+"""What needs no letter for its colour in this colour, and what stands there instead."""
 
 # Letters of the text picture; where a status matters it picks from the letters, the last one serves the rest.
 _LETTERS: Final[dict[int, str]] = {
@@ -28,7 +31,7 @@ _LETTERS: Final[dict[int, str]] = {
     tiles.LAVA: "~",
     tiles.SWITCH: "sS",
     tiles.APPLE: "a:",
-    tiles.LEVER: "lJ",
+    tiles.LEVER: "lJj",
     tiles.GENERATOR: "gG",
     tiles.MARBLE: "m",
     tiles.PLATFORM: "pP",
@@ -43,6 +46,7 @@ def draw_grid(
     seen: NDArray[np.bool_] | None = None,
     tile: int = 32,
     below: Mapping[tuple[int, int], Code] | None = None,
+    gestures: Mapping[tuple[int, int], Gesture] | None = None,
 ) -> NDArray[np.uint8]:
     """Draw the room from above.
 
@@ -52,6 +56,7 @@ def draw_grid(
         seen: bool (H, W), the cells in the agent's field of view, tinted and outlined; None marks nothing.
         tile: side of a cell in pixels.
         below: (x, y) -> what lies under the one who stands there, such as a doorway.
+        gestures: (x, y) -> where the NPC there points and what it did last.
 
     Returns:
         uint8 (H * tile, W * tile, 3).
@@ -70,7 +75,8 @@ def draw_grid(
             here = direction % 4 if (column, row) == (x, y) else None
             lit = bool(seen[row, column]) if seen is not None else False
             under = below.get((column, row)) if below else None
-            cells.append(draw_tile(code, here, lit, tile, under))
+            gesture = gestures.get((column, row)) if gestures else None
+            cells.append(draw_tile(code, here, lit, tile, under, gesture))
         rows.append(np.concatenate(cells, axis=1))
     picture = np.concatenate(rows, axis=0)
     if seen is not None:
@@ -106,8 +112,9 @@ def draw_ansi(
 
     The agent and the NPCs show an arrow in their direction of gaze: the agent's stands alone, an NPC's
     follows the letter of its kind (`A` for kind 0). Objects have the first letter of their colour (`e` for
-    grey) before their own: `gD` is a green closed door, `gL` a locked one, `g/` an open one. With `colour`,
-    escape codes show the colours as well, those of NPCs too, and cells of `seen`, bool (H, W), lie on a lighter ground.
+    grey) before their own: `gD` is a green closed door, `gL` a locked one, `g/` an open one, `g>` a marble that rolls
+    to the right. With `colour`, escape codes show the colours as well, those of NPCs too, and cells of `seen`, bool
+    (H, W), lie on a lighter ground.
     """
     _check(codes, seen)
     x, y, direction = agent
@@ -122,20 +129,50 @@ def draw_ansi(
             elif code[0] == tiles.EMPTY:
                 cells.append(_paint(" .", f"2{ground}", colour and bool(ground)))
             else:
-                cells.append(_paint(_letters(code), f"{_ANSI_COLOURS[code[1] % 6]}{ground}", colour))
+                cells.append(_paint(_letters_of(code), f"{_ANSI_COLOURS[code[1] % 6]}{ground}", colour))
         lines.append("".join(cells))
     return "\n".join(lines)
 
 
-def _letters(code: Code) -> str:
+def figures(
+    codes: NDArray[np.uint8],
+    gestures: Mapping[tuple[int, int], Gesture],
+    places: Container[tuple[int, int]] | None = None,
+) -> list[str]:
+    """What the two letters of an NPC do not say, one line each in reading order: `A> 3,1 red, points down`.
+
+    Args:
+        codes: as for `draw_grid`.
+        gestures: (x, y) -> where the NPC there points and what it did last.
+        places: the cells to be told of; None for all.
+    """
+    lines = []
+    for row, column in np.argwhere(codes[..., 0] == tiles.NPC).tolist():
+        if places is not None and (column, row) not in places:
+            continue
+        code, gesture = _code(codes, row, column), gestures.get((column, row))
+        said = [COLORS[code[1] % len(COLORS)], *([gesture.words] if gesture and gesture.words else [])]
+        lines.append(f"{_letters_of(code)} {column},{row} {', '.join(said)}")
+    return lines
+
+
+def letters(codes: NDArray[np.uint8], row: int, column: int) -> str:
+    """The two characters of a cell."""
+    return _letters_of(_code(codes, row, column))
+
+
+def _letters_of(code: Code) -> str:
     kind, colour, status, orientation = code
     if kind == tiles.NPC:
         return chr(ord("A") + status % 26) + _ARROWS[orientation % 4]
     choices = _LETTERS.get(kind, "?")
     letter = choices[min(status, len(choices) - 1)]
-    if kind == tiles.WALL:
-        return "##"
-    return (" " if kind in _COLOURLESS else _COLOUR_LETTERS[colour % 6]) + letter
+    if kind == tiles.MARBLE and status:
+        letter = _ARROWS[orientation % 4]
+    usual = _USUAL.get(kind)
+    if usual is not None and colour == usual[0]:
+        return usual[1] + letter
+    return _COLOUR_LETTERS[colour % 6] + letter
 
 
 def _paint(text: str, style: str, colour: bool) -> str:

@@ -13,7 +13,7 @@ from socialai_dsl.engine.calls import BAD_ACTION, TRUNCATED, Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.actions import encode_action
 from socialai_dsl.envs.panel import Face
-from socialai_dsl.envs.picture import cast_of, coloured_text, frame
+from socialai_dsl.envs.picture import cast_of, coloured_text, frame, plain_text
 from socialai_dsl.envs.recording import Recording
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Register
@@ -225,6 +225,10 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         heard = "\n".join(self._table.heard(0))
         print(f"{text}\n{heard}\n")
         return None
+
+    def plain_text(self) -> str:
+        """The room as text, two characters a cell."""
+        return plain_text(self._table, 0)
 
     def coloured_text(self) -> str:
         """The room as text with escape codes for colours; what the agent has in view has a lighter ground."""

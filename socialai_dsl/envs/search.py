@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from enum import Enum
+from functools import cache
 from typing import Any, Final
 
 import numpy as np
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from socialai_dsl.draws import GOLDEN, MASK, mix
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
+from socialai_dsl.envs.effort import Clock
 from socialai_dsl.envs.relevance import Relevance
 from socialai_dsl.envs.table import Table
 from socialai_dsl.envs.vector_env import ScenarioVectorEnv
@@ -107,7 +109,6 @@ class Search:
         self._table.reset(0, None)
         wanted = [o.success if goals is None else o.name in goals for o in program.outcome_table]
         self._wins = np.array([*wanted, False])
-        self._multipliers = multipliers(len(self._relevance.registers))
 
     def counters(self) -> dict[str, Any]:
         """How often each outcome and rule happened in all that was searched, as `Table.counters`."""
@@ -119,8 +120,12 @@ class Search:
         board: NDArray[np.uint32],
         key: NDArray[np.uint64],
         states: int = STATES,
+        clock: Clock | None = None,
     ) -> Finding:
-        """Search from one state: registers, int16 (R,), board, uint32 (C,), key, uint64 (Key.WORDS,)."""
+        """Search from one state: registers, int16 (R,), board, uint32 (C,), key, uint64 (Key.WORDS,).
+
+        It is undecided as soon as the clock is over.
+        """
         state = self._table.state
         layer = _Layer(
             registers[None, : state.registers.shape[1]].copy(),
@@ -143,7 +148,7 @@ class Search:
                     return Finding(
                         Verdict.SOLVABLE, len(self._parents), self._plan(chosen), True, len(chosen)
                     )
-                if len(self._parents) > states:
+                if len(self._parents) > states or (clock is not None and clock.is_over):
                     return Finding(Verdict.UNDECIDED, len(self._parents), None, False)
             layer = _joined(following, layer)
         return Finding(Verdict.UNSOLVABLE, len(self._parents), None, not self._relevance.chance)
@@ -198,9 +203,7 @@ class Search:
 
     def _digests(self, registers: NDArray[np.int16]) -> NDArray[np.uint64]:
         """One number for each state, (S,): equal for equal states, else almost surely different."""
-        relevant = np.minimum(registers[:, self._relevance.registers], self._relevance.limits)
-        digests: NDArray[np.uint64] = relevant.astype(np.int64).view(np.uint64) @ self._multipliers
-        return digests
+        return digests_of(self._relevance.of_rows(registers))
 
     def _choices_to(self, node: int, choice: int) -> list[int]:
         """What was chosen from the start on."""
@@ -221,8 +224,21 @@ def marks(chances: int) -> NDArray[np.uint64]:
     return np.array([mix(k * GOLDEN) & MASK if k else 0 for k in range(chances)], np.uint64)
 
 
+def digests_of(rows: NDArray[np.int16]) -> NDArray[np.uint64]:
+    """One number for each row of int16 (S, N), uint64 (S,): equal for equal rows, else almost surely different."""
+    words = -(-rows.shape[1] // 4)
+    packed = np.empty((len(rows), 4 * words), np.int16)
+    packed[:, : rows.shape[1]], packed[:, rows.shape[1] :] = rows, 0
+    parts = packed.view(np.uint64) * multipliers(words)
+    parts ^= parts >> np.uint64(32)
+    parts *= multipliers(words + 1)[1:]
+    digests: NDArray[np.uint64] = (parts ^ (parts >> np.uint64(29))).sum(axis=1, dtype=np.uint64)
+    return digests
+
+
+@cache
 def multipliers(count: int) -> NDArray[np.uint64]:
-    """Odd numbers that digests are summed up with."""
+    """Odd numbers that digests are made with."""
     drawn = np.random.default_rng(0).integers(0, 1 << 63, count, np.uint64)
     return drawn * np.uint64(2) + np.uint64(1)
 

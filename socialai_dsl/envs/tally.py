@@ -1,7 +1,7 @@
 """This module counts how often each rule, state and outcome came about while environments were played.
 
 The engine counts rules and outcomes anyway. How often a state was entered follows from the rules that lead to it; which
-entry of `steps` a frame is in is read from its register after each step. A step of training pays for none of it.
+entries of `steps` a frame has gone through, from its register before and after each step. Training pays for none of it.
 """
 
 from __future__ import annotations
@@ -169,12 +169,18 @@ class _Frames:
             entered += np.bincount(registers[:, register], minlength=len(entered))
 
     def moved(self, before: NDArray[np.int16], after: NDArray[np.int16]) -> None:
-        """Count the entries of `steps` that frames have gone to."""
+        """Count the entries of `steps` that frames have gone to.
+
+        In one turn a frame may leave several behind: those that are fulfilled already, and one that ends at once.
+        """
         frames = zip(self.checked.frames, self._states, self._entered, strict=True)
         for frame, register, entered in frames:
-            if frame.steps:
-                gone = before[:, register] != after[:, register]
-                entered += np.bincount(after[gone, register], minlength=len(entered))
+            if not frame.steps:
+                continue
+            old, new = before[:, register].astype(np.int64), after[:, register].astype(np.int64)
+            first = np.where(new > old, old + 1, new)
+            for k in range(len(entered)):
+                entered[k] += np.count_nonzero((old != new) & (first <= k) & (k <= new))
 
     def times(self, counters: list[int]) -> Counter[Part]:
         """How often each part came about, by the engine's counters."""

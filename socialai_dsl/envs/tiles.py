@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.envs.canvas import INK, PAPER, WHITE, Canvas, Rgb, mix
-from socialai_dsl.envs.figures import draw_agent, draw_npc, turn
+from socialai_dsl.envs.figures import draw_agent, draw_gesture, draw_npc, turn
+from socialai_dsl.envs.gestures import Gesture
 
 Code: TypeAlias = tuple[int, int, int, int]
 """A cell as in the observation: type, colour, status, orientation."""
@@ -29,6 +30,7 @@ PALETTE: Final[tuple[Rgb, ...]] = (
     (136, 140, 148),
 )
 LINE: Final[Rgb] = (221, 218, 209)
+_LAVA: Final[Rgb] = (240, 118, 34)
 STONE: Final[Rgb] = (92, 97, 107)
 SEEN_TINT: Final[Rgb] = (255, 226, 138)
 SEEN_LINE: Final[Rgb] = (214, 150, 20)
@@ -36,7 +38,12 @@ SEEN_LINE: Final[Rgb] = (214, 150, 20)
 
 @lru_cache(maxsize=4096)
 def draw_tile(
-    code: Code, agent_direction: int | None, seen: bool, size: int, below: Code | None = None
+    code: Code,
+    agent_direction: int | None,
+    seen: bool,
+    size: int,
+    below: Code | None = None,
+    gesture: Gesture | None = None,
 ) -> NDArray[np.uint8]:
     """Draw one cell.
 
@@ -46,6 +53,7 @@ def draw_tile(
         seen: whether the cell lies in the agent's field of view; such cells are tinted.
         size: side of the tile in pixels.
         below: what lies under it, such as the doorway in which an NPC stands; None for plain floor.
+        gesture: where an NPC points and what it did last; None where that is not shown.
 
     Returns:
         A read-only array, uint8 (size, size, 3).
@@ -56,6 +64,8 @@ def draw_tile(
     for kind, colour, status, orientation in [below, code] if below is not None else [code]:
         draw = _DRAWERS.get(kind, _draw_unknown)
         draw(canvas, PALETTE[colour % len(PALETTE)], status, orientation)
+    if gesture is not None:
+        draw_gesture(canvas, PALETTE[code[1] % len(PALETTE)], code[3], gesture)
     if agent_direction is not None:
         draw_agent(canvas, agent_direction)
     pixels = canvas.pixels()
@@ -177,8 +187,8 @@ def _draw_box(canvas: Canvas, colour: Rgb, status: int, orientation: int) -> Non
 
 
 def _draw_lava(canvas: Canvas, colour: Rgb, status: int, orientation: int) -> None:
-    del colour, status, orientation
-    canvas.fill((240, 118, 34))
+    del status, orientation
+    canvas.fill(_LAVA if colour == PALETTE[0] else mix(_LAVA, colour, 0.6))
     for y in (0.22, 0.5, 0.78):
         wave = [(x / 20, y + 0.06 * math.sin(x / 20 * 4 * math.pi)) for x in range(21)]
         canvas.line(wave, fill=(140, 38, 18), width=0.06)
@@ -200,8 +210,11 @@ def _draw_switch(canvas: Canvas, colour: Rgb, status: int, orientation: int) -> 
 
 def _draw_apple(canvas: Canvas, colour: Rgb, status: int, orientation: int) -> None:
     del orientation
-    if status:  # only the core is left
-        canvas.line([(0.5, 0.3), (0.5, 0.8)], fill=(120, 84, 50), width=0.12)
+    if status:  # only the core is left, and a little peel
+        canvas.ellipse(0.34, 0.28, 0.66, 0.46, fill=colour)
+        canvas.ellipse(0.36, 0.7, 0.64, 0.86, fill=colour)
+        canvas.line([(0.5, 0.3), (0.5, 0.8)], fill=(244, 232, 196), width=0.13)
+        canvas.circle(0.5, 0.55, 0.035, fill=(104, 70, 40))
     else:
         canvas.circle(0.38, 0.56, 0.24, fill=colour)
         canvas.circle(0.62, 0.56, 0.24, fill=colour)
@@ -213,9 +226,14 @@ def _draw_apple(canvas: Canvas, colour: Rgb, status: int, orientation: int) -> N
 
 def _draw_lever(canvas: Canvas, colour: Rgb, status: int, orientation: int) -> None:
     del orientation
-    tip = (0.76, 0.24) if status else (0.24, 0.24)
-    canvas.line([(0.5, 0.7), tip], fill=INK, width=0.08)
-    canvas.circle(*tip, 0.12, fill=colour, outline=_dark(colour), width=0.04)
+    if status < 2:  # down, up
+        tip = (0.76, 0.24) if status else (0.24, 0.24)
+        canvas.line([(0.5, 0.7), tip], fill=INK, width=0.08)
+        canvas.circle(*tip, 0.12, fill=colour, outline=_dark(colour), width=0.04)
+    else:  # spent: broken off, and lying there
+        canvas.line([(0.5, 0.7), (0.56, 0.54)], fill=INK, width=0.08)
+        canvas.line([(0.14, 0.93), (0.6, 0.93)], fill=INK, width=0.06)
+        canvas.circle(0.72, 0.9, 0.09, fill=colour, outline=_dark(colour), width=0.04)
     canvas.rectangle(0.18, 0.66, 0.82, 0.86, fill=STONE, outline=INK, width=0.03, radius=0.05)
 
 

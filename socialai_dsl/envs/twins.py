@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.engine.calls import Task
+from socialai_dsl.envs.rooms import name_of
 from socialai_dsl.envs.table import Table
 from socialai_dsl.envs.values import shown
 from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, VIEW, Field, Flag, Header, Program, Register
@@ -40,11 +41,13 @@ class Compared:
 
     Attributes:
         pairs: how many were played. cued: how many differ first in a cue. leaks: the pairs that differ otherwise.
+        rooms: the rooms of the pairs that differ.
     """
 
     pairs: int
     cued: int
     leaks: tuple[Leak, ...]
+    rooms: tuple[int, ...]
 
 
 def layouts(program: Program, path: str, values: Sequence[int]) -> list[dict[str, Any]]:
@@ -74,12 +77,17 @@ class Twins:
     ) -> None:
         self._program, self._path, self._values = program, path, values
         self._hidden = not checked.names_shown
-        self._by = [entity for entity in checked.entities if _member(entity) in by]
+        self._by = [entity for entity in checked.entities if name_of(checked, entity.number) in by]
         self._before_npcs = bool(program.header(Header.FLAGS) & Flag.PICTURE_BEFORE_NPCS)
         self._table = Table([program], 2 * len(values), 1)
         given = [layout for pair in values.tolist() for layout in layouts(program, path, pair)]
         index = np.repeat(np.arange(len(values)), 2)
         self._table.reset(seed, {"index": index, "layout": given})
+
+    def start(self, room: int) -> tuple[NDArray[np.int16], NDArray[np.uint32], NDArray[np.uint64]]:
+        """How the two of a room begin: registers (2, R), boards (2, C), keys (2, Key.WORDS)."""
+        rows, state = slice(2 * room, 2 * room + 2), self._table.state
+        return state.registers[rows].copy(), state.boards[rows].copy(), state.keys[rows].copy()
 
     def play(self, actions: Actions) -> Compared:
         """Do the same in both of each pair until they differ or one of them ends."""
@@ -87,7 +95,7 @@ class Twins:
         state, ports = self._table.state, self._table.batch.ports
         running = self._same()
         leaks = [self._leak(k, 0) for k in np.flatnonzero(~running).tolist()]
-        cued, step = 0, 0
+        cued, step = list[int](), 0
         while running.any():
             before = state.registers.copy()
             ports.actions[:] = np.repeat(actions(step), 2, axis=0)
@@ -97,10 +105,10 @@ class Twins:
             for k in np.flatnonzero(running & ~self._same()).tolist():
                 running[k] = False
                 if self._is_cue(k, before):
-                    cued += 1
+                    cued.append(k)
                 else:
                     leaks.append(self._leak(k, step))
-        return Compared(pairs, cued, tuple(leaks))
+        return Compared(pairs, len(cued), tuple(leaks), (*cued, *(leak.index for leak in leaks)))
 
     def _leak(self, pair: int, step: int) -> Leak:
         first, second = layouts(self._program, self._path, self._values[pair].tolist())
@@ -155,11 +163,6 @@ class Twins:
             if seen[first + Field.GONE] == 0 and 0 <= ahead < VIEW and abs(right) <= VIEW // 2:
                 cells.append((right + VIEW // 2) * VIEW + VIEW - 1 - ahead)
         return cells
-
-
-def _member(entity: Entity) -> str:
-    """What the cast calls an entity."""
-    return entity.key if entity.index is None else f"{entity.key}[{entity.index}]"
 
 
 def random_actions(program: Program, pairs: int, seed: int) -> Actions:

@@ -90,10 +90,10 @@ def config_of(cell: Cell, seed: int = 0) -> RunConfig:
     options |= dict(cell.options.get("hyper", {}))
     if not cell.trains:
         kept = {name: options[name] for name in OF_ANY_AGENT if name in options}
-        return resolved_config("plain", given | kept | {"frames": 0})
+        return resolved_config(given | kept | {"frames": 0})
     if cell.frames is not None:
         given["frames"] = cell.frames
-    return resolved_config(str(options.pop("recipe", "plain")), given | options)
+    return resolved_config(given | options)
 
 
 def options_of(cell: Cell) -> dict[str, Any]:

@@ -14,14 +14,16 @@ _BONUS_C: Final = {"lang": 7.0, "cell": 3.0}
 _TABLE: Final = Path(__file__).with_name("paper_bonus.yaml")
 
 
-def resolved_config(recipe: str, given: Mapping[str, Any]) -> RunConfig:
-    """The configuration of a run; `bonus` may be `auto`, and its scale is the paper's unless it is given.
+def resolved_config(given: Mapping[str, Any]) -> RunConfig:
+    """The configuration of a run from its options, `recipe` among them.
+
+    `bonus` may be `auto`, and its scale is the paper's unless it is given.
 
     Raises:
         pydantic.ValidationError: see `trainer.config.configure`.
     """
     bonus = resolved_bonus(str(given.get("bonus", "none")), str(given.get("scenario", "")))
-    return configure(recipe, **(bonus | {name: value for name, value in given.items() if name != "bonus"}))
+    return configure(**(bonus | {name: value for name, value in given.items() if name != "bonus"}))
 
 
 def resolved_bonus(kind: str, scenario: str) -> dict[str, Any]:

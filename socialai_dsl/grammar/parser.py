@@ -20,12 +20,15 @@ MAX_DEPTH = 24
 class ParseProblem(Exception):  # noqa: N818 - a finding on its way to a diagnostic, not a failure
     """What is wrong with a string of the language: a code of the catalogue, a message and where.
 
-    Attributes: code, message, offset (0-based, into the parsed string), hint (or None).
+    Attributes: code, message, offset (0-based, into the parsed string), hint (or None), words (several that stand
+    side by side and may be a text; or None).
     """
 
-    def __init__(self, code: str, message: str, offset: int, hint: str | None = None) -> None:
+    def __init__(
+        self, code: str, message: str, offset: int, hint: str | None = None, words: str | None = None
+    ) -> None:
         super().__init__(message)
-        self.code, self.message, self.offset, self.hint = code, message, offset, hint
+        self.code, self.message, self.offset, self.hint, self.words = code, message, offset, hint, words
 
 
 @lru_cache(maxsize=4096)
@@ -235,11 +238,17 @@ def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
         return ParseProblem("S210", "`where` belongs in a place or inside pick(d in group where ...)", offset)
     if token.type == "RPAR":
         return ParseProblem("S202", "something is missing before this bracket", offset)
-    hint = None
+    hint = words = None
     if token.type == "NAME":
+        words = next(found[0] for found in _SEVERAL.finditer(text) if found.start() <= offset < found.end())
         hint = "between two names stands a dot, an operator, or a word such as `and`: `agent.next_to(exit)`"
-    return ParseProblem("S210", f"did not expect `{token}` here", offset, hint)
+    return ParseProblem("S210", f"did not expect `{token}` here", offset, hint, words)
 
+
+_SEVERAL = re.compile(
+    r"\b(?!(?:and|or|not|in|where|to)\b)[\w']+(?: +(?!(?:and|or|not|in|where|to)\b)[\w']+)*"
+)
+"""Words with nothing but blanks between them."""
 
 _WORDS = re.compile(r"\"[^\"]*\"|[<>=!]=|[<>()]|,|\b(?:and|or|not|where|to)\b|[^<>=!()\",\s]+|\s+|.")
 """The pieces of an expression, as far as they say where a comparison begins and ends."""

@@ -15,6 +15,7 @@ from socialai_dsl.loader.document import Data, DataPath, Document, NodeSpan, Sty
 from socialai_dsl.loader.files import FORBIDDEN, checked, display_name, forbidden_character, read_source
 from socialai_dsl.loader.limits import MAX_DEPTH, MAX_EVENTS, MAX_SCALAR
 from socialai_dsl.loader.scalars import read_plain
+from socialai_dsl.loader.texts import value_at
 from socialai_dsl.loader.yaml_errors import explain
 from socialai_dsl.source import Source, Span
 
@@ -192,6 +193,10 @@ class _Builder:
         if style is not Style.PLAIN:
             self._value(text, event, style)
             return
+        meant = value_at(self._path(), text)
+        if meant is not None:
+            self._value(meant, event, style)
+            return
         plain = read_plain(text)
         if plain.code:
             self._error(plain.code, plain.message, self._span(event), plain.hint)
@@ -215,6 +220,16 @@ class _Builder:
             hint = "quote a key that begins with `?`"
             self._error("S001", "not YAML: a key in braces or brackets cannot begin with `?`", span, hint)
 
+    def _path(self) -> DataPath:
+        """The path of the value that comes next."""
+        if not self._stack:
+            return ()
+        frame = self._stack[-1]
+        if isinstance(frame.container, list):
+            return (*frame.path, len(frame.container))
+        assert frame.key is not None, "internal: a value without a key"
+        return (*frame.path, frame.key)
+
     def _value(self, value: Data, event: Any, style: Style) -> DataPath:
         """Put a value where the next one belongs and return its path."""
         start, end = event.start_mark, event.end_mark
@@ -223,17 +238,11 @@ class _Builder:
             self._data = value
             self._spans[()] = NodeSpan(None, span, style, False, start.index, end.index)
             return ()
-        frame = self._stack[-1]
-        container = frame.container
-        path: DataPath
-        if isinstance(container, list):
-            path = (*frame.path, len(container))
-            container.append(value)
+        path, frame = self._path(), self._stack[-1]
+        if isinstance(frame.container, list):
+            frame.container.append(value)
         else:
-            key = frame.key
-            assert key is not None, "internal: a value without a key"
-            path = (*frame.path, key)
-            container[key] = value
+            frame.container[str(path[-1])] = value
         self._spans[path] = NodeSpan(frame.key_span, span, style, frame.flow, start.index, end.index)
         frame.key = frame.key_span = None
         return path

@@ -91,5 +91,6 @@ def _ambiguous(text: str) -> Plain | None:
 
 
 def _refused(text: str, reading: str, otherwise: str | None = None) -> Plain:
-    hint = f'quote it if you mean the text: "{text}"' + (f"; else {otherwise}" if otherwise else "")
+    hint = f'if you mean the text, quote it: "{text}"'
+    hint = f"{otherwise}; {hint}" if otherwise else hint
     return Plain(text, "S003", f"`{text}` is {reading}", hint)

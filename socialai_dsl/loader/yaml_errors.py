@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import Any, Final
 
 from socialai_dsl.diagnostics import Diagnostic
@@ -18,7 +19,7 @@ def explain(error: Exception, source: Source) -> Diagnostic:
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     place = _Place(source, mark)
     context = _Place(source, getattr(error, "context_mark", None) or mark)
-    for explanation in (_unclosed, _colon, _first_character, _after_quote, _layout):
+    for explanation in (_swallowed, _unclosed, _colon, _first_character, _after_quote, _layout):
         found = explanation(problem, place, context)
         if found:
             return found
@@ -44,6 +45,13 @@ class _Place:
     def span(self) -> Span:
         return self._source.span(self.line_number, self.column)
 
+    def lines_to(self, end: _Place) -> Iterator[_Place]:
+        """The lines from this one to that of `end`."""
+        for number in range(self.line_number, end.line_number + 1):
+            place = _Place(self._source, None)
+            place.line_number, place.line = number, self._source.line(number)
+            yield place
+
     def line_above(self) -> _Place:
         """The first character of the line above."""
         above = _Place(self._source, None)
@@ -62,6 +70,34 @@ class _Place:
 
     def finding(self, message: str, hint: str | None = None) -> Diagnostic:
         return Diagnostic("S001", message, self.span, hint=hint)
+
+
+def _swallowed(problem: str, place: _Place, context: _Place) -> Diagnostic | None:
+    """A bracket that stands behind a `#`, where it is part of a comment."""
+    closing = {"{": "}", "[": "]"}.get(context.character)
+    if closing is None:
+        return None
+    for line in context.lines_to(place):
+        start = _comment_in(line.line)
+        if start is not None and closing in line.line[start:]:
+            line.column = start + 1
+            message = f"not YAML: a `#` behind a blank begins a comment, which takes the `{closing}` along"
+            return line.finding(message, "quote the text that the `#` belongs to")
+    return None
+
+
+def _comment_in(line: str) -> int | None:
+    """Where the comment of a line begins."""
+    quote, before = "", ":"
+    for i, character in enumerate(line):
+        if quote:
+            quote = "" if character == quote else quote
+        elif character in _TEXT_QUOTES and before in "[{,:-":
+            quote = character
+        elif character == "#" and line[i - 1 : i] in ("", " ", "\t"):
+            return i
+        before = before if character.isspace() else character
+    return None
 
 
 def _unclosed(problem: str, place: _Place, context: _Place) -> Diagnostic | None:

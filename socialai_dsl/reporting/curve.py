@@ -1,4 +1,4 @@
-"""This module draws a run's learning curve."""
+"""A run's learning curve."""
 
 import json
 import math
@@ -34,6 +34,7 @@ class Curve:
         outcomes: outcome -> its share of those episodes.
         successes: which outcomes are successes.
         test: frames, success rate and both ends of its 95 % interval; None if it was not evaluated.
+        agreement: share of the steps of a guide in which the agent would have done the same; nan where none led.
     """
 
     frames: Sequence[float]
@@ -41,6 +42,7 @@ class Curve:
     outcomes: Mapping[str, Sequence[float]]
     successes: frozenset[str]
     test: tuple[float, float, float, float] | None = None
+    agreement: Sequence[float] = ()
 
 
 def read_curve(
@@ -55,6 +57,7 @@ def read_curve(
         {name: [_number(row["outcomes"].get(name)) for row in rows] for name in names},
         successes,
         test,
+        [_number(row.get("agreement")) for row in rows],
     )
 
 
@@ -108,6 +111,20 @@ def _draw_success(axes: Axes, curve: Curve) -> None:
         linewidth=1.8,
         label="training episodes",
     )
+    led = [
+        frames
+        for frames, agrees in zip(curve.frames, curve.agreement, strict=False)
+        if not math.isnan(agrees)
+    ]
+    if led:
+        axes.axvspan(0, led[-1], color="#f3efe2", zorder=0)
+        axes.plot(
+            curve.frames,
+            curve.agreement,
+            color="#8a7434",
+            linewidth=1.4,
+            label="agrees with the script that leads",
+        )
     if curve.test is not None:
         frames, rate, low, high = curve.test
         axes.errorbar(

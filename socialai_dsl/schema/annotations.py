@@ -101,7 +101,7 @@ def home_of(key: str, owner: type | None) -> str | None:
 
 def model_at(model: type[BaseModel], path: DataPath) -> type[BaseModel] | None:
     """The model of the mapping at `path`; None if there is none."""
-    for part in _unwrapped(annotation_at(model, path)):
+    for part in branches(annotation_at(model, path)):
         if isinstance(part, type) and issubclass(part, BaseModel):
             return part
     return None
@@ -116,7 +116,7 @@ def annotation_at(model: type[BaseModel], path: DataPath) -> Any:
 
 
 def _step(annotation: Any, step: str | int) -> Any:
-    for part in _unwrapped(annotation):
+    for part in branches(annotation):
         origin, arguments = get_origin(part), get_args(part)
         if isinstance(part, type) and issubclass(part, BaseModel):
             for name, field in part.model_fields.items():
@@ -137,21 +137,21 @@ def _step(annotation: Any, step: str | int) -> Any:
     return Any
 
 
-def _unwrapped(annotation: Any) -> Iterator[Any]:
+def branches(annotation: Any) -> Iterator[Any]:
     """The branches of a union, without annotations around them."""
     origin = get_origin(annotation)
     if origin is Annotated:
-        yield from _unwrapped(get_args(annotation)[0])
+        yield from branches(get_args(annotation)[0])
     elif origin in (Union, UnionType):
         for branch in get_args(annotation):
-            yield from _unwrapped(branch)
+            yield from branches(branch)
     else:
         yield annotation
 
 
 def literals(annotation: Any) -> list[object]:
     """The words that a place is limited to."""
-    return [word for part in _unwrapped(annotation) if get_origin(part) is Literal for word in get_args(part)]
+    return [word for part in branches(annotation) if get_origin(part) is Literal for word in get_args(part)]
 
 
 _SCALARS: Final = {int: "a whole number", float: "a number", bool: "`true` or `false`", str: "a text"}
@@ -159,10 +159,10 @@ _SCALARS: Final = {int: "a whole number", float: "a number", bool: "`true` or `f
 
 def expectation(annotation: Any) -> str:
     """What belongs there, in words."""
-    branches = [part for part in _unwrapped(annotation) if part is not type(None)]
-    if {int, bool, str} <= set(map(_hashable, branches)):
+    parts = [part for part in branches(annotation) if part is not type(None)]
+    if {int, bool, str} <= set(map(_hashable, parts)):
         return "an expression"
-    for part in branches:
+    for part in parts:
         if part in _SCALARS:
             return _SCALARS[part]
         if isinstance(part, type) and issubclass(part, BaseModel):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Final
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, StringConstraints
+from pydantic import BaseModel, BeforeValidator, ConfigDict, StringConstraints, WithJsonSchema
 from pydantic.config import JsonDict
 
 
@@ -26,8 +26,21 @@ WORD_SCHEMA: Final[JsonDict] = {"pattern": "^[A-Za-z_][A-Za-z0-9_]*$", "maxLengt
 Expression = int | bool | str
 """The source of an expression; a bare number or truth value may be written without quotes."""
 
-TextLine = Annotated[str, StringConstraints(min_length=1, max_length=500)]
+_Text = Annotated[str, StringConstraints(min_length=1, max_length=500)]
+
+# The loader makes texts of plain numbers, `true` and `null` where a text is expected.
+_Null = Annotated[None, WithJsonSchema({"enum": [None]})]
+TextLine = Annotated[_Text, as_written(_Text | float | bool | _Null)]
 """A text that somebody can say, possibly with <...> parts."""
+
+Prose = Annotated[str, as_written(str | float | bool)]
+"""A text for people."""
+
+StateName = Annotated[Word, as_written(Word | bool | _Null)]
+"""The name of a state."""
+
+ExpressionOrText = Annotated[Expression, as_written(Expression | float | _Null)]
+"""The source of an expression, or a text."""
 
 
 def _one_or_many(value: Any) -> Any:

@@ -9,8 +9,11 @@ from pydantic import BeforeValidator, ConfigDict, Field
 from socialai_dsl.schema.base import (
     WORD_SCHEMA,
     Expression,
+    ExpressionOrText,
     Expressions,
     Model,
+    Prose,
+    StateName,
     TextLine,
     Texts,
     Word,
@@ -65,8 +68,8 @@ class WorldRule(Model):
 class ThenRule(Rule):
     """A rule read after the body action."""
 
-    goto: Word | None = Field(None, description="the state from the next step on")
-    goto_now: Word | None = Field(
+    goto: StateName | None = Field(None, description="the state from the next step on")
+    goto_now: StateName | None = Field(
         None, description="the state from now on: its `then` is still read in this step"
     )
 
@@ -94,7 +97,7 @@ class State(Model):
 class Step(Effects):
     """One entry of `steps`: an activity until it is finished, then its effects."""
 
-    state: Word | None = Field(None, description="a name for npc.is(name)")
+    state: StateName | None = Field(None, description="a name for npc.is(name)")
     do: str | None = Field(None, description="an activity, until it is finished", examples=["go_to(exit)"])
     until: Expression | None = Field(None, description="a condition that finishes the step")
     for_: Expression | None = Field(None, alias="for", description="number of steps, or `ever`")
@@ -119,7 +122,7 @@ class Frame(Model):
         default_factory=dict, description="registers, one copy per NPC"
     )
     define: dict[str, Expression] = Field(default_factory=dict, description="recomputed at every use")
-    start: Word | None = Field(None, description="the first state; default the first written")
+    start: StateName | None = Field(None, description="the first state; default the first written")
     states: dict[Word, State] | None = Field(
         None, description="name: what is noticed and done in this state of the interaction"
     )
@@ -151,7 +154,9 @@ class Character(Model):
 
     role: Word | None = Field(None, description="the part it plays")
     kind: Word | None = Field(None, description="what it looks like; default peer")
-    name: Expression | None = Field(None, description="what precedes its lines; default its key, capitalised")
+    name: ExpressionOrText | None = Field(
+        None, description="what precedes its lines; default its key, capitalised"
+    )
     color: Expression | None = Field(None, description="default random")
     place: str | None = Field(None, description="default anywhere")
     at: Annotated[tuple[Expression, ...], BeforeValidator(_as_tuple)] | None = Field(
@@ -161,7 +166,9 @@ class Character(Model):
     view: int | None = Field(None, ge=1, le=15, description="side of the square it sees; default 7")
     earshot: Expression | None = Field(None, description="how far its voice carries")
     frame: Word | None = Field(None, description="the frame it follows; default none: it stays")
-    with_: dict[Word, Expression] = Field(default_factory=dict, alias="with", description="fills the slots")
+    with_: dict[Word, ExpressionOrText] = Field(
+        default_factory=dict, alias="with", description="fills the slots"
+    )
     beliefs: dict[Word, Belief] = Field(default_factory=dict, description="what it takes for true")
     audible: Literal["always"] | None = Field(None, description="heard even while NPCs are hidden")
     kind_code: int | None = Field(None, ge=0, le=255, description="status code in the image")
@@ -172,8 +179,8 @@ class Npc(Character):
 
     npc: Word = Field(description="the name of this file's NPC")
     abstract: bool = Field(False, description="others build on it by `extends`; nobody can be it")
-    about: str | None = Field(None, description="one sentence for people")
-    notes: str | None = Field(None, description="more for people")
+    about: Prose | None = Field(None, description="one sentence for people")
+    notes: Prose | None = Field(None, description="more for people")
     frames: dict[Word, Frame] = Field(default_factory=dict, description="the frames it brings along")
 
 
@@ -207,7 +214,7 @@ class CastGroup(CastMember):
     """
 
     count: int = Field(ge=1, le=16, description="a group of so many")
-    name: Annotated[Expression | None, as_written(Expression | list[Expression])] = Field(
+    name: Annotated[Expression | None, as_written(ExpressionOrText | None | list[ExpressionOrText])] = Field(
         None, description="what precedes its lines; a list gives one each"
     )
     color: Annotated[Expression | None, as_written(Expression | list[Expression])] = Field(

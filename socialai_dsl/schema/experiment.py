@@ -15,7 +15,7 @@ from pydantic import (
     create_model,
 )
 
-from socialai_dsl.schema.base import Model, Word, _as_tuple, _one_or_many
+from socialai_dsl.schema.base import Model, Prose, Word, _as_tuple, _one_or_many
 from socialai_dsl.schema.suite import MemberName
 from trainer.config import FLAGS, HYPER, RunConfig
 
@@ -40,7 +40,7 @@ class Reference(Model):
 
     mean: float | int = Field(description="share of successful test episodes, mean over seeds", ge=0, le=1)
     std: float | int | None = Field(None, description="its standard deviation over seeds", ge=0, le=1)
-    note: str | None = Field(None, description="what has to be known to compare")
+    note: Prose | None = Field(None, description="what has to be known to compare")
     source: str | None = Field(None, description="where the figure stands")
 
 
@@ -201,7 +201,7 @@ OverrideList = Annotated[tuple[Override, ...], BeforeValidator(_as_tuple), Field
 class Profile(Model):
     """A size in which the experiment can be run; what it says wins over everything else in the file."""
 
-    about: str | None = Field(None, description="one sentence for people")
+    about: Prose | None = Field(None, description="one sentence for people")
     set: Settings | None = Field(None, description="settings of all conditions of the file")
     overrides: OverrideList = Field((), description="other settings for some of them; later ones win")
     conditions: ConditionList = Field(
@@ -213,8 +213,8 @@ class Experiment(Model):
     """What to run, as a whole."""
 
     experiment: Word = Field(description="the name of the experiment, and of its folder")
-    about: str | None = Field(None, description="one sentence for people")
-    notes: str | None = Field(None, description="more for people")
+    about: Prose | None = Field(None, description="one sentence for people")
+    notes: Prose | None = Field(None, description="more for people")
     set: Settings | None = Field(None, description="settings of all conditions that say nothing else")
     conditions: Annotated[ConditionList, Field(min_length=1)] = Field(
         description="conditions and grids of them"

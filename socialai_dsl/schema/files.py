@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from pydantic import Field, JsonValue
 
-from socialai_dsl.schema.base import Model
+from socialai_dsl.schema.base import Model, Prose
 from socialai_dsl.schema.behaviour import Npc
 from socialai_dsl.schema.experiment import Experiment
 from socialai_dsl.schema.scenario import Scenario
@@ -46,9 +46,9 @@ class VariantFile(Model):
 
     variant: str = Field(description="the name of the variant")
     of: str = Field(description="the file it is a variant of, or `any`", examples=["talkitout.yaml", "any"])
-    about: str | None = Field(None, description="one sentence for people")
-    notes: str | None = Field(None, description="more for people")
-    skills: list[str] = Field(default_factory=list, description="what it asks of an agent, for people")
+    about: Prose | None = Field(None, description="one sentence for people")
+    notes: Prose | None = Field(None, description="more for people")
+    skills: list[Prose] = Field(default_factory=list, description="what it asks of an agent, for people")
     remove: list[str] = Field(
         default_factory=list, description="paths of what is removed", examples=[["cast.liar"]]
     )

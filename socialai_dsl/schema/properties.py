@@ -29,7 +29,7 @@ class OnlyThrough(Model):
 
 
 class Property(Model):
-    """One property: exactly one of `reachable`, `never`, `within`, `oracle`, `needs` and `only_through`."""
+    """One property: exactly one of `reachable`, `never`, `within`, `oracle`, `needs`, `only_through` and `knowable`."""
 
     reachable: Expression | None = Field(None, description="a condition, or the name of an outcome")
     never: Expression | None = Field(None, description="a condition, or the name of an outcome")
@@ -37,7 +37,11 @@ class Property(Model):
     oracle: Probability | None = Field(None, description="share of rooms that the variant `oracle` solves")
     needs: Names | None = Field(None, description="members without whom one can only guess")
     only_through: OnlyThrough | None = Field(None, description="whose cues alone may show what was drawn")
+    knowable: bool | None = Field(
+        None,
+        description="whether an agent can perceive in time what its success depends on (tried by default)",
+    )
     share: Probability | None = Field(
-        None, description="least share of rooms, for `reachable`, `within` and `needs`"
+        None, description="least share of rooms, for `reachable`, `within`, `needs` and `knowable`"
     )
     draw: Word | None = Field(None, description="for `needs`: the `let` that has to be guessed")

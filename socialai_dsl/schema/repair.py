@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from socialai_dsl.diagnostics import DiagnosticBag
-from socialai_dsl.schema.behaviour import FirstRule, ThenRule, WorldRule
+from socialai_dsl.schema.behaviour import FirstRule, Step, ThenRule, WorldRule
 from socialai_dsl.schema.positions import DataPath, Positions
 from socialai_dsl.source import Span
 
-_KEYS = {key for model in (FirstRule, ThenRule, WorldRule) for key in model.model_fields}
+_KEYS = {key for model in (FirstRule, ThenRule, Step, WorldRule) for key in model.model_fields}
 """Keys of rules, which are mostly written inside { }."""
 
 
@@ -21,12 +21,12 @@ class Repaired:
 
     Attributes:
         data: the document, changed.
-        renamed: path as it is now -> the key it is written under.
+        moved: path as it is now -> where it is written.
         lost: paths of parts that were left out although they may have meant something.
     """
 
     data: Any
-    renamed: dict[DataPath, str] = field(default_factory=dict)
+    moved: dict[DataPath, DataPath] = field(default_factory=dict)
     lost: list[DataPath] = field(default_factory=list)
 
     def rename(self, path: DataPath, key: str) -> bool:
@@ -37,8 +37,13 @@ class Repaired:
         entries = [(key if k == path[-1] else k, value) for k, value in parent.items()]
         parent.clear()
         parent.update(entries)
-        self.renamed[(*path[:-1], key)] = str(path[-1])
+        self.moved[(*path[:-1], key)] = written(path, self.moved)
         return True
+
+    def move(self, path: DataPath, to: DataPath) -> None:
+        """Read the entry at `path` as if it were written at `to`, in a mapping that has no such key."""
+        part_at(self.data, to[:-1])[to[-1]] = part_at(self.data, path[:-1]).pop(path[-1])
+        self.moved[to] = written(path, self.moved)
 
     def leave_out(self, path: DataPath) -> None:
         """Go on without the entry at `path`; an item of a list stays, since the others are known by their number."""
@@ -122,8 +127,11 @@ def _join_cut_values(
 
 
 def _looks_cut(key: str, before: str, path: DataPath, places: Positions) -> bool:
-    inside = places.in_flow((*path, key))
-    return inside and (not key.isidentifier() or before.count("(") > before.count(")"))
+    """Whether a key without a value is the rest of the value before it."""
+    if not places.in_flow((*path, key)):
+        return False
+    in_text = path[-1:] == ("with",) or (isinstance(path[-1], int) and key not in _KEYS) if path else False
+    return in_text or not key.isidentifier() or before.count("(") > before.count(")")
 
 
 def _report_nothing(path: DataPath, places: Positions, bag: DiagnosticBag) -> None:
@@ -132,28 +140,33 @@ def _report_nothing(path: DataPath, places: Positions, bag: DiagnosticBag) -> No
     bag.error("S104", what, places.key_span(path), hint="write a value, or leave the key out")
 
 
+def written(path: DataPath, moved: Mapping[DataPath, DataPath]) -> DataPath:
+    """Where the part that is now at a path is written."""
+    for length in range(len(path), 0, -1):
+        if path[:length] in moved:
+            return (*moved[path[:length]], *path[length:])
+    return path
+
+
 @dataclass(frozen=True)
-class RenamedPlaces:
-    """Positions of a document some of whose keys are read under another name."""
+class MovedPlaces:
+    """Positions of a document some of whose entries are read as if they were written elsewhere."""
 
     places: Positions
-    renamed: Mapping[DataPath, str]
+    moved: Mapping[DataPath, DataPath]
 
     def locate(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
         """The place of a character of the text at `path`."""
-        return self.places.locate(self._written(path), offset, width)
+        return self.places.locate(written(path, self.moved), offset, width)
 
     def value_span(self, path: DataPath) -> Span:
         """The place of the value at `path`."""
-        return self.places.value_span(self._written(path))
+        return self.places.value_span(written(path, self.moved))
 
     def key_span(self, path: DataPath) -> Span:
         """The place of the key at `path`."""
-        return self.places.key_span(self._written(path))
+        return self.places.key_span(written(path, self.moved))
 
     def in_flow(self, path: DataPath) -> bool:
         """Whether the part at `path` stands inside { } or [ ]."""
-        return self.places.in_flow(self._written(path))
-
-    def _written(self, path: DataPath) -> DataPath:
-        return tuple(self.renamed.get(path[: i + 1], step) for i, step in enumerate(path))
+        return self.places.in_flow(written(path, self.moved))

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, StringConstraints
 
-from socialai_dsl.schema.base import Expression, Model, Word, _as_tuple, as_written
+from socialai_dsl.schema.base import Expression, ExpressionOrText, Model, Prose, Word, _as_tuple, as_written
 from socialai_dsl.schema.behaviour import (
     CastMember,
     Character,
@@ -93,9 +93,9 @@ class Scenario(Model):
 
     scenario: Word = Field(description="the name of the scenario")
     abstract: bool = Field(False, description="others build on it by `extends`; it cannot be run itself")
-    about: str | None = Field(None, description="one sentence for people")
-    notes: str | None = Field(None, description="more for people")
-    skills: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = Field(
+    about: Prose | None = Field(None, description="one sentence for people")
+    notes: Prose | None = Field(None, description="more for people")
+    skills: Annotated[tuple[Prose, ...], BeforeValidator(_as_tuple)] = Field(
         (), description="what it asks of an agent, for people"
     )
     horizon: int = Field(100, ge=1, le=10_000, description="the episode ends at t == horizon")
@@ -126,7 +126,7 @@ class Scenario(Model):
     state: dict[Word, Expression | Ranged] = Field(
         default_factory=dict, description="registers of the world, set by rules and by any frame"
     )
-    tables: dict[Word, dict[str, Expression] | str] = Field(
+    tables: dict[Word, dict[str, ExpressionOrText] | str] = Field(
         default_factory=dict, description="name: {key: value}, or permuted(table): name(key) looks a value up"
     )
     memory: dict[Word, Memory] = Field(default_factory=dict, description="what the agent did last")

@@ -21,8 +21,9 @@ from socialai_dsl.schema.annotations import (
     model_at,
 )
 from socialai_dsl.schema.behaviour import Npc, Ranged, State, ThenRule
+from socialai_dsl.schema.indentation import mend_indentation
 from socialai_dsl.schema.positions import DataPath, Positions
-from socialai_dsl.schema.repair import RenamedPlaces, Repaired, copied, fill_gaps, part_at
+from socialai_dsl.schema.repair import MovedPlaces, Repaired, copied, fill_gaps, part_at
 from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.source import Span
 
@@ -69,22 +70,34 @@ def model_of(
             scenario will give it.
     """
     repaired = Repaired(copied(data))
-    fill_gaps(repaired, places, bag)
+    known = len(bag)
+    made = _tried(model, repaired.data)
+    if made is None:
+        mend_indentation(model, repaired, places, bag)
+    found: Positions = MovedPlaces(places, repaired.moved)
+    fill_gaps(repaired, found, bag)
+    if made is not None and len(bag) == known:
+        return Shaped(made, repaired.data, places, False)
     try:
-        made: M | None = _made(model, repaired.data)
+        made = _made(model, repaired.data)
     except ValidationError as error:
-        _Report(model, repaired, places, bag, partial, parameters).add_all(error)
-        made = None
-        with suppress(ValidationError):
-            made = _made(model, repaired.data)
+        _Report(model, repaired, found, bag, partial, parameters).add_all(error)
+        made = _tried(model, repaired.data)
     lost = any(_matters(path) for path in repaired.lost)
-    kept: Positions = RenamedPlaces(places, repaired.renamed) if repaired.renamed else places
+    kept = found if repaired.moved else places
     return Shaped(made, repaired.data, kept, lost)
 
 
 def _made(model: type[M], data: object) -> M:
     """The model of data; a field that has an alias (`for`, `with`) is known by that alone."""
     return model.model_validate(data, by_alias=True, by_name=False)
+
+
+def _tried(model: type[M], data: object) -> M | None:
+    """The model of data; None if the data has mistakes."""
+    with suppress(ValidationError):
+        return _made(model, data)
+    return None
 
 
 _INDIFFERENT: Final = frozenset(
@@ -260,7 +273,8 @@ class _Report:
         span = self._places.value_span(finding.path)
         for finding in findings:
             if finding.kind in ("greater_than_equal", "less_than_equal", "greater_than", "less_than"):
-                self._bag.error("S106", f"`{finding.value}` is {_bound(finding)}", span)
+                hint = _as_share(finding.value, finding.context.get("le"))
+                self._bag.error("S106", f"`{finding.value}` is {_bound(finding)}", span, hint=hint)
                 return
             if finding.kind in ("too_short", "too_long", "string_too_short", "string_too_long"):
                 self._bag.error("S106", _length(finding), span)
@@ -276,7 +290,7 @@ class _Report:
         got = _kind_of(finding.value)
         key = next((str(part) for part in reversed(finding.path) if isinstance(part, str)), "")
         what = f"`{key}` is {expected}" if key else f"{expected} is expected"
-        self._bag.error("S104", f"{what}, here is {got}", span, hint=_cure(finding.value))
+        self._bag.error("S104", f"{what}, here is {got}", span, hint=_cure(key, expected, finding.value))
 
     def _literal(self, finding: _Finding, span: Span) -> None:
         annotation = annotation_at(self._model, finding.path)
@@ -317,6 +331,13 @@ def _bound(finding: _Finding) -> str:
     return f"too large; at most {context.get('le', context.get('lt'))} is expected"
 
 
+def _as_share(value: object, most: object) -> str | None:
+    """What a number in per cent is where a share is expected."""
+    if most != 1 or not isinstance(value, int | float) or not 2 <= value <= 100:
+        return None
+    return f"it is a share, not per cent: write {value / 100:g}"
+
+
 def _length(finding: _Finding) -> str:
     context = finding.context
     key = next((str(part) for part in reversed(finding.path) if isinstance(part, str)), "this")
@@ -328,11 +349,21 @@ def _length(finding: _Finding) -> str:
     return f"`{key}` is empty"
 
 
-def _cure(value: object) -> str | None:
+_RANGES: Final = ("size", "width", "height", "range")
+_ASSIGNMENT: Final = re.compile(r"\s*(\w+)\s*=\s*([^=].*)")
+
+
+def _cure(key: str, expected: str, value: object) -> str | None:
+    """What to write in place of a value of a wrong kind."""
     if isinstance(value, list) and len(value) == 2 and all(type(item) is int for item in value):
-        return f"a range is written {value[0]}..{value[1]}"
-    if isinstance(value, list):
+        interval = f"{value[0]}..{value[1]}"
+        return f"a range is written {interval}" if key in _RANGES else f"`pick({interval})` draws one of them"
+    if isinstance(value, list) and expected == "a text":
+        return "a text in brackets has to be quoted"
+    if isinstance(value, list) and expected == "an expression":
         return "conditions are joined with `and` or `or`, alternatives are written a | b"
+    if isinstance(value, str) and (assigned := _ASSIGNMENT.fullmatch(value)):
+        return f"write `{key}: {{{assigned[1]}: {assigned[2]}}}`" if "mapping" in expected else None
     if isinstance(value, dict):
         return "a value with `{ }` or a colon in it has to be quoted"
     return None

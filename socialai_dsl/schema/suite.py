@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, JsonValue, StringConstraints, Tag
 
-from socialai_dsl.schema.base import WORD_SCHEMA, Model, Word, _as_tuple
+from socialai_dsl.schema.base import WORD_SCHEMA, Model, Prose, Word, _as_tuple
 from socialai_dsl.schema.scenario import Primitive
 from socialai_dsl.schema.world import UtteranceGrammar
 
@@ -52,7 +52,7 @@ class Value(Changes):
     model_config = ConfigDict(extra="allow", json_schema_extra={"propertyNames": WORD_SCHEMA})
     __pydantic_extra__: dict[Word, Values]
 
-    about: str | None = Field(None, description="one sentence for people")
+    about: Prose | None = Field(None, description="one sentence for people")
     scenario: MemberName | None = Field(None, description="what is played; deeper ones replace it")
 
 
@@ -87,9 +87,9 @@ class Suite(Model):
     """Several scenarios with one action space; each episode plays one of them."""
 
     suite: Word = Field(description="the name of the suite")
-    about: str | None = Field(None, description="one sentence for people")
-    notes: str | None = Field(None, description="more for people")
-    skills: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = Field(
+    about: Prose | None = Field(None, description="one sentence for people")
+    notes: Prose | None = Field(None, description="more for people")
+    skills: Annotated[tuple[Prose, ...], BeforeValidator(_as_tuple)] = Field(
         (), description="what it asks of an agent, for people"
     )
     draw: Literal["uniform", "in_sequence"] = Field(

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from socialai_dsl.schema.base import Expression, Expressions, Model, TextLine, Word, _as_tuple
+from socialai_dsl.schema.base import Expression, Expressions, Model, StateName, TextLine, Word, _as_tuple
 
 
 class Room(Model):
@@ -42,7 +42,7 @@ class ObjectGroup(Model):
         | None
     ) = Field(None, description="[x, y], or a list of them: a group")
     color: Expressions | None = Field(None, description="a colour, `random`, `distinct`, or one each")
-    state: Word | None = Field(None, description="initial status; default the type's")
+    state: StateName | None = Field(None, description="initial status; default the type's")
     pressed: Expression | None = Field(None, description="whether it is pressed at first")
     opened: Expression | None = Field(None, description="whether it is opened at first")
     locked: Expression | None = Field(None, description="computed: it is locked while this holds")

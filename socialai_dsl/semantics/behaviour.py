@@ -290,7 +290,7 @@ class _Planner:
         doing = self._activity((*path, "do"), step.do, address)
         name = f"{self.played.member}.{self.played.name}.steps[{index}]"
         self.resolver.readings.entries[name] = step
-        duration = self._duration((*path, "for"), step.for_)
+        duration, lasted = self._duration((*path, "for"), step.for_, f"{address}.for")
         head = (step.do or "").partition("(")[0].strip()
         endless = doing is not None and (doing.name in _ENDLESS or head in _ENDLESS)
         if step.do is not None and step.until is None and step.for_ is None and endless:
@@ -304,23 +304,35 @@ class _Planner:
             span=self.resolver.findings.places.value_span(path),
             until=self._condition((*path, "until"), step.until, address),
             duration=duration,
+            lasted=lasted,
             sets=self._sets(step, path, address),
             causes=self._causes(step, path, address),
             say=self.spoken.lines.get(path),
         )
 
-    def _duration(self, path: DataPath, raw: object) -> int | None:
+    def _duration(self, path: DataPath, raw: object, site: str) -> tuple[int | None, Sited | None]:
+        """For how many turns an entry lasts; a number that is not known becomes a condition on the clock."""
         if raw is None:
-            return None
+            return None, None
         if raw == "ever":
-            return _FOR_EVER
-        findings = self.resolver.findings
+            return _FOR_EVER, None
+        findings, horizon = self.resolver.findings, self.resolver.symbols.scenario.horizon
         try:
-            term = self.resolver.written(path, raw, _INT, _scope(self.played, path, ""))  # type: ignore[arg-type]
+            term = self.resolver.written(path, raw, _INT, self._scope(path, site))  # type: ignore[arg-type]
         except FailedError:
-            return None
-        if not isinstance(term, Const) or not 0 <= term.value <= self.resolver.symbols.scenario.horizon:
-            message = "`for` is a known number of steps within the horizon, or `ever`"
+            return None, None
+        if isinstance(term, Const):
+            if 0 <= term.value <= horizon:
+                return term.value, None
+            message = f"`for` is a number of turns within the horizon, 0 to {horizon}, or `ever`"
             findings.error("S106", message, findings.at(path))
-            return None
-        return term.value
+            return None, None
+        if term.type.low < 1:
+            message = (
+                f"`for` can be {term.type.low} here; a number that is not known beforehand is at least 1"
+            )
+            findings.error("S106", message, findings.at(path), hint=f"write `max(1, {raw})`")
+            return None, None
+        clock = Read(Type("int", 0, horizon), f"{self.played.member}.clock")
+        lasted = Compare("<=", term, clock)
+        return None, Sited(lasted, f"{self.played.member}/{site}", findings.at(path))

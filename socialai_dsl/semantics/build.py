@@ -25,6 +25,8 @@ TRUE = Const(BOOL, 1)
 FALSE = Const(BOOL, 0)
 NOTED = "prev."
 """How the registers begin that `prev` notes values in."""
+LARGEST = 1 << 62
+"""Greatest magnitude of a number in an expression: what 64 bits hold, with room for things that are out of the room."""
 
 
 def integer(low: int, high: int | None = None) -> Type:

@@ -9,7 +9,7 @@ from operator import itemgetter
 from typing import Final
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, did_you_mean
-from socialai_dsl.schema import PRIMITIVES, Scenario
+from socialai_dsl.schema import PRIMITIVES, Scenario, Sequence
 from socialai_dsl.schema.base import Expression
 from socialai_dsl.schema.positions import DataPath, Positions
 from socialai_dsl.schema.world import CHANNELS
@@ -25,15 +25,17 @@ from socialai_dsl.semantics import (
     tables,
     world,
 )
+from socialai_dsl.semantics.absence import check_absences
 from socialai_dsl.semantics.emptiness import check_placements
 from socialai_dsl.semantics.entities import AGENT, Prelude
 from socialai_dsl.semantics.findings import Findings, Scalar, surviving
 from socialai_dsl.semantics.inhabitants import entities_of
+from socialai_dsl.semantics.possible import check_possible
 from socialai_dsl.semantics.properties import properties
 from socialai_dsl.semantics.ranges import Ranges
 from socialai_dsl.semantics.resolve import Resolver
 from socialai_dsl.semantics.room import room_plan, room_sizes
-from socialai_dsl.semantics.scope import PlayedFrame, at_every_step, reset_scope
+from socialai_dsl.semantics.scope import PlayedFrame, at_every_step, frames_of, reset_scope
 from socialai_dsl.semantics.sequences import performs
 from socialai_dsl.semantics.terms import BOOL, Checked, Const, FramePlan, Line, OutcomePlan, Sited, Type
 from socialai_dsl.semantics.utterances import MAX_TEXTS, number_of_texts, texts_of
@@ -113,6 +115,13 @@ def _without_consequences(found: DiagnosticBag, scenario: Scenario) -> Iterator[
     return (d for d in found if d.code not in follow)
 
 
+def _definitions(scenario: Scenario) -> Iterator[DataPath]:
+    """Where the definitions of a scenario and of its frames stand."""
+    yield from (("define", key) for key in scenario.define)
+    for path, frame in frames_of(scenario):
+        yield from ((*path, "define", key) for key in frame.define)
+
+
 @dataclass(frozen=True)
 class _Spoken:
     """What the members say: by member, the frame it plays and its lines."""
@@ -174,6 +183,7 @@ class _Run:
             return None
         for plan in plans:
             shadowing.check_shadowed(plan, findings)
+        self._report_unused()
         names = [resolver.registers.read(f"{member}.name") for member in self._symbols.cast]
         words = words_in_order(scenario.grammar, names, spoken.lines(self._symbols.cast))
         made = Checked(
@@ -205,7 +215,8 @@ class _Run:
             properties=claimed,
             readings=resolver.readings,
         )
-        check_placements(made, findings)
+        check_absences(made, findings, check_placements(made, findings))
+        check_possible(made, findings)
         return made
 
     def _spoken(self) -> _Spoken:
@@ -250,6 +261,22 @@ class _Run:
                         self._symbols, self._findings, npc, name, frame, path, looked_at=True
                     )
                 )
+
+    def _report_unused(self) -> None:
+        """Definitions and draws that nothing uses (W317), in a scenario that is written in one file: those of several
+        may be there for what else is built of these files.
+        """
+        places, scenario = self._findings.places, self._scenario
+        drawn = [key for key, value in scenario.let.items() if not isinstance(value, Sequence)]
+        paths: list[DataPath] = [*(("let", key) for key in drawn), *_definitions(scenario)]
+        parts: list[DataPath] = [(name,) for name in scenario.model_fields_set]
+        if len({places.key_span(path).file for path in (*parts, *paths)}) > 1:
+            return
+        for path in paths:
+            if path not in self.resolver.used:
+                name = str(path[-1]).partition("(")[0].strip()
+                hint = "delete it, or use it where it was meant"
+                self._findings.warning("W317", f"nothing uses `{name}`", places.key_span(path), hint=hint)
 
     def _look_at(self, frame: PlayedFrame) -> None:
         remembered = self.resolver.registers.remembered

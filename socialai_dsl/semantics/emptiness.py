@@ -11,7 +11,7 @@ from typing import Final
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.findings import Findings
-from socialai_dsl.semantics.geometry import EXACT, Cell, Size, UnknownError, interior_cells, value
+from socialai_dsl.semantics.geometry import EXACT, Cell, Size, UnknownError, interior_cells, value, wall_cells
 from socialai_dsl.semantics.terms import Checked, Const, Placing, Region, Term
 
 _AROUND: Final = ((0, -1), (0, 1), (-1, 0), (1, 0))
@@ -22,14 +22,15 @@ _TAKES_AWAY: Final = {"at": 1, "in_front_of": 1, "next_to": 4}
 """How many cells at most `not here.TEST(x)` excludes for each x."""
 
 
-def check_placements(checked: Checked, findings: Findings) -> None:
+def check_placements(checked: Checked, findings: Findings) -> frozenset[int]:
     """Report S601: an error where no room of a size has a cell for something, a warning where some may have none.
 
-    Sizes are looked at from the smallest on, as far as a fixed effort goes.
+    Sizes are looked at from the smallest on, as far as a fixed effort goes. Returns the entities whose cells depend on
+    more than that.
     """
     certain: dict[str, tuple[Placing, Size, Sequence[int]]] = {}
     possible: dict[str, tuple[Placing, Size, Sequence[int]]] = {}
-    effort = _Effort()
+    effort, undecided = _Effort(), set[int]()
     for size in product(_sizes(checked.room.width), _sizes(checked.room.height)):
         room = _Room(checked, size, effort)
         crowded = False
@@ -38,6 +39,8 @@ def check_placements(checked: Checked, findings: Findings) -> None:
             if key in certain or _is_sure(placing):
                 continue
             most, least = room.cells_for(number)
+            if number in room.unknown:
+                undecided.add(placing.entity)
             if least > 0:
                 continue
             rivals: Sequence[int] = room.rivals(number) if room.has_cells(number) else ()
@@ -51,6 +54,8 @@ def check_placements(checked: Checked, findings: Findings) -> None:
     # Once for a group, of which the last ones lack a cell.
     for key, (placing, size, rivals) in (possible | certain).items():
         _report(checked, findings, placing, size, rivals, key in certain)
+    reported = possible | certain
+    return frozenset(number for number in undecided if checked.entities[number].key not in reported)
 
 
 def _is_sure(placing: Placing) -> bool:
@@ -121,6 +126,7 @@ class _Room:
         self._effort = effort
         self.placings = [item for item in checked.setup if isinstance(item, Placing)]
         self._places = _Places(self.placings)
+        self.unknown: set[int] = set()
         self._cells: dict[int, tuple[int, int]] = {}
         self._counted = 0
         self._put_down: Counter[int] = Counter()
@@ -147,6 +153,7 @@ class _Room:
                 return 0, 0
             rivals = self.rivals(number)
         except UnknownError:
+            self.unknown.add(number)
             return 1, 1
         if cells is None:
             return least, least - excluded - len(rivals)
@@ -253,12 +260,8 @@ class _Room:
 
     def _wall(self, region: Region) -> set[Cell]:
         width, height = self.size
-        along = {"top": width, "bottom": width, "left": height, "right": height}
         # Of a wall that is drawn, the shorter is looked at.
-        side = region.side or ("top" if width <= height else "left")
-        places = range(region.margin, along[side] - region.margin)
-        at = {"top": 0, "bottom": height - 1, "left": 0, "right": width - 1}[side]
-        return {(k, at) if side in ("top", "bottom") else (at, k) for k in places}
+        return wall_cells(region, self.size, region.side or ("top" if width <= height else "left"))
 
     def _least_around(self, region: Region) -> int:
         """How many floor cells there are at least next to, or in front of, something."""

@@ -15,6 +15,10 @@ from socialai_dsl.source import Span
 Scalar = int | bool | float | str
 
 
+_NO_TEXTS = frozenset({"cause", "do", "place"})
+"""Keys whose values have no texts in them."""
+
+
 class FailedError(Exception):
     """A value that means nothing; the reason has been reported."""
 
@@ -37,15 +41,19 @@ class Findings:
     substituted: frozenset[DataPath] = frozenset()
     data: object = None
 
-    def is_list(self, path: DataPath) -> bool:
-        """Whether a list is written at `path`."""
+    def part(self, path: DataPath) -> object:
+        """What is written at `path`; None if nothing is."""
         part: Any = self.data
         for step in path:
             known = range(len(part)) if isinstance(part, list) else part if isinstance(part, dict) else ()
             if step not in known:
-                return False
+                return None
             part = part[step]
-        return isinstance(part, list)
+        return part
+
+    def is_list(self, path: DataPath) -> bool:
+        """Whether a list is written at `path`."""
+        return isinstance(self.part(path), list)
 
     def at(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
         """The place of a character of the text at `path`."""
@@ -93,6 +101,8 @@ class Findings:
     def _problem(self, problem: ParseProblem, path: DataPath) -> FailedError:
         code = "S212" if problem.code == "S004" else problem.code
         hint = problem.hint if problem.hint and problem.hint not in str(problem) else None
+        if problem.words and not _NO_TEXTS & {*path}:
+            hint = f"{hint}; a text is quoted: {as_text(problem.words, self.part(path))}"
         return self.fail(code, str(problem), self.at(path, problem.offset), hint=hint)
 
     def _filled(self, tree: ast.Expr, path: DataPath) -> ast.Expr:
@@ -162,6 +172,11 @@ def _placed_at(node: ast.Expr, at: int) -> ast.Expr:
                 for item in value
             )
     return replace(node, **changes)
+
+
+def as_text(text: str, whole: object) -> str:
+    """How a text is written in an expression: where that is the whole value, YAML takes the outer quotes away."""
+    return f"""'"{text}"'""" if text == whole else f'"{text}"'
 
 
 def surviving() -> suppress:

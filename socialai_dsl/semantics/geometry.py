@@ -28,6 +28,15 @@ def interior_cells(region: Region, size: Size) -> list[Cell]:
     return [(x, y) for y, x in cells if _lies_in(region.name, args, (x, y), size)]
 
 
+def wall_cells(region: Region, size: Size, side: str) -> set[Cell]:
+    """The cells of one wall, `margin` away from its corners."""
+    width, height = size
+    along = {"top": width, "bottom": width, "left": height, "right": height}
+    places = range(region.margin, along[side] - region.margin)
+    at = {"top": 0, "bottom": height - 1, "left": 0, "right": width - 1}[side]
+    return {(k, at) if side in ("top", "bottom") else (at, k) for k in places}
+
+
 def _lies_in(name: str, args: Sequence[int], cell: Cell, size: Size) -> bool:
     (x, y), (width, height) = cell, size
     match name:
@@ -66,7 +75,7 @@ def value(term: Term, size: Size, here: Cell = (0, 0)) -> int:
             # As in a room: dividing by nothing gives 0.
             return 0 if op in ("//", "%") and numbers[1] == 0 else compute(op, *numbers)
         case terms.Compare(op=op, left=left, right=right):
-            return _COMPARISONS[op](value(left, size, here), value(right, size, here))
+            return COMPARISONS[op](value(left, size, here), value(right, size, here))
         case terms.Logic(op="and", args=args):
             return all(value(arg, size, here) for arg in args)
         case terms.Logic(args=args):
@@ -76,7 +85,7 @@ def value(term: Term, size: Size, here: Cell = (0, 0)) -> int:
     raise UnknownError(str(term))
 
 
-_COMPARISONS: Final[dict[str, Callable[[int, int], bool]]] = {
+COMPARISONS: Final[dict[str, Callable[[int, int], bool]]] = {
     "==": lambda a, b: a == b,
     "!=": lambda a, b: a != b,
     "<": lambda a, b: a < b,

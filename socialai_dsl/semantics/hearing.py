@@ -27,9 +27,9 @@ from socialai_dsl.semantics.terms import (
     Type,
     World,
 )
-from socialai_dsl.semantics.utterances import normal
 from socialai_dsl.semantics.wording import quoted
 from socialai_dsl.source import Span
+from socialai_dsl.vocabulary import normal
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver

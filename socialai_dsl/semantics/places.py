@@ -98,6 +98,7 @@ def region(resolver: Resolver, node: ast.Expr, scope: Scope, spot: Spot | None =
     if define is not None and not args and not define.parameters:
         if name in scope.within:
             raise resolver.fail("S208", f"`{name}` needs itself", node, scope)
+        resolver.used.add(define.path)
         body = resolver.findings.expression(define.path, define.raw)
         inner = replace(scope, path=define.path, within=(*scope.within, name))
         options = body.options if isinstance(body, ast.Alternatives) else (body,)

@@ -32,11 +32,11 @@ from socialai_dsl.semantics.terms import (
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
 
-_Kind = Literal["reachable", "never", "within", "oracle", "needs", "only_through"]
+_Kind = Literal["reachable", "never", "within", "oracle", "needs", "only_through", "knowable"]
 KINDS: tuple[_Kind, ...] = get_args(_Kind)
 DEADLY = "deadly"
 
-_WITH = {"share": ("reachable", "within", "needs"), "draw": ("needs",)}
+_WITH = {"share": ("reachable", "within", "needs", "knowable"), "draw": ("needs",)}
 """Keys that say more, and what they can be said about."""
 
 Draw = tuple[str, tuple[int, ...]]
@@ -84,6 +84,9 @@ class _Entry:
                 )
             case "oracle":
                 return replace(plan, text=f"oracle: {entry.oracle:g}", share=entry.oracle)
+            case "knowable":
+                text = f"knowable: {str(entry.knowable).lower()}"
+                return replace(plan, text=text, expected=bool(entry.knowable))
             case "needs":
                 members = self._members(place, entry.needs or ())
                 tried = (
@@ -160,6 +163,7 @@ class _Entry:
             raise self._findings.fail(
                 "S201", message, self._findings.at(path, width=len(word)), suggestion=near
             )
+        self._resolver.used.add(("let", word))
         return f"let.{word}"
 
     def _not_a_pick(self, path: DataPath, word: str) -> Exception:

@@ -145,6 +145,11 @@ class Registers:
             )
         self.words[declaration.path] = expected
 
+    def drawn_at_reset(self, path: str) -> Term | None:
+        """What a register is given at reset and keeps for the episode; None for a constant, or if rules can set it."""
+        drawn = self._drawn.get(path)
+        return drawn.value.term if drawn is not None and not self.is_set(path) else None
+
     def is_set(self, path: str) -> bool:
         """Whether a register is one that rules can set: of a frame's `let`, or of `state`."""
         source = self._declared[path].source if path in self._declared else ()

@@ -19,6 +19,7 @@ from socialai_dsl.semantics import (
     tables,
 )
 from socialai_dsl.semantics.build import (
+    LARGEST,
     all_of,
     any_of,
     arithmetic,
@@ -71,6 +72,7 @@ class Resolver:
         frames: member -> the frame it plays.
         npc_texts: every text that an NPC can say, for what others may hear. said_by: member -> those it can say.
         readings: how everything was written that has been given a meaning.
+        used: where the definitions and draws stand that something uses.
     """
 
     def __init__(
@@ -89,6 +91,7 @@ class Resolver:
         self.npc_texts: dict[str, None] = {}
         self.said_by: dict[str, dict[str, None]] = {}
         self.readings = Readings()
+        self.used: set[DataPath] = set()
         self._within: list[tuple[ast.Expr, Scope]] = []
         self._parts = self._all_parts = 0
         self._tables: dict[str, tuple[tuple[str, ...], tuple[Term, ...]] | None] = {}
@@ -343,7 +346,7 @@ class Resolver:
 
     def _arithmetic(self, node: ast.Arithmetic | ast.Negative, scope: Scope) -> Term:
         if isinstance(node, ast.Negative):
-            return arithmetic("neg", self.value(node.operand, INT, scope))
+            return self.computed("neg", (self.value(node.operand, INT, scope),), node, scope)
         if node.op in "+-":
             left, right = self._operands(node, scope)
             if left.type.kind == "direction":
@@ -353,7 +356,22 @@ class Resolver:
             if node.op in ("//", "%") and right.type.low <= 0 <= right.type.high:
                 message = f"`{quoted(node.right)}` can be 0, and nothing can be divided by 0"
                 raise self.fail("S204", message, node.right, scope)
-        return arithmetic(node.op, left, right)
+        return self.computed(node.op, (left, right), node, scope)
+
+    def computed(self, op: str, args: tuple[Term, ...], node: ast.Expr, scope: Scope) -> Term:
+        """An operation on numbers, which must fit into the engine's 64 bits whatever they are."""
+        term = arithmetic(op, *args)
+        low, high = term.type.low, term.type.high
+        if low >= -LARGEST and high <= LARGEST:
+            return term
+        far = high if high > LARGEST else low
+        raise self.fail(
+            "S214",
+            f"`{quoted(node)}` can be {far:.1e}, and numbers go up to {LARGEST:.1e}",
+            node,
+            scope,
+            hint="use smaller numbers, or bound a part of it: `min(..., 1000)`",
+        )
 
     def _operands(self, node: ast.Arithmetic, scope: Scope) -> tuple[Term, Term]:
         """Numbers, or a direction and a turn added to it."""

@@ -184,7 +184,8 @@ def _function(resolver: Resolver, node: ast.Call, expected: Type | None, scope: 
     if node.name == "prev":
         return _before(resolver, node, expected, scope)
     whole = Type("int", 0, 0)
-    return arithmetic(node.name, *(resolver.value(argument, whole, scope) for argument in node.args))
+    args = tuple(resolver.value(argument, whole, scope) for argument in node.args)
+    return resolver.computed(node.name, args, node, scope)
 
 
 def _before(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope) -> Term:
@@ -323,14 +324,14 @@ def _is_in_state(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
     states += [step.state for step in frame.model.steps or () if step.state] + (
         [_FINISHED] if frame.model.steps else []
     )
-    if not isinstance(argument, ast.Name):
+    if not isinstance(argument, ast.Name | ast.Truth):
         raise resolver.fail("S211", "`is` takes the name of a state", argument, scope)
-    if argument.id not in states:
+    state = argument.id if isinstance(argument, ast.Name) else str(argument.value).lower()
+    if state not in states:
         called = (resolver.symbols.group_of(member) or (member, 0))[0]
-        message = f"`{called}` has no state `{argument.id}` (it plays `{frame.name}`: {', '.join(states)})"
-        near = did_you_mean(argument.id, states)
-        raise resolver.fail("S310", message, argument, scope, suggestion=near)
-    return InState(member, frame.name, argument.id)
+        message = f"`{called}` has no state `{state}` (it plays `{frame.name}`: {', '.join(states)})"
+        raise resolver.fail("S310", message, argument, scope, suggestion=did_you_mean(state, states))
+    return InState(member, frame.name, state)
 
 
 def _is_each_in_state(resolver: Resolver, who: Term, node: ast.Call, scope: Scope) -> Term:

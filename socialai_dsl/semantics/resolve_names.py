@@ -14,7 +14,7 @@ from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import beliefs, hearing, resolve_attributes
 from socialai_dsl.semantics.alternatives import by_value, drawn, of_each
 from socialai_dsl.semantics.build import FALSE, all_of, any_of
-from socialai_dsl.semantics.findings import FailedError
+from socialai_dsl.semantics.findings import FailedError, as_text
 from socialai_dsl.semantics.scope import Define, Draws, Macro, PlayedFrame, Scope
 from socialai_dsl.semantics.signatures import ACTIVITIES, EFFECTS, PLACES, QUANTIFIERS, VALUES, WORDS
 from socialai_dsl.semantics.terms import (
@@ -32,6 +32,7 @@ from socialai_dsl.semantics.terms import (
     World,
 )
 from socialai_dsl.semantics.wording import described, usage, words_of
+from socialai_dsl.vocabulary import normal
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
@@ -153,6 +154,7 @@ def _declared(resolver: Resolver, node: ast.Name, expected: Type | None, scope: 
     if word in symbols.scenario.state:
         return resolver.registers.read(f"state.{word}", expected, resolver.findings.node(scope.path, node))
     if word in symbols.scenario.let:
+        resolver.used.add(("let", word))
         return resolver.registers.read(f"let.{word}", expected, resolver.findings.node(scope.path, node))
     if word in symbols.defines:
         return expanded(resolver, symbols.defines[word], {}, node, expected, scope)
@@ -250,13 +252,34 @@ def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: S
         )
     if word in resolver.symbols.scenario.tables:
         return resolver.fail("S211", f"`{word}` is a table: write `{word}(key)`", node, scope)
+    called = next(
+        (key for key, member in resolver.symbols.scenario.cast.items() if member.name == word), None
+    )
+    if called is not None:
+        hint = "in expressions a member of the cast goes by its key"
+        return resolver.fail(
+            "S201", f"`{word}` is what somebody is called", node, scope, suggestion=called, hint=hint
+        )
     near, place = suggestion(resolver, word, expected, scope)
-    message, hint = f"unknown name `{word}`", None
+    message = f"unknown name `{word}`"
+    hint: str | None = None
     if expected is not None and expected.words and expected.kind not in ("bool", "noun"):
         message = f"unknown name `{word}`, where {described(expected)} is expected"
         hint = None if near else "one of " + words_of(expected)
     elif expected is not None and expected.kind == "bool" and word.casefold() in _YES_AND_NO:
         message = f"`{word}` means nothing here; a truth is written `true` or `false`"
+    whole = resolver.findings.part(scope.path)
+    nouns = [noun for noun in resolver.symbols.nouns.words if normal(noun) == normal(word)]
+    if nouns and (expected is None or expected.kind == "noun"):
+        near, place, hint = (
+            as_text(nouns[0], nouns[0] if whole == word else None),
+            None,
+            "a noun is quoted, as every text",
+        )
+    elif near is None and expected is not None and expected.kind == "int" and not expected.words:
+        message = f"unknown name `{word}`, where a number is expected"
+    elif near is None and expected is None:
+        hint = f"if a text is meant, quote it: {as_text(word, whole)}"
     return resolver.fail("S201", message, node, scope, suggestion=near, suggestion_place=place, hint=hint)
 
 
@@ -408,6 +431,7 @@ def expanded(
     scope: Scope,
 ) -> Term:
     """The value of a definition where it is used; `arguments` are resolved in the user's scope."""
+    resolver.used.add(define.path)
     if len(arguments) != len(define.parameters):
         wanted = ", ".join(define.parameters)
         raise resolver.fail("S211", f"`{define.name}` takes ({wanted})", node, scope)

@@ -11,7 +11,8 @@ from socialai_dsl.schema import PRIMITIVES, Scenario
 from socialai_dsl.schema.positions import Positions
 from socialai_dsl.schema.suite import Suite
 from socialai_dsl.semantics.terms import Checked, FramePlan, Line, Pattern
-from socialai_dsl.semantics.utterances import normal, texts_of
+from socialai_dsl.semantics.utterances import texts_of
+from socialai_dsl.vocabulary import normal
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import resolve_names
 from socialai_dsl.semantics.build import all_of
 from socialai_dsl.semantics.findings import FailedError, surviving
+from socialai_dsl.semantics.possible_values import values_of
 from socialai_dsl.semantics.scope import Scope, reset_scope
 from socialai_dsl.semantics.terms import Compare, Const, Quantified, Read, Select, Sited, Term, Type, Variable
 from socialai_dsl.semantics.wording import described, quoted, spoken
@@ -39,9 +40,12 @@ def looked_up(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
         raise resolver.fail("S211", f"`{name}` is a table: it takes one key", node, scope)
     key = _key(resolver, name, node.args[0], scope)
     known = [key.value] if isinstance(key, Const) else range(key.type.low, key.type.high + 1)
+    possible = values_of(resolver, key)
     cases: list[tuple[Term, Term]] = []
     for value in known:
         word = spoken(key.type, value)
+        if word not in keys and value not in possible:
+            continue
         if word not in keys:
             raise _no_key(resolver, name, keys, word, key, node.args[0], scope)
         if isinstance(key, Const):

@@ -13,7 +13,7 @@ text       index into `words`: the finite set of texts that the expression can b
 noun       index into `words`, the nouns of the scenario's grammar
 status     index into `words`, the states of an object type
 utterance  0 silence, else 1 + template * nouns + noun; `words` are the texts
-cell       CELL + 32 * y + x (program.py); where an entity is asked for its place, a cell will do
+cell       CELL + 32 * y + x (program); where an entity is asked for its place, a cell will do
 =========  =====================================================================================
 """
 
@@ -512,7 +512,13 @@ class StatePlan:
 
 @dataclass(frozen=True, slots=True)
 class StepPlan:
-    """An entry of `steps`. `steps` None: until finished (or one step); -1: for ever. `state` is its name, if any."""
+    """An entry of `steps`.
+
+    Attributes:
+        state: its name, if any. until: what ends it.
+        duration: for how many turns; -1: for ever.
+        lasted: whether it has lasted for as many turns as a value that is computed says.
+    """
 
     name: str
     state: str | None
@@ -520,9 +526,15 @@ class StepPlan:
     span: Span
     until: Sited | None = None
     duration: int | None = None
+    lasted: Sited | None = None
     sets: tuple[tuple[str, Sited], ...] = ()
     causes: tuple[Effect, ...] = ()
     say: Line | None = None
+
+    @property
+    def ends_with_its_activity(self) -> bool:
+        """Whether nothing else says how long it lasts."""
+        return self.until is None and self.duration is None and self.lasted is None
 
 
 @dataclass(frozen=True, slots=True)
@@ -720,10 +732,11 @@ class PropertyPlan:
     `reachable` and `never` are about `condition` or, without one, the outcomes of the names in `goals`; `condition` may
     read `remembered`, which belongs to it alone. `share`: the least share of rooms, of `oracle` that of successes;
     None where none is given. `steps`: of `within`. `members`: of `needs` and `only_through`, as in the cast.
-    `draws`: the registers whose values are tried (`let.exit`), of which for `needs` one is enough.
+    `draws`: the registers whose values are tried (`let.exit`), of which for `needs` one is enough. `expected`: whether
+    what success depends on is to be `knowable`, or not to be.
     """
 
-    kind: Literal["reachable", "never", "within", "oracle", "needs", "only_through"]
+    kind: Literal["reachable", "never", "within", "oracle", "needs", "only_through", "knowable"]
     text: str
     site: str
     span: Span
@@ -734,6 +747,7 @@ class PropertyPlan:
     steps: int = 0
     members: tuple[str, ...] = ()
     draws: tuple[tuple[str, tuple[int, ...]], ...] = ()
+    expected: bool = True
 
 
 @dataclass(frozen=True)

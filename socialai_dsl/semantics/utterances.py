@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeGuard
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
@@ -15,6 +16,7 @@ from socialai_dsl.semantics import resolve_groups
 from socialai_dsl.semantics.alternatives import by_value, drawn, select
 from socialai_dsl.semantics.build import all_of, any_of, walk
 from socialai_dsl.semantics.findings import FailedError
+from socialai_dsl.semantics.possible_values import values_of
 from socialai_dsl.semantics.scope import Draws, Scope
 from socialai_dsl.semantics.terms import (
     Compare,
@@ -29,6 +31,7 @@ from socialai_dsl.semantics.terms import (
 )
 from socialai_dsl.semantics.wording import described, quoted, spoken
 from socialai_dsl.source import Span
+from socialai_dsl.vocabulary import normal
 
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
@@ -36,12 +39,10 @@ if TYPE_CHECKING:
 MAX_TEXTS = 4096
 """How many different texts one line may have."""
 
+_JOINED = re.compile(r"\s*\|\s*|\s+or\s+")
+"""What an author may put between alternatives."""
+
 _SAYABLE = ("text", "noun", "color", "int", "status", "direction", "action")
-
-
-def normal(text: str) -> str:
-    """What counts of a text when it is matched: not its case, nor a final . ! ? or blanks."""
-    return " ".join(text.casefold().strip().rstrip(".!?").split())
 
 
 class Utterances:
@@ -170,10 +171,11 @@ class Utterances:
                 found_nouns = tuple((t, noun) for t, noun in nouns.items() if noun is not None)
                 pattern = Pattern(pairs, said, frozenset(nouns), found_nouns)
                 found.append((pattern, all_of(conditions) if conditions else None))
-            else:
+            elif self._can_be(choice):
                 unsayable.append((said, next((word for word, c in choice if c is not None), "")))
         if unsayable:
-            self._report_unsayable(unsayable, parts, bool(found), span, from_npcs)
+            values = [(node, part) for node, part in zip(spliced, parts, strict=True) if _varies(part)]
+            self._report_unsayable(unsayable, values, bool(found), span, from_npcs)
         return found
 
     def _spliced(
@@ -209,6 +211,14 @@ class Utterances:
             message = "any noun is `<noun>`; anything at all is `hears: any`"
             raise self._resolver.fail("S402", message, part, scope)
         return sayable(self._resolver, part, scope)
+
+    def _can_be(self, choice: Iterable[tuple[str, Term | None]]) -> bool:
+        """Whether the values of a text can be those that it is made of."""
+        return all(
+            condition.right.value in values_of(self._resolver, condition.left)
+            for _, condition in choice
+            if isinstance(condition, Compare) and isinstance(condition.right, Const)
+        )
 
     def _choices(self, part: str | Term | None) -> list[tuple[str, Term | None]]:
         if isinstance(part, str):
@@ -262,23 +272,28 @@ class Utterances:
     def _report_unsayable(
         self,
         unsayable: list[tuple[str, str]],
-        parts: list[str | Term | None],
+        values: list[tuple[str | ast.Expr, Term]],
         some: bool,
         span: Span,
         from_npcs: bool,
     ) -> None:
         findings = self._resolver.findings
         said, word = unsayable[0]
-        value = next((p for p in parts if isinstance(p, Term) and not isinstance(p, Const)), None)
-        if value is not None and some:
-            name = f"`{value.path.rsplit('.', 1)[-1]}`" if isinstance(value, Read) else "the value in it"
-            message = f'{name} can be {word}, but "{said}" cannot be said with this grammar'
+        if values and some:
+            node, value = values[0]
+            name = quoted(node) if not isinstance(node, str) else node
+            message = f'`{name}` can be {word}, but "{said}" cannot be said with this grammar'
             drawn_once = isinstance(value, Read) and not self._resolver.registers.is_set(value.path)
             report = findings.error if drawn_once else findings.warning
             nouns = [str(noun) for noun in self._grammar.nouns]
             missing = f"`{word}`" if word not in nouns else "what is missing"
             report("S402", message, span, hint=f"add {missing} to the nouns, or narrow what is drawn")
             return
+        alternatives = [part for part in _JOINED.split(said) if part]
+        if len(alternatives) > 1 and any(self._match(part) for part in alternatives):
+            message = f'nobody can say "{said}" with this grammar'
+            hint = f"alternatives are a list: [{', '.join(alternatives)}]"
+            raise findings.fail("S401", message, span, hint=hint)
         near = did_you_mean(said, [*self.all_texts(), *(self._resolver.npc_texts if from_npcs else ())])
         raise findings.fail(
             "S401",
@@ -350,11 +365,12 @@ class Utterances:
         """The line in the grammar's own spelling."""
         findings = self._resolver.findings
         spelled: dict[str, str] = {normal(text): text for text in self.all_texts()}
-        unsayable = [said for said in texts_of(line) if normal(said) not in spelled]
+        texts = list(islice(self._texts_said(line), MAX_TEXTS))
+        unsayable = [said for said in texts if normal(said) not in spelled]
         if unsayable:
             said, values = unsayable[0], [part for part in line.parts if not isinstance(part, str)]
             message = f'the agent cannot say "{said}" with this grammar'
-            if len(unsayable) < len(texts_of(line)) and any(self._may_change(value) for value in values):
+            if len(unsayable) < len(texts) and any(self._may_change(value) for value in values):
                 hint = "then it says nothing; give the register a range, or the grammar the noun"
                 findings.warning("S402", message, line.span, hint=hint)
                 return line
@@ -363,6 +379,12 @@ class Utterances:
         if len(line.parts) == 1 and isinstance(line.parts[0], str):
             return Line((spelled[normal(line.parts[0])],), line.site, line.span)
         return line
+
+    def _texts_said(self, line: Line) -> Iterator[str]:
+        """The texts that a line can be, as far as it is known what its values can be."""
+        for choice in product(*(self._choices(part) for part in line.parts)):
+            if self._can_be(choice):
+                yield "".join(word for word, _ in choice)
 
     def _may_change(self, value: Term) -> bool:
         """Whether a value is made of registers that rules set, whose range may be wider than what happens."""
@@ -385,6 +407,11 @@ class _Filling:
         """What its names mean where it is put in."""
         draws = Draws(f"cast.{self.member}.with.{self.slot}")
         return Scope(self.path, draws, member=self.member, outer=user.draws)
+
+
+def _varies(part: str | Term | None) -> TypeGuard[Term]:
+    """Whether a part of a text is a value that is not known."""
+    return isinstance(part, Term) and not isinstance(part, Const)
 
 
 def _given(condition: Term | None) -> list[Term]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 
@@ -10,11 +9,7 @@ from socialai_dsl.schema import UtteranceGrammar
 from socialai_dsl.semantics.terms import Line, Term, Type
 from socialai_dsl.semantics.utterances import texts_of
 from socialai_dsl.semantics.wording import spoken
-
-
-def words(text: str) -> list[str]:
-    """The lower-cased maximal runs of letters, digits and apostrophes."""
-    return re.findall(r"(?:[^\W_]|')+", text.lower())
+from socialai_dsl.vocabulary import words
 
 
 def words_in_order(

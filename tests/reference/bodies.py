@@ -161,12 +161,14 @@ def plan(value: Value, context: Context) -> Activity:
 
 
 def turn_towards(world: World, me: Entity, wanted: str) -> str:
-    """One quarter turn; left or right at random when it is behind."""
+    """One quarter turn; when it is behind the agent turns left, an NPC left or right at random."""
     if me.facing == wanted:
         return "none"
     for primitive, quarter in (("left", -1), ("right", 1)):
         if turned(me.facing, quarter) == wanted:
             return primitive
+    if me is world.agent:
+        return "left"
     return ("left", "right")[chance.choose(world.key, f"cast.{me.key}.turn", world.t, 0, 2)]
 
 
@@ -195,7 +197,7 @@ def go_next_to(world: World, me: Entity, goal: Any) -> str:
 
 def along(world: World, me: Entity, goals: list[Cell]) -> str:
     """The next action on a shortest path to any of the goals, which need not be free themselves: breadth first, ties
-    down, up, right, left."""
+    down, up, right, left; of the agent ahead, left, right, back."""
     steps = dict.fromkeys(goals, 0)
     queue = list(steps)
     for cell in queue:
@@ -205,7 +207,8 @@ def along(world: World, me: Entity, goals: list[Cell]) -> str:
                 steps[neighbour] = steps[cell] + 1
                 queue.append(neighbour)
     assert me.cell is not None
-    options = [d for d in SEARCH_ORDER if step_from(me.cell, d) in steps]
+    order = [turned(me.facing, k) for k in (0, -1, 1, 2)] if me is world.agent else SEARCH_ORDER
+    options = [d for d in order if step_from(me.cell, d) in steps]
     if not options:
         return "none"
     here = me.cell

@@ -170,7 +170,10 @@ class FrameRunner:
         if entry.for_ is None and entry.until is None:
             return activity.finished(self.world, self.me)
         if entry.for_ is not None:
-            turns = self.turns_of(entry)
+            try:
+                turns = self.turns_of(entry)
+            except NothingFoundError:
+                turns = None
             if turns is not None and self.me.clock >= turns:
                 return True
         try:
@@ -200,7 +203,12 @@ class FrameRunner:
         assert isinstance(self.me.state, int)
         while self.me.state < len(frame.steps):
             entry = frame.steps[self.me.state]
-            if self.me.clock > 0 or entry.for_ is None or self.turns_of(entry) != 0:
+            if self.me.clock > 0 or entry.for_ is None:
+                return
+            try:
+                if self.turns_of(entry) != 0:
+                    return
+            except NothingFoundError:
                 return
             self.me.state += 1
 

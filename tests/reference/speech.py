@@ -22,8 +22,8 @@ def noun_values(world: World) -> list[str | int]:
 
 
 def canonical(text: str) -> str:
-    """Matching ignores case and a final `.`, `!` or `?`."""
-    return re.sub(r"[.!?]$", "", text.strip()).lower()
+    """Matching ignores case, a final `.`, `!` or `?`, and how many blanks there are."""
+    return re.sub(r"[.!?]$", "", " ".join(text.split())).lower()
 
 
 def match(pieces: list[str | None], text: str, world: World) -> dict[str, Any] | None:

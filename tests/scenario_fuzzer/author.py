@@ -447,7 +447,10 @@ class _Author:
             if self.often(0.3):
                 entry["id"] = f"end_{number}"
             entries.append(entry)
-        return entries
+        return [
+            *entries,
+            {"success": "t > 10 and agent.spoke and agent.did(forward)"},
+        ]  # one that is possible
 
     def observe(self) -> dict[str, Any]:
         """What the agent perceives."""

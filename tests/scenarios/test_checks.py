@@ -6,18 +6,33 @@ import pytest
 
 import socialai_dsl
 from socialai_dsl.cli.check import check_scenario
-from socialai_dsl.envs.properties import Effort
+from socialai_dsl.envs.effort import Effort
 from socialai_dsl.loader import shipped_folder
 
 CLAIMING = {
-    "talkitout": 2,
-    "talkitout+no_liar": 2,
-    "talkitout+unsocial": 2,
-    "diverse_exit": 1,
-    "help": 1,
-    "help+as_helper": 1,
+    "talkitout": 3,
+    "talkitout+no_liar": 3,
+    "talkitout+unsocial": 0,  # a control: nobody is perceived
+    "diverse_exit": 2,
+    "help": 2,
+    "help+as_helper": 2,
 }
-NOVEL = {"culprit": 2, "haggling": 2, "interpreter": 1, "turn_taking": 1, "whisper": 2}
+"""How many properties are tried, `knowable` among them."""
+
+NOVEL = {"culprit": 3, "haggling": 3, "interpreter": 2, "turn_taking": 2, "whisper": 3}
+
+CLAIMING_NOTHING = [
+    *("cointhief", "cointhief+tags", "dance", "showme", "showme+no_social"),
+    *("novel/gaze_following", "novel/sally_anne", "novel/shop"),
+]
+SCHOOL = [
+    *("apple_stealing", "apple_stealing+asocial", "boxes+alone", "doors_alone", "marbles_alone"),
+    *("lever_door", "lever_door+swapped", "marble_pass", "marble_pass+swapped", "marble_push"),
+    *("marble_push+swapped", "color_match", "color_match+swapped", "color_match_generators"),
+    *("color_match_switches", "color_match_marbles"),
+]
+PROBLEMS = ["boxes", "switches", "generators", "marbles", "doors", "levers"]
+CUES = ["pointing", "color", "feedback", "emulation", "scaffolding"]
 
 
 def verdicts(name: str, rooms: int, states: int = 20_000) -> dict[str, str]:
@@ -44,13 +59,37 @@ def test_no_claiming_scenario_is_left_out() -> None:
     }
 
 
+@pytest.mark.parametrize("name", CLAIMING_NOTHING)
+def test_success_is_knowable(name: str) -> None:
+    (known,) = verdicts(name, 3).items()
+    assert known[0] == "knowable: true"
+    assert known[1].startswith("holds")
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("cue", ["", "+pointing", "+color", "+feedback"])
-@pytest.mark.parametrize("problem", ["boxes", "switches", "generators", "marbles", "doors", "levers"])
-def test_nobody_solves_a_problem_of_the_school_without_the_caretaker(problem: str, cue: str) -> None:
-    found = verdicts(f"school/{problem}{cue}", 2)
-    assert list(found) == ["needs: caretaker"]
-    assert found["needs: caretaker"].startswith("holds")
+@pytest.mark.parametrize("name", SCHOOL)
+def test_success_is_knowable_in_the_school(name: str) -> None:
+    (known,) = verdicts(f"school/{name}", 3).items()
+    assert known[0] == "knowable: true"
+    assert known[1].startswith("holds")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("problem", PROBLEMS)
+def test_a_problem_of_the_school_without_a_cue_leaves_a_guess(problem: str) -> None:
+    (said,) = verdicts(f"school/{problem}", 2).values()
+    assert said.startswith("holds")
+    assert "`target` stays hidden" in said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cue", CUES)
+@pytest.mark.parametrize("problem", PROBLEMS)
+def test_a_problem_of_the_school_can_be_known_by_its_cue(problem: str, cue: str) -> None:
+    found = verdicts(f"school/{problem}+{cue}", 2)
+    assert list(found) == ["needs: caretaker", "knowable: true"]
+    assert found["knowable: true"].startswith("holds")
+    assert not found["needs: caretaker"].startswith("fails")
 
 
 @pytest.mark.slow

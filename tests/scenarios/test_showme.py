@@ -117,6 +117,15 @@ class TestThePeer:
         heard = Episode(name, ROOM).hears(None, None)
         assert [bool(line) for line in heard] == [step == 1, step == 2]
 
+    def test_as_coded_it_stands_still_while_it_says_so(self) -> None:
+        room = {**ROOM, "jim": {"at": [2, 3], "facing": "right"}}
+        episode = Episode("showme+as_coded", room)
+        courses = []
+        for _ in range(3):
+            heard = episode.act().heard
+            courses.append((bool(heard), episode.now()["jim"]["at"], episode.now()["jim"]["facing"]))
+        assert courses == [(True, [2, 3], "right"), (False, [2, 3], "down"), (False, [2, 4], "down")]
+
     @pytest.mark.parametrize("name", NAMES)
     def test_without_eye_contact_it_only_turns(self, name: str) -> None:
         episode = Episode(name, {**ROOM, "agent": {"at": [5, 3], "facing": "up"}})

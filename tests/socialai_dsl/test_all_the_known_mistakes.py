@@ -74,7 +74,7 @@ MISTAKES = {
         ("a state has `first`, `do`, `then`",),
     ),
     "12 yes for true": Mistake(
-        "diverse_exit/npc_00", "near: true", "near: yes", "yes", "S003", None, ("write `true`",), "diverse_exit"
+        "diverse_exit/npc_00", "near: true", "near: yes", "yes", "S204", None, ("write `true`",), "diverse_exit"
     ),
     "12b a word for true": Mistake(
         "diverse_exit/npc_00", "near: true", 'near: "yes"', 'yes"', "S204", None,

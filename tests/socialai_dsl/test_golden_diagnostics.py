@@ -42,6 +42,13 @@ def test_message(case, update_goldens):
     assert said == golden.read_text(encoding="utf-8"), "if the new text is meant, run pytest --update-goldens"
 
 
+@pytest.mark.parametrize(
+    "case", [case for case in CASES if case[:2] in ("75", "76", "77", "78", "80", "81", "82", "83")]
+)
+def test_a_slip_of_an_author_is_one_finding(case):
+    assert len(checked(case).diagnostics) == 1
+
+
 def test_every_code_has_a_case():
     seen = {d.code for case in CASES for d in checked(case).diagnostics}
     missing = set(CODES) - seen - set(NOT_FROM_ONE_FILE)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from socialai_dsl.cli.main import main
+from socialai_dsl.envs.search import Search
 
 Capture = pytest.CaptureFixture[str]
 ROOT = Path(__file__).parents[3]
@@ -55,13 +57,17 @@ def test_what_holds_is_no_failure(gate: Path, capsys: Capture) -> None:
         "  holds: `reachable: out`: it can come about in 3 of 3 rooms",
         "  holds: `within: 3`: a shortest success takes at most 3 steps in 3 of 3 rooms, 3 in the longest that can be "
         "solved",
+        "  holds: `knowable: true`: in 3 rooms success depends on nothing hidden",
+        "  4 of 6 states, steps, rules and outcomes happen in some room",
+        f"  {name}:11:55: warning: the rule `guard.watch.awake.then[1]` happens in none of these rooms",
+        f"  {name}:12:7: warning: the state `guard.watch.asleep` happens in none of these rooms",
     ]
 
 
 def test_what_fails_is_named_with_its_place_and_rooms(gate: Path, capsys: Capture) -> None:
     name = claiming(gate, "{reachable: out}", "{never: gave_up}")
     assert main(["check", name, "--rooms", "2"]) == 1
-    *_, said, place = capsys.readouterr().out.splitlines()
+    _, _, said, place, *_ = capsys.readouterr().out.splitlines()
     assert said == "  fails: `never: gave_up`: it can come about in 2 of 2 rooms; in room 0 after 1 step"
     assert (
         place
@@ -74,7 +80,9 @@ def test_what_is_undecided_fails_only_when_strict(gate: Path, capsys: Capture) -
     assert main(["check", name, "--rooms", "2", "--states", "3"]) == 0
     assert "  undecided: " in capsys.readouterr().out
     assert main(["check", name, "--rooms", "2", "--states", "3", "--strict"]) == 1
-    assert main(["check", name, "--rooms", "2", "--strict"]) == 0, "with enough states it is decided"
+    capsys.readouterr()
+    assert main(["check", name, "--rooms", "2"]) == 0
+    assert "  undecided: " not in capsys.readouterr().out, "with enough states it is decided"
 
 
 def test_without_a_script_an_oracle_fails(gate: Path, capsys: Capture) -> None:
@@ -82,11 +90,14 @@ def test_without_a_script_an_oracle_fails(gate: Path, capsys: Capture) -> None:
     assert "there is no variant `oracle`" in capsys.readouterr().out
 
 
-def test_without_properties_it_is_said_what_never_happens(gate: Path, capsys: Capture) -> None:
+@pytest.mark.parametrize("claims", [(), ("{reachable: out}",)])
+def test_it_is_always_said_what_never_happens(gate: Path, claims: tuple[str, ...], capsys: Capture) -> None:
+    if claims:
+        claiming(gate, *claims)
     assert main(["check", str(gate), "--rooms", "2"]) == 0
-    _, happened, *warnings = capsys.readouterr().out.splitlines()
+    *_, happened, one, other = capsys.readouterr().out.splitlines()
     assert happened == "  4 of 6 states, steps, rules and outcomes happen in some room"
-    assert [re.sub(r".*gate.yaml:", "", warning) for warning in warnings] == [
+    assert [re.sub(r".*gate.yaml:", "", warning) for warning in (one, other)] == [
         "11:55: warning: the rule `guard.watch.awake.then[1]` happens in none of these rooms",
         "12:7: warning: the state `guard.watch.asleep` happens in none of these rooms",
     ]
@@ -98,17 +109,85 @@ def test_json_has_the_same(gate: Path, capsys: Capture) -> None:
     assert main(["check", name, "--rooms", "2", "--format", "json"]) == 1
     (report,) = json.loads(capsys.readouterr().out)
     assert (report["scenario"], report["rooms"], report["seed"]) == (name, 2, 0)
-    assert report["never_happens"] == []
-    (found,) = report["properties"]
+    assert [part["name"] for part in report["never_happens"]] == [
+        "guard.watch.awake.then[1]",
+        "guard.watch.asleep",
+    ]
+    found, known = report["properties"]
+    assert (known["property"], known["verdict"]) == ("knowable: true", "holds")
     assert found["property"] == "never: gave_up"
     assert (found["verdict"], found["held"], found["against"], found["file"]) == ("fails", 0, [0, 1], name)
 
 
 def test_every_member_of_a_suite_is_checked(capsys: Capture) -> None:
-    assert main(["check", "social_env", "--rooms", "1"]) == 0
+    assert main(["check", "social_env", "--rooms", "3"]) == 0
     named = [line.split(":")[0] for line in capsys.readouterr().out.splitlines() if not line.startswith(" ")]
     assert named[:3] == ["talkitout", "dance", "cointhief"]
     assert len(named) == 6
+
+
+def test_progress_is_told_beside_the_results(
+    gate: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("socialai_dsl.envs.effort._QUIET", 0.0)
+    assert main(["check", claiming(gate, "{reachable: out}"), "--rooms", "2"]) == 0
+    captured = capsys.readouterr()
+    assert captured.err.splitlines()[:2] == [
+        "reachable: out: room 0 of 2",
+        "reachable: out: room 1 of 2",
+    ]
+    assert "room 1 of 2" not in captured.out
+
+
+def test_quick_checks_tell_no_progress(gate: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("socialai_dsl.envs.effort._QUIET", 3600.0)
+    assert main(["check", str(gate), "--rooms", "2"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_what_there_was_time_for_is_said(gate: Path, capsys: Capture) -> None:
+    name = claiming(gate, "{reachable: out}")
+    assert main(["check", name, "--rooms", "2", "--seconds", "1e-9"]) == 0
+    out = capsys.readouterr().out
+    assert "  undecided: `reachable: out`: there was no time to look at a room" in out
+    assert (
+        "  of 2 rooms there was time for 0 for `reachable: out`, 0 for `knowable: true`; "
+        "`--seconds` gives more time" in out
+    )
+    assert main(["check", name, "--rooms", "2", "--seconds", "1e-9", "--strict"]) == 1
+    assert main(["check", name, "--rooms", "2", "--seconds", "0"]) == 0
+    assert "there was time for" not in capsys.readouterr().out.partition("holds")[2]
+
+
+def test_an_interrupted_check_tells_what_is_known(
+    gate: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C in the third room of the second property."""
+    rooms = 4
+    searched = Search.solve
+    calls = []
+
+    def interrupting(self: Search, *arguments: Any) -> Any:
+        calls.append(self)
+        if len(calls) == rooms + 3:
+            raise KeyboardInterrupt
+        return searched(self, *arguments)
+
+    monkeypatch.setattr(Search, "solve", interrupting)
+    name = claiming(gate, "{reachable: out, share: 1}", "{never: guard.is(asleep)}", "{within: 3}")
+    assert main(["check", name, "--rooms", str(rooms)]) == 130
+    assert capsys.readouterr().out.splitlines() == [
+        f"{name}: 4 rooms of seed 0",
+        "  holds: `reachable: out`: it can come about in 4 of 4 rooms",
+        "  holds: `never: guard.is(asleep)`: it can come about in 0 of 2 rooms",
+        "  of 4 rooms there was time for 2 for `never: guard.is(asleep)`; it was interrupted",
+    ]
+
+
+@pytest.mark.parametrize("seconds", ["-1", "inf", "nan"])
+def test_seconds_are_a_number(gate: Path, seconds: str, capsys: Capture) -> None:
+    assert main(["check", str(gate), f"--seconds={seconds}"]) == 2
+    assert f"--seconds: got {seconds}, expected at least 0" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("option", ["--rooms", "--states"])
@@ -125,7 +204,7 @@ def test_the_example_of_the_page_holds(tmp_path: Path, capsys: Capture) -> None:
     file = tmp_path / "page.yaml"
     file.write_text(head + example.replace("cast:\n", "cast:\n  agent: {}\n"))
     assert main(["check", str(file), "--rooms", "3", "--strict"]) == 0, capsys.readouterr().out
-    assert capsys.readouterr().out.count("  holds: ") == 6
+    assert capsys.readouterr().out.count("  holds: ") == 7
 
 
 def test_deep_tries_everything(gate: Path, capsys: Capture) -> None:
@@ -133,6 +212,7 @@ def test_deep_tries_everything(gate: Path, capsys: Capture) -> None:
     assert main(["check", name, "--rooms", "3", "--deep"]) == 0
     assert capsys.readouterr().out.splitlines()[1:] == [
         "  holds: `reachable: out`: it can come about in 3 of 3 rooms",
+        "  holds: `knowable: true`: in 3 rooms success depends on nothing hidden",
         "  4 of 6 states, steps, rules and outcomes happen in some room",
         f"  {name}:11:55: warning: the rule `guard.watch.awake.then[1]` happens in none of these rooms",
         f"  {name}:12:7: warning: the state `guard.watch.asleep` happens in none of these rooms",
@@ -150,6 +230,6 @@ def test_deep_as_json(gate: Path, capsys: Capture) -> None:
 
 
 def test_deep_fails_where_nothing_can_succeed(gate: Path, capsys: Capture) -> None:
-    gate.write_text(GATE.replace("success: agent.at(gate)", "success: agent.at(gate) and t > 10"))
+    gate.write_text(GATE.replace("success: agent.at(gate)", "success: agent.at(gate) and guard.is(asleep)"))
     assert main(["check", str(gate), "--rooms", "2", "--deep"]) == 1
     assert "no way was found in rooms 0, 1" in capsys.readouterr().out

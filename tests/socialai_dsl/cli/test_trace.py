@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import socialai_dsl as sd
 from socialai_dsl.cli.main import main
 from tests.tiny import Folder
 
@@ -170,3 +171,35 @@ def test_a_trained_agent_can_be_watched(shy: str, capsys: Capture) -> None:
     assert json.loads(capsys.readouterr().out)["episodes"] == {"trained": 5}
     assert main(["trace", "dance", "--agent", str(Path("trained").resolve())]) == 2
     assert "checkpoint is for" in capsys.readouterr().err
+
+
+def test_lines_are_typed_as_in_play(shy: str, capsys: Capture) -> None:
+    assert main(["trace", shy, "--json", "--do", ".", "--do", "none Say hello", "--do", "f"]) == 0
+    steps = json.loads(capsys.readouterr().out)["steps"]
+    assert [(step["action"], step["said"]) for step in steps] == [
+        ("none", None),
+        ("none", "Say hello"),
+        ("forward", None),
+    ]
+    assert main(["trace", shy, "--do", "frward"]) == 2
+    assert "did you mean 'forward'?" in capsys.readouterr().err
+
+
+def test_any_room_of_a_seed_can_be_opened(capsys: Capture) -> None:
+    """The rooms that `check` and `coverage` name."""
+    envs = sd.make_vec("talkitout", num_envs=18)
+    envs.reset(seed=4)
+    assert main(["trace", "talkitout", "--seed", "4", "--index", "17", "--json", "--do", "."]) == 0
+    trace = json.loads(capsys.readouterr().out)
+    assert trace["episode"] == "seed 4, room 17"
+    assert {**trace["start"], "heard": []} == {**envs.unwrapped.describe(17), "heard": []}
+    envs.close()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [["--index", "-1"], ["--index", "1", "--test-episode", "1"], ["--test-episode", "1", "--index", "0"]],
+)
+def test_rooms_that_there_are_not(options: list[str], shy: str, capsys: Capture) -> None:
+    assert main(["trace", shy, *options]) == 2
+    assert "--index" in capsys.readouterr().err

@@ -21,6 +21,10 @@ PHRASES = Phrases(ACTIONS, ("Where is <noun>", "Hello"), ("the exit", "you"))
         ("d", (None, "d")),
         ("do", ("done", None)),
         ("Le mot", (None, "Le mot")),
+        (".", (None, None)),
+        ("none", (None, None)),
+        (". Open sesame", (None, "Open sesame")),
+        ("none Open sesame", (None, "Open sesame")),
     ],
 )
 def test_a_line_is_a_movement_an_utterance_or_both(
@@ -50,7 +54,24 @@ def test_completed(line: str, completed: str | None) -> None:
 
 @pytest.mark.parametrize(
     ("line", "corrected"),
-    [("Wher is teh exit", "Where is the exit"), ("left Helo", "left Hello"), ("Sing a song", None)],
+    [
+        ("Wher is teh exit", "Where is the exit"),
+        ("left Helo", "left Hello"),
+        ("Sing a song", None),
+        ("frward", "forward"),
+        ("frward Hello", "forward Hello"),
+        ("togle Helo", "toggle Hello"),
+        ("nonne", "none"),
+        ("frward Sing", None),
+    ],
 )
 def test_corrected(line: str, corrected: str | None) -> None:
     assert PHRASES.corrected(line) == corrected
+
+
+def test_what_is_wrong_with_a_line_names_what_was_meant_or_what_there_is() -> None:
+    assert PHRASES.problem("frward") == "'frward' can be neither done nor said; did you mean 'forward'?"
+    assert PHRASES.problem("Sing") == (
+        "'Sing' can be neither done nor said; "
+        "movements are left, right, forward, pickup, drop, toggle, done, ., none"
+    )

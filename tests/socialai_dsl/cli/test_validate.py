@@ -168,15 +168,14 @@ check: [{never: agent.did(toggle)}]
 """
 
 
-def test_deep_tries_what_has_no_errors_out(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("socialai_dsl.cli.check.ROOMS", 3)
+def test_deep_tries_what_has_no_errors_out(capsys: Capture) -> None:
     Path("claiming.yaml").write_text(CLAIMING)
-    assert main(["validate", "--deep", "claiming.yaml", "broken.yaml", "--format", "json"]) == 1
+    assert main(["validate", "--deep", "claiming.yaml", "broken.yaml", "--rooms", "3", "--format", "json"]) == 1
     found = {(d["file"], d["code"], d["line"]) for d in json.loads(capsys.readouterr().out)}
     assert found >= {("claiming.yaml", "S801", 10), ("claiming.yaml", "W802", 9)}
     assert {file for file, *_ in found} == {"claiming.yaml", "broken.yaml"}
     Path("claiming.yaml").write_text(CLAIMING.partition("  - {failure")[0])
-    assert main(["validate", "--deep", "--strict", "claiming.yaml"]) == 0
+    assert main(["validate", "--deep", "--strict", "claiming.yaml", "--rooms", "3"]) == 0
     said = capsys.readouterr().out
     assert "claiming.yaml: 3 rooms of seed 0" in said
     assert "a success can be reached in 3 of 3 rooms" in said

@@ -304,6 +304,28 @@ REFUSED: dict[str, tuple[Header, Code]] = {
         RESET,
         [(Op.LOAD, FIRST_ENTITY + ENTITY_FIELDS * GUIDE + Field.STATUS, const(200))],
     ),
+    "the lesser of 3 and a product that may wrap around": (
+        RULES,
+        [
+            (Op.MUL, temp(0), const(500_000), const(500_000)),
+            (Op.MUL, temp(1), temp(0), temp(0)),
+            (Op.MUL, temp(2), temp(1), temp(0)),
+            (Op.MIN, "n", temp(2), const(3)),
+        ],
+    ),
+    "a sum that may wrap around": (
+        RULES,
+        [
+            (Op.MUL, temp(0), const(1 << 18), const(1 << 18)),
+            (Op.MUL, temp(1), temp(0), const(1 << 18)),
+            (Op.ADD, temp(1), temp(1), temp(1)),
+            *[(Op.ADD, temp(1), temp(1), temp(1)) for _ in range(9)],
+            (Op.MIN, temp(1), temp(1), const(3)),
+            (Op.MAX, temp(1), temp(1), const(0)),
+            (Op.DIV, "n", temp(0), temp(1)),
+        ],
+    ),
+    "how many bits of -1 are set": (RULES, [(Op.COUNT_BITS, "n", const(-1))]),
     "the width before there is a room": (
         RESET,
         [FILL, (Op.LOAD, temp(0), Register.WIDTH), (Op.LOAD, temp(1), const(0)), (Op.PUT, const(1), temp(0))],

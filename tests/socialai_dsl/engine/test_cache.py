@@ -97,7 +97,12 @@ def test_the_key_covers_every_source_of_the_engine(tmp_path: Path, monkeypatch: 
     package = Path(cache.__file__).parents[1]
     copy = tmp_path / "package"
     (copy / "engine").mkdir(parents=True)
-    for source in [*(package / "engine").glob("*.py"), package / "program.py", package / "draws.py"]:
+    (copy / "program").mkdir()
+    for source in [
+        *(package / "engine").glob("*.py"),
+        *(package / "program").glob("*.py"),
+        package / "draws.py",
+    ]:
         (copy / source.relative_to(package)).write_bytes(source.read_bytes())
     monkeypatch.setattr(cache, "__file__", str(copy / "engine" / "cache.py"))
     keys = {cache.fingerprint.__wrapped__()}

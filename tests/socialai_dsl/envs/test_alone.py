@@ -12,7 +12,8 @@ from socialai_dsl.checking import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.envs.alone import Alone, success_alone
 from socialai_dsl.envs.depth import depth
-from socialai_dsl.envs.properties import Effort
+from socialai_dsl.envs.effort import Effort
+from socialai_dsl.envs.properties import Trial
 
 # One of three doors is right, and Ada would say which. What it looks like is up to the test.
 DOORS = """
@@ -49,7 +50,7 @@ def alone(name: str, rooms: int) -> Alone:
     loaded = socialai_dsl.load(name)
     assert isinstance(loaded, LoadedScenario)
     hidden = replace(loaded, checked=replace(loaded.checked, npcs_hidden=True))
-    return success_alone(compile_loaded(hidden), rooms, 0, 20_000)
+    return success_alone(compile_loaded(hidden), Effort(rooms, 0, 20_000))
 
 
 @pytest.fixture
@@ -75,7 +76,11 @@ def test_a_draw_that_shows_is_known(tmp_path: Path, doors: str) -> None:
 
 def test_what_nobody_can_do_is_never_solved(tmp_path: Path, doors: str) -> None:
     found = alone_in(
-        tmp_path, doors.replace("COLOR", "red").replace('exit.index>")}', 'exit.index>") and t < 0}'), 4
+        tmp_path,
+        doors.replace("COLOR", "red").replace(
+            'exit.index>")}', 'exit.index>") and ada.is(content) and t == 1 and agent.did(done)}'
+        ),
+        4,
     )
     assert (found.success, found.undecided) == (0.0, 0)
 
@@ -89,7 +94,8 @@ def test_the_depth_of_a_scenario(tmp_path: Path) -> None:
     scripted = socialai_dsl.load("talkitout+oracle")
     assert isinstance(loaded, LoadedScenario)
     assert isinstance(scripted, LoadedScenario)
-    found = depth(loaded, Effort(rooms=8, states=20_000), scripted)
+    effort = Effort(rooms=8, states=20_000)
+    found = depth(Trial(loaded, effort, scripted), effort)
     assert len(found.steps) + len(found.unsolvable) + len(found.undecided) == 8
     assert found.unsolved == found.unsolvable  # the oracle solves what can be solved
     assert found.steps == tuple(sorted(found.steps))
@@ -100,4 +106,5 @@ def test_the_depth_of_a_scenario(tmp_path: Path) -> None:
 def test_where_there_is_no_npc_nobody_is_missed(tmp_path: Path) -> None:
     loaded = socialai_dsl.load("showme_no_social")
     assert isinstance(loaded, LoadedScenario)
-    assert depth(loaded, Effort(rooms=1, states=1_000), None).alone is None
+    effort = Effort(rooms=1, states=1_000)
+    assert depth(Trial(loaded, effort), effort).alone is None

@@ -8,7 +8,7 @@ import pytest
 
 import socialai_dsl
 from socialai_dsl.envs.coverage import Coverage, coverage
-from socialai_dsl.envs.properties import Effort
+from socialai_dsl.envs.effort import Effort
 
 # Only who says all three words, one after another and nothing else, is let in.
 SECRETIVE = """

@@ -269,3 +269,83 @@ def test_a_program_from_nowhere_cannot_be_explained(tiny: Folder) -> None:
     env.step(np.array([0, 0, 0, 0]))
     with pytest.raises(ValueError, match="not compiled from a scenario"):
         env.explain()
+
+
+WAY = """
+room: {{size: 5}}
+objects:
+  gate: {{type: door, at: [2, 0], state: {gate}, color: red}}
+  crate: {{type: box, at: {crate}, color: blue}}
+let: {{goal: pick(gate | crate)}}
+frames:
+  leave: {{steps: [{{do: {do}}}, {{do: stay, for: ever}}]}}
+cast:
+  ann: {{at: [3, 3], frame: leave}}
+  porter: {{at: {porter}}}
+  agent: {{at: {agent}, facing: left}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("do", "changes", "why"),
+    [
+        ("go_to(gate)", {"crate": [2, 1]}, "there is no way: crate at 2,1 is in the way"),
+        ("go_next_to(gate)", {"crate": [2, 1]}, "there is no way: crate at 2,1 is in the way"),
+        ("enter(gate)", {"porter": [2, 1]}, "there is no way: porter at 2,1 is in the way"),
+        ("use(gate)", {"agent": [2, 1]}, "there is no way: agent at 2,1 is in the way"),
+        ("go_to(goal)", {"porter": [2, 1]}, "there is no way: porter at 2,1 is in the way"),
+        (
+            "go_to(nearest(d in gate | gate to agent))",
+            {"crate": [2, 1]},
+            "there is no way: crate at 2,1 is in the way",
+        ),
+        (
+            "go_next_to(porter)",
+            {"porter": [1, 1], "crate": [2, 1], "agent": [1, 2]},
+            "there is no way: agent at 1,2 is in the way",
+        ),
+        ("go_to(gate)", {}, ""),
+        ("go_next_to(porter)", {}, ""),
+    ],
+)
+def test_a_way_that_is_not_found_names_who_or_what_is_in_it(
+    tiny: Folder, do: str, changes: dict[str, list[int]], why: str
+) -> None:
+    places = {"crate": [3, 1], "porter": [1, 1], "agent": [1, 3], "gate": "open", **changes}
+    play = tiny(WAY.format(do=do, **places), {"let": {"goal": "gate"}}).step()
+    assert reason(play, do)["why"] == f"do: {do} is not finished" + (f": {why}" if why else "")
+
+
+def test_a_way_to_somebody_who_has_left(tiny: Folder) -> None:
+    play = tiny(
+        """
+        frames:
+          leave: {steps: [{cause: self.vanish}]}
+          seek: {steps: [{do: go_next_to(bob)}]}
+        cast:
+          bob: {at: [5, 5], frame: leave}
+          ann: {at: [3, 3], frame: seek}
+          agent: {}
+        """
+    ).step()
+    assert (
+        reason(play, "go_next_to(bob)")["why"]
+        == "do: go_next_to(bob) is not finished: its goal is not in the room"
+    )
+
+
+def test_what_is_heard_with_values_in_it_is_told_before_what_else_must_hold(tiny: Folder) -> None:
+    """Nobody has spoken, so nobody is the speaker."""
+    play = tiny(
+        """
+        let: {word: pick("hello" | "hello")}
+        frames:
+          shy: {states: {s: {then: [{hears: Say <word>, when: next_to(speaker), say: You there}]}}}
+        cast:
+          ann: {at: [3, 3], frame: shy}
+          agent: {}
+        """
+    )
+    assert reason(play.step(), "You there")["why"] == "hears: Say <word>: nothing was heard"
+    assert reason(play.step(None, "Say bye"), "You there")["why"] == 'hears: Say <word>: heard "Say bye"'
+    assert "next_to(speaker) is false" in reason(play.step(None, "Say hello"), "You there")["why"]

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 import socialai_dsl
-from socialai_dsl.envs.properties import Effort, Report, Verdict, check_property
+from socialai_dsl.envs.effort import Effort
+from socialai_dsl.envs.properties import Report, Verdict, check_property
 
 # One of two doors is right. Ada tells which to whoever asks and is in front of her.
 TOLD = """
@@ -157,8 +158,9 @@ objects:
   boxes: {type: box, count: 2, color: red, at: [[0, 2], [4, 2]], exclusive: true}
   apple: {type: apple, inside: target}
 let: {target: pick(boxes)}
+frames: {look: {states: {looking: {do: face(target)}}}}
 cast:
-  ada: {at: [2, 3], facing: up, color: red}
+  ada: {at: [2, 3], facing: up, color: red, frame: look}
   agent: {at: [2, 2], facing: left}
 outcome: [{success: apple.eaten}]
 check: [{needs: ada}]

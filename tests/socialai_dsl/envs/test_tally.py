@@ -11,6 +11,8 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.envs import ScenarioVectorEnv
+from socialai_dsl.envs.coverage import coverage
+from socialai_dsl.envs.properties import Effort
 from socialai_dsl.envs.tally import Tally, parts_of, tally
 from tests.tiny import Folder
 
@@ -125,3 +127,32 @@ def test_parts_are_named_where_they_are_written() -> None:
     assert isinstance(loaded, sd.LoadedScenario)
     files = {Path(part.span.file).name for part in parts_of(loaded.checked)}
     assert files == {"diverse_exit.yaml", "teacher.yaml"}
+
+
+def test_entries_that_begin_and_end_in_one_turn_have_come_about(tmp_path: Path) -> None:
+    """A way that is fulfilled already is skipped, and what follows it may end in the same turn."""
+    file = Folder(tmp_path).write(
+        "skipping",
+        """\
+        objects: {ball: {type: ball, at: [3, 3]}}
+        frames:
+          work:
+            steps:
+              - {do: go_next_to(ball)}
+              - {do: left}
+              - {do: go_next_to(ball)}
+              - {do: go_next_to(ball)}
+              - {do: right}
+              - {do: stay, for: 0}
+              - {do: stay, for: ever}
+        cast:
+          ann: {frame: work, at: [4, 3]}
+          agent: {}
+        """,
+    )
+    counted = played(str(file), EPISODES, False)
+    steps = {part.name: times for part, times in counted.times.items() if part.kind == "step"}
+    assert steps == {f"work.steps[{k}]": EPISODES for k in range(7)}
+    loaded = sd.load(file)
+    assert isinstance(loaded, sd.LoadedScenario)
+    assert [part for part in coverage(loaded, Effort(2)).missing if part.kind == "step"] == []

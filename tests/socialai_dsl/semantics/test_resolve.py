@@ -182,10 +182,10 @@ def test_picks_are_numbered_in_source_order(outcome_term):
 
 
 def test_a_status_is_a_word_after_the_dot(outcome_term):
-    term = outcome_term("exit.locked")
+    term = outcome_term("exit.closed")
     assert (term.left.name, term.right.value, term.left.type.words) == (
         "status",
-        2,
+        1,
         ("open", "closed", "locked"),
     )
 

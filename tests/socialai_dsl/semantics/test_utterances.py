@@ -6,7 +6,7 @@ import pytest
 
 from socialai_dsl.frontend import load
 from socialai_dsl.semantics.utterances import normal
-from socialai_dsl.semantics.vocabulary import words
+from socialai_dsl.vocabulary import words
 
 
 @pytest.mark.parametrize("text", ["Open sesame", " open  SESAME. ", "open sesame!?"])

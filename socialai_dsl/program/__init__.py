@@ -10,15 +10,16 @@ gives shapes). Registers 0 to 31 are the same in every program (`Register`). Fro
 members of a group next to each other. Then come the program's own registers (drawn names, `let`, frame states, clocks,
 ...), the lines heard this step, the inboxes of the NPCs, and the log of lines heard since the last reset.
 
-**Code.** An instruction is four words: op, a, b, c. Tests go on with the next instruction if they hold and skip `c`
-instructions forward if not; nothing ever jumps backward. `EACH_CELL` is the one loop: it runs the instructions up to
-its `END_EACH` once for each cell of a board, so it is bounded by the room. Code starts at a `pc`, counted in
-instructions from the code table's start, and ends at `HALT`; pc 0 is a `HALT`, so an entry of 0 means "nothing to do".
+**Code.** An instruction is four words: op, a, b, c; `instructions.TABLE` says what each op does. Tests go on with the
+next instruction if they hold and skip `c` instructions forward if not; nothing ever jumps backward. `EACH_CELL` is the
+one loop: it runs the instructions up to its `END_EACH` once for each cell of a board, so it is bounded by the room.
+Code starts at a `pc`, counted in instructions from the code table's start, and ends at `HALT`; pc 0 is a `HALT`, so an
+entry of 0 means "nothing to do".
 
-**Operands.** `value(x)` of an operand word x: a constant x - CONSTANT if x >= CONSTANT // 2; a temporary if
-x >= TEMPORARY; else the register x. Temporaries are int64 scratch of one run and carry nothing from run to run. Where
-an op writes, `dst` is a register or temporary. An "entity" operand is a value that is an entity's number, or a cell:
-`CELL + 32 * y + x`, which is always present, never moves and faces nowhere.
+**Operands.** `v(x)`, the value of an operand word x: a constant x - CONSTANT if x >= CONSTANT // 2; a temporary if
+x >= TEMPORARY; else the register x. Temporaries are int64 scratch of one run and carry nothing from run to run. An
+entity is named by its number; where a place will do, also by a cell: `CELL + 32 * y + x`, which is always present,
+never moves and faces nowhere. Boards are sets of cells, numbered 0 to BOARDS - 1; they carry nothing from run to run.
 
 **Utterance classes.** The compiler groups all pairs (template, noun) that no rule of the program tells apart into one
 class; class 0 is silence, 1 is "said, but nothing any rule waits for". Tables are indexed by class, so a step visits
@@ -36,6 +37,9 @@ from hashlib import sha256
 import numpy as np
 import numpy.typing as npt
 
+from socialai_dsl.program.instructions import CLASS_SIZE as CLASS_SIZE
+from socialai_dsl.program.instructions import Op as Op
+from socialai_dsl.program.instructions import OpClass as OpClass
 from socialai_dsl.source import Span
 
 VERSION = 2
@@ -268,127 +272,6 @@ class LineColumn(IntEnum):
     COLUMNS = 4
 
 
-class Op(IntEnum):
-    """The instruction set. `v(x)` is the value of operand x, `e(x)` the entity v(x), n the words to skip when false."""
-
-    HALT = 0  # end of this code
-    SKIP = 1  # c: skip c instructions
-    # Tests: go on if true, else skip c instructions.
-    IF_EQ = 2  # v(a) == v(b)
-    IF_NE = 3  # v(a) != v(b)
-    IF_LT = 4  # v(a) < v(b)
-    IF_LE = 5  # v(a) <= v(b)
-    IF_BIT = 6  # bit v(b) of v(a) is set
-    IF_UNPINNED = 7  # no layout gives register a (the register number itself, not its value)
-    IF_CHANCE = (
-        8  # an event of probability a / 65536 (a literal word) happens, drawn at site b (a literal word)
-    )
-    IF_HEARD = 9  # class b (literal) is in the inbox that starts at register a (literal)
-    IF_SAME_CELL = 10  # e(a) and e(b) are in one cell, both present
-    IF_NEXT_TO = 11  # Manhattan distance 1, both present
-    IF_FACES = 12  # e(b) is in the cell ahead of e(a)
-    IF_IN_FRONT_OF = (
-        13  # e(a) stands in the cell in front of e(b): one step into the room from a wall, else ahead of it
-    )
-    IF_EYE_CONTACT = (
-        14  # same row or column, different cells, each facing the other; nothing is tested between
-    )
-    IF_FACES_TOWARD = 15  # direction of e(a) is the quadrant of the way to e(b)
-    IF_IN_LINE = 16  # same row or column, both present
-    IF_REACHES = 17  # e(a) has a path to the cell of e(b), or next to it
-    IF_LOOKS_AT = 18  # e(b) lies straight ahead of e(a), within its view, nothing opaque between
-    IF_UNOBSTRUCTED = 19  # e(a) and e(b) are in one row or column with nothing opaque between
-    # Values.
-    LOAD = 20  # dst a = v(b)
-    ADD = 21  # dst a = v(b) + v(c)
-    SUB = 22
-    MUL = 23
-    DIV = 24  # floored; 0 if v(c) == 0
-    MOD = 25  # floored, sign of the divisor; 0 if v(c) == 0
-    MIN = 26
-    MAX = 27
-    ABS = 28  # dst a = |v(b)|
-    FIELD = 29  # dst a = field c (literal Field) of e(b)
-    DISTANCE = 30  # dst a = Manhattan distance of e(b) and e(c)
-    # dst a = the entity nearest to e(b) of those from c >> 8 to c & 255 (a literal), ties: the first; -1 if none is in
-    # the room, or e(b) is not
-    NEAREST = 31
-    QUADRANT = 32  # dst a = direction of e(c) seen from e(b); |dx| == |dy|: SE right, NE up, NW left, SW down
-    DRAW = 33  # dst a = uniform number below v(b), drawn at site c (literal)
-    # dst a = a uniform number other than v(b), drawn at site c & 65535, of the c >> 24 numbers from (c >> 16 & 255) on
-    DRAW_OTHER = 34
-    SET_BIT = 35  # dst a |= 1 << v(b)
-    COUNT_BITS = 36  # dst a = number of set bits of v(b)
-    LOWEST_BIT = 37  # dst a = position of the lowest set bit of v(b); 0 if none
-    PICK_BIT = 38  # dst a = position of a uniformly drawn set bit of v(b), site c (literal); 0 if none
-    SEES = 39  # dst a = 1 if e(c) would be in the view square of e(b) if that faced direction v(a), else 0
-    CELL_OF = 40  # dst a = the cell of e(b); CELL - 1 if it is not in the room
-    CELL_BESIDE = 41  # dst a = the cell beside e(b) in direction v(c); CELL - 1 if that is off the canvas
-    # Effects.
-    SET_FIELD = 42  # field b (literal) of e(a) = v(c); X, Y, STATUS, GONE have ops of their own
-    BECOME = 43  # status of e(a) = v(b); the cell is drawn anew
-    VANISH = 44  # e(a) leaves the room
-    SAY = 45  # e(a) says line v(b) at the end of its turn, unless it says something already
-    GOTO = 46  # frame a (literal) enters state b (literal), clock 0
-    COUNT = 47  # counter a (literal) += 1
-    END = 48  # the episode ends: outcome a (literal), b (literal) per cent of the reward
-    PLACE = 49  # e(a) is put on the cell of e(b), in the room; it may share the cell
-    REWARD = 50  # Register.BONUS += v(a)
-    END_GRADED = 51  # the episode ends: outcome a (literal), v(b) per cent of the reward, cut to 0..100
-    # A rule that answers, in one instruction: counter a (literal) += 1, line v(b) is said as by SAY, and, unless c
-    # (literal) is 0, frame c >> 8 enters state (c & 255) - 1, as by GOTO.
-    ANSWER = 52
-    # Activities: choose the body action of the entity on turn.
-    BODY = 53  # action v(a)
-    TURN_TO = (
-        54  # e(a) makes one quarter turn towards direction v(b), none if it faces it; behind: site c decides
-    )
-    GO_TO = 55  # e(a) takes one step of a shortest path to the cell of e(b); site c for turning round
-    GO_NEXT_TO = 56  # e(a) takes one step of a shortest path to a free cell next to e(b); site c
-    POINT = 57  # e(a) points in direction v(b)
-    # One of b (literal) actions, drawn at site c: action k is in the bits 4 k to 4 k + 3 of a (literal).
-    CHOOSE = 58
-    # e(a) makes one quarter turn towards e(b), as TURN_TO towards its QUADRANT; none if it is not in the room.
-    FACE = 59
-    # Boards: sets of cells, numbered 0 to BOARDS - 1 (literals). They carry nothing from run to run; B_FREE and PUT
-    # belong to reset code.
-    B_FLOOR = 60  # board a = cells of plain floor
-    B_WALL = 61  # board a = cells of wall side b (literal Side), at least c (literal) cells from its corners
-    B_RECT = (
-        62  # board a = cells with v(b) <= x <= v(b + 1) and v(b + 2) <= y <= v(b + 3) that count (c, a literal
-        # Counting); b is a temporary
-    )
-    B_NEXT_TO = 63  # board a = cells with Manhattan distance 1 to e(b)
-    B_IN_FRONT_OF = 64  # board a = the cell in front of e(b)
-    B_AND = 65  # board a = a and b
-    B_OR = 66  # board a = a or b
-    B_WITHOUT = 67  # board a = a without b
-    B_FREE = 68  # board a = a without cells that hold an entity
-    EACH_CELL = (
-        69  # run the c instructions up to END_EACH for each cell of board a, row by row; v(b), v(b + 1) = x, y and
-        # v(b + 2) = the cell as an operand (temporaries)
-    )
-    DROP_CELL = 70  # take the current cell out of the board of the loop
-    END_EACH = 71
-    PICK_CELL = (
-        72  # dst a, a + 1 (temporaries) = x, y of a uniformly drawn cell of board b, site c; -1, -1 if none
-    )
-    PUT = 73  # e(a) is placed at x = v(b), y = v(b + 1) (b is a temporary); not in the room if x is -1
-    MAKE_ROOM = 74  # the room has width v(a), height v(b)
-    B_COPY = 75  # board a = board b
-    B_COUNT = 76  # dst a (a temporary) = number of cells of board b
-    FIRST_CELL = (
-        77  # dst a, a + 1 (temporaries) = x, y of the first cell of board b, row by row; -1, -1 if none
-    )
-    # dst a, a + 1 (temporaries) = x, y of the cell of board b nearest to e(c), ties: the first; -1, -1 if none
-    NEAREST_CELL = 78
-    # Who and what was heard: of the first entry of inbox b (literal) whose class is in class set c (literal).
-    HEARD_FROM = 79  # dst a = the speaker's number; -1 if there is none
-    HEARD_NOUN = 80  # dst a = the noun; -1 if there is none
-    # Reset code: the board shows the room with what stands in it so far (a literal 1), or bare again (0).
-    DRAW_ROOM = 81
-
-
 class Counting(IntEnum):
     """Which cells a rectangle is made of."""
 
@@ -406,7 +289,7 @@ class Side(IntEnum):
     RIGHT = 3
 
 
-TESTS = range(Op.IF_EQ, Op.IF_UNOBSTRUCTED + 1)
+TESTS = frozenset(op for op in Op if op // CLASS_SIZE == OpClass.TEST)
 CODES_OF_TYPES: Mapping[str, int] = {"empty": 1, "wall": 2, "npc": 11}
 COLORS = ("red", "green", "blue", "purple", "yellow", "grey")
 DIRECTIONS = ("right", "down", "left", "up")

@@ -1,0 +1,94 @@
+"""How much is tried, for how long, and who is told how far it is."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Final, TypeVar
+
+Tell = Callable[[str], None]
+"""Takes a line about how far something is."""
+
+_QUIET: Final = 1.0
+"""Seconds after which progress is told, and between two such lines."""
+
+T = TypeVar("T")
+
+
+class Clock:
+    """When to stop.
+
+    Args:
+        seconds: how long there is from now on; None: for ever.
+        tell: takes a line about progress, at most one a second.
+    """
+
+    def __init__(self, seconds: float | None = None, tell: Tell | None = None) -> None:
+        now = time.monotonic()
+        self._until = None if seconds is None else now + seconds
+        self._tell, self._last = tell, now
+        self._whole, self._interrupted = self, False
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether somebody wants to stop."""
+        return self._whole._interrupted
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the time is spent, or somebody wants to stop."""
+        return self.interrupted or (self._until is not None and time.monotonic() >= self._until)
+
+    @property
+    def left(self) -> float | None:
+        """Seconds; None: for ever."""
+        return None if self._until is None else max(0.0, self._until - time.monotonic())
+
+    def part(self, parts: int) -> Clock:
+        """A clock for one of so many tasks that share what is left."""
+        own = Clock(None if self.left is None else self.left / parts, self._tell)
+        own._whole = self._whole
+        return own
+
+    def interrupt(self) -> None:
+        """Stop as soon as possible, and tell what is known."""
+        self._whole._interrupted = True
+
+    def progress(self, what: str) -> None:
+        """Tell how far it is, if it is time for that."""
+        now = time.monotonic()
+        if self._tell is not None and now - self._whole._last >= _QUIET:
+            self._whole._last = now
+            self._tell(what)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is tried: rooms 0, 1, ... of a seed, so many states of each, as long as the clock says."""
+
+    rooms: int = 100
+    seed: int = 0
+    states: int = 50_000
+    clock: Clock = field(default_factory=Clock, compare=False)
+
+    def each_room(self, what: str, find: Callable[[int], T], complete: Callable[[T], bool]) -> Iterator[T]:
+        """What is found in room after room, until the time is spent or somebody interrupts.
+
+        Args:
+            what: for progress, such as `needs: ada`.
+            find: looks at one room.
+            complete: whether what was found is more than that the time was spent.
+        """
+        for room in range(self.rooms):
+            if self.clock.is_over:
+                return
+            self.clock.progress(f"{what}: room {room} of {self.rooms}")
+            try:
+                found = find(room)
+            except KeyboardInterrupt:
+                self.clock.interrupt()
+                return
+            if self.clock.is_over and not complete(found):
+                return
+            yield found

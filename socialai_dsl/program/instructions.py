@@ -1,0 +1,543 @@
+"""The instruction table: of each op its class, its operands, what it reads and writes, and the range of its results.
+
+An instruction is four words: op, a, b, c. The interpreter, the verifier, the listing, the liveness of registers and
+`docs/instructions.md` are made from this table or checked against it; an op without an entry can neither be assembled
+nor verified. An op's number is its class and its place in the class, so a new one renumbers nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+from functools import cached_property
+from types import MappingProxyType
+from typing import Final
+
+from socialai_dsl.program import ranges
+from socialai_dsl.program.ranges import ANYTHING, Rule
+
+CLASS_SIZE: Final = 64
+"""Ops of a class: op // CLASS_SIZE is the class."""
+
+
+class OpClass(IntEnum):
+    """What kinds of instructions there are."""
+
+    CONTROL = 0  # where code goes on
+    TEST = 1  # goes on if true, else skips
+    VALUE = 2  # computes a value
+    EFFECT = 3  # changes the world
+    ACTIVITY = 4  # chooses the body action of the entity on turn
+    BOARD = 5  # fills and reads boards, and sets up the room
+
+
+class Op(IntEnum):
+    """The instruction set; `TABLE` says what each does."""
+
+    HALT = 0
+    SKIP = 1
+    EACH_CELL = 2
+    DROP_CELL = 3
+    END_EACH = 4
+
+    IF_EQ = 64
+    IF_NE = 65
+    IF_LT = 66
+    IF_LE = 67
+    IF_BIT = 68
+    IF_UNPINNED = 69
+    IF_CHANCE = 70
+    IF_HEARD = 71
+    IF_SAME_CELL = 72
+    IF_NEXT_TO = 73
+    IF_FACES = 74
+    IF_IN_FRONT_OF = 75
+    IF_EYE_CONTACT = 76
+    IF_FACES_TOWARD = 77
+    IF_IN_LINE = 78
+    IF_REACHES = 79
+    IF_LOOKS_AT = 80
+    IF_UNOBSTRUCTED = 81
+
+    LOAD = 128
+    ADD = 129
+    SUB = 130
+    MUL = 131
+    DIV = 132
+    MOD = 133
+    MIN = 134
+    MAX = 135
+    ABS = 136
+    FIELD = 137
+    DISTANCE = 138
+    NEAREST = 139
+    QUADRANT = 140
+    DRAW = 141
+    DRAW_OTHER = 142
+    SET_BIT = 143
+    COUNT_BITS = 144
+    LOWEST_BIT = 145
+    PICK_BIT = 146
+    SEES = 147
+    CELL_OF = 148
+    CELL_BESIDE = 149
+    HEARD_FROM = 150
+    HEARD_NOUN = 151
+
+    SET_FIELD = 192
+    BECOME = 193
+    VANISH = 194
+    SAY = 195
+    GOTO = 196
+    COUNT = 197
+    END = 198
+    PLACE = 199
+    REWARD = 200
+    END_GRADED = 201
+    ANSWER = 202
+
+    BODY = 256
+    TURN_TO = 257
+    GO_TO = 258
+    GO_NEXT_TO = 259
+    POINT = 260
+    CHOOSE = 261
+    FACE = 262
+
+    B_FLOOR = 320
+    B_WALL = 321
+    B_RECT = 322
+    B_NEXT_TO = 323
+    B_IN_FRONT_OF = 324
+    B_AND = 325
+    B_OR = 326
+    B_WITHOUT = 327
+    B_FREE = 328
+    B_COPY = 329
+    B_COUNT = 330
+    PICK_CELL = 331
+    FIRST_CELL = 332
+    NEAREST_CELL = 333
+    PUT = 334
+    MAKE_ROOM = 335
+    DRAW_ROOM = 336
+
+
+class Kind(Enum):
+    """What an operand word is."""
+
+    UNUSED = "unused"
+    VALUE = "a value"
+    ENTITY = "an entity's number"
+    PLACE = "an entity's number, or a cell"
+    TARGET = "a register or temporary that is written"
+    UPDATED = "a temporary that is read and written"
+    TEMPORARIES = "the first of some temporaries that are written"
+    COORDINATES = "the first of some temporaries that are read"
+    BOARD = "a board that is read"
+    FILLED = "a board that is filled"
+    CHANGED = "a board that is read and changed"
+    SITE = "a draw site"
+    INBOX = "the first register of an inbox"
+    REGISTER = "a register's number"
+    LITERAL = "a literal number"
+    SKIP = "instructions to skip"
+
+
+@dataclass(frozen=True)
+class Operand:
+    """One operand: its kind, and the range that its value or literal must be in.
+
+    Attributes:
+        kind: what the word is.
+        low, high: the range, where it is the same in every program.
+        count: of COORDINATES how many temporaries are read.
+        meaning: what a literal means.
+    """
+
+    kind: Kind
+    low: int = ANYTHING[0]
+    high: int = ANYTHING[1]
+    count: int = 1
+    meaning: str = ""
+
+
+_READ: Final = frozenset((Kind.VALUE, Kind.ENTITY, Kind.PLACE, Kind.UPDATED, Kind.COORDINATES, Kind.INBOX))
+_WRITTEN: Final = frozenset((Kind.TARGET, Kind.UPDATED, Kind.TEMPORARIES))
+
+
+@dataclass(frozen=True)
+class Instruction:
+    """What an op is.
+
+    Attributes:
+        says: what it does, in one sentence; a, b, c are its operands, v(x) the value of one.
+        operands: of a, b and c.
+        results: the range of each value that it writes, first to last.
+        setup: whether only reset code may run it.
+    """
+
+    op: Op
+    says: str
+    operands: tuple[Operand, Operand, Operand]
+    results: tuple[Rule, ...] = ()
+    setup: bool = False
+
+    @property
+    def op_class(self) -> OpClass:
+        """Its class."""
+        return OpClass(self.op // CLASS_SIZE)
+
+    @cached_property
+    def arity(self) -> int:
+        """How many of its operands are used."""
+        return max((k + 1 for k in range(3) if self.operands[k].kind is not Kind.UNUSED), default=0)
+
+    @cached_property
+    def reads(self) -> tuple[int, ...]:
+        """Positions of the operands that name registers or temporaries to read."""
+        return tuple(k for k, operand in enumerate(self.operands) if operand.kind in _READ)
+
+    @cached_property
+    def writes(self) -> int | None:
+        """Position of the operand that names what is written, as many registers or temporaries as there are results."""
+        return next((k for k, operand in enumerate(self.operands) if operand.kind in _WRITTEN), None)
+
+    def read_at(self, position: int, words: Sequence[int]) -> range:
+        """The registers or temporaries that an operand names to be read, as operand words."""
+        operand, first = self.operands[position], words[position]
+        return range(first, first + operand.count) if operand.kind in _READ else range(0)
+
+    def written(self, words: Sequence[int]) -> range:
+        """The registers or temporaries that it writes, as operand words."""
+        if self.writes is None:
+            return range(0)
+        return range(words[self.writes], words[self.writes] + len(self.results))
+
+    @cached_property
+    def draws(self) -> bool:
+        """Whether chance decides what it does."""
+        return any(operand.kind is Kind.SITE for operand in self.operands)
+
+    @property
+    def skips(self) -> bool:
+        """Whether it may go on behind the instructions that its last operand counts."""
+        return self.operands[2].kind is Kind.SKIP
+
+
+_NONE: Final = Operand(Kind.UNUSED)
+_VALUE: Final = Operand(Kind.VALUE)
+_DIRECTION: Final = Operand(Kind.VALUE, 0, 3)
+_ENTITY: Final = Operand(Kind.ENTITY)
+_PLACE: Final = Operand(Kind.PLACE)
+_TARGET: Final = Operand(Kind.TARGET)
+_WRITTEN_HERE: Final = Operand(Kind.TEMPORARIES)
+_BOARD: Final = Operand(Kind.BOARD)
+_FILLED: Final = Operand(Kind.FILLED)
+_CHANGED: Final = Operand(Kind.CHANGED)
+_SITE: Final = Operand(Kind.SITE)
+_INBOX: Final = Operand(Kind.INBOX)
+_SKIP: Final = Operand(Kind.SKIP)
+
+
+def _literal(meaning: str, low: int = 0, high: int = (1 << 31) - 1) -> Operand:
+    return Operand(Kind.LITERAL, low, high, meaning=meaning)
+
+
+def _test(op: Op, says: str, a: Operand = _PLACE, b: Operand = _PLACE) -> Instruction:
+    return Instruction(op, says, (a, b, _SKIP))
+
+
+def _value(
+    op: Op, says: str, rule: Rule, b: Operand = _VALUE, c: Operand = _NONE, a: Operand = _TARGET
+) -> Instruction:
+    return Instruction(op, says, (a, b, c), (rule,))
+
+
+def _plain(
+    op: Op, says: str, a: Operand = _NONE, b: Operand = _NONE, c: Operand = _NONE, setup: bool = False
+) -> Instruction:
+    return Instruction(op, says, (a, b, c), setup=setup)
+
+
+_CELL_FOUND: Final = (ranges.a_column, ranges.a_line)
+
+_ALL: Final = (
+    _plain(Op.HALT, "This code ends."),
+    _plain(Op.SKIP, "Skip c instructions.", c=_SKIP),
+    Instruction(
+        Op.EACH_CELL,
+        "Run the c instructions up to END_EACH for each cell of board a, row by row; b, b + 1 and b + 2 are its x, its "
+        "y and the cell as an operand.",
+        (_BOARD, _WRITTEN_HERE, _SKIP),
+        (ranges.column_of_loop, ranges.line_of_loop, ranges.cell_of_loop),
+    ),
+    _plain(Op.DROP_CELL, "Take the current cell out of the board of the loop."),
+    _plain(Op.END_EACH, "The end of a loop."),
+    _test(Op.IF_EQ, "v(a) == v(b).", _VALUE, _VALUE),
+    _test(Op.IF_NE, "v(a) != v(b).", _VALUE, _VALUE),
+    _test(Op.IF_LT, "v(a) < v(b).", _VALUE, _VALUE),
+    _test(Op.IF_LE, "v(a) <= v(b).", _VALUE, _VALUE),
+    _test(Op.IF_BIT, "Bit v(b) of v(a) is set.", _VALUE, Operand(Kind.VALUE, 0, 62)),
+    _test(Op.IF_UNPINNED, "No layout gives register a.", Operand(Kind.REGISTER), _NONE),
+    _test(
+        Op.IF_CHANCE,
+        "An event of probability a / 65536 happens, drawn at site b.",
+        _literal("probability", 0, 65536),
+        _SITE,
+    ),
+    _test(Op.IF_HEARD, "Something of class b is in inbox a.", _INBOX, _literal("utterance class", 1)),
+    _test(Op.IF_SAME_CELL, "Both are in one cell."),
+    _test(Op.IF_NEXT_TO, "Their Manhattan distance is 1."),
+    _test(Op.IF_FACES, "b is in the cell ahead of a."),
+    _test(
+        Op.IF_IN_FRONT_OF,
+        "a stands in the cell in front of b: one step into the room from a wall, else ahead of b.",
+    ),
+    _test(
+        Op.IF_EYE_CONTACT,
+        "Both are in one row or column, in different cells, each facing the other; nothing is tested between.",
+    ),
+    _test(Op.IF_FACES_TOWARD, "The direction of a is the quadrant of the way to b."),
+    _test(Op.IF_IN_LINE, "Both are in one row or column."),
+    _test(Op.IF_REACHES, "a has a path to the cell of b, or next to it."),
+    _test(Op.IF_LOOKS_AT, "b lies straight ahead of a, within its view, with nothing opaque between."),
+    _test(Op.IF_UNOBSTRUCTED, "Both are in one row or column with nothing opaque between."),
+    _value(Op.LOAD, "a = v(b).", ranges.same),
+    _value(Op.ADD, "a = v(b) + v(c).", ranges.total, c=_VALUE),
+    _value(Op.SUB, "a = v(b) - v(c).", ranges.difference, c=_VALUE),
+    _value(Op.MUL, "a = v(b) * v(c).", ranges.product, c=_VALUE),
+    _value(Op.DIV, "a = v(b) // v(c), floored; 0 if v(c) is 0.", ranges.quotient, c=_VALUE),
+    _value(Op.MOD, "a = v(b) % v(c), with the sign of v(c); 0 if that is 0.", ranges.remainder, c=_VALUE),
+    _value(Op.MIN, "a = the lesser of v(b) and v(c).", ranges.least, c=_VALUE),
+    _value(Op.MAX, "a = the greater of v(b) and v(c).", ranges.greatest, c=_VALUE),
+    _value(Op.ABS, "a = |v(b)|.", ranges.magnitude),
+    _value(
+        Op.FIELD,
+        "a = field c of b; x and y are -1 of what is not in the room.",
+        ranges.field,
+        _PLACE,
+        _literal("field"),
+    ),
+    _value(
+        Op.DISTANCE,
+        "a = the Manhattan distance of b and c; width and height together if one is not in the room.",
+        ranges.distance,
+        _PLACE,
+        _PLACE,
+    ),
+    _value(
+        Op.NEAREST,
+        "a = the entity nearest to b of those from c >> 8 to c & 255, ties: the first; -1 if none is in the room.",
+        ranges.one_of_those,
+        _PLACE,
+        _literal("first and last entity"),
+    ),
+    _value(
+        Op.QUADRANT,
+        "a = the direction of c seen from b; on diagonals SE is right, NE up, NW left, SW down.",
+        ranges.direction,
+        _PLACE,
+        _PLACE,
+    ),
+    _value(
+        Op.DRAW,
+        "a = a uniform number below v(b), drawn at site c.",
+        ranges.drawn,
+        Operand(Kind.VALUE, 1, 1 << 30),
+        _SITE,
+    ),
+    _value(
+        Op.DRAW_OTHER,
+        "a = a uniform number other than v(b), drawn at site c & 65535, of the c >> 24 numbers from c >> 16 & 255 on.",
+        ranges.drawn_other,
+        _VALUE,
+        Operand(Kind.SITE, meaning="packed"),
+    ),
+    _value(
+        Op.SET_BIT,
+        "Bit v(b) of v(a) is set.",
+        ranges.with_bit,
+        Operand(Kind.VALUE, 0, 62),
+        a=Operand(Kind.UPDATED, 0),
+    ),
+    _value(Op.COUNT_BITS, "a = how many of the lower 32 bits of v(b) are set.", ranges.bits_set),
+    _value(Op.LOWEST_BIT, "a = the position of the lowest set bit of v(b), of 32; 0 if none.", ranges.a_bit),
+    _value(
+        Op.PICK_BIT,
+        "a = the position of a uniformly drawn set bit of v(b), of 32, at site c; 0 if none.",
+        ranges.a_bit,
+        c=_SITE,
+    ),
+    _value(
+        Op.SEES,
+        "a = 1 if c would be in the view square of b if b faced direction v(a), else 0.",
+        ranges.truth,
+        _ENTITY,
+        _PLACE,
+        Operand(Kind.UPDATED, 0, 3),
+    ),
+    _value(Op.CELL_OF, "a = the cell of b; no cell if it is not in the room.", ranges.a_cell, _PLACE),
+    _value(
+        Op.CELL_BESIDE,
+        "a = the cell beside b in direction v(c); no cell if that is off the canvas.",
+        ranges.a_cell,
+        _PLACE,
+        _DIRECTION,
+    ),
+    _value(
+        Op.HEARD_FROM,
+        "a = who said the first entry of inbox b whose class is in class set c; -1 if there is none.",
+        ranges.a_speaker,
+        _INBOX,
+        _literal("class set"),
+    ),
+    _value(
+        Op.HEARD_NOUN,
+        "a = the noun of the first entry of inbox b whose class is in class set c; -1 if there is none.",
+        ranges.a_noun,
+        _INBOX,
+        _literal("class set"),
+    ),
+    _plain(
+        Op.SET_FIELD,
+        "Field b of a = v(c); x, y, status and gone have ops of their own.",
+        _ENTITY,
+        _literal("field"),
+        _VALUE,
+    ),
+    _plain(Op.BECOME, "The status of a = v(b); its cell is drawn anew.", _ENTITY, _VALUE),
+    _plain(Op.VANISH, "a leaves the room.", _ENTITY),
+    _plain(
+        Op.SAY, "a says line v(b) at the end of its turn, unless it says something already.", _ENTITY, _VALUE
+    ),
+    _plain(Op.GOTO, "Frame a enters state b, clock 0.", _literal("frame"), _literal("state")),
+    _plain(Op.COUNT, "Counter a += 1.", _literal("rule")),
+    _plain(
+        Op.END,
+        "The episode ends with outcome a, for b per cent of the reward.",
+        _literal("outcome"),
+        _literal("per cent", 0, 100),
+    ),
+    _plain(Op.PLACE, "a is put on the cell of b, in the room; it may share the cell.", _ENTITY, _PLACE),
+    _plain(
+        Op.REWARD,
+        "v(a) per cent of the success reward are added to that of this step.",
+        Operand(Kind.VALUE, -100, 100),
+    ),
+    _plain(
+        Op.END_GRADED,
+        "The episode ends with outcome a, for v(b) per cent of the reward, cut to 0..100.",
+        _literal("outcome"),
+        _VALUE,
+    ),
+    _plain(
+        Op.ANSWER,
+        "Counter a += 1, line v(b) is said as by SAY, and, unless c is 0, frame c >> 8 enters state (c & 255) - 1.",
+        _literal("rule"),
+        _VALUE,
+        _literal("goal"),
+    ),
+    _plain(Op.BODY, "Body action v(a).", _VALUE),
+    _plain(
+        Op.TURN_TO,
+        "a makes one quarter turn towards direction v(b), none if it faces it; where it lies behind site c decides.",
+        _ENTITY,
+        _DIRECTION,
+        _SITE,
+    ),
+    _plain(
+        Op.GO_TO,
+        "a takes one step of a shortest path to the cell of b; site c for turning round.",
+        _ENTITY,
+        _PLACE,
+        _SITE,
+    ),
+    _plain(
+        Op.GO_NEXT_TO,
+        "a takes one step of a shortest path to a free cell next to b; site c for turning round.",
+        _ENTITY,
+        _PLACE,
+        _SITE,
+    ),
+    _plain(Op.POINT, "a points in direction v(b).", _ENTITY, _DIRECTION),
+    _plain(
+        Op.CHOOSE,
+        "One of b body actions, drawn at site c: action k is in the bits 4 k to 4 k + 3 of a.",
+        _literal("actions"),
+        _literal("how many"),
+        _SITE,
+    ),
+    _plain(
+        Op.FACE,
+        "a makes one quarter turn towards b, as TURN_TO towards its QUADRANT; none if b is not in the room.",
+        _ENTITY,
+        _PLACE,
+        _SITE,
+    ),
+    _plain(Op.B_FLOOR, "Board a = the cells of plain floor.", _FILLED),
+    _plain(
+        Op.B_WALL,
+        "Board a = the cells of wall side b, at least c cells from its corners.",
+        _FILLED,
+        _literal("side", 0, 3),
+        _literal("margin", 0, 64),
+    ),
+    _plain(
+        Op.B_RECT,
+        "Board a = the cells with v(b) <= x <= v(b + 1) and v(b + 2) <= y <= v(b + 3): of plain floor (c is 0), of "
+        "floor and what is built on it (1), of the whole canvas (2).",
+        _FILLED,
+        Operand(Kind.COORDINATES, -64, 64, 4),
+        _literal("which cells", 0, 2),
+    ),
+    _plain(Op.B_NEXT_TO, "Board a = the cells at Manhattan distance 1 from b.", _FILLED, _PLACE),
+    _plain(Op.B_IN_FRONT_OF, "Board a = the cell in front of b.", _FILLED, _PLACE),
+    _plain(Op.B_AND, "Board a = a and b.", _CHANGED, _BOARD),
+    _plain(Op.B_OR, "Board a = a or b.", _CHANGED, _BOARD),
+    _plain(Op.B_WITHOUT, "Board a = a without b.", _CHANGED, _BOARD),
+    _plain(Op.B_FREE, "Board a = a without the cells that hold an entity.", _CHANGED, setup=True),
+    _plain(Op.B_COPY, "Board a = board b.", _FILLED, _BOARD),
+    Instruction(
+        Op.B_COUNT,
+        "a = how many cells board b has.",
+        (_WRITTEN_HERE, _BOARD, _NONE),
+        (ranges.how_many_cells,),
+    ),
+    Instruction(
+        Op.PICK_CELL,
+        "a, a + 1 = x, y of a uniformly drawn cell of board b, at site c; -1, -1 if it has none.",
+        (_WRITTEN_HERE, _BOARD, _SITE),
+        _CELL_FOUND,
+    ),
+    Instruction(
+        Op.FIRST_CELL,
+        "a, a + 1 = x, y of the first cell of board b, row by row; -1, -1 if it has none.",
+        (_WRITTEN_HERE, _BOARD, _NONE),
+        _CELL_FOUND,
+    ),
+    Instruction(
+        Op.NEAREST_CELL,
+        "a, a + 1 = x, y of the cell of board b nearest to c, ties: the first; -1, -1 if there is none.",
+        (_WRITTEN_HERE, _BOARD, _PLACE),
+        _CELL_FOUND,
+    ),
+    _plain(
+        Op.PUT,
+        "a is placed at x = v(b), y = v(b + 1), and is not in the room if x is -1.",
+        _ENTITY,
+        Operand(Kind.COORDINATES, -1, 31, 2),
+        setup=True,
+    ),
+    _plain(Op.MAKE_ROOM, "The room has width v(a) and height v(b).", _VALUE, _VALUE, setup=True),
+    _plain(
+        Op.DRAW_ROOM,
+        "The board shows the room with what stands in it so far (a is 1), or bare again (0).",
+        _literal("whether", 0, 1),
+        setup=True,
+    ),
+)
+
+TABLE: Final[Mapping[Op, Instruction]] = MappingProxyType({entry.op: entry for entry in _ALL})
+"""Of each op what it is."""

@@ -1,0 +1,309 @@
+"""What can never be so, whatever happens: conditions that no value makes true."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Final
+
+from socialai_dsl.semantics import terms
+from socialai_dsl.semantics.build import is_own_noun, walk
+from socialai_dsl.semantics.findings import Findings
+from socialai_dsl.semantics.terms import (
+    Checked,
+    Const,
+    Effect,
+    ObjectType,
+    RulePlan,
+    Select,
+    Sited,
+    Term,
+)
+from socialai_dsl.source import Span
+
+_GIVES: Final = {"open": ("open", "opened"), "close": ("closed", "shut"), "lock": ("locked",)}
+"""Statuses that an effect may lead to, of those that a type has."""
+
+
+def check_possible(checked: Checked, findings: Findings) -> None:
+    """Report conditions that can never hold: of rules (W311), of steps and outcomes (W314), and S316 where nothing is
+    left to be played: no success, or no room.
+    """
+    possible = Possible(checked)
+    for span, conditions in _by_place(_rules(checked)):
+        if (why := possible.never(conditions)) is not None:
+            findings.warning("W311", "this rule never fires: its condition can never hold", span, hint=why)
+    for span, conditions in _by_place(_untils(checked)):
+        if (why := possible.never(conditions)) is not None:
+            findings.warning("W314", "this step can never end: `until` can never hold", span, hint=why)
+    for required in checked.require:
+        if (why := possible.never([required])) is not None:
+            message = "no room is played: what it has to be like can never hold"
+            findings.error("S316", message, required.span, hint=why)
+    never = {
+        outcome: why
+        for outcome in checked.outcomes
+        if (why := possible.never([outcome.condition])) is not None
+    }
+    successes = [outcome for outcome in checked.outcomes if outcome.success]
+    lost = bool(successes) and all(outcome in never for outcome in successes)
+    for outcome, why in never.items():
+        if lost and outcome.success:
+            message = "no success is possible: this can never hold"
+            findings.error("S316", message, outcome.condition.span, hint=why)
+        else:
+            findings.warning("W314", "this outcome can never hold", outcome.condition.span, hint=why)
+
+
+def _by_place(found: Iterable[tuple[Span, Sited]]) -> Iterator[tuple[Span, list[Sited]]]:
+    """Conditions by the place they are written at: several members may follow one frame."""
+    places: dict[Span, list[Sited]] = {}
+    for span, condition in found:
+        places.setdefault(span, []).append(condition)
+    yield from places.items()
+
+
+def _rules(checked: Checked) -> Iterator[tuple[Span, Sited]]:
+    in_frames = (
+        rule for frame in checked.frames for state in frame.states for rule in (*state.first, *state.then)
+    )
+    for rule in (*in_frames, *checked.rules):
+        if rule.when is not None:
+            yield rule.when.span, rule.when
+
+
+def _untils(checked: Checked) -> Iterator[tuple[Span, Sited]]:
+    for frame in checked.frames:
+        for step in frame.steps:
+            if step.until is not None:
+                yield step.until.span, step.until
+
+
+class Possible:
+    """What the parts of a scenario can be, each looked at by itself."""
+
+    def __init__(self, checked: Checked) -> None:
+        self._checked = checked
+        self._statuses = _Statuses(checked)
+
+    def never(self, conditions: Sequence[Sited]) -> str | None:
+        """Why none of these conditions can hold; None if one of them may.
+
+        What is false as it is written, such as a parameter that switches a rule off, is meant to be.
+        """
+        why = None
+        for condition in conditions:
+            if self._may(condition.term):
+                return None
+            why = why or self._why(condition.term)
+        return why
+
+    def _may(self, term: Term, wanted: bool = True) -> bool:
+        """Whether a condition may be true, or false."""
+        match term:
+            case Const(value=value):
+                return bool(value) is wanted
+            case terms.Not(arg=arg):
+                return self._may(arg, not wanted)
+            case terms.Logic(op=op, args=args):
+                every = (op == "and") is wanted
+                return (all if every else any)(self._may(arg, wanted) for arg in args)
+            case terms.Compare():
+                return self._may_compare(term, wanted)
+            case terms.Quantified(op="any" | "all" as op, items=items, condition=condition, cells=False):
+                if not items:
+                    return (op == "all") is wanted
+                if (op == "any") is wanted and condition is not None:
+                    return self._may(condition, wanted)
+            case terms.Chance(probability=probability):
+                return probability > 0 if wanted else probability < 1
+        return True
+
+    def _may_compare(self, term: terms.Compare, wanted: bool) -> bool:
+        if is_own_noun(term.left) or is_own_noun(term.right):
+            return True  # whoever is silent names no noun
+        op, left, right = term.op, term.left, term.right
+        a, b = self._values(left), self._values(right)
+        if not wanted:
+            op = {"==": "!=", "!=": "==", "<": ">=", "<=": ">"}[op]  # type: ignore[assignment]
+        match str(op):
+            case "==":
+                return any(value in b for value in a) if len(a) < len(b) else any(value in a for value in b)
+            case "!=":
+                return not (len(a) == 1 == len(b) and a[0] == b[0])
+            case "<":
+                return min(a) < max(b)
+            case "<=":
+                return min(a) <= max(b)
+            case ">=":
+                return max(a) >= min(b)
+        return max(a) > min(b)
+
+    def _values(self, term: Term) -> Sequence[int]:
+        """All that a term can be, at most."""
+        match term:
+            case Const(value=value):
+                return (value,)
+            case terms.FieldOf(entity=entity, name="status"):
+                low, high = entity.type.low, entity.type.high
+                found = {
+                    s for number in range(low, high + 1) for s in self._statuses.of(number, term.type.size)
+                }
+                return sorted(found) or range(term.type.low, term.type.high + 1)
+            case Select(values=values, default=default):
+                return sorted({v for part in (*values, default) for v in self._few(part)}) or (
+                    default.type.low,
+                )
+        return range(term.type.low, term.type.high + 1)
+
+    def _few(self, term: Term) -> Sequence[int]:
+        values = self._values(term)
+        return values if len(values) <= 256 else (min(values), max(values))
+
+    # -- words --
+
+    def _why(self, term: Term) -> str | None:
+        """What of a condition is never so, as a hint; None where nothing in it depends on what happens."""
+        match term:
+            case terms.Logic(op="and", args=args):
+                return next((why for arg in args if not self._may(arg) and (why := self._why(arg))), None)
+            case terms.Logic(args=args):
+                return next((why for arg in args if (why := self._why(arg))), None)
+            case terms.Quantified(condition=condition, items=items) if condition is not None and items:
+                return self._why(condition)
+            case terms.Compare(left=left, right=right) if not isinstance(left, Const) or not isinstance(
+                right, Const
+            ):
+                return self._why_not_equal(left, right) if term.op == "==" else _bounds(left, right)
+        return None
+
+    def _why_not_equal(self, left: Term, right: Term) -> str:
+        if isinstance(left, terms.FieldOf) and left.name == "status" and isinstance(right, Const):
+            words = left.type.words
+            can = " or ".join(words[value - left.type.low] for value in self._values(left))
+            wanted = words[right.value - left.type.low]
+            name = self._name(left.entity)
+            return f"nothing makes {name} `{wanted}`: it is {can}"
+        return _bounds(left, right)
+
+    def _name(self, entity: Term) -> str:
+        low, high = entity.type.low, entity.type.high
+        keys = dict.fromkeys(self._checked.entities[number].key for number in range(low, high + 1))
+        return " or ".join(f"`{key}`" for key in keys)
+
+
+def _bounds(left: Term, right: Term) -> str:
+    """The ranges of what is compared."""
+    return (
+        " and ".join(
+            f"{_called(part)} is {_between(part)}" for part in (left, right) if not isinstance(part, Const)
+        )
+        or "it compares two different values"
+    )
+
+
+def _called(term: Term) -> str:
+    match term:
+        case terms.World(name=name):
+            return f"`{name}`"
+        case terms.FieldOf(name=name):
+            return f"`{name}`"
+        case terms.Measure(name=name):
+            return f"`{name}`"
+        case terms.Read(path=path):
+            return f"`{path.rpartition('.')[2]}`"
+    return "what is compared"
+
+
+def _between(term: Term) -> str:
+    type_ = term.type
+    if type_.words:
+        named = type_.words[:6]
+        return "one of " + ", ".join(named) + (", ..." if len(type_.words) > len(named) else "")
+    if type_.kind == "entity":
+        return "something else"
+    return f"{type_.low}" if type_.size == 1 else f"from {type_.low} to {type_.high}"
+
+
+class _Statuses:
+    """The statuses that each object can ever have: at first, by being toggled or pushed, by links and effects."""
+
+    def __init__(self, checked: Checked) -> None:
+        self._checked = checked
+        self._opened = {number for entity in checked.entities for number in entity.opens}
+        self._unlocked = {number for entity in checked.entities for number in entity.unlocks}
+        self._computed: dict[int, set[int]] = {}
+        for one in checked.computed:
+            self._computed.setdefault(one.entity, set()).update((one.on, one.off))
+        self._effects: dict[int, list[Effect]] = {}
+        for effect in _effects(checked):
+            for entity in effect.entities:
+                for number in range(entity.type.low, entity.type.high + 1):
+                    self._effects.setdefault(number, []).append(effect)
+        self._known: dict[int, frozenset[int]] = {}
+
+    def of(self, number: int, size: int) -> frozenset[int]:
+        """Statuses of an entity; all, as many as `size`, for what is no object."""
+        if number not in self._known:
+            type_ = self._checked.entities[number].type
+            self._known[number] = frozenset(range(size)) if type_ is None else self._reached(number, type_)
+        return self._known[number]
+
+    def _reached(self, number: int, type_: ObjectType) -> frozenset[int]:
+        every = frozenset(range(len(type_.states)))
+        if number in self._opened:
+            return every
+        found = {*self._initial(number, type_), *self._computed.get(number, ())}
+        if number in self._unlocked:
+            found.add(type_.unlocked)
+        for effect in self._effects.get(number, ()):
+            gives = self._given(effect, type_)
+            if gives is None:
+                return every
+            found |= gives
+        waiting = list(found)
+        while waiting:
+            status = waiting.pop()
+            for following in (type_.toggled, type_.pushed, type_.expired):
+                if status in following and following[status] not in found:
+                    found.add(following[status])
+                    waiting.append(following[status])
+            if status in type_.rolls and type_.initial not in found:
+                found.add(type_.initial)
+                waiting.append(type_.initial)
+        return frozenset(found)
+
+    def _initial(self, number: int, type_: ObjectType) -> Iterator[int]:
+        entity = self._checked.entities[number]
+        if entity.initial is None:
+            yield entity.status
+            return
+        path = entity.initial.path
+        drawn = (item for item in self._checked.setup if isinstance(item, terms.Drawn) and item.path == path)
+        for item in drawn:
+            yield from (part.value for part in walk(item.value.term) if isinstance(part, Const)
+                        and part.type.kind == "status")  # fmt: skip
+        yield type_.initial
+
+    def _given(self, effect: Effect, type_: ObjectType) -> set[int] | None:
+        """Statuses that an effect leads to; None for any."""
+        match effect.name:
+            case "vanish" | "put" | "move_into" | "reset":
+                return set()
+            case "open" | "close" | "lock":
+                return {type_.states.index(name) for name in _GIVES[effect.name] if name in type_.states}
+            case "unlock":
+                return {type_.unlocked}
+            case "become" if isinstance(effect.value, Const):
+                return {effect.value.value}
+        return None
+
+
+def _effects(checked: Checked) -> Iterator[Effect]:
+    rules: list[RulePlan] = list(checked.rules)
+    for frame in checked.frames:
+        for step in frame.steps:
+            yield from step.causes
+        for state in frame.states:
+            rules += (*state.first, *state.then)
+    for rule in rules:
+        yield from rule.causes
