@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from socialai_dsl.checking import LoadedScenario
     from socialai_dsl.envs.effort import Effort
 
-SUMMARY: Final = "verify the properties that scenarios claim in `check`, and that everything in them can happen and be known"
+SUMMARY: Final = "verify what scenarios claim in `check`, and that everything in them can happen and be known"
 
 ROOMS: Final = 100
 STATES: Final = 50_000

@@ -81,7 +81,8 @@ class Effort:
             complete: whether what was found is more than that the time was spent.
         """
         for room in range(self.rooms):
-            if self.clock.is_over:
+            over = self.clock.is_over  # a variable, or the type checker takes it for False below as well
+            if over:
                 return
             self.clock.progress(f"{what}: room {room} of {self.rooms}")
             try:

@@ -352,9 +352,8 @@ def _searched_for(
     few = replace(effort, rooms=min(effort.rooms, _SEARCHED_ROOMS))
     for plan in few.each_room("only_through", find, lambda plan: plan is not None):
         if plan is not None:
-            yield twins().play(
-                lambda step, plan=plan: np.tile(plan[min(step, len(plan) - 1)], (len(values), 1))
-            )
+            steps = plan
+            yield twins().play(lambda step: np.tile(steps[min(step, len(steps) - 1)], (len(values), 1)))
             return
 
 

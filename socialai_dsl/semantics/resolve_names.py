@@ -256,9 +256,9 @@ def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: S
         (key for key, member in resolver.symbols.scenario.cast.items() if member.name == word), None
     )
     if called is not None:
-        hint = "in expressions a member of the cast goes by its key"
+        goes = "in expressions a member of the cast goes by its key"
         return resolver.fail(
-            "S201", f"`{word}` is what somebody is called", node, scope, suggestion=called, hint=hint
+            "S201", f"`{word}` is what somebody is called", node, scope, suggestion=called, hint=goes
         )
     near, place = suggestion(resolver, word, expected, scope)
     message = f"unknown name `{word}`"

@@ -170,7 +170,9 @@ check: [{never: agent.did(toggle)}]
 
 def test_deep_tries_what_has_no_errors_out(capsys: Capture) -> None:
     Path("claiming.yaml").write_text(CLAIMING)
-    assert main(["validate", "--deep", "claiming.yaml", "broken.yaml", "--rooms", "3", "--format", "json"]) == 1
+    assert (
+        main(["validate", "--deep", "claiming.yaml", "broken.yaml", "--rooms", "3", "--format", "json"]) == 1
+    )
     found = {(d["file"], d["code"], d["line"]) for d in json.loads(capsys.readouterr().out)}
     assert found >= {("claiming.yaml", "S801", 10), ("claiming.yaml", "W802", 9)}
     assert {file for file, *_ in found} == {"claiming.yaml", "broken.yaml"}
