@@ -12,7 +12,7 @@ ARGS ?=
 
 SECONDS_EACH ?= 60
 
-.PHONY: help run test test-long test-faults test-bounds endurance fuzz nightly lint format bench docs fidelity update-goldens clean
+.PHONY: help run test test-long test-learning test-faults test-bounds endurance fuzz nightly lint format bench docs fidelity update-goldens clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -25,6 +25,9 @@ test: $(STAMP) ## run the tests, on up to four cores at once
 
 test-long: $(STAMP) ## run the tests that take minutes
 	$(BIN)/python -m pytest -m slow $(ARGS)
+
+test-learning: $(STAMP) ## train agents on two scenarios for minutes, and require what they have to reach
+	$(BIN)/python -m pytest -m learning tests/test_learning.py $(ARGS)
 
 test-faults: $(STAMP) ## lose workers, nodes and the command of an experiment; installs Ray and submitit
 	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[ray,slurm]'
@@ -40,8 +43,9 @@ fuzz: $(STAMP) ## throw made-up files at the loader, each target for SECONDS_EAC
 	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[fuzz]'
 	$(BIN)/python -m tests.fuzzing.run --seconds $(SECONDS_EACH) $(ARGS)
 
-nightly: $(STAMP) ## everything that takes long: the long tests, half an hour of fuzzing, planted mistakes, how time grows
+nightly: $(STAMP) ## everything that takes long: the long tests, what agents learn, half an hour of fuzzing, planted mistakes, how time grows
 	$(MAKE) test-long
+	$(MAKE) test-learning
 	$(MAKE) test-faults
 	$(MAKE) test-bounds
 	$(MAKE) fuzz SECONDS_EACH=600

@@ -172,8 +172,6 @@ def commands(path: Path) -> Iterator[list[str]]:
     for text in blocks(path, "console"):
         for line in text.replace("\\\n", " ").splitlines():
             words = shlex.split(line.removeprefix("$ "), comments=True)
-            if words[:1] == ["torchrun"]:
-                words = ["socialai", *words[words.index("socialai_dsl") + 1 :]]
             if line.startswith("$ ") and words[0].startswith("socialai"):
                 yield words
 

@@ -162,7 +162,13 @@ def _resumed(arguments: argparse.Namespace) -> "RunConfig":
         raise UsageError(f"--resume: the agent {config.agent!r} of {folder} is not trained")
     asked = {"frames": arguments.frames, "wandb": arguments.wandb}
     changes = {name: value for name, value in asked.items() if value is not None}
-    return checked_config(config.model_dump() | changes)
+    resumed = checked_config(config.model_dump() | changes)
+    if config.depends_on_frames and resumed.frames != config.frames:  # before its folder says otherwise
+        raise UsageError(
+            f"--frames: got {resumed.frames}, expected {config.frames}, because guide and schedules of this run "
+            "reach from its first frame to its last"
+        )
+    return resumed
 
 
 def _draw_curve(config: "RunConfig", program: "Playable", folder: Path, result: dict[str, Any]) -> None:

@@ -190,7 +190,7 @@ class _Run:
         self._report_unused()
         names = [resolver.registers.read(f"{member}.name") for member in self._symbols.cast]
         words = words_in_order(scenario.grammar, names, spoken.lines(self._symbols.cast))
-        made = Checked(
+        return Checked(
             name=name,
             horizon=scenario.horizon,
             actions=tuple(action for action in PRIMITIVES if action in scenario.actions),
@@ -219,7 +219,6 @@ class _Run:
             properties=claimed,
             readings=resolver.readings,
         )
-        return made
 
     def _spoken(self) -> _Spoken:
         """What everybody says, before what anybody hears."""

@@ -1,0 +1,36 @@
+"""Agents learn two scenarios from the reward alone, to a success on the test set that chance never has."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from socialai_dsl.cli import main
+
+# scenario, frames, least success on the 500 test episodes
+GOALS = [("help", 600_000, 0.95), ("cointhief_tags", 1_500_000, 0.70)]
+
+
+@pytest.mark.learning
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize(("scenario", "frames", "least"), GOALS, ids=[goal[0] for goal in GOALS])
+def test_an_agent_learns(
+    scenario: str, frames: int, least: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = [
+        "--recipe",
+        "plain",
+        "--frames",
+        str(frames),
+        "--seed",
+        "0",
+        "--threads",
+        "2",
+        "--device",
+        "cpu",
+    ]
+    assert main.main(["run", scenario, *options, "--out", str(tmp_path), "--json"]) == 0
+    capsys.readouterr()
+    figures = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))["eval"]
+    assert figures["episodes"] == 500
+    assert figures["success_rate"] >= least
