@@ -395,9 +395,9 @@ def part_of(program: Program) -> Part:
     )
 
 
-def batch_of(program: Program, rows: int = 1, threads: int = 1, seed: int = 7) -> Batch:
+def batch_of(program: Program, rows: int = 1, seed: int = 7) -> Batch:
     """A batch of one program, row i at (seed, i), reset."""
-    batch = Batch([part_of(program)], [[0]], [0] * rows, program.header(Header.TOKENS), threads)
+    batch = Batch([part_of(program)], [[0]], [0] * rows, program.header(Header.TOKENS))
     batch.state.keys[:, Key.SEED] = seed
     batch.state.keys[:, Key.INDEX] = np.arange(rows)
     batch.reset()

@@ -55,7 +55,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"numpy"},
     ),
     "compilation": (TEXT_SIDE - {"frontend"} | {"program", "program_suite", "compiler"}, set()),
-    "engine": ({"program", "draws"}, {"numpy", "numba", "llvmlite"}),
+    "engine": ({"program", "draws"}, {"numpy", "numba"}),
     "envs": (
         TEXT_SIDE | {"program", "program_suite", "compilation", "engine"},
         {"numpy", "gymnasium", "PIL"},

@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--only",
         action="append",
         metavar="NAME",
-        help="measure only this: ours, rules, programs, threads, start, a peer, a limit; with --train a trainer; "
+        help="measure only this: ours, rules, programs, start, a peer, a limit; with --train a trainer; "
         "may be given again",
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object instead of a table")

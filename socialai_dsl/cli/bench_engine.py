@@ -12,7 +12,7 @@ from socialai_dsl.cli.measure import PROGRAMS, Ours
 from socialai_dsl.cli.reference_loop import reference_speed
 from socialai_dsl.cli.start_up import waits
 
-OWN_PARTS: Final = ("ours", "rules", "programs", "threads", "start")
+OWN_PARTS: Final = ("ours", "rules", "programs", "start")
 
 
 @dataclass(frozen=True)
@@ -67,12 +67,6 @@ def measure_engine(plan: Plan, note: Callable[[str], None]) -> Report:
             if plan.holds(peer.name):
                 note(f"{peer.name}: {peer.workload}")
                 measure_peer(report, peer, plan.batches, plan.repetitions, plan.seconds)
-    if plan.holds("threads"):
-        note("two threads")
-        rows = list(ours.threads(plan.scenarios[0]))
-        report.rows += rows
-        if not rows:
-            report.missing["threads"] = "there is one core"
     if plan.holds("start"):
         note("the start of a process")
         try:

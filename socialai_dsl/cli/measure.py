@@ -7,7 +7,6 @@ import numpy as np
 
 import socialai_dsl
 from socialai_dsl.cli.bench_report import Memory, Row
-from socialai_dsl.cli.machine import on_cores
 from socialai_dsl.cli.mixes import BATCHES, Actions, Allowed, random_actions, translated, walk_actions
 from socialai_dsl.cli.rule_heavy import rule_heavy_actions
 from socialai_dsl.cli.timing import Speed, speed_of
@@ -87,16 +86,6 @@ class Ours:
         envs.close()
         what = f"{name}, {heavy.fired:.2f} rules a step"
         yield Row(what, "ours", "rules", envs.num_envs, speed, None)
-
-    def threads(self, name: str, mix: str = "walk") -> Iterator[Row]:
-        """The largest batch on one thread and on two, with a core for each."""
-        with on_cores(2) as cores:
-            for threads in (1, 2) if cores == 2 else ():
-                envs = socialai_dsl.make_vec(
-                    name, num_envs=max(self._batches), num_threads=threads, copy=False
-                )
-                actions = self._actions(name, mix, envs)
-                yield self._vector(f"{name}, {threads} of 2 threads", mix, envs, actions)
 
     def memory(self, name: str) -> Memory:
         """Bytes of one environment."""

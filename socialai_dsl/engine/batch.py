@@ -1,19 +1,19 @@
-"""A batch of environments in memory: programs one behind the other, state, ports, and the threads that serve them."""
+"""A batch of environments in memory: programs one behind the other, state, ports, and the calls that step them."""
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any, Final, NamedTuple
+from functools import partial
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.engine.book import make_book, replace_in
-from socialai_dsl.engine.calls import BAD_ACTION, CHECKED, Task
+from socialai_dsl.engine.calls import BAD_ACTION, Task
 from socialai_dsl.engine.errors import RoomError
-from socialai_dsl.engine.machine import Call, prepare_call
-from socialai_dsl.engine.relay import Relay, order_of
-from socialai_dsl.engine.settings import is_interpreted
+from socialai_dsl.engine.jit import load
+from socialai_dsl.engine.kernel import serve
+from socialai_dsl.engine.pointers import make_book, replace_in
+from socialai_dsl.engine.queries import identify, script
 from socialai_dsl.engine.state import (
     ATTEMPTS,
     Book,
@@ -27,10 +27,9 @@ from socialai_dsl.engine.state import (
     empty_state,
     no_pins,
 )
-from socialai_dsl.engine.views import MEDIUM_CANVAS, SMALL_CANVAS, view_table
+from socialai_dsl.engine.views import view_table
 from socialai_dsl.program import VIEW, EntityColumn, Flag, FrameColumn, Header, LineColumn, Op, TypeColumn
 
-_ROWS_WORTH_A_THREAD: Final = 64
 _PLAIN_CHANNELS: Final = 4
 
 
@@ -60,14 +59,6 @@ class Part:
     name: str = ""
 
 
-class _Shares(NamedTuple):
-    """One call for each thread: the caller's, those of the others, and all of them as they are handed over."""
-
-    own: Call
-    others: list[Call]
-    order: Any
-
-
 class Batch:
     """Environments that are stepped together.
 
@@ -75,7 +66,7 @@ class Batch:
         state, ports: arrays, one row for each environment.
         tables: programs, views and pools.
         offsets, first_counters: where each program begins in the words, and where its counters.
-        counters: int64 (threads, counters of all programs), how often each thread has seen what is counted.
+        counters: int64 (counters of all programs,), how often what is counted was seen.
     """
 
     def __init__(
@@ -84,7 +75,6 @@ class Batch:
         pools: Sequence[Sequence[int]],
         pool_of_row: Sequence[int],
         length: int,
-        threads: int,
         sequences: Collection[int] = (),
     ) -> None:
         """Allocate everything; every row must be reset before its first step.
@@ -94,7 +84,6 @@ class Batch:
             pools: sets of programs, by number; an episode draws one of its pool.
             pool_of_row: for each environment the number of its pool.
             length: tokens in a history.
-            threads: how many threads share the work.
             sequences: numbers of the pools whose programs are the acts of one episode, played one after another. They
                 have one horizon.
         """
@@ -114,17 +103,16 @@ class Batch:
         gestures = any(int(header[Header.CHANNELS]) > _PLAIN_CHANNELS for header in headers)
         self.state: State = empty_state(rows, registers, board, length, VIEW, gestures)
         counters = int(sum(int(header[Header.COUNTERS]) for header in headers))
-        self.ports: Ports = empty_ports(self.state, counters, threads)
-        self.counters = self.ports.counters[:, :counters]
+        self.ports: Ports = empty_ports(self.state, counters)
+        self.counters = self.ports.counters
         for row, pool in enumerate(pool_of_row):
             in_sequence = int(pool in sequences)
             self.state.keys[row, Key.POOL] = int(starts[pool]) | len(pools[pool]) << 32 | in_sequence << 63
             self.state.keys[row, Key.PROGRAM] = self.offsets[pools[pool][0]]
         self._pool_starts = starts.tolist()
         self._names = [part.name or f"program {number}" for number, part in enumerate(parts)]
-        self._cuts = _cut(rows, threads)
-        self._open_book()
-        self._relay = Relay(len(self._cuts) - 1) if len(self._cuts) > 1 and not is_interpreted() else None
+        tables = self.tables._replace(views=self.tables.views.reshape(-1))
+        self._book = make_book((*tables, *self.state, *self.ports, self.ports.actions.reshape(-1)))
 
     def program_numbers(self) -> NDArray[np.intp]:
         """Which program each row plays, (E,)."""
@@ -160,38 +148,16 @@ class Batch:
             RoomError: all rows were stepped, but one that was reset found no room as its scenario requires; it
                 is in the last room that was drawn, and play may go on.
         """
-        if len(self._cuts) == 1:
-            if actions is not None:
-                self.ports.actions[:] = actions
-            return self._share(self._tasks[task])
-        ended = self._check_and_step(task, actions)
-        if ended is None:
-            return BAD_ACTION
-        if ended < 0:
-            raise self.refused_room()
-        return ended
+        if actions is not None:
+            self.ports.actions[:] = actions
+        return self._serve(task)
 
     def stepper(self, task: Task) -> Callable[[], int]:
-        """What does `step(task)`, for a batch that no threads share, without anything between Python and the engine.
+        """What does `step(task)` without anything between Python and the engine.
 
         Below BAD_ACTION means that a room was refused (`refused_room`).
         """
-        assert len(self._cuts) == 1, "internal: threads share this batch"
-        return self._tasks[task].own
-
-    def _check_and_step(self, task: Task, actions: NDArray[np.integer[Any]] | None) -> int | None:
-        """Let each thread copy the actions of its rows, which come late from another core's cache, and step if all fit.
-
-        What the calls return in all, or None if an action does not fit.
-        """
-        first, second = self._checks, self._checked[task]
-        given = self.ports.actions if actions is None else np.ascontiguousarray(actions, np.int64)
-        replace_in(
-            self._book, Book.GIVEN, given.reshape(-1)
-        )  # which is read by the check only, so never later
-        if self._relay is not None:
-            return self._relay.make_both(first.order, second.order)
-        return self._ask(second) if self._ask(first) == 0 else None
+        return partial(load(serve), self._book, int(task), self._rows)
 
     def reset(self, pins: NDArray[np.int16] | None = None) -> None:
         """Start the episodes that the keys of the rows `ports.chosen` name, from their layouts (`ports.layout`).
@@ -203,48 +169,19 @@ class Batch:
             registers = self.state.registers.shape[1]
             self.ports = self.ports._replace(pins=no_pins(registers) if pins is None else pins)
             replace_in(self._book, Book.PINS, self.ports.pins)  # so that prepared calls stay valid
-        self._share(self._tasks[Task.RESET])
+        self._serve(Task.RESET)
 
     def script(self) -> None:
         """Let `ports.actions` be what the agents' frames would do now."""
-        self._ask(self._prepare_once("script"))
+        load(script)(self._book, self._rows)
 
     def identify(self) -> NDArray[np.int64]:
         """A digest of each picture, int64 (E,)."""
-        self._ask(self._prepare_once("identify"))
+        load(identify)(self._book, self._rows)
         return self.ports.image_ids.view(np.int64).copy()
 
-    def close(self) -> None:
-        """Let the threads go."""
-        if self._relay is not None:
-            self._relay.close()
-            self._relay = None
-
-    def _open_book(self) -> None:
-        tables = self.tables._replace(views=self.tables.views.reshape(-1))
-        ports = self.ports._replace(counters=self.ports.counters.reshape(-1))
-        self._book = make_book((*tables, *self.state, *ports, *[ports.actions.reshape(-1)] * 2))
-        self._tasks = [self._prepare("serve", task) for task in Task]
-        self._checked = [self._prepare("serve", task + CHECKED) for task in Task if task < Task.CHECK]
-        self._checks = self._tasks[Task.CHECK]
-        self._others: dict[str, _Shares] = {}
-
-    def _prepare(self, name: str, *what: int) -> _Shares:
-        """A call for each thread, which does its rows."""
-        own, *others = [
-            prepare_call(name, self._book, *what, thread, *rows) for thread, rows in enumerate(self._cuts)
-        ]
-        return _Shares(own, others, None if is_interpreted() else order_of([own, *others]))
-
-    def _prepare_once(self, name: str) -> _Shares:
-        """The calls of what few batches are asked for, whose code is loaded when they are."""
-        if name not in self._others:
-            self._others[name] = self._prepare(name)
-        return self._others[name]
-
-    def _share(self, shares: _Shares) -> int:
-        """Let every thread do its rows; how many episodes ended, or BAD_ACTION."""
-        ended = self._ask(shares)
+    def _serve(self, task: Task) -> int:
+        ended = load(serve)(self._book, int(task), self._rows)
         if ended < BAD_ACTION:
             raise self.refused_room()
         return ended
@@ -259,26 +196,11 @@ class Batch:
             f"{row} (seed {key[Key.SEED]}, index {key[Key.INDEX]}, episode {key[Key.EPISODE]})"
         )
 
-    def _ask(self, shares: _Shares) -> int:
-        """Make the calls side by side; the sum of what they return."""
-        if self._relay is not None:
-            return self._relay.make(shares.order)
-        return shares.own() + sum(call() for call in shares.others) if shares.others else shares.own()
-
 
 def _board_words(header: NDArray[np.int32]) -> int:
-    """Words of a program's board, which is read in whole vectors where its canvas is small."""
+    """Words of a program's board."""
     width, height = int(header[Header.CANVAS_WIDTH]), int(header[Header.CANVAS_HEIGHT])
-    cells = width * height
-    read = next((canvas for canvas in (SMALL_CANVAS, MEDIUM_CANVAS) if cells <= canvas), cells)
-    return max(cells + 1 + 2 * height + width, read + 1)
-
-
-def _cut(rows: int, threads: int) -> list[tuple[int, int]]:
-    """Nearly equal ranges of rows, one for each thread that is worth its while."""
-    threads = max(1, min(threads, rows // _ROWS_WORTH_A_THREAD))
-    edges = [rows * thread // threads for thread in range(threads + 1)]
-    return list(pairwise(edges))
+    return width * height + 1 + 2 * height + width
 
 
 def _check_sequences(parts: Sequence[Part], sequences: Sequence[Sequence[int]]) -> None:
@@ -330,8 +252,7 @@ def _link(
 
 def _traits(words: NDArray[np.int32]) -> int:
     """What may happen in a program, as bits of `Trait`."""
-    cells = words[Header.CANVAS_WIDTH] * words[Header.CANVAS_HEIGHT]
-    traits = int(Trait.SMALL if cells <= SMALL_CANVAS else Trait.MEDIUM if cells <= MEDIUM_CANVAS else 0)
+    traits = 0
     if words[Header.TICK_PC] or words[Header.FLAGS] & Flag.ROLLS:
         traits |= Trait.GOES_BY_ITSELF
     types, starts = _types(words)

@@ -1,7 +1,7 @@
-"""Compiled code on disk: private to the user, and never older than the package's sources.
+"""Where Numba keeps the engine's compiled code: private to the user, and never older than the package's sources.
 
-The folder is named by a digest of all sources of the engine, the versions, the processor and the settings that shape
-the code. Entries end with a digest of name and content: what is damaged, or another's, is compiled again instead.
+The folder is named by a digest of all sources that the code is made from, and of Numba's settings. Numba itself tells
+processors and versions of its own apart.
 """
 
 import hashlib
@@ -9,17 +9,22 @@ import os
 import stat
 import sys
 import tempfile
-import threading
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
-import llvmlite.binding as llvm
+import numba
+import numpy as np
 
-from socialai_dsl.engine.settings import settings
-
-_DIGEST_BYTES: Final = 32
+_SETTINGS: Final = (
+    "OPT",
+    "BOUNDSCHECK",
+    "DEBUGINFO_DEFAULT",
+    "LOOP_VECTORIZE",
+    "SLP_VECTORIZE",
+    "ENABLE_AVX",
+)
+"""Numba's settings that shape code and that its own cache does not ask for."""
 
 
 @cache
@@ -50,17 +55,13 @@ def cache_folder() -> Path | None:
 def fingerprint() -> str:
     """Digest of everything that compiled code depends on."""
     package = Path(__file__).parents[1]
-    sources = [
-        *sorted((package / "engine").glob("*.py")),
-        *sorted((package / "program").glob("*.py")),
-        package / "draws.py",
-    ]
+    sources = [*(package / "engine").glob("*.py"), *(package / "program").glob("*.py"), package / "draws.py"]
     digest = hashlib.sha256()
-    for source in sources:
+    for source in sorted(sources):
         digest.update(source.name.encode())
         digest.update(hashlib.sha256(source.read_bytes()).digest())
-    words = [*map(version, ("numba", "llvmlite", "numpy")), sys.version, *settings().values(), package]
-    for word in (*words, llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()):
+    settings = [str(getattr(numba.config, name, None)) for name in _SETTINGS]
+    for word in (numba.__version__, np.__version__, sys.version, *settings):
         digest.update(f"\x1f{word}".encode())
     return digest.hexdigest()[:24]
 
@@ -81,33 +82,3 @@ def _make_private(folder: Path) -> bool:
     if os.name == "nt":
         return True
     return status.st_uid == _user() and status.st_mode & (stat.S_IWGRP | stat.S_IWOTH) == 0
-
-
-def read(name: str) -> bytes | None:
-    """What was kept under this name; None if nothing was, or what is there is damaged."""
-    folder = cache_folder()
-    if folder is None:
-        return None
-    try:
-        data = (folder / name).read_bytes()
-    except OSError:
-        return None
-    body = data[:-_DIGEST_BYTES]
-    return body if _digest(name, body) == data[-_DIGEST_BYTES:] else None
-
-
-def keep(name: str, body: bytes) -> None:
-    """Keep something for later processes if the disk lets us: a full or vanished one must not stop a run."""
-    folder = cache_folder()
-    if folder is None:
-        return
-    temporary = folder / f".{name}.{os.getpid()}-{threading.get_ident()}"
-    try:
-        temporary.write_bytes(body + _digest(name, body))
-        temporary.replace(folder / name)
-    except OSError:
-        temporary.unlink(missing_ok=True)
-
-
-def _digest(name: str, body: bytes) -> bytes:
-    return hashlib.sha256(name.encode() + b"\0" + body).digest()

@@ -18,9 +18,4 @@ class Task(IntEnum):
     STEP_NEXT = 0  # step; an episode that has ended is reset by the next step
     STEP_SAME = 1  # step; an episode that ends is reset at once, its last observation is kept
     STEP_ONLY = 2  # step; resets are the caller's
-    CHECK = 3  # only look whether the actions are inside their space, and take them over
-    RESET = 4  # reset the chosen rows to the episode named by their keys
-
-
-CHECKED = 8
-"""Added to a step whose actions a `CHECK` has taken over."""
+    RESET = 3  # reset the chosen rows to the episode named by their keys

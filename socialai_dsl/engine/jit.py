@@ -1,45 +1,101 @@
-"""How the engine's functions are compiled: integers as they are, nothing reordered, no interpreter lock.
+"""How the engine's functions are compiled: by Numba, into few entry points that Python calls.
 
-`inline` is for helpers, which are merged into their callers. `outline` is for what runs rarely or is large: it begins
-with `stay_outline()`, without which LLVM merges it into each of its callers all the same. The interpreter itself is
-compiled apart (`separate`), and so are the entry points called from Python. None of them allocates memory.
+With `NUMBA_DISABLE_JIT=1` all of them run as plain Python instead. None of them allocates memory.
 """
 
+import pickle
+import shutil
+import sys
 from collections.abc import Callable
+from pathlib import Path
+from threading import RLock
 from typing import Any, Final, TypeVar, cast
 
+import numpy as np
 from numba import config, njit, types
-from numba.core.typing.templates import signature
 from numba.extending import intrinsic
 
-from socialai_dsl.engine.merged import Merged
+from socialai_dsl.engine.cache import cache_folder
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
+_OPTIONS: Final[dict[str, bool | str]] = {"nogil": True, "error_model": "numpy"}
+_HELPER: Final[dict[str, bool | str]] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
-_OPTIONS: Final[dict[str, bool | str]] = {
-    "nogil": True,
-    "error_model": "numpy",
-    "_nrt": False,
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-    "no_rewrites": True,
-}
+
+def is_interpreted() -> bool:
+    """Whether the engine runs as plain Python."""
+    return bool(config.DISABLE_JIT)
 
 
 def inline(function: _Function) -> _Function:
     """Compile a helper into each of its callers."""
-    return cast(_Function, njit(**_OPTIONS, forceinline=True, pipeline_class=Merged)(function))
+    return cast(_Function, njit(**_HELPER, forceinline=True)(function))
+
+
+def merged(function: _Function) -> _Function:
+    """Write a function out in its callers before anything is compiled: for what leads to the interpreter."""
+    return cast(_Function, njit(**_HELPER, inline="always")(function))
 
 
 def outline(function: _Function) -> _Function:
-    """Compile a function that is called."""
-    return cast(_Function, njit(**_OPTIONS, forceinline=False, pipeline_class=Merged)(function))
+    """Compile a function that is called: it runs rarely, or is large."""
+    return cast(_Function, njit(**_HELPER, forceinline=False)(function))
 
 
 def compiled(function: _Function) -> _Function:
     """Compile a function that Python calls and that may allocate."""
-    return cast(_Function, njit(nogil=True, error_model="numpy")(function))
+    return cast(_Function, njit(**_OPTIONS)(function))
+
+
+_LOADING: Final = RLock()
+_loaded: dict[Callable[..., int], Callable[..., int]] = {}
+
+
+def load(function: Callable[..., int]) -> Callable[..., int]:
+    """A function of a book (`pointers.make_book`) and numbers as Python calls it: from the disk, or compiled and kept.
+
+    In plain Python it is the function itself, with numbers that wrap around as those of compiled code do.
+    """
+    if is_interpreted():
+        return np.errstate(over="ignore")(function)
+    with _LOADING:
+        if function not in _loaded:
+            _loaded[function] = _compiled_or_kept(function)
+        return _loaded[function]
+
+
+def _compiled_or_kept(function: Callable[..., int]) -> Callable[..., int]:
+    kinds = (types.int64[::1], *[types.int64] * (function.__code__.co_argcount - 1))
+    folder = cache_folder()
+    if folder is not None:
+        dispatcher = _kept_in(folder, function)
+        if not list(folder.rglob(f"*.{function.__name__}-*.nbi")):
+            _announce(function, "once for this machine")
+        try:
+            dispatcher.compile(kinds)
+        except (OSError, EOFError, ValueError, pickle.UnpicklingError):  # a full disk, or damaged files
+            shutil.rmtree(folder, ignore_errors=True)
+        if dispatcher.signatures:
+            return cast(Callable[..., int], dispatcher)
+    _announce(function, "for this process, as the disk keeps nothing")
+    dispatcher = njit(**_OPTIONS)(function)
+    dispatcher.compile(kinds)
+    return cast(Callable[..., int], dispatcher)
+
+
+def _kept_in(folder: Path, function: Callable[..., int]) -> Any:
+    """The function with Numba's cache in a folder, which is named by a setting that is read when it is decorated."""
+    before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
+    try:
+        return njit(**_OPTIONS, cache=True)(function)
+    finally:
+        config.CACHE_DIR = before
+
+
+def _announce(function: Callable[..., int], how_often: str) -> None:
+    if function.__name__ == "serve":  # the others take a moment only
+        print(f"socialai: compiling the engine, {how_often}: about 20 seconds", file=sys.stderr, flush=True)
 
 
 @intrinsic
@@ -48,7 +104,7 @@ def _stay_outline(context: Any) -> Any:
         builder.function.attributes.add("noinline")
         return context.get_dummy_value()
 
-    return signature(types.none), generate
+    return types.void(), generate
 
 
 def _do_nothing() -> None:

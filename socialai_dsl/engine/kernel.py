@@ -1,4 +1,4 @@
-"""The one compiled entry point: steps, resets or scripts the rows of a part of a batch."""
+"""The compiled entry point: steps or resets the rows of a batch."""
 
 from typing import Any
 
@@ -6,13 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.engine import rng
-from socialai_dsl.engine.calls import BAD_ACTION, CHECKED, NO_ROOM, TERMINATED, Task
+from socialai_dsl.engine.calls import BAD_ACTION, NO_ROOM, TERMINATED, Task
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.machine import symbol_of
 from socialai_dsl.engine.picture import take_picture
 from socialai_dsl.engine.pointers import (
     bytes_of,
-    copy_many,
     float64_of,
     int16_of,
     int32_of,
@@ -23,7 +21,6 @@ from socialai_dsl.engine.pointers import (
 )
 from socialai_dsl.engine.reset import draw_member, reset_row
 from socialai_dsl.engine.rows import copy, open_row
-from socialai_dsl.engine.separate import entry
 from socialai_dsl.engine.state import PIN_NONE, ZERO, Book, Key, Link, Row, Size
 from socialai_dsl.engine.step import step_row
 from socialai_dsl.engine.views import CELLS
@@ -136,54 +133,37 @@ def _report_end(book: Any, row: int, opened: Row) -> None:
 
 
 @inline
-def _take_actions(book: Any, first: int, last: int) -> None:
-    """Copy the given actions to those of the step, because another thread of the caller's may be writing there."""
-    taken, given = uint64_of(book, Book.TAKEN, 4 * first), uint64_of(book, Book.GIVEN, 4 * first)
-    copy_many(taken, given, 4 * (last - first))
-
-
-@inline
-def _actions_fit(book: Any, first: int, last: int) -> bool:
+def _actions_fit(book: Any, rows: int) -> bool:
     """Whether all actions are inside the action space."""
-    program = int32_of(book, Book.WORDS, np.int64(uint64_of(book, Book.KEYS, first)[Key.PROGRAM]))
+    program = int32_of(book, Book.WORDS, np.int64(uint64_of(book, Book.KEYS, ZERO)[Key.PROGRAM]))
     link = program[Header.SIZE]
     primitives = np.uint64(program[link + Link.ACTIONS])
     templates = np.uint64(program[link + Link.TEMPLATES])
     nouns = np.uint64(program[link + Link.NOUNS])
-    actions = uint64_of(book, Book.TAKEN, 4 * first)
+    actions = uint64_of(book, Book.FLAT_ACTIONS, ZERO)
     wrong = False
-    for i in range(0, 4 * (last - first), 4):
+    for i in range(0, 4 * rows, 4):
         # What is negative is large unsigned.
         wrong |= (actions[i] >= primitives) | (actions[i + 1] >= np.uint64(2))
         wrong |= (actions[i + 2] >= templates) | (actions[i + 3] >= nouns)
     return not wrong
 
 
-@entry(symbol_of("serve"))
-def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
-    """Do a `Task` for the rows first to last - 1 with the scratch space of a thread.
+def serve(book: Any, task: int, rows: int) -> int:
+    """Do a `Task` for all rows.
 
     Args:
-        book: the arrays of `Book` (`book.make_book`).
-        task: a `Task`, or a step with CHECKED added.
-        thread: number of the thread.
-        first: the first row.
-        last: the row after the last.
+        book: the arrays of `Book` (`pointers.make_book`).
+        task: a `Task`.
+        rows: how many there are.
 
     Returns:
         How many episodes ended, plus NO_ROOM for each row without a room, or BAD_ACTION (then nothing was done).
     """
     ended = 0
-    if task >= CHECKED:
-        task -= CHECKED
-    elif task <= Task.CHECK:
-        if task == Task.CHECK:
-            _take_actions(book, first, last)
-        if not _actions_fit(book, first, last):
-            return BAD_ACTION
-    if task == Task.CHECK:
-        return 0
-    for row in range(first, last):
+    if task != Task.RESET and not _actions_fit(book, rows):
+        return BAD_ACTION
+    for row in range(rows):
         layout = ZERO
         t = ZERO
         if task == Task.RESET:
@@ -193,7 +173,7 @@ def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
         else:
             _report_nothing(book, row)
             if int16_of(book, Book.REGISTERS, row)[Register.ENDED] == 0:
-                opened = open_row(book, thread, ZERO, row)
+                opened = open_row(book, ZERO, row)
                 reward = step_row(opened, opened.program[Header.SIZE], book, row)
                 if reward != 0.0 and _plays_acts(opened.key):
                     reward /= np.float64(_pool_size(opened.key))
@@ -214,7 +194,7 @@ def serve(book: Any, task: int, thread: int, first: int, last: int) -> int:
                 uint64_of(book, Book.KEYS, row)[Key.EPISODE] += np.uint64(1)
         if t == 0:
             _open_episode(book, layout, row)
-        fresh = open_row(book, thread, layout, row)
+        fresh = open_row(book, layout, row)
         if not reset_row(fresh, layout != 0, t):
             bytes_of(book, Book.REFUSED, ZERO)[row] = 1
             ended += NO_ROOM

@@ -7,12 +7,10 @@ from numpy.typing import NDArray
 
 from socialai_dsl.engine import rng
 from socialai_dsl.engine.entities import field, npc_at, step_x, step_y
-from socialai_dsl.engine.gather import permute_medium, permute_small, spread_out
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.pointers import uint16_of
 from socialai_dsl.engine.shadows import lit_cells
 from socialai_dsl.engine.state import AGENT, NOTHING, Book, Link, Row, Trait
-from socialai_dsl.engine.vectors import WIDE
 from socialai_dsl.engine.views import CELLS, OWN_LOOK, OWN_PLACE
 from socialai_dsl.program import (
     CODES_OF_TYPES,
@@ -77,18 +75,12 @@ def take_picture(row: Row, link: int, book: Any, number: int) -> None:
 @inline
 def _gather(row: Row, view: int, lit: np.uint64) -> None:
     """Write the cells of the board that the table of views names; what is not lit reads 0, which is unseen."""
-    flags = row.program[Header.FLAGS]
-    if WIDE and flags & Trait.SMALL:
-        permute_small(row.image, row.board, row.views, view, lit)
-    elif WIDE and flags & Trait.MEDIUM:
-        permute_medium(row.image, row.board, row.views, view, lit)
-    else:
+    for i in range(CELLS):
+        row.image[i] = row.board[row.views[view + i]]
+    if lit != _EVERYWHERE:
         for i in range(CELLS):
-            row.image[i] = row.board[row.views[view + i]]
-        if lit != _EVERYWHERE:
-            for i in range(CELLS):
-                row.image[i] &= np.int64(-((lit >> np.uint64(i)) & np.uint64(1)))
-        row.image[OWN_PLACE] = OWN_LOOK
+            row.image[i] &= np.int64(-((lit >> np.uint64(i)) & np.uint64(1)))
+    row.image[OWN_PLACE] = OWN_LOOK
 
 
 @inline
@@ -142,13 +134,10 @@ def _show_npcs(row: Row, extra: NDArray[np.uint16], picture: NDArray[np.uint16])
 @inline
 def _put_together(row: Row, picture: NDArray[np.uint16]) -> None:
     """Write the six channels of a picture in which nobody points or did anything."""
-    if WIDE:
-        spread_out(picture, row.image)
-    else:
-        for i in range(CELLS):
-            picture[3 * i] = row.image[i]
-            picture[3 * i + 1] = row.image[i] >> 16
-            picture[3 * i + 2] = NO_GESTURE << 8 | NO_GESTURE
+    for i in range(CELLS):
+        picture[3 * i] = row.image[i]
+        picture[3 * i + 1] = row.image[i] >> 16
+        picture[3 * i + 2] = NO_GESTURE << 8 | NO_GESTURE
 
 
 @inline

@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.machine import symbol_of
 from socialai_dsl.engine.picture import image_digest
 from socialai_dsl.engine.pointers import int16_of, int64_of, uint16_of, uint32_of, uint64_of
 from socialai_dsl.engine.rows import copy, open_row
-from socialai_dsl.engine.separate import entry
 from socialai_dsl.engine.speech import inbox_class
 from socialai_dsl.engine.state import STILL, ZERO, Book, Link, Row, Size, Trait
 from socialai_dsl.engine.step import be_silent, begin
@@ -94,13 +92,13 @@ def _index_of(program: NDArray[np.int32], table: int, size: int, wanted: int) ->
 
 
 @inline
-def _script_row(book: Any, thread: int, row: int) -> None:
+def _script_row(book: Any, row: int) -> None:
     """Write the scripted action of one row. It is played, and then everything is as it was."""
-    opened = open_row(book, thread, ZERO, row)
+    opened = open_row(book, ZERO, row)
     sizes = int64_of(book, Book.SIZES, ZERO)
-    registers = int16_of(book, Book.SPARE_REGISTERS, thread)
-    board = uint32_of(book, Book.SPARE_BOARDS, thread)
-    counters = int64_of(book, Book.SPARE_COUNTERS, thread)
+    registers = int16_of(book, Book.SPARE_REGISTERS, ZERO)
+    board = uint32_of(book, Book.SPARE_BOARDS, ZERO)
+    counters = int64_of(book, Book.SPARE_COUNTERS, ZERO)
     count = opened.program[Header.COUNTERS]
     copy(registers, opened.registers, sizes[Size.REGISTERS])
     copy(board, opened.board, sizes[Size.BOARD])
@@ -111,19 +109,17 @@ def _script_row(book: Any, thread: int, row: int) -> None:
     copy(opened.counters, counters, count)
 
 
-@entry(symbol_of("script"))
-def script(book: Any, thread: int, first: int, last: int) -> int:
-    """Write what the agents' frames would do now into the actions of the rows first to last - 1."""
-    for row in range(first, last):
-        _script_row(book, thread, row)
+def script(book: Any, rows: int) -> int:
+    """Write what the agents' frames would do now into the actions of all rows."""
+    for row in range(rows):
+        _script_row(book, row)
     return 0
 
 
-@entry(symbol_of("identify"))
-def identify(book: Any, thread: int, first: int, last: int) -> int:
-    """Write digests of the pictures of the rows first to last - 1."""
+def identify(book: Any, rows: int) -> int:
+    """Write digests of the pictures of all rows."""
     gestures = int64_of(book, Book.SIZES, ZERO)[Size.EXTRA]
-    for row in range(first, last):
+    for row in range(rows):
         uint64_of(book, Book.IMAGE_IDS, ZERO)[row] = image_digest(
             uint32_of(book, Book.IMAGE, row), uint16_of(book, Book.EXTRA, row), gestures
         )

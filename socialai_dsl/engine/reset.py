@@ -7,7 +7,7 @@ from socialai_dsl import draws
 from socialai_dsl.engine import rng
 from socialai_dsl.engine.boards import draw_all
 from socialai_dsl.engine.entities import column, field, set_field
-from socialai_dsl.engine.jit import inline
+from socialai_dsl.engine.jit import inline, merged
 from socialai_dsl.engine.places import occupy
 from socialai_dsl.engine.sets import clear
 from socialai_dsl.engine.speech import clear_tokens, remember
@@ -35,7 +35,7 @@ def draw_member(key: np.uint64, weights: NDArray[np.int64], count: int) -> int:
     return low
 
 
-@inline
+@merged
 def reset_row(row: Row, pinned: bool, t: int) -> bool:
     """Start an episode, or an act of one at step `t`; the row's key and program are set already.
 
@@ -59,7 +59,7 @@ def reset_row(row: Row, pinned: bool, t: int) -> bool:
     return np.bool_(False)
 
 
-@inline
+@merged
 def _draw_room(row: Row, pinned: bool, t: int) -> None:
     _blank(row)
     if pinned:

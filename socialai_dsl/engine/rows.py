@@ -6,16 +6,15 @@ import numpy as np
 
 from socialai_dsl.engine.jit import inline
 from socialai_dsl.engine.pointers import int16_of, int32_of, int64_of, uint16_of, uint32_of, uint64_of
-from socialai_dsl.engine.state import ZERO, Book, Key, Link, Row, Size
+from socialai_dsl.engine.state import ZERO, Book, Key, Link, Row
 from socialai_dsl.program import Header
 
 
 @inline
-def open_row(book: Any, thread: int, layout: int, row: int) -> Row:
-    """One environment, with the scratch space of a thread and the pins of a layout."""
+def open_row(book: Any, layout: int, row: int) -> Row:
+    """One environment, with the pins of a layout."""
     key = uint64_of(book, Book.KEYS, row)
     program = int32_of(book, Book.WORDS, np.int64(key[Key.PROGRAM]))
-    counters = thread * int64_of(book, Book.SIZES, ZERO)[Size.COUNTERS]
     return Row(
         program,
         int16_of(book, Book.REGISTERS, row),
@@ -24,10 +23,10 @@ def open_row(book: Any, thread: int, layout: int, row: int) -> Row:
         int16_of(book, Book.TOKENS, row),
         uint32_of(book, Book.IMAGE, row),
         int64_of(book, Book.ACTIONS, row),
-        int64_of(book, Book.COUNTERS, counters + program[program[Header.SIZE] + Link.COUNTERS]),
+        int64_of(book, Book.COUNTERS, program[program[Header.SIZE] + Link.COUNTERS]),
         int16_of(book, Book.PINS, layout),
-        int64_of(book, Book.SCRATCH, thread),
-        uint32_of(book, Book.SETS, thread),
+        int64_of(book, Book.SCRATCH, ZERO),
+        uint32_of(book, Book.SETS, ZERO),
         uint16_of(book, Book.VIEWS, ZERO),
     )
 

@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 from socialai_dsl.engine.boards import is_opaque, note_opaque, opaque_line
 from socialai_dsl.engine.entities import step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.masked import opaque_lines
 from socialai_dsl.engine.state import ONE, RESETTING, ZERO, Row
-from socialai_dsl.engine.vectors import WIDE
 from socialai_dsl.program import VIEW, Header, Register
 
 _HALF = VIEW // 2
@@ -173,9 +171,12 @@ def _opaque_in_view(row: Row, x: int, y: int, direction: int) -> np.uint64:
 
 @inline
 def _opaque_lines(row: Row, first: int, lines: int, top: int, beyond: int, left: int) -> np.uint64:
-    """The lines of the room that such a view has: see `masked.opaque_lines`."""
-    if WIDE:
-        return opaque_lines(row.board, first, lines, top, beyond, left)
+    """The lines of the room that such a view has, a byte for each.
+
+    Line 0 of the room is number `first` of the board, bit k of a line its cell k, and the view begins at cell `left` of
+    line `top`. What is off the canvas is opaque: lines from `lines` on, cells whose bit in `beyond` is set, and
+    whatever comes before.
+    """
     opaque = np.uint64(0)
     for r in range(VIEW):
         inside = np.int64(top + r >= 0) & np.int64(top + r < lines)

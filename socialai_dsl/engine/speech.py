@@ -1,15 +1,10 @@
 """What is said reaches who is near: the agent's log and tokens, the inboxes of those who follow a frame."""
 
-import numpy as np
-
 from socialai_dsl.engine.boards import npcs_are_hidden
 from socialai_dsl.engine.entities import column, distance, field, is_present
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.masked import put_short
-from socialai_dsl.engine.pointers import move_down
 from socialai_dsl.engine.rng import fold
 from socialai_dsl.engine.state import AGENT, NOTHING, Key, Row
-from socialai_dsl.engine.vectors import LANES, WIDE
 from socialai_dsl.program import EntityColumn, Field, Flag, FrameColumn, Header, LineColumn, Register
 
 
@@ -39,7 +34,8 @@ def _forget_oldest(row: Row, words: int) -> None:
         lines -= 1
     left = max(left, 0)
     shift = registers[Register.TOKENS] - left
-    move_down(row.tokens, shift, left)
+    for i in range(left):
+        row.tokens[i] = row.tokens[shift + i]
     registers[Register.OLDEST] = oldest
     registers[Register.LOGGED] = lines
     registers[Register.TOKENS] = left
@@ -54,16 +50,10 @@ def remember(row: Row, line: int) -> None:
     _forget_oldest(row, words)
     start = registers[Register.TOKENS]
     first = row.program[Header.TOKEN_AT] + _line(row, line, LineColumn.FIRST_TOKEN)
-    room = row.program[Header.TOKENS] - start
-    words = min(words, room)
-    written = words
-    if WIDE and words <= LANES:
-        put_short(row.tokens, start, room, row.program, first, words)
-        written = np.int64(LANES)
-    else:
-        for i in range(words):
-            row.tokens[start + i] = row.program[first + i]
-    for i in range(start + written, before):
+    words = min(words, row.program[Header.TOKENS] - start)
+    for i in range(words):
+        row.tokens[start + i] = row.program[first + i]
+    for i in range(start + words, before):
         row.tokens[i] = 0
     place = registers[Register.OLDEST] + registers[Register.LOGGED]
     size = row.program[Header.LOG_SIZE]

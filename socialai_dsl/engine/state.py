@@ -83,8 +83,6 @@ class Trait(IntEnum):
     GESTURES = 1 << 22  # pictures of the batch have channels 5 and 6
     REWARDS = 1 << 23  # there are rewards besides that of an outcome
     APART = 1 << 24  # some frame has code for what it perceives, or for the rest of a rule of `first`
-    SMALL = 1 << 25  # the canvas has at most `views.SMALL_CANVAS` cells
-    MEDIUM = 1 << 26  # it has more, but at most `views.MEDIUM_CANVAS`
 
 
 class Book(IntEnum):
@@ -123,8 +121,7 @@ class Book(IntEnum):
     REFUSED = 30
     PICTURE = 31
     SIZES = 32
-    TAKEN = 33  # int64 (4 E), the rows of ACTIONS one behind the other
-    GIVEN = 34  # int64 (4 E), the actions as the caller of a step has them; a check takes them over
+    FLAT_ACTIONS = 33  # int64 (4 E), the rows of ACTIONS one behind the other
 
 
 class Size(IntEnum):
@@ -133,9 +130,8 @@ class Size(IntEnum):
     REGISTERS = 0
     BOARD = 1
     TOKENS = 2
-    COUNTERS = 3
-    EXTRA = 4
-    END = 5
+    EXTRA = 3
+    END = 4
 
 
 class State(NamedTuple):
@@ -186,16 +182,12 @@ class Ports(NamedTuple):
         np.bool_
     ]  # (E,) whether an episode ended in this step, and was a success in all its acts
     ended: NDArray[np.bool_]  # (E,) terminated or truncated
-    counters: NDArray[
-        np.int64
-    ]  # (threads, counters of all programs, then a line of the cache that is nobody's)
-    scratch: NDArray[np.int64]  # (threads, TEMPORARIES)
-    sets: NDArray[
-        np.uint32
-    ]  # (threads, SCRATCH_BOARDS * MAX_SIDE, then a line of the cache that is nobody's)
-    spare_registers: NDArray[np.int16]  # (threads, R) of a row that is played on for a look
-    spare_boards: NDArray[np.uint32]  # (threads, board)
-    spare_counters: NDArray[np.int64]  # (threads, counters of all programs)
+    counters: NDArray[np.int64]  # (counters of all programs,)
+    scratch: NDArray[np.int64]  # (TEMPORARIES,)
+    sets: NDArray[np.uint32]  # (SCRATCH_BOARDS * MAX_SIDE,)
+    spare_registers: NDArray[np.int16]  # (R,) of a row that is played on for a look
+    spare_boards: NDArray[np.uint32]  # (board,)
+    spare_counters: NDArray[np.int64]  # (counters of all programs,)
     image_ids: NDArray[np.uint64]  # (E,) digests of the pictures
     refused: NDArray[np.bool_]  # (E,) rows that were reset and found no room that is as required
     picture: NDArray[np.uint16]  # (E, 147) `image` and `extra` cell by cell, six bytes each; or (E, 0)
@@ -231,11 +223,9 @@ def empty_state(rows: int, registers: int, board: int, tokens: int, view: int, g
     )
 
 
-def empty_ports(state: State, counters: int, threads: int) -> Ports:
+def empty_ports(state: State, counters: int) -> Ports:
     """Ports that fit a state, with nothing pinned and no outcome."""
     rows, registers = state.registers.shape
-    # Threads that write to one line of the cache take it from each other: a line lies between what they count or mark.
-    apart = -(-counters // 8) * 8 + 8
     return Ports(
         actions=np.zeros((rows, 4), np.int64),
         pins=no_pins(registers),
@@ -250,17 +240,17 @@ def empty_ports(state: State, counters: int, threads: int) -> Ports:
         final_extra=np.zeros_like(state.extra),
         success=np.zeros(rows, np.bool_),
         ended=np.zeros(rows, np.bool_),
-        counters=np.zeros((threads, apart), np.int64),
-        scratch=np.zeros((threads, TEMPORARIES), np.int64),
-        sets=np.zeros((threads, SCRATCH_BOARDS * MAX_SIDE + 16), np.uint32),
-        spare_registers=np.zeros((threads, registers), np.int16),
-        spare_boards=np.zeros((threads, state.boards.shape[1]), np.uint32),
-        spare_counters=np.zeros((threads, counters), np.int64),
+        counters=np.zeros(counters, np.int64),
+        scratch=np.zeros(TEMPORARIES, np.int64),
+        sets=np.zeros(SCRATCH_BOARDS * MAX_SIDE, np.uint32),
+        spare_registers=np.zeros(registers, np.int16),
+        spare_boards=np.zeros(state.boards.shape[1], np.uint32),
+        spare_counters=np.zeros(counters, np.int64),
         image_ids=np.zeros(rows, np.uint64),
         refused=np.zeros(rows, np.bool_),
         picture=np.zeros((rows, 3 * state.extra.shape[1]), np.uint16),
         sizes=np.array(
-            [registers, state.boards.shape[1], state.tokens.shape[1], apart, state.extra.shape[1]],
+            [registers, state.boards.shape[1], state.tokens.shape[1], state.extra.shape[1]],
             np.int64,
         ),
     )

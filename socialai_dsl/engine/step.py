@@ -7,9 +7,8 @@ import numpy as np
 from socialai_dsl.engine.boards import is_deadly
 from socialai_dsl.engine.calls import TERMINATED, TRUNCATED
 from socialai_dsl.engine.entities import field
-from socialai_dsl.engine.jit import inline
+from socialai_dsl.engine.jit import inline, merged
 from socialai_dsl.engine.picture import take_picture
-from socialai_dsl.engine.pointers import fetch
 from socialai_dsl.engine.speech import empty_inbox, inbox_class
 from socialai_dsl.engine.state import AGENT, Link, Row, Trait
 from socialai_dsl.engine.turns import (
@@ -26,9 +25,6 @@ from socialai_dsl.engine.turns import (
 from socialai_dsl.engine.vm import run
 from socialai_dsl.program import Field, Flag, FrameColumn, Header, Register
 
-_LINE_OF_CACHE = 32
-"""Tokens in a line of the cache."""
-
 
 @inline
 def _is_due(row: Row, register: int) -> bool:
@@ -36,7 +32,7 @@ def _is_due(row: Row, register: int) -> bool:
     return register == 0 or row.registers[register] + row.registers[Register.CHANGED] != 0
 
 
-@inline
+@merged
 def begin(row: Row) -> None:
     """What asks how things were is answered; then time goes on, and nothing is heard, used or said yet."""
     registers = row.registers
@@ -60,14 +56,6 @@ def be_silent(row: Row) -> None:
 
 
 @inline
-def _fetch_history(row: Row) -> None:
-    """Somebody will probably answer: a line is written behind the history, which may move to make room."""
-    for i in range(0, row.registers[Register.TOKENS] + 1, _LINE_OF_CACHE):
-        fetch(row.tokens, i)
-    fetch(row.registers, row.program[Header.LOG] + row.registers[Register.OLDEST])
-
-
-@inline
 def decode(row: Row, link: int) -> None:
     """Note the agent's body action and utterance. A pair that its grammar lacks is silence."""
     registers = row.registers
@@ -85,11 +73,9 @@ def decode(row: Row, link: int) -> None:
             registers[Register.NOUN] = noun
             registers[Register.UTTERANCE] = 1 + pair
             registers[Register.CLASS] = program[program[Header.CLASS_AT] + pair]
-            if registers[Register.CLASS] > 1:
-                _fetch_history(row)
 
 
-@inline
+@merged
 def step_row(row: Row, link: int, book: Any, number: int) -> float:
     """One step; the reward. Whether and how the episode ended is in the registers.
 
@@ -136,7 +122,7 @@ def step_row(row: Row, link: int, book: Any, number: int) -> float:
     return reward
 
 
-@inline
+@merged
 def _judge(row: Row, link: int) -> float:
     """Whether the episode ends, how, and for what share of the reward."""
     registers = row.registers

@@ -1,7 +1,6 @@
 """Turns: the body actions of agent and NPCs, and how an NPC follows its frames."""
 
 from socialai_dsl.engine.boards import draw_cell, draw_npc, is_solid, npcs_are_hidden, type_row
-from socialai_dsl.engine.direct import past_tests
 from socialai_dsl.engine.entities import (
     field,
     is_present,
@@ -11,30 +10,29 @@ from socialai_dsl.engine.entities import (
     step_x,
     step_y,
 )
-from socialai_dsl.engine.jit import inline, outline, stay_outline
+from socialai_dsl.engine.jit import inline, merged, outline, stay_outline
 from socialai_dsl.engine.operands import draw_action, value
 from socialai_dsl.engine.paths import face
 from socialai_dsl.engine.pushing import is_free, push, roll
 from socialai_dsl.engine.speech import deliver, empty_inbox, hear, inbox_class, speak
 from socialai_dsl.engine.state import AGENT, NOTHING, ONE, STILL, ZERO, Row, Trait
-from socialai_dsl.engine.vm import answer, run
+from socialai_dsl.engine.vm import answer, past_tests, run
 from socialai_dsl.program import Body, Field, Flag, FrameColumn, Header, Op, Register, TypeColumn
 
 
-@inline
+@merged
 def settle(row: Row) -> None:
     """Let statuses that follow from others follow, unless nothing that they depend on has changed."""
     if row.registers[Register.CHANGED] != 0:
         compute_statuses(row, follow_links(row))
 
 
-@outline
+@merged
 def follow_links(row: Row) -> bool:
     """Let statuses have their direct consequences in others, if any has changed; whether one had.
 
     What changes from here on is settled next time, so to do nothing where nothing changed makes no difference.
     """
-    stay_outline()
     changed = row.registers[Register.CHANGED] != 0
     row.registers[Register.CHANGED] = 0
     if changed and row.program[Header.LINKS_PC] != 0:
@@ -42,23 +40,21 @@ def follow_links(row: Row) -> bool:
     return changed
 
 
-@outline
+@merged
 def compute_statuses(row: Row, changed: bool) -> None:
     """Let statuses follow from their conditions, if what these read may have changed.
 
     Where they read more than statuses this counts as changed again at once: a step then asks for one thing only.
     """
-    stay_outline()
     if changed and row.program[Header.SETTLE_PC] != 0:
         run(row, row.program[Header.SETTLE_PC])
     if row.program[Header.FLAGS] & Flag.SETTLE_ALWAYS:
         row.registers[Register.CHANGED] = 1
 
 
-@outline
+@merged
 def go_by_itself(row: Row) -> bool:
     """What counts or moves by itself does so, with its direct consequences; whether a status has changed."""
-    stay_outline()
     if row.program[Header.TICK_PC] != 0:
         run(row, row.program[Header.TICK_PC])
     if row.program[Header.FLAGS] & Flag.ROLLS:
@@ -154,21 +150,19 @@ def _state_table(row: Row, frame: int) -> int:
     return row.program[Header.STATE_AT] + columns * state
 
 
-@outline
+@merged
 def _perceive(row: Row, frame: int) -> None:
-    stay_outline()
     if row.program[frame + FrameColumn.PERCEIVE] != 0:
         run(row, row.program[frame + FrameColumn.PERCEIVE])
 
 
-@outline
+@merged
 def _do_the_rest(row: Row, frame: int) -> None:
-    stay_outline()
     if row.program[frame + FrameColumn.DEFERRED] != 0:
         run(row, row.program[frame + FrameColumn.DEFERRED])
 
 
-@inline
+@merged
 def notice(row: Row, frame: int, heard: int, flags: int) -> bool:
     """What a frame perceives, and does before the body action (`first`); whether it has chosen that action."""
     if flags & Trait.APART:
@@ -182,14 +176,14 @@ def notice(row: Row, frame: int, heard: int, flags: int) -> bool:
     return row.registers[Register.LAST_TURN] >= 0
 
 
-@inline
+@merged
 def act(row: Row, frame: int) -> int:
     """The body action that the activity of the current state chooses."""
     pc = row.program[_state_table(row, frame)]
     if pc != 0:
         code = row.program[Header.CODE_AT] + 4 * pc
         if row.program[code + 4] == Op.HALT:
-            # Of all activities these two are seen most often, and they are shorter than calling the interpreter.
+            # Fast path: these two are all there is to most activities.
             a = row.program[code + 1]
             b = row.program[code + 2]
             site = row.program[code + 3]
@@ -202,7 +196,7 @@ def act(row: Row, frame: int) -> int:
     return chosen if chosen >= 0 else STILL
 
 
-@inline
+@merged
 def conclude(row: Row, frame: int, heard: int, chosen: bool, flags: int) -> None:
     """The clock ticks, then what is done after the body action: `then`, or the rest of a rule of `first` that acted."""
     row.registers[row.program[frame + FrameColumn.CLOCK]] += 1
@@ -213,7 +207,7 @@ def conclude(row: Row, frame: int, heard: int, chosen: bool, flags: int) -> None
         if pc != 0:
             code = row.program[Header.CODE_AT] + 4 * pc
             if row.program[code] == Op.ANSWER and row.program[code + 4] == Op.HALT:
-                # As in `act`: this is what rules do most often.
+                # Fast path: this is all that most rules do.
                 answer(row, row.program[code + 1], row.program[code + 2], row.program[code + 3])
             else:
                 run(row, pc)
@@ -221,7 +215,7 @@ def conclude(row: Row, frame: int, heard: int, chosen: bool, flags: int) -> None
         _do_the_rest(row, frame)
 
 
-@inline
+@merged
 def _follow(row: Row, frame: int, npc: int, flags: int) -> None:
     """One turn of one frame of an NPC; it ends at once if the NPC makes itself vanish before it moves."""
     heard = inbox_class(row, row.program[frame + FrameColumn.INBOX])
@@ -238,7 +232,7 @@ def _follow(row: Row, frame: int, npc: int, flags: int) -> None:
     conclude(row, frame, heard, chosen, flags)
 
 
-@inline
+@merged
 def take_turns(row: Row) -> None:
     """Every NPC takes its turn, in the order of the cast; what it says is heard when its turn ends."""
     flags = row.program[Header.FLAGS]

@@ -15,10 +15,6 @@ OWN_PLACE: Final = (VIEW // 2) * VIEW + VIEW - 1
 OWN_LOOK: Final = pack_cell(1)
 """What its own cell reads."""
 
-SMALL_CANVAS: Final = 64
-MEDIUM_CANVAS: Final = 128
-"""Cells of the largest canvases that pictures are gathered from by vectors (`gather`); a board has a word more."""
-
 
 def view_table(width: int, height: int) -> NDArray[np.uint16]:
     """The cell of the board for each cell of the picture, (height * width * 4, 49) by (y, x, direction).

@@ -1,22 +1,16 @@
 """The interpreter: runs one piece of code on one environment. It raises nothing, since programs are proven first."""
 
-from typing import Any
-
 import numpy as np
-from numba import types
 
 from socialai_dsl.engine import paths
 from socialai_dsl.engine.bits import count_bits, lowest_bit, nth_bit
 from socialai_dsl.engine.boards import draw_entity
-from socialai_dsl.engine.conditions import holds
+from socialai_dsl.engine.conditions import compares, holds
 from socialai_dsl.engine.entities import field, quadrant, set_field
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.machine import symbol_of
 from socialai_dsl.engine.operands import assign, draw_action, draw_below, draw_other, value
 from socialai_dsl.engine.places import next_cell, place
-from socialai_dsl.engine.pointers import ROW_TYPES
 from socialai_dsl.engine.pushing import put_on
-from socialai_dsl.engine.separate import Separate
 from socialai_dsl.engine.sets import drop_cell
 from socialai_dsl.engine.sight import is_in_view
 from socialai_dsl.engine.speech import first_heard
@@ -24,7 +18,7 @@ from socialai_dsl.engine.state import NO_PATH, NOTHING, ONE, RESETTING, STILL, Z
 from socialai_dsl.engine.whereabouts import attribute, cell_beside, cell_of, is_somewhere, nearest, x_of, y_of
 from socialai_dsl.program import (
     CELL,
-    CLASS_SIZE,
+    CLASS_BITS,
     Body,
     Field,
     FrameColumn,
@@ -206,22 +200,26 @@ def _choose(row: Row, op: int, a: int, b: int, c: int) -> int:
     return paths.turn_towards(row, mover, way, c)
 
 
-def _run(
-    program: Any,
-    registers: Any,
-    board: Any,
-    key: Any,
-    tokens: Any,
-    image: Any,
-    action: Any,
-    counters: Any,
-    pins: Any,
-    scratch: Any,
-    sets: Any,
-    views: Any,
-    pc: int,
-) -> None:
-    row = Row(program, registers, board, key, tokens, image, action, counters, pins, scratch, sets, views)
+@inline
+def past_tests(row: Row, pc: int) -> int:
+    """Fast path: evaluates the comparisons that code begins with outside of the interpreter; 0 if it has ended."""
+    start = row.program[Header.CODE_AT]
+    code = start + 4 * pc
+    op = row.program[code]
+    while op >= Op.IF_EQ and op <= Op.IF_LE:
+        left = value(row, row.program[code + 1])
+        right = value(row, row.program[code + 2])
+        if not compares(op, left, right):
+            code += 4 * row.program[code + 3]
+        code += 4
+        op = row.program[code]
+    return ZERO if op == Op.HALT else (code - start) >> 2
+
+
+@outline
+def run(row: Row, pc: int) -> None:
+    """Run the code at `pc` to its `HALT`. Skips go forward and `EACH_CELL` counts cells, so it ends."""
+    stay_outline()
     start = row.program[Header.CODE_AT]
     loop = 0  # pc of the first instruction in the loop
     loop_board = 0
@@ -234,7 +232,7 @@ def _run(
         b = row.program[word + 2]
         c = row.program[word + 3]
         pc += 1
-        kind = op // CLASS_SIZE
+        kind = op >> CLASS_BITS
         if kind == OpClass.TEST:
             if not holds(row, op, a, b):
                 pc += c
@@ -271,11 +269,3 @@ def _run(
                 assign(row, loop_target, cell & 31)
                 assign(row, loop_target + 1, cell >> 5)
                 assign(row, loop_target + 2, CELL + cell)
-
-
-def _like_run(row: Row, pc: int) -> None:
-    """Run the code at `pc` to its `HALT`. Skips go forward and `EACH_CELL` counts cells, so it ends."""
-
-
-interpreter = Separate(symbol_of("interpreter"), _run, (*ROW_TYPES, types.int64), types.none)
-run = interpreter.caller(_like_run)

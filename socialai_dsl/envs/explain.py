@@ -89,13 +89,13 @@ class Explainer:
         state.registers[0, : self._probed.first] = start.registers[: self._probed.first]
         state.boards[0] = start.board[: state.boards.shape[1]]
         state.tokens[:] = 0
-        before = batch.counters[0].copy()
+        before = batch.counters.copy()
         for action in recording.actions:
             state.registers[0, self._probed.first :] = 0
-            before = batch.counters[0].copy()
+            before = batch.counters.copy()
             batch.ports.actions[0] = np.frombuffer(action, np.int64)
             batch.step(Task.STEP_ONLY)
-        return np.asarray(batch.counters[0] - before)
+        return np.asarray(batch.counters - before)
 
 
 def _alone(program: Program, suite: ProgramSuite | None, number: int) -> Program | ProgramSuite:

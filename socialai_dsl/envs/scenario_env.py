@@ -240,4 +240,3 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
 
     def close(self) -> None:
         """Nothing is held open but memory."""
-        self._table.batch.close()

@@ -50,7 +50,9 @@ class Table:
         image: uint8 (E, 7, 7, 4 or 6), tokens: int16 (E, L): buffers that every call writes to.
     """
 
-    def __init__(self, playables: Sequence[Playable], rows: int, threads: int) -> None:
+    def __init__(self, playables: Sequence[Playable], rows: int, threads: int = 1) -> None:
+        if threads != 1:
+            raise ValueError(f"num_threads: got {threads}; expected 1: to use more cores run more processes")
         different = list({id(playable): playable for playable in playables}.values())
         self.merged = Merged.of(different)
         self.programs = self.merged.programs
@@ -62,7 +64,6 @@ class Table:
             self.merged.pools,
             self.pool_of.tolist(),
             self.merged.length,
-            threads,
             [number for number, in_acts in enumerate(self._plays_acts) if in_acts],
         )
         self.state, self.rows = self.batch.state, rows
@@ -314,7 +315,7 @@ class Table:
 
         With several programs, names are preceded by the member's or scenario's: `dance: timeout`.
         """
-        totals = self.batch.counters.sum(axis=0)
+        totals = self.batch.counters
         counted: dict[str, Any] = {"outcomes": {}, "rules": {}, "episodes": 0}
         alone = isinstance(self.merged.playable, Program)
         for member, program, first in zip(
@@ -343,11 +344,8 @@ class Table:
         read = {name: np.empty_like(array) for name, array in arrays.items()}
         snapshot.unpack(data, read, self._identity())
         self._check(read)
-        counters = read.pop("counters")
         for name, array in read.items():
             arrays[name][...] = array
-        self.batch.counters[:] = 0
-        self.batch.counters[0] = counters
         self.fresh = False
         if self._shows_gestures:
             self.image[...] = joined(self.state.image, self.state.extra)
@@ -386,7 +384,7 @@ class Table:
     def _arrays(self) -> dict[str, NDArray[Any]]:
         return {
             **self.state._asdict(),
-            "counters": self.batch.counters.sum(axis=0),
+            "counters": self.batch.counters,
             "weights": self.batch.tables.weights,
         }
 

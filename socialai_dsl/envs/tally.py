@@ -144,7 +144,7 @@ class _Watch:
         """What has been counted."""
         times: Counter[Part] = Counter()
         endings: Counter[str] = Counter()
-        counters = self._table.batch.counters.sum(axis=0)
+        counters = self._table.batch.counters
         for frames, first in zip(self._programs, self._table.batch.first_counters, strict=True):
             own = counters[first : first + frames.program.header(Header.COUNTERS)].tolist()
             times.update(frames.times(own))

@@ -38,7 +38,7 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
     Args:
         playables: at least one program or suite of programs; of a suite every episode plays a member, drawn anew.
         num_envs: E.
-        num_threads: threads that share a step; results do not depend on it.
+        num_threads: 1; to use more cores run more processes.
         autoreset_mode: NextStep, SameStep or Disabled (`reset(options={"reset_mask": ...})` restarts some).
         copy: False gives the engine's own buffers, also in infos, valid until the next call; only what changed is
             written to them.
@@ -235,10 +235,6 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
         if self.render_mode is None:
             return None
         return tuple(frame(self._table, row, self.render_mode) for row in range(self.num_envs))
-
-    def close_extras(self, **_: Any) -> None:
-        """Let the threads go."""
-        self._table.batch.close()
 
     def set_attr(self, name: str, values: Mapping[str, Any] | Any) -> None:
         """Environments of a batch have no attributes of their own."""

@@ -37,7 +37,7 @@ from hashlib import sha256
 import numpy as np
 import numpy.typing as npt
 
-from socialai_dsl.program.instructions import CLASS_SIZE as CLASS_SIZE
+from socialai_dsl.program.instructions import CLASS_BITS as CLASS_BITS
 from socialai_dsl.program.instructions import Op as Op
 from socialai_dsl.program.instructions import OpClass as OpClass
 from socialai_dsl.source import Span
@@ -289,7 +289,7 @@ class Side(IntEnum):
     RIGHT = 3
 
 
-TESTS = frozenset(op for op in Op if op // CLASS_SIZE == OpClass.TEST)
+TESTS = frozenset(op for op in Op if op >> CLASS_BITS == OpClass.TEST)
 CODES_OF_TYPES: Mapping[str, int] = {"empty": 1, "wall": 2, "npc": 11}
 COLORS = ("red", "green", "blue", "purple", "yellow", "grey")
 DIRECTIONS = ("right", "down", "left", "up")

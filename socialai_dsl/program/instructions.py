@@ -17,8 +17,8 @@ from typing import Final
 from socialai_dsl.program import ranges
 from socialai_dsl.program.ranges import ANYTHING, Rule
 
-CLASS_SIZE: Final = 64
-"""Ops of a class: op // CLASS_SIZE is the class."""
+CLASS_BITS: Final = 6
+"""Bits of an op's number within its class: op >> CLASS_BITS is the class."""
 
 
 class OpClass(IntEnum):
@@ -187,7 +187,7 @@ class Instruction:
     @property
     def op_class(self) -> OpClass:
         """Its class."""
-        return OpClass(self.op // CLASS_SIZE)
+        return OpClass(self.op >> CLASS_BITS)
 
     @cached_property
     def arity(self) -> int:

@@ -77,7 +77,7 @@ def test_the_report_is_json(scenario: str, capsys: Capture) -> None:
 def test_wrong_usage(capsys: Capture) -> None:
     assert main(["bench", "--repeat", "0"]) == 2
     assert main(["bench", "--only", "nobody"]) == 2
-    assert "expected one of ours, rules, programs, threads" in capsys.readouterr().err
+    assert "expected one of ours, rules, programs, start" in capsys.readouterr().err
     assert main(["bench", "--train", "--plot", "x.png"]) == 2
     with pytest.raises(SystemExit) as ended:
         main(["bench", "--batch", "1,x"])

@@ -45,7 +45,7 @@ def member(number: int, horizon: int = 8, percent: int = 100, **more: object) ->
 
 def suite(members: int, rows: int = 1, in_sequence: bool = True, seed: int = 7, **more: object) -> Batch:
     parts = [part_of(member(number, **more)) for number in range(members)]  # type: ignore[arg-type]
-    batch = Batch(parts, [range(members)], [0] * rows, 8, 1, sequences=(0,) if in_sequence else ())
+    batch = Batch(parts, [range(members)], [0] * rows, 8, sequences=(0,) if in_sequence else ())
     batch.state.keys[:, Key.SEED] = seed
     batch.state.keys[:, Key.INDEX] = np.arange(rows)
     batch.reset()
@@ -87,7 +87,7 @@ def test_the_acts_of_an_episode_follow_each_other_on_one_clock() -> None:
     assert batch.ports.terminated[0]
     assert batch.ports.outcome[0] == WON
     assert batch.ports.success[0]
-    counters = batch.counters.sum(axis=0)
+    counters = batch.counters
     assert counters[[first + 1 + WON for first in batch.first_counters]].tolist() == [1, 1, 1]
 
 
@@ -145,7 +145,7 @@ def test_a_layout_may_start_with_a_later_act() -> None:
 
 def test_acts_keep_their_history_to_themselves() -> None:
     program = member(0, lines=(("hello", (2, 3), 1),), rules=[], flags=8, agent_says=1)
-    batch = Batch([part_of(program)] * 2, [[0, 1]], [0], 8, 1, sequences=(0,))
+    batch = Batch([part_of(program)] * 2, [[0, 1]], [0], 8, sequences=(0,))
     batch.reset()
     play(batch, (7, 1, 0, 0))
     assert batch.state.tokens[0].any()
@@ -158,7 +158,7 @@ def test_acts_keep_their_history_to_themselves() -> None:
 def test_acts_must_have_one_horizon() -> None:
     parts = [part_of(member(0, horizon=5)), part_of(member(1, horizon=6))]
     with pytest.raises(AssertionError, match="horizons"):
-        Batch(parts, [[0, 1]], [0], 8, 1, sequences=(0,))
+        Batch(parts, [[0, 1]], [0], 8, sequences=(0,))
 
 
 def members_drawn(batch: Batch) -> list[int]:
@@ -189,7 +189,7 @@ def test_weights_that_are_none(weights: list[int]) -> None:
 
 def test_weights_of_one_pool_leave_the_other_alone() -> None:
     parts = [part_of(member(number)) for number in range(4)]
-    batch = Batch(parts, [[0, 1], [2, 3]], [0, 1] * 20, 8, 1)
+    batch = Batch(parts, [[0, 1], [2, 3]], [0, 1] * 20, 8)
     batch.state.keys[:, Key.INDEX] = np.arange(40)
     before = members_drawn(batch)
     batch.set_weights(0, [0, 1])

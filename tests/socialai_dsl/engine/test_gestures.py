@@ -118,7 +118,7 @@ def test_programs_with_four_channels_have_no_more() -> None:
     plain = Assembly(at=((1, 2), (2, 2)), npcs=1).program()
     assert batch_of(plain).state.extra.shape == (1, 0)
     rich = Assembly(at=((1, 2), (2, 2)), npcs=1, channels=6).program()
-    both = Batch([part_of(plain), part_of(rich)], [[0], [1]], [0, 1], 8, 1)
+    both = Batch([part_of(plain), part_of(rich)], [[0], [1]], [0, 1], 8)
     both.state.extra[:] = 7
     both.reset()
     assert (both.state.extra[0] == 0xFFFF).all()

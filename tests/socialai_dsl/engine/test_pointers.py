@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from socialai_dsl.engine.book import make_book
-from socialai_dsl.engine.machine import load_object
-from socialai_dsl.engine.pointers import Guarded, float64_of, int16_of, int64_of, uint32_of
-from socialai_dsl.engine.separate import entry
-from socialai_dsl.engine.settings import is_interpreted
+from socialai_dsl.engine.jit import compiled
+from socialai_dsl.engine.pointers import Guarded, float64_of, int16_of, int64_of, make_book, uint32_of
 from socialai_dsl.program import Field
 
 ROOT = Path(__file__).parents[3]
@@ -35,23 +29,13 @@ def mix_up(book: np.ndarray, row: int) -> int:
     return small[Field.X] + large[1]
 
 
-def called(function: Callable[..., int], book: Any, number: int) -> int:
-    """Call a function of a book and a number: compiled, as the engine's own are."""
-    if is_interpreted():
-        return function(book, number)
-    symbol = f"test_pointers_{function.__name__}"
-    address = load_object(symbol, entry(symbol)(function).object_code())
-    words = (ctypes.c_int64 * 2)(ctypes.addressof(book), number)
-    return ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)(address)(words)
-
-
 def test_rows_of_arrays_of_all_kinds() -> None:
     small = np.arange(12, dtype=np.int16).reshape(3, 4)
     large = np.full((3, 2), 5, np.uint32)
     flat = np.zeros(6, np.int64)
     fraction = np.zeros(3)
     book = make_book([small, large, flat, fraction])
-    assert called(mix_up, book, 2) == 8 + 0xFFFFFFFF, "an unsigned number is read as one"
+    assert compiled(mix_up)(book, 2) == 8 + 0xFFFFFFFF, "an unsigned number is read as one"
     assert small[2].tolist() == [8, np.int64(70005).astype(np.int16), 10, 11]
     assert small[:2].ravel().tolist() == list(range(8))
     assert large.tolist() == [[5, 5], [5, 5], [5, 0xFFFFFFFF]]
@@ -76,10 +60,10 @@ def test_guards(index: int) -> None:
 )
 def test_plain_python_does_the_same_within_bounds(tests: list[str]) -> None:
     """The same functions without the compiler: every access is checked, and everything passes."""
-    large = "not batch_size and not threads"
+    large = "not batch_size"
     selection = tests if "-k" in tests else [*tests, "-k", large]
     result = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-W", "ignore::RuntimeWarning", "--timeout=1800", *selection],
+        [sys.executable, "-m", "pytest", "-q", "-W", "error::RuntimeWarning", "--timeout=1800", *selection],
         capture_output=True,
         text=True,
         cwd=ROOT,

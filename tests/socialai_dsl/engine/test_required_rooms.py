@@ -113,7 +113,7 @@ def refused(index: int, below: int, least: int) -> int:
 
 def test_the_last_attempt_counts() -> None:
     index = next(i for i in range(20000) if refused(i, 60, 59) == ATTEMPTS - 1)
-    batch = Batch([part_of(drawn(60, 59))], [[0]], [0], 8, 1)
+    batch = Batch([part_of(drawn(60, 59))], [[0]], [0], 8)
     batch.state.keys[:, Key.SEED], batch.state.keys[:, Key.INDEX] = 7, index
     batch.reset()
     assert batch.state.registers[0, [Register.ATTEMPT, OWN]].tolist() == [ATTEMPTS - 1, 59]
@@ -128,12 +128,9 @@ def part_of(program: Program, name: str = "") -> Part:
 NEVER = drawn(1000, 1000, horizon=2)
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_a_room_that_never_fits_is_reported_and_left_sound(threads: int) -> None:
+def test_a_room_that_never_fits_is_reported_and_left_sound() -> None:
     rows = 200
-    batch = Batch(
-        [part_of(NEVER, "picky"), part_of(drawn(9, 0))], [[0], [1]], [1] * 130 + [0] * 70, 8, threads
-    )
+    batch = Batch([part_of(NEVER, "picky"), part_of(drawn(9, 0))], [[0], [1]], [1] * 130 + [0] * 70, 8)
     batch.state.keys[:, Key.SEED] = 7
     batch.state.keys[:, Key.INDEX] = np.arange(rows)
     with pytest.raises(
@@ -146,13 +143,12 @@ def test_a_room_that_never_fits_is_reported_and_left_sound(threads: int) -> None
     assert (registers[:, entity_register(0, Field.X)] >= 1).all(), "the last room is complete"
     assert batch.state.keys[:, Key.KEY].tolist() == [draws.episode_key(7, i, 0) for i in range(rows)]
     assert not batch.ports.refused.any()
-    batch.close()
 
 
 @pytest.mark.parametrize("task", [Task.STEP_NEXT, Task.STEP_SAME])
 def test_a_reset_within_a_step_reports_it_too(task: Task) -> None:
     parts = [part_of(NEVER), part_of(drawn(9, 0, horizon=9))]
-    batch = Batch(parts, [[0], [1]], [1, 0], 8, 1)
+    batch = Batch(parts, [[0], [1]], [1, 0], 8)
     batch.state.keys[:, Key.INDEX] = np.arange(2)
     with pytest.raises(RuntimeError, match="program 0: none of"):
         batch.reset()
@@ -186,7 +182,7 @@ def test_a_pool_keeps_its_member() -> None:
     """The rooms are drawn again, the program is not."""
     frame = FrameSpec(0, ([],))
     programs = [drawn(1000, 900), drawn(1000, 0, frames=(frame,)), drawn(1000, 100)]
-    batch = Batch([part_of(program) for program in programs], [[0, 1, 2]], [0] * 200, 8, 1)
+    batch = Batch([part_of(program) for program in programs], [[0, 1, 2]], [0] * 200, 8)
     batch.state.keys[:, Key.SEED] = 7
     batch.state.keys[:, Key.INDEX] = np.arange(200)
     batch.reset()

@@ -33,7 +33,7 @@ def test_time_runs_out() -> None:
     assert play(batch, SILENT) == [1]
     assert ends(batch) == (False, True, 3, 0.0)
     assert batch.state.registers[0, Register.ENDED] == 2
-    assert batch.counters[0].tolist() == [0, 0, 0, 0, 1, 1]
+    assert batch.counters.tolist() == [0, 0, 0, 0, 1, 1]
 
 
 def test_an_outcome_in_the_last_step_is_not_a_time_out() -> None:
@@ -89,10 +89,9 @@ def test_a_bad_action_is_refused_and_changes_nothing() -> None:
         np.testing.assert_array_equal(was, now)
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_given_actions_are_copied_and_only_for_that_step(threads: int) -> None:
+def test_given_actions_are_copied_and_only_for_that_step() -> None:
     rows = 200
-    own, given_to = (batch_of(Assembly().program(), rows, threads=threads) for _ in range(2))
+    own, given_to = (batch_of(Assembly().program(), rows) for _ in range(2))
     actions = np.tile(np.array(SILENT), (rows, 1))
     actions[::3, 0] = Body.LEFT
     own.ports.actions[:] = actions

@@ -521,6 +521,6 @@ def test_an_answer_counts_says_and_goes_on(through: list[tuple[int, ...]]) -> No
     batch = batch_of(Assembly(at=((1, 1), (2, 1)), npcs=1, frames=(frame,), lines=lines).program())
     play(batch, body(Body.NONE), body(Body.NONE))
     registers = batch.state.registers[0]
-    assert batch.counters[0][2] == 1, "the second state has no rule"
+    assert batch.counters[2] == 1, "the second state has no rule"
     assert batch.state.tokens[0][:2].tolist() == [3, 0]
     assert registers[Register.HEARD] == 0

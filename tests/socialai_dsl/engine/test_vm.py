@@ -228,7 +228,7 @@ def test_count_and_end() -> None:
     assert batch.ports.terminated[0]
     assert batch.ports.outcome[0] == 1
     assert batch.ports.reward[0] == pytest.approx(0.5 * (1 - 0.9 * 3 / 10))
-    assert batch.counters[0].tolist() == [3, 0, 1, 0, 0, 1]
+    assert batch.counters.tolist() == [3, 0, 1, 0, 0, 1]
 
 
 def test_each_cell_visits_row_by_row_and_drops() -> None:

@@ -20,7 +20,7 @@ from socialai_dsl.listing import instructions_page
 from socialai_dsl.program import (
     BOARDS,
     CELL,
-    CLASS_SIZE,
+    CLASS_BITS,
     ENTITY_FIELDS,
     FIRST_ENTITY,
     MAX_SIDE,
@@ -51,7 +51,7 @@ NOT_RUN_ALONE = {
 
 def test_every_op_has_its_entry_in_its_class() -> None:
     assert set(TABLE) == set(Op)
-    assert all(op // CLASS_SIZE == entry.op_class and op == entry.op for op, entry in TABLE.items())
+    assert all(op >> CLASS_BITS == entry.op_class and op == entry.op for op, entry in TABLE.items())
 
 
 def test_what_writes_says_what() -> None:
@@ -177,11 +177,11 @@ class Trial:
         registers = self._randomize()
         for temporary, (low, high) in self.given.items():
             value = self.random.choice((low, high, self.random.randint(low, high)))
-            batch.ports.scratch[0, temporary] = value
-        before = batch.ports.scratch[0].tolist()
+            batch.ports.scratch[temporary] = value
+        before = batch.ports.scratch.tolist()
         batch.ports.actions[:] = (7, 0, 0, 0)
         batch.step(Task.STEP_ONLY)
-        after = batch.ports.scratch[0].tolist()
+        after = batch.ports.scratch.tolist()
         what = f"{self.entry.op.name} {self.words} of {[before[k] for k in self.given]} within {self.given}"
         written = {word - TEMPORARY for word in self.entry.written(self.words)}
         for temporary in range(TEMPORARIES):
@@ -208,7 +208,7 @@ class Trial:
             if min(registers[first + Field.X], registers[first + Field.Y]) < 0:
                 registers[first + Field.X] = registers[first + Field.Y] = -1
         h = self.town.header
-        sets = self.table.batch.ports.sets[0]
+        sets = self.table.batch.ports.sets
         for board in range(BOARDS):
             for y in range(h(Header.CANVAS_HEIGHT)):
                 full = self.random.getrandbits(h(Header.CANVAS_WIDTH))

@@ -40,4 +40,4 @@ def test_comparisons_are_made(code: Code, counted: list[int], where: str, by_its
     batch = batch_of(Assembly(at=((1, 1), (2, 3)), npcs=1, frames=(frame,)).program())
     for _ in range(5):
         batch.step(Task.STEP_ONLY)
-    assert batch.counters[0][:2].tolist() == counted
+    assert batch.counters[:2].tolist() == counted
