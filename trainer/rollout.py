@@ -180,6 +180,12 @@ def _follow(session: Session, rollout: Rollout, t: int) -> StepLead:
     state, guide = session.state, session.guide
     assert guide is not None, "internal: there is a guide"
     lead = guide.lead(session.envs, state.starts, min(session.frames / session.config.frames, 1.0))
+    for name, shape in (
+        ("actions", (len(state.starts), 4)),
+        ("led", (len(state.starts),)),
+        ("weights", (len(state.starts),)),
+    ):
+        _require_shape(f"guide: {name} of lead", getattr(lead, name), shape)
     if lead.led.any():
         led, actions = torch.from_numpy(lead.led), torch.from_numpy(lead.actions)
         own = rollout.actions[t].cpu()
@@ -211,10 +217,17 @@ def _step(session: Session, rollout: Rollout, t: int) -> dict[str, NDArray[Any]]
         session.tutor.step(ended, success)
     if session.bonus is not None:
         paid = session.bonus.step(envs, observation["image"], ended)
+        _require_shape("bonus: the result of step", paid, ended.shape)
         rollout.rewards[t] += paid
         rollout.bonus += float(paid.sum()) / rollout.rewards.size
     state.starts = ended
     return observation
+
+
+def _require_shape(what: str, array: Any, shape: tuple[int, ...]) -> None:
+    """Refuse an array of the user's code that NumPy would stretch or stumble over."""
+    if np.shape(array) != shape:
+        raise ValueError(f"{what}: got the shape {np.shape(array)}, expected {shape}")
 
 
 def ended_info(infos: dict[str, Any], key: str, default: NDArray[Any]) -> NDArray[Any]:

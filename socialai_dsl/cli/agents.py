@@ -3,6 +3,7 @@
 import argparse
 import json
 import os
+import traceback
 from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -317,7 +318,7 @@ def train_agent(
     from trainer.errors import TrainingStopped
     from trainer.ppo import Progress, train
 
-    played = with_script(config.scenario) if config.guide == "script" else config.scenario
+    played = _played(config)
     envs = socialai_dsl.make_vec(played, num_envs=config.envs, copy=False, autoreset_mode="SameStep")
     total = config.updates * config.frames_per_update
     learnt = Learnt(loaded, endings_of(loaded, program))
@@ -333,12 +334,41 @@ def train_agent(
         if isinstance(error.__cause__, OSError):
             raise UsageError(str(error)) from error
         raise RunFailed(str(error)) from error
-    except ValueError as error:  # what the trainer says about options or a checkpoint that do not fit
-        raise UsageError(str(error)) from error
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"interrupted; go on with: socialai-run --resume {folder}") from None
+    except Exception as error:
+        if (place := _place_in_own_code(config, error)) is not None:
+            raise UsageError(f"{place}: {type(error).__name__}: {error}") from error
+        if isinstance(
+            error, ValueError
+        ):  # what the trainer says about options or a checkpoint that do not fit
+            raise UsageError(str(error)) from error
+        raise
     finally:
         envs.close()
+
+
+def _played(config: RunConfig) -> str:
+    """What is played while training: where a guide leads, the variant with the script that it may follow."""
+    if config.guide == "none":
+        return config.scenario
+    if config.guide == "script":
+        return with_script(config.scenario)
+    return scripted_name(config.scenario) or config.scenario
+
+
+def _place_in_own_code(config: RunConfig, error: BaseException) -> str | None:
+    """`file:line` where the user's network, bonus, curriculum or guide raised an error; None if none of them did."""
+    from trainer.extensions import own_file
+
+    names = (config.net, config.bonus, config.curriculum, config.guide)
+    files = {str(file) for name in names if (file := own_file(name, config.code_folder)) is not None}
+    places = [
+        f"{frame.filename}:{frame.lineno}"
+        for frame in traceback.extract_tb(error.__traceback__)
+        if frame.filename in files
+    ]
+    return places[-1] if places else None
 
 
 def _tracker(config: RunConfig, folder: Path) -> "Tracker | None":

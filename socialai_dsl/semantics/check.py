@@ -91,7 +91,9 @@ def check_meaning(
                 run.report_growth(path)
             if checked is not None:
                 check_absences(checked, findings, check_placements(checked, findings))
-            if checked is not None and not found.has_errors:  # else what is missing would seem never to happen
+            if (
+                checked is not None and not found.has_errors
+            ):  # else what is missing would seem never to happen
                 check_possible(checked, findings)
             break
     bag.extend(_without_consequences(found, scenario))

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
 from gymnasium.vector import AutoresetMode
@@ -17,6 +18,8 @@ from trainer.guides import build_guide
 from trainer.nets import NetSpec, build_net
 from trainer.play import CheckpointPolicy
 from trainer.ppo import Progress, train
+from trainer.rollout import collect
+from trainer.session import Session
 
 SPEC = NetSpec((4, 2, 2, 4), (7, 7, 4), (12, 5, 3, 3), ("<pad>", "<unk>", "hello"))
 LEAVES = Leaves(("a", "b"), ({}, {}), (1, 1))
@@ -211,3 +214,15 @@ def test_a_run_with_everything_of_ones_own_resumes_to_the_same_bits(
     there = EchoEnvs(4, mode=AutoresetMode.DISABLED)
     policy = CheckpointPolicy.load(path, there, net="mine:Net", folder=tmp_path)
     assert policy.act(there.reset(seed=0)[0]).shape == (4, 4)
+
+
+class _Short:
+    def step(self, *_: Any) -> Any:
+        return np.zeros(3)
+
+
+def test_arrays_of_another_shape_are_refused_by_name(small_config: Any) -> None:
+    session = Session.start(small_config(), EchoEnvs(8))
+    session.bonus = _Short()  # type: ignore[assignment]
+    with pytest.raises(ValueError, match=r"bonus: the result of step: got the shape \(3,\), expected \(8,\)"):
+        collect(session)

@@ -409,3 +409,17 @@ def test_unwritable_output(capsys: Capture) -> None:
     Path("file").write_text("")
     assert run_main(["corridor.yaml", *QUICK, "--out", "file/run"]) == 2
     assert "file/run" in capsys.readouterr().err
+
+
+def test_an_error_in_code_of_ones_own_names_its_place(capsys: Capture) -> None:
+    Path("mine.py").write_text(
+        "class Bonus:\n"
+        "    def __init__(self, config, num_envs): pass\n"
+        "    def step(self, envs, image, ended): return not_there\n"
+        "    def state(self): return {}\n"
+        "    def load_state(self, state): pass\n"
+    )
+    assert run_main(["corridor.yaml", *QUICK, "--bonus", "mine:Bonus"]) == 2
+    said = capsys.readouterr().err
+    assert "mine.py:3: NameError: name 'not_there' is not defined" in said
+    assert "Traceback" not in said
