@@ -89,6 +89,8 @@ def check_meaning(
         if found.has_errors or (ranges.settled(registers.ranges) and settled):
             for path in ranges.unbounded:
                 run.report_growth(path)
+            if checked is not None and not found.has_errors:
+                check_possible(checked, findings)  # what is possible is known once all ranges are
             break
     bag.extend(_without_consequences(found, scenario))
     return None if found.has_errors else checked
@@ -216,7 +218,6 @@ class _Run:
             readings=resolver.readings,
         )
         check_absences(made, findings, check_placements(made, findings))
-        check_possible(made, findings)
         return made
 
     def _spoken(self) -> _Spoken:
