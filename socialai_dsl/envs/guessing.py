@@ -135,14 +135,16 @@ class Guessing:
         keys: NDArray[np.uint64],
         effort: Effort,
         plans: Sequence[Plan] = (),
+        surely: bool = False,
     ) -> Guess:
         """Play from rooms that look alike: registers (rooms, R), boards (rooms, C), keys (rooms, Key.WORDS).
 
-        `plans` are sequences of actions that are tried first.
+        `plans` are sequences of actions that are tried first. With `surely` it is not enough that rooms look different
+        of which it is not found out whether they can still be solved, as long as there is something else to try.
         """
         start = self._start(registers, boards, keys)
         self._solvable.clear()
-        self._effort = effort
+        self._effort, self._surely = effort, surely
         if plans and (known := self._walked(start, plans, len(plans))) is not None:
             return known
         few = _NEAR * len(self._useful) // len(self._actions)
@@ -218,6 +220,8 @@ class Guessing:
                 if known is Searched.SOLVABLE:
                     return Guess(Answer.TELLS_APART, len(self._seen), True, step)
                 perhaps = perhaps or (step if known is Searched.UNDECIDED else None)
+                if perhaps is not None and not self._surely:
+                    return Guess(Answer.TELLS_APART, len(self._seen), False, perhaps)
                 if len(self._seen) > states or clock.is_over:
                     return Guess(Answer.UNDECIDED, len(self._seen), False)
             layer = _joined(following)
@@ -280,6 +284,8 @@ class Guessing:
                 return Searched.SOLVABLE
             if perhaps > self._level:
                 found = Searched.UNDECIDED
+                if not self._surely:
+                    break
         return found
 
     def _alone_in(self, state: _Together, room: int, states: int) -> Searched:

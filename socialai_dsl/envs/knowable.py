@@ -123,7 +123,7 @@ class Knowing:
                 if played is not None and (known := played.known.get(other.row)) is not None:
                     step = max(step or 0, known) or None
                     continue
-                guess = self._pair.solve(*self._both(room, other), self._effort, plans)
+                guess = self._pair.solve(*self._both(room, other), self._effort, plans, surely=True)
                 if guess.answer in (Answer.KNOWS, Answer.TELLS_APART) and guess.exact:
                     step = max(step or 0, guess.step or 0)
                     continue

@@ -404,7 +404,7 @@ _KNOWN: Final = {
     Answer.UNDECIDED: "in {} it is undecided",
 }
 _NO_SUCCESS: Final = "no success is possible"
-_NEAR: Final = 15_000
+_NEAR: Final = 8_000
 """In so many states a success without the members is looked for before anything else."""
 
 _ALWAYS_A_GUESS: Final = "there is nothing but a guess with them, too"

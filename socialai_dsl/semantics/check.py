@@ -91,10 +91,8 @@ def check_meaning(
                 run.report_growth(path)
             if checked is not None:
                 check_absences(checked, findings, check_placements(checked, findings))
-            if (
-                checked is not None and not found.has_errors
-            ):  # else what is missing would seem never to happen
-                check_possible(checked, findings)
+            if checked is not None and not found.has_errors:
+                check_possible(checked, findings)  # else what is missing would seem never to happen
             break
     bag.extend(_without_consequences(found, scenario))
     return None if found.has_errors else checked
