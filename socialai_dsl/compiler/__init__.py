@@ -12,7 +12,6 @@ from socialai_dsl.compiler.behaviour import Behaviour
 from socialai_dsl.compiler.classes import Classes
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.homes import Homes
-from socialai_dsl.compiler.kept_lines import KeptLines
 from socialai_dsl.compiler.lines import Lines, note_what_is_said
 from socialai_dsl.compiler.links import links
 from socialai_dsl.compiler.memories import push_acts, remember
@@ -24,7 +23,6 @@ from socialai_dsl.compiler.statuses import ComputedStatuses
 from socialai_dsl.compiler.tables import Tables
 from socialai_dsl.compiler.timers import tick
 from socialai_dsl.compiler.verifier import verify
-from socialai_dsl.compiler.waiting import Waiting
 from socialai_dsl.compiler.world_rules import world_rules
 from socialai_dsl.program import Flag, Header, Program
 from socialai_dsl.semantics.terms import Checked
@@ -67,17 +65,14 @@ def _compiled(checked: Checked, probes: Probes, numbered: Lines | None) -> tuple
     registers = Registers.of(checked)
     classes = Classes(checked)
     sites = Sites()
-    kept = KeptLines(checked, registers)
-    lines = Lines(checked, classes, kept)
+    lines = Lines(checked, classes)
     if numbered is not None:
         lines.adopt(numbered)
     note_what_is_said(checked, lines, registers)
-    kept.reserve(lines.bounds)
     homes = Homes(checked, registers)
     code = CodeTable()
     tables = Tables(checked, registers, classes, sites, lines, code)
     computed = ComputedStatuses(checked)
-    waiting = Waiting(checked, registers, computed)
 
     def entry(label: str, *emitters: Callable[[Expressions], None]) -> int:
         to = Expressions(Block(), checked, registers, classes, sites)
@@ -85,24 +80,22 @@ def _compiled(checked: Checked, probes: Probes, numbered: Lines | None) -> tuple
             emit(to)
         return code.add(to.block, label)
 
-    entries = {Header.RESET_PC: entry("reset", lambda to: reset(to, computed, homes, kept))}
+    entries = {Header.RESET_PC: entry("reset", lambda to: reset(to, computed, homes))}
     inboxes = tables.reserve_inboxes()
     behaviour = Behaviour(checked, registers, classes, sites, lines, homes, code, [], inboxes, probes)
     frames = [behaviour.frame(number, frame) for number, frame in enumerate(checked.frames)]
     entries |= {
         Header.REQUIRE_PC: entry("require", require),
-        Header.BEFORE_PC: entry("before", waiting.begin_remembering, remember),
-        Header.LINKS_PC: entry("links", links, waiting.note_change),
+        Header.BEFORE_PC: entry("before", remember),
+        Header.LINKS_PC: entry("links", links),
         Header.SETTLE_PC: entry("settle", computed.settle),
         Header.RULES_PC: entry(
             "rules",
             push_acts,
-            lambda to: world_rules(to, lines, homes, waiting, behaviour.rules, probes),
+            lambda to: world_rules(to, lines, homes, behaviour.rules, probes),
         ),
         Header.TICK_PC: entry("tick", tick),
     }
-    due = {Header.BEFORE_DUE: waiting.before, Header.RULES_DUE: None if probes.recording else waiting.rules}
-    entries |= {word: register for word, register in due.items() if register is not None}
     outcomes = outcome_table(checked, registers, classes, sites, code, probes)
     if isinstance(probes, Recorder):
         probes.declare(registers)

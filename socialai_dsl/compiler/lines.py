@@ -10,7 +10,6 @@ from math import prod
 from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.classes import Classes, parts, texts_of_pairs
 from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.compiler.kept_lines import KeptLines, factors
 from socialai_dsl.compiler.registers import Registers, said_path
 from socialai_dsl.program import Op
 from socialai_dsl.semantics.terms import (
@@ -44,7 +43,6 @@ class Lines:
 
     checked: Checked
     classes_of: Classes
-    kept: KeptLines
     texts: list[str] = field(default_factory=list)
     classes: list[int] = field(default_factory=list)
     nouns: list[int] = field(default_factory=list)
@@ -128,17 +126,7 @@ class Lines:
             return self._utterance(to, line)
         pieces = (speaker.name or "", *line.parts)
         first = self._family(speaker, pieces)
-        kept = self.kept.of.get((speaker.number, line.parts))
-        if kept is None:
-            return self._index(to, [part for part in pieces if not isinstance(part, str | Const)], first)
-        result, rest = kept.register, 0
-        for part, stride in factors(speaker, line):
-            if not self.kept.is_fixed(part):
-                value = to.saturated(part)
-                value = value if stride == 1 else to.into_temporary(Op.MUL, value, constant(stride))
-                result = to.into_temporary(Op.ADD, result, value)
-                rest -= part.type.low * stride
-        return to.into_temporary(Op.ADD, result, constant(rest)) if rest != 0 else result
+        return self._index(to, [part for part in pieces if not isinstance(part, str | Const)], first)
 
     def perform(self, to: Expressions, speaker: Entity, utterance: Term) -> None:
         """Emit that `speaker` says an utterance of the grammar as part of a sequence; 0 is silence."""

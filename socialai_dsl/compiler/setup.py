@@ -7,7 +7,6 @@ from socialai_dsl.compiler.behaviour import FOR_EVER
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import fold
 from socialai_dsl.compiler.homes import Homes
-from socialai_dsl.compiler.kept_lines import KeptLines
 from socialai_dsl.compiler.places import Places
 from socialai_dsl.compiler.registers import entity_register, state_names
 from socialai_dsl.compiler.statuses import ComputedStatuses
@@ -27,7 +26,7 @@ from socialai_dsl.semantics.terms import (
 ALL_COLORS = (1 << len(COLORS)) - 1
 
 
-def reset(to: Expressions, computed: ComputedStatuses, homes: Homes, kept: KeptLines) -> None:
+def reset(to: Expressions, computed: ComputedStatuses, homes: Homes) -> None:
     """Emit everything that happens at reset."""
     checked, registers = to.checked, to.registers
     to.is_bare = True
@@ -48,7 +47,6 @@ def reset(to: Expressions, computed: ComputedStatuses, homes: Homes, kept: KeptL
         _not_yet(to, registers.by_path[item.path])
     computed.fix(to)
     homes.save(to)
-    kept.work_out(to)
     if to.has_drawn:  # everything is drawn once more when the code has run, into the bare room
         to.block.emit(Op.DRAW_ROOM, 0)
 

@@ -116,8 +116,6 @@ def _registers(program: Program) -> None:
     _require(h(Header.INBOX_SIZE) >= 1 + h(Header.FRAMES), "an inbox could overflow")
     named = [name.register for name in program.registers]
     _require(len(set(named)) == len(named), "a register has two names")
-    for word in (Header.BEFORE_DUE, Header.RULES_DUE):
-        _require(h(word) == 0 or h(word) in named, f"{word.name} is {h(word)}, which is no named register")
     for start, end, name in areas:
         _require(not any(start <= register < end for register in named), f"a named register lies in {name}")
 

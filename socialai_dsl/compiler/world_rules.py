@@ -9,7 +9,6 @@ from socialai_dsl.compiler.folding import FALSE, fold
 from socialai_dsl.compiler.homes import Homes
 from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.probes import NO_PROBES, Probes
-from socialai_dsl.compiler.waiting import Waiting
 from socialai_dsl.program import Op
 from socialai_dsl.semantics.terms import BOOL, RulePlan
 
@@ -18,24 +17,17 @@ def world_rules(
     to: Expressions,
     lines: Lines,
     homes: Homes,
-    waiting: Waiting,
     counted: list[str],
     probes: Probes = NO_PROBES,
 ) -> None:
     """Emit the rules top to bottom, and add their names to those that are counted."""
-    for rules, due in waiting.runs:
-        after = Label()
-        if due is not None:
-            # To be told why a rule does not fire is to ask it.
-            waiting.begin_run(to, due, after, always=probes.recording)
-        for rule in rules:
-            counted.append(rule.name)
-            if rule.when is not None and fold(rule.when.term, to.facts, to.classes) == FALSE:
-                if probes.recording:
-                    _ask_in_vain(to, rule, len(counted) - 1, probes)
-                continue
-            _rule(to, lines, homes, rule, due, len(counted) - 1, probes)
-        to.block.bind(after)
+    for rule in to.checked.rules:
+        counted.append(rule.name)
+        if rule.when is not None and fold(rule.when.term, to.facts, to.classes) == FALSE:
+            if probes.recording:
+                _ask_in_vain(to, rule, len(counted) - 1, probes)
+            continue
+        _rule(to, lines, homes, rule, len(counted) - 1, probes)
 
 
 def _ask_in_vain(to: Expressions, rule: RulePlan, counter: int, probes: Probes) -> None:
@@ -53,7 +45,6 @@ def _rule(
     lines: Lines,
     homes: Homes,
     rule: RulePlan,
-    due: int | None,
     counter: int,
     probes: Probes,
 ) -> None:
@@ -77,8 +68,6 @@ def _rule(
     Effects(to, lines, homes).emit(rule, counter, asked.nothing("values", following))
     if fired is not None:
         block.emit(Op.LOAD, fired, constant(1))
-    if due is not None:
-        block.emit(Op.LOAD, due, constant(1))
     asked.report(to, following)
     block.bind(following)
     block.release(mark)

@@ -26,17 +26,11 @@ from socialai_dsl.engine.vm import run
 from socialai_dsl.program import Field, Flag, FrameColumn, Header, Register
 
 
-@inline
-def _is_due(row: Row, register: int) -> bool:
-    """Whether code has to be run, if this register says so; 0: it always has."""
-    return register == 0 or row.registers[register] + row.registers[Register.CHANGED] != 0
-
-
 @merged
 def begin(row: Row) -> None:
     """What asks how things were is answered; then time goes on, and nothing is heard, used or said yet."""
     registers = row.registers
-    if row.program[Header.BEFORE_PC] != 0 and _is_due(row, row.program[Header.BEFORE_DUE]):
+    if row.program[Header.BEFORE_PC] != 0:
         run(row, row.program[Header.BEFORE_PC])
     registers[Register.T] += 1
     registers[Register.HEARD] = 0
@@ -110,7 +104,7 @@ def step_row(row: Row, link: int, book: Any, number: int) -> float:
         registers[Register.SAID_LINE] = 0
 
     take_turns(row)
-    if program[Header.RULES_PC] != 0 and _is_due(row, program[Header.RULES_DUE]):
+    if program[Header.RULES_PC] != 0:
         run(row, program[Header.RULES_PC])
     settle(row)
     reward = _judge(row, link)

@@ -123,11 +123,7 @@ class Header(IntEnum):
     CLASS_SETS = 54
     CLASS_SET_WORDS = 55
     CHANNELS = 56  # of the picture: 4, or 6 with pointing and last act
-    # Registers that are not 0 when the code at BEFORE_PC or RULES_PC is due: else, and unless Register.CHANGED is set,
-    # it would do nothing. 0: it is always due.
-    BEFORE_DUE = 57
-    RULES_DUE = 58
-    END = 59
+    END = 57
 
 
 class Flag(IntEnum):

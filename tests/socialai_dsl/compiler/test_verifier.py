@@ -114,10 +114,6 @@ MUTANTS: dict[str, Callable[[Words, Program], None]] = {
     "a reset outside the code": set_header(Header.RESET_PC, 5000),
     "more lines than rows": set_header(Header.LINES, 5000),
     "more sites than rows": set_header(Header.SITES, 5000),
-    "rules that are due when no register says so": set_header(
-        Header.RULES_DUE, lambda p: p.header(Header.LOG)
-    ),
-    "something remembered that is due in no register": set_header(Header.BEFORE_DUE, 9000),
     "rooms higher than the canvas": set_header(Header.MIN_HEIGHT, 9),
     "a body action that does not exist": set_table(Header.ACTION_AT, 0, 8),
     "an utterance in class 0": set_table(Header.CLASS_AT, 0, 0),

@@ -90,7 +90,7 @@ def lonely(town: Program) -> Table:
     """A room of the town, where nothing happens in a step but one instruction, which is put where the reset was."""
     words = town.words.copy()
     h = town.header
-    for entry in (Header.BEFORE_PC, Header.LINKS_PC, Header.SETTLE_PC, Header.TICK_PC, Header.RULES_DUE):
+    for entry in (Header.BEFORE_PC, Header.LINKS_PC, Header.SETTLE_PC, Header.TICK_PC):
         words[entry] = 0
     words[Header.FRAMES] = words[Header.FLAGS] = 0
     words[h(Header.OUTCOME_AT) :][: 8 * h(Header.CLASSES)] = 0
