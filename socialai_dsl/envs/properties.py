@@ -16,6 +16,7 @@ from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.guessing import Answer, Guess, Guessing
 from socialai_dsl.envs.muting import muted
+from socialai_dsl.envs.perceiving import perceived
 from socialai_dsl.envs.search import Finding, Search
 from socialai_dsl.envs.search import Verdict as Searched
 from socialai_dsl.envs.table import Table
@@ -84,6 +85,8 @@ def check_property(
             return _within(loaded, plan, effort)
         case "oracle":
             return _oracle(plan, effort, scripted)
+        case "script":
+            return _script(plan, effort, scripted)
         case "needs":
             return _needs(loaded, plan, effort)
         case "only_through":
@@ -173,17 +176,39 @@ def _by_share(held: int, undecided: int, rooms: int, share: float | None) -> Ver
 
 # --- by playing ---
 
+_NOBODY_PLAYS: Final = Report(
+    Verdict.FAILS, 0, 0, 0, (), "nobody plays: the agent has no frame, and there is no variant `oracle`"
+)
+
 
 def _oracle(plan: PropertyPlan, effort: Effort, scripted: LoadedScenario | None) -> Report:
     assert plan.share is not None, "internal: an oracle has a share"
     if scripted is None:
-        said = "nobody plays: the agent has no frame, and there is no variant `oracle`"
-        return Report(Verdict.FAILS, 0, 0, 0, (), said)
+        return _NOBODY_PLAYS
     won = solved_by_script(compile_loaded(scripted), effort)
     against = np.flatnonzero(~won).tolist()
     said = f"its own script solves {won.sum()} of {effort.rooms} rooms"
     verdict = Verdict.HOLDS if won.mean() >= plan.share - 1e-9 else Verdict.FAILS
     return Report(verdict, effort.rooms, int(won.sum()), 0, tuple(against[:_SHOWN]), said)
+
+
+def _script(plan: PropertyPlan, effort: Effort, scripted: LoadedScenario | None) -> Report:
+    """Whether the script acts on what it has perceived alone."""
+    if scripted is None:
+        return _NOBODY_PLAYS
+    found = perceived(scripted, effort.rooms, effort.seed)
+    against = list(dict.fromkeys(peek.index for peek in found.peeks))
+    held = effort.rooms - len(against)
+    if found.pairs == 0:
+        said = "no two rooms look alike at first"
+        return Report(Verdict.UNDECIDED, effort.rooms, 0, effort.rooms, (), said)
+    said = f"in {held} of {effort.rooms} rooms the script acts on what it has perceived alone"
+    said += f" ({found.pairs} pairs of rooms that look alike at first)"
+    if found.peeks:
+        said += f"; {found.peeks[0]}"
+    share = 1.0 if plan.share is None else plan.share
+    verdict = _by_share(held, 0, effort.rooms, share)
+    return Report(verdict, effort.rooms, held, 0, tuple(against[:_SHOWN]), said)
 
 
 def solved_by_script(program: Program, effort: Effort) -> NDArray[np.bool_]:

@@ -32,11 +32,11 @@ from socialai_dsl.semantics.terms import (
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
 
-_Kind = Literal["reachable", "never", "within", "oracle", "needs", "only_through"]
+_Kind = Literal["reachable", "never", "within", "oracle", "script", "needs", "only_through"]
 KINDS: tuple[_Kind, ...] = get_args(_Kind)
 DEADLY = "deadly"
 
-_WITH = {"share": ("reachable", "within", "needs"), "draw": ("needs",)}
+_WITH = {"share": ("reachable", "within", "script", "needs"), "draw": ("needs",)}
 """Keys that say more, and what they can be said about."""
 
 Draw = tuple[str, tuple[int, ...]]
@@ -84,6 +84,8 @@ class _Entry:
                 )
             case "oracle":
                 return replace(plan, text=f"oracle: {entry.oracle:g}", share=entry.oracle)
+            case "script":
+                return replace(plan, text=f"script: {entry.script}")
             case "needs":
                 members = self._members(place, entry.needs or ())
                 tried = (

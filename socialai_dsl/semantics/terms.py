@@ -723,7 +723,7 @@ class PropertyPlan:
     `draws`: the registers whose values are tried (`let.exit`), of which for `needs` one is enough.
     """
 
-    kind: Literal["reachable", "never", "within", "oracle", "needs", "only_through"]
+    kind: Literal["reachable", "never", "within", "oracle", "script", "needs", "only_through"]
     text: str
     site: str
     span: Span
