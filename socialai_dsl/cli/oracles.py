@@ -101,7 +101,7 @@ def as_object(report: OracleReport) -> dict[str, Any]:
 def _page(reports: list[OracleReport], states: int) -> str:
     rows = [
         "# What the scripts solve\n",
-        "Each scenario's own script (its variant `oracle`) plays rooms of one seed; it knows what was drawn. A room",
+        "Each scenario's own script (its variant `oracle`) plays rooms of one seed. A room",
         "that it does not solve is searched: all that the agent can do and say is tried, breadth first, as far as",
         f'{states:,} different states. `env.reset(seed=..., options={{"index": ...}})` opens such a room.\n',
         "| scenario | rooms | solved | ceiling | unsolvable | solvable | undecided |",

@@ -60,7 +60,7 @@ def index(rows: Mapping[str, tuple["Loaded", Mapping[str, Any] | None]]) -> str:
     foot = ["", "[Fidelity](../fidelity.md) compares them with the paper's code."]
     if any(measured for _, measured in rows.values()):
         foot[1:1] = [
-            "Success of the random policy and of each scenario's own script, which knows what was drawn; the ceiling",
+            "Success of the random policy and of each scenario's own script; the ceiling",
             "is the share of rooms that can be solved at all.",
         ]
     return "\n".join([*head, *table(columns, cells), *foot]) + "\n"

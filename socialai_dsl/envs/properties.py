@@ -22,6 +22,7 @@ from socialai_dsl.envs.effort import Effort
 from socialai_dsl.envs.guessing import Answer, Guess, Guessing, Plan
 from socialai_dsl.envs.knowable import Knowing, Known, RoomKnown, followed
 from socialai_dsl.envs.muting import muted
+from socialai_dsl.envs.perceiving import perceived
 from socialai_dsl.envs.rooms import Rooms, name_of, wins_of
 from socialai_dsl.envs.search import Finding, Search
 from socialai_dsl.envs.search import Verdict as Searched
@@ -86,6 +87,7 @@ class Trial:
     ) -> None:
         self.loaded, self.effort = loaded, effort
         self.program = compile_loaded(loaded)
+        self.script = scripted
         self.scripted = None if scripted is None else compile_loaded(scripted)
 
     @cached_property
@@ -113,6 +115,8 @@ class Trial:
                 return _within(self, plan, effort)
             case "oracle":
                 return _oracle(self, plan, effort)
+            case "script":
+                return _script(self, plan, effort)
             case "needs":
                 return _needs(self, plan, effort)
             case "only_through":
@@ -296,12 +300,15 @@ def search_rooms_of(
 
 # --- by playing ---
 
+_NOBODY_PLAYS: Final = Report(
+    Verdict.FAILS, 0, 0, 0, (), "nobody plays: the agent has no frame, and there is no variant `oracle`", 0
+)
+
 
 def _oracle(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     assert plan.share is not None, "internal: an oracle has a share"
     if trial.scripted is None:
-        said = "nobody plays: the agent has no frame, and there is no variant `oracle`"
-        return Report(Verdict.FAILS, 0, 0, 0, (), said, 0)
+        return _NOBODY_PLAYS
     won, idle = trial.solved, trial.rooms.solved_by_idling
     said = f"its own script solves {won.sum()} of {_rooms(effort.rooms)}"
     against = tuple(np.flatnonzero(~won).tolist()[:_SHOWN])
@@ -313,6 +320,25 @@ def _oracle(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     if idle.any():
         said += f"; in {int(idle.sum())} of them a success comes of itself"
     return Report(verdict, effort.rooms, int(won.sum()), 0, against, said, rests)
+
+
+def _script(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
+    """Whether the script acts on what it has perceived alone."""
+    if trial.script is None:
+        return _NOBODY_PLAYS
+    found = perceived(trial.script, effort.rooms, effort.seed)
+    against = list(dict.fromkeys(peek.index for peek in found.peeks))
+    held = effort.rooms - len(against)
+    if found.pairs == 0:
+        said = "it rests on nothing: no two rooms look alike at first"
+        return Report(Verdict.FAILS, effort.rooms, 0, 0, (), said, 0)
+    said = f"in {held} of {_rooms(effort.rooms)} the script acts on what it has perceived alone"
+    said += f" ({found.pairs} pairs of rooms that look alike at first)"
+    if found.peeks:
+        said += f"; {found.peeks[0]}"
+    share = 1.0 if plan.share is None else plan.share
+    verdict = _by_share(held, 0, effort.rooms, share)
+    return Report(verdict, effort.rooms, held, 0, tuple(against[:_SHOWN]), said, effort.rooms, found.pairs)
 
 
 def solved_by_script(program: Program, effort: Effort) -> NDArray[np.bool_]:

@@ -93,7 +93,7 @@ class Twins:
         """Do the same in both of each pair until they differ or one of them ends."""
         pairs = len(self._values)
         state, ports = self._table.state, self._table.batch.ports
-        running = self._same()
+        running = pairs_alike(self._table)
         leaks = [self._leak(k, 0) for k in np.flatnonzero(~running).tolist()]
         cued, step = list[int](), 0
         while running.any():
@@ -102,7 +102,7 @@ class Twins:
             self._table.batch.step(Task.STEP_ONLY)
             step += 1
             running &= (state.registers[:, Register.ENDED] == 0).reshape(-1, 2).all(axis=1)
-            for k in np.flatnonzero(running & ~self._same()).tolist():
+            for k in np.flatnonzero(running & ~pairs_alike(self._table)).tolist():
                 running[k] = False
                 if self._is_cue(k, before):
                     cued.append(k)
@@ -113,14 +113,6 @@ class Twins:
     def _leak(self, pair: int, step: int) -> Leak:
         first, second = layouts(self._program, self._path, self._values[pair].tolist())
         return Leak(pair, step, (*first["let"].values(), *second["let"].values()))
-
-    def _same(self) -> NDArray[np.bool_]:
-        """Whether both of each pair show the same and sound the same, (pairs,)."""
-        state = self._table.state
-        same = np.ones(len(self._values), np.bool_)
-        for array in (state.image, state.extra, state.tokens):
-            same &= (array[0::2] == array[1::2]).reshape(len(same), -1).all(axis=1)
-        return same
 
     def _is_cue(self, pair: int, before: NDArray[np.int16]) -> bool:
         """Whether what differs for the first time comes from one of the members."""
@@ -197,6 +189,15 @@ class Script:
         self._table.batch.ports.actions[:] = actions
         self._table.batch.step(Task.STEP_ONLY)
         return actions
+
+
+def pairs_alike(table: Table) -> NDArray[np.bool_]:
+    """Whether rows 2k and 2k + 1 show the same and sound the same, (pairs,)."""
+    state = table.state
+    same = np.ones(len(state.registers) // 2, np.bool_)
+    for array in (state.image, state.extra, state.tokens):
+        same &= (array[0::2] == array[1::2]).reshape(len(same), -1).all(axis=1)
+    return same
 
 
 def alike(table: Table, rows: slice) -> bool:

@@ -27,7 +27,7 @@ def ceiling_blocks(analysis: Analysis) -> Iterator[Block]:
             [Cell(name, tone="strong"), _level(one.oracle), _level(one.random), _level(one.alone)]
             for name, one in known.items()
         ],
-        "Success ± standard error. Own script: the scenario's variant “oracle”, which knows what was drawn. Random: "
+        "Success ± standard error. Own script: the scenario's variant “oracle”. Random: "
         "every part of the action drawn uniformly. Without NPCs: a policy found by search that knows the whole "
         "room, and neither sees nor hears an NPC; so much at least can be had by guessing (socialai check --deep).",
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, StringConstraints
 
@@ -29,12 +29,15 @@ class OnlyThrough(Model):
 
 
 class Property(Model):
-    """One property: exactly one of `reachable`, `never`, `within`, `oracle`, `needs`, `only_through` and `knowable`."""
+    """A property: one of `reachable`, `never`, `within`, `oracle`, `script`, `needs`, `only_through` and `knowable`."""
 
     reachable: Expression | None = Field(None, description="a condition, or the name of an outcome")
     never: Expression | None = Field(None, description="a condition, or the name of an outcome")
     within: int | None = Field(None, ge=1, le=10_000, description="steps of a shortest success")
     oracle: Probability | None = Field(None, description="share of rooms that the variant `oracle` solves")
+    script: Literal["perceives"] | None = Field(
+        None, description="the variant `oracle` acts on what it has perceived alone"
+    )
     needs: Names | None = Field(None, description="members without whom one can only guess")
     only_through: OnlyThrough | None = Field(None, description="whose cues alone may show what was drawn")
     knowable: bool | None = Field(
@@ -42,6 +45,6 @@ class Property(Model):
         description="whether an agent can perceive in time what its success depends on (tried by default)",
     )
     share: Probability | None = Field(
-        None, description="least share of rooms, for `reachable`, `within`, `needs` and `knowable`"
+        None, description="least share of rooms, for `reachable`, `within`, `script`, `needs` and `knowable`"
     )
     draw: Word | None = Field(None, description="for `needs`: the `let` that has to be guessed")

@@ -32,11 +32,11 @@ from socialai_dsl.semantics.terms import (
 if TYPE_CHECKING:
     from socialai_dsl.semantics.resolve import Resolver
 
-_Kind = Literal["reachable", "never", "within", "oracle", "needs", "only_through", "knowable"]
+_Kind = Literal["reachable", "never", "within", "oracle", "script", "needs", "only_through", "knowable"]
 KINDS: tuple[_Kind, ...] = get_args(_Kind)
 DEADLY = "deadly"
 
-_WITH = {"share": ("reachable", "within", "needs", "knowable"), "draw": ("needs",)}
+_WITH = {"share": ("reachable", "within", "script", "needs", "knowable"), "draw": ("needs",)}
 """Keys that say more, and what they can be said about."""
 
 Draw = tuple[str, tuple[int, ...]]
@@ -87,6 +87,8 @@ class _Entry:
             case "knowable":
                 text = f"knowable: {str(entry.knowable).lower()}"
                 return replace(plan, text=text, expected=bool(entry.knowable))
+            case "script":
+                return replace(plan, text=f"script: {entry.script}")
             case "needs":
                 members = self._members(place, entry.needs or ())
                 tried = (

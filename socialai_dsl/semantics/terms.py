@@ -736,7 +736,7 @@ class PropertyPlan:
     what success depends on is to be `knowable`, or not to be.
     """
 
-    kind: Literal["reachable", "never", "within", "oracle", "needs", "only_through", "knowable"]
+    kind: Literal["reachable", "never", "within", "oracle", "script", "needs", "only_through", "knowable"]
     text: str
     site: str
     span: Span

@@ -355,7 +355,7 @@ class TestOutcome:
 @pytest.mark.parametrize("cue", CUES)
 @pytest.mark.parametrize("problem", PROBLEMS)
 def test_the_rooms_can_be_solved(problem: str, cue: str) -> None:
-    """The scripted agent, who knows what is drawn, loses a room of a thousand when it gets in the caretaker's way."""
+    """The scripted agent loses a room of a hundred: it searches too long, or gets in the caretaker's way."""
     for introduction in INTRODUCTIONS:
         name = school(problem, f"{cue}+oracle", introduction=introduction)
         assert solved(name, 40) >= 39, introduction

@@ -54,7 +54,7 @@ def test_it_fits_a_terminal_and_has_no_colour_elsewhere(capsys: Capture) -> None
     assert "changed wizard.state: stranger -> acquainted" in printed
     assert 'agent   none, says "Open sesame"' in printed
     assert "talkitout.yaml:30  as before" in printed
-    assert printed.splitlines()[-1].startswith("success (success@54) after 16 steps, reward 0.")
+    assert printed.splitlines()[-1].startswith("success (success@54) after 21 steps, reward 0.")
 
 
 def test_json_is_one_object(shy: str, capsys: Capture) -> None:

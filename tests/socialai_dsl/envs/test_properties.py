@@ -233,3 +233,14 @@ def test_which_line_is_said_may_be_what_tells(tried: Trying) -> None:
     report = tried("{needs: ada}", alone, lines, nonsense)
     assert report.verdict is Verdict.HOLDS
     assert "chance during the episode was tried only in part" in report.said
+
+
+def test_a_script_that_knows_what_it_was_not_told_peeks(tried: Trying) -> None:
+    report = tried("{script: perceives}")
+    assert report.verdict is Verdict.HOLDS, "it asks, and heeds the answer"
+    deaf = ("say: Number <exit.index>, goto: content", "goto: content")
+    report = tried("{script: perceives}", deaf)
+    assert (report.verdict, report.held) == (Verdict.FAILS, 0)
+    assert "`let.exit`, doors[" in report.said
+    assert report.said.endswith("decides what it does in step 3, unperceived")
+    assert tried("{script: perceives, share: 0}", deaf).verdict is Verdict.HOLDS

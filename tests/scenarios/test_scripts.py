@@ -1,0 +1,46 @@
+"""The scenarios' own scripts act on what they have seen and heard alone, and succeed."""
+
+from __future__ import annotations
+
+import pytest
+
+import socialai_dsl as sd
+from socialai_dsl.envs.perceiving import perceived
+from socialai_dsl.envs.properties import Effort, solved_by_script
+
+ROOMS = 40
+PAPER = (
+    *("talkitout", "talkitout_no_liar", "dance", "cointhief", "cointhief_tags", "diverse_exit", "showme"),
+    *("showme_no_social", "help", "help_as_helper"),
+)
+NOVEL = tuple(
+    f"novel/{name}"
+    for name in (
+        *("culprit", "gaze_following", "haggling", "interpreter", "sally_anne", "shop", "turn_taking"),
+        "whisper",
+    )
+)
+SCHOOL = tuple(
+    f"school/{name}"
+    for name in (
+        *("boxes+color", "boxes+asocial+alone", "switches+color", "marbles+pointing", "levers+color"),
+        *("color_match_swapped", "lever_door_swapped", "marble_pass_swapped", "marble_push"),
+    )
+)
+
+
+@pytest.mark.parametrize("name", [*PAPER, *NOVEL, *SCHOOL])
+def test_a_script_acts_on_what_it_has_perceived(name: str) -> None:
+    scripted = sd.load(f"{name}+oracle")
+    assert isinstance(scripted, sd.LoadedScenario)
+    found = perceived(scripted, ROOMS, 0)
+    assert found.pairs > 0, "otherwise nothing would be tried"
+    assert [str(peek) for peek in found.peeks] == []
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_a_script_succeeds_where_success_is_possible(name: str) -> None:
+    scripted = sd.load(f"{name}+oracle")
+    assert isinstance(scripted, sd.LoadedScenario)
+    ceiling = 0.94 if name == "talkitout" else 0.99
+    assert solved_by_script(sd.compile(scripted), Effort(300)).mean() >= ceiling
