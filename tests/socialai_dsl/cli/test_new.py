@@ -48,6 +48,14 @@ def test_every_template_is_solved_by_its_script(template: str) -> None:
         assert report.success_rate == 1, (scenario, report.unsolved)
 
 
+@pytest.mark.parametrize("template", TEMPLATES)
+def test_what_every_template_claims_holds_and_can_be_known(template: str, capsys: Capture) -> None:
+    main(["new", "corridor", "--template", template])
+    for scenario in ["corridor.yaml"] + ["corridor_swapped.yaml"] * Path("corridor_swapped.yaml").exists():
+        assert main(["check", scenario, "--rooms", "3", "--seconds", "0"]) == 0, capsys.readouterr().out
+        assert "  holds: `knowable: true`" in capsys.readouterr().out
+
+
 def test_only_one_template_has_two_parts() -> None:
     swapped = [name for name in TEMPLATES if Path("x_swapped.yaml") in template_files(name, "x")]
     assert swapped == ["role-swap"]
