@@ -25,7 +25,7 @@ state: {{found: {{start: 0, range: 0..1}}}}
 rules:
   - {{when: found == 1, set: {{found: 0}}}}
   - {{when: "{condition}", set: {{found: 1}}}}
-outcome: [{{success: t > 12}}]
+outcome: [{{success: t == 12}}]
 """
 
 CONDITIONS = (

@@ -3,7 +3,6 @@
 With `NUMBA_DISABLE_JIT=1` all of them run as plain Python instead. None of them allocates memory.
 """
 
-import pickle
 import shutil
 import sys
 from collections.abc import Callable
@@ -74,7 +73,7 @@ def _compiled_or_kept(function: Callable[..., int]) -> Callable[..., int]:
             _announce(function, "once for this machine")
         try:
             dispatcher.compile(kinds)
-        except (OSError, EOFError, ValueError, pickle.UnpicklingError):  # a full disk, or damaged files
+        except Exception:  # a full disk, or damaged files, which Numba reports in many ways
             shutil.rmtree(folder, ignore_errors=True)
         if dispatcher.signatures:
             return cast(Callable[..., int], dispatcher)

@@ -84,7 +84,7 @@ def test_members_of_a_suite_count(capsys: Capture) -> None:
         (["--episodes", "0"], "--episodes: got 0, expected at least 1"),
         (["--seed", "-2"], "--seed: got -2, expected at least 0"),
         (["--fail-under", "101"], "--fail-under: got 101, expected a per cent from 0 to 100"),
-        (["--agent", "oracle"], "the agent has no frame"),
+        (["--agent", "oracle"], "has no frame"),
     ],
 )
 def test_wrong_usage_is_said_in_one_line(deaf: str, options: list[str], said: str, capsys: Capture) -> None:

@@ -21,7 +21,19 @@ from trainer.checkpoint import read
 
 Capture = pytest.CaptureFixture[str]
 
-RUN = ["help", "--frames", "1536", "--envs", "8", "--checkpoint-every", "2", "--eval-episodes", "5"]
+RUN = [
+    "help",
+    "--recipe",
+    "plain",
+    "--frames",
+    "1536",
+    "--envs",
+    "8",
+    "--checkpoint-every",
+    "2",
+    "--eval-episodes",
+    "5",
+]
 RUN += ["--device", "cpu"]
 
 

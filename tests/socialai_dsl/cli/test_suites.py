@@ -54,7 +54,7 @@ def test_the_scripts_of_a_suite(capsys: Capture) -> None:
     assert result["eval"]["success_rate"] > 0.9
     assert all(member["success_rate"] > 0.5 for member in result["eval"]["members"].values())
     assert run_main(["pair.yaml", "--agent", "oracle"]) == 2
-    assert "the agent of errands follows no frame" in capsys.readouterr().err
+    assert "the agent of errands has no frame" in capsys.readouterr().err
 
 
 def test_a_person_plays_members(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -139,7 +139,10 @@ def test_a_run_with_a_curriculum_is_resumed_with_it(capsys: Capture) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["school.yaml", "--curriculum", "expart"], "curriculum: got 'expart', expected expert, progress"),
+        (
+            ["school.yaml", "--curriculum", "expart"],
+            "curriculum: got 'expart', expected one of expert, progress",
+        ),
         (
             ["school.yaml", "--curriculum", "expert"],
             "got introduction: ask_eye_contact; the suite has ask, gaze, none",

@@ -136,7 +136,7 @@ def test_without_a_script_chance_plays(shy: str, capsys: Capture) -> None:
         (["--layout", "nowhere.json"], "No such file or directory: nowhere.json"),
         (["--layout", "shy.yaml"], "is no JSON"),
         (["--layout", "wrong.json"], "guide.at"),
-        (["--agent", "oracle"], "the agent has no frame"),
+        (["--agent", "oracle"], "has no frame"),
     ],
 )
 def test_wrong_usage_is_said_in_one_line(shy: str, options: list[str], said: str, capsys: Capture) -> None:

@@ -36,13 +36,28 @@ def choice(op: Op, mover: int, target: int, **room: object) -> int:
     ],
 )
 def test_ties_go_down_up_right_left(to: tuple[int, int], facing: int, expected: Body) -> None:
+    assert choice(Op.GO_TO, 1, 0, at=(to, (2, 2)), npcs=1, facing=(0, facing)) == expected
+
+
+@pytest.mark.parametrize(
+    ("to", "facing", "expected"),
+    [
+        ((3, 3), 0, FORWARD),  # right, which is straight ahead, before down
+        ((1, 1), 2, FORWARD),
+        ((2, 3), 0, RIGHT),
+        ((2, 3), 3, LEFT),  # what is behind
+    ],
+)
+def test_a_script_of_the_agent_s_goes_straight_ahead(
+    to: tuple[int, int], facing: int, expected: Body
+) -> None:
     room = {"at": ((2, 2), to), "npcs": 1, "facing": (facing, 0), "flags": HIDDEN}
     assert choice(Op.GO_TO, 0, 1, **room) == expected
 
 
 def test_behind_a_coin_decides() -> None:
-    room = {"at": ((2, 2), (2, 3)), "npcs": 1, "facing": (3, 0), "flags": HIDDEN}
-    block = [(Op.GO_TO, constant(0), constant(1), 1)]
+    room = {"at": ((2, 3), (2, 2)), "npcs": 1, "facing": (0, 3)}
+    block = [(Op.GO_TO, constant(1), constant(0), 1)]
     batch = batch_of(Assembly(rules=block, **room).program(), 200)  # type: ignore[arg-type]
     batch.ports.actions[:] = (7, 0, 0, 0)
     batch.step(Task.STEP_ONLY)
