@@ -28,6 +28,9 @@ from trainer.nets import ActorCritic
 from trainer.rollout import Rollout, collect
 from trainer.session import Session
 
+_SMALLEST_SHARE = 1024
+"""Frames below which a thread of its own costs more, waiting for Python's interpreter lock, than it brings."""
+
 Mapper = Callable[[Callable[[Minibatch], Any], Iterable[Minibatch]], Iterable[Any]]
 """`map`, or that of a pool of threads."""
 
@@ -229,7 +232,9 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map, threads: in
     groups = [
         [
             make_minibatch(session.actor, rollout, advantages, returns, share, stretch)
-            for share in envs.tensor_split(min(threads, len(envs)))
+            for share in envs.tensor_split(
+                max(1, min(threads, len(envs) * config.horizon // _SMALLEST_SHARE))
+            )
         ]
         for envs in order.tensor_split(config.minibatches)
     ]

@@ -1,6 +1,7 @@
 """Advantages and losses have the values worked out by hand."""
 
 import copy
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from math import exp, log
 from typing import Any
@@ -319,3 +320,17 @@ def test_a_divergence_above_the_target_ends_the_epochs(
     update(session, rollout)
     (steps,) = {int(state["step"]) for state in session.optimizer.state.values()}
     assert steps == epochs * session.config.minibatches
+
+
+def test_threads_make_the_step_that_one_makes(small_config: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("trainer.ppo._SMALLEST_SHARE", 1)
+    nets = []
+    for threads in (1, 2):
+        session, rollout = played(small_config(minibatches=1, epochs=1))
+        with ThreadPoolExecutor(threads) as pool:
+            update(session, rollout, pool.map, threads)
+        nets.append(session.actor.net)
+    for (name, one), other in zip(nets[0].named_parameters(), nets[1].parameters(), strict=True):
+        assert one.grad is not None, name
+        assert other.grad is not None, name
+        assert torch.allclose(one.grad, other.grad, rtol=1e-4, atol=1e-6), f"{name}: the shares do not add up"
