@@ -103,6 +103,7 @@ def estimate_advantages(session: Session, rollout: Rollout) -> tuple[Tensor, Ten
 STATISTICS = (
     "loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "imitation_loss", "grad_norm",
 )  # fmt: skip
+_KL = STATISTICS.index("approx_kl")
 
 
 @dataclass(frozen=True)
@@ -242,11 +243,8 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map, threads: in
     for _ in range(config.epochs):
         for index in torch.randperm(len(groups), generator=generator).tolist():
             steps.append(_step(session, groups[index], mapper))
-        if (
-            config.target_kl is not None
-            and float(steps[-1][STATISTICS.index("approx_kl")]) > config.target_kl
-        ):
-            break
+            if config.target_kl is not None and float(steps[-1][_KL]) > config.target_kl:
+                return summarize(steps, rollout.values, returns)
     return summarize(steps, rollout.values, returns)
 
 

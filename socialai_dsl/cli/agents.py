@@ -212,7 +212,7 @@ def _usual_recipe(given: dict[str, Any], scenario: str) -> str:
     return "guided" if scripted_name(scenario) is not None else "plain"
 
 
-GUIDED_FRAMES: Final = 1_600_000
+GUIDED_FRAMES: Final = 2_000_000
 GUIDED_FRAMES_OF_A_SUITE: Final = 6_000_000
 
 

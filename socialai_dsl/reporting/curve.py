@@ -142,7 +142,7 @@ def _draw_success(axes: Axes, curve: Curve) -> None:
     axes.set_ylabel("success", fontsize=9)
     axes.grid(axis="y", color="#e6e6e6", linewidth=0.8)
     axes.set_axisbelow(True)
-    axes.legend(loc="upper left", fontsize=8, frameon=False)
+    axes.legend(loc="lower right" if led else "upper left", fontsize=8, frameon=False)
 
 
 _BESIDE: Final = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "reverse": True}
