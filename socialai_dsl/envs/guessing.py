@@ -21,10 +21,9 @@ from socialai_dsl.envs.effort import Effort
 from socialai_dsl.envs.relevance import Relevance
 from socialai_dsl.envs.rooms import wins_of
 from socialai_dsl.envs.search import (
-    CHANCES,
+    Chances,
     Search,
     digests_of,
-    marks,
     multipliers,
     useful_actions,
 )
@@ -112,9 +111,9 @@ class Guessing:
         self._weights, self._level = weights, int(weights.max())
         self._relevance = Relevance.of(program)
         self._useful = useful_actions(program, self._relevance.whole_utterance)
-        chances = CHANCES if self._relevance.drawn else 1  # which line is said may tell something, too
-        self._actions = np.repeat(self._useful, chances, axis=0)
-        self._marks = np.tile(marks(chances), len(self._useful))
+        # Which line is said may tell something, too.
+        self._chances = Chances(program, self._relevance, self._relevance.drawn)
+        self._actions = np.repeat(self._useful, self._chances.count, axis=0)
         rooms = len(weights)
         self._at_once = max(1, _ROWS // (len(self._actions) * rooms))
         self._table = Table([program], self._at_once * len(self._actions) * rooms, 1)
@@ -188,7 +187,7 @@ class Guessing:
                 part = slice(first, first + self._at_once)
                 reached, alike = self._step(layer.part(part))
                 made = [[*plan, action] for plan in plans[part] for action in self._actions]
-                exact = np.tile(self._marks == 0, len(made) // len(self._actions))
+                exact = np.arange(len(made)) % self._chances.count == 0
                 apart = np.flatnonzero(~alike & reached.going.all(axis=1) & exact)
                 if len(apart):
                     return made[int(apart[0])]
@@ -303,7 +302,12 @@ class Guessing:
     def _step(self, layer: _Together) -> tuple[_Together, NDArray[np.bool_]]:
         """Do everything in these states; what follows, and whether the rooms that go on still look alike."""
         count = len(layer)
-        return self._advance(layer, np.tile(self._actions, (count, 1)), np.tile(self._marks, count))
+        marks = self._chances.marks(
+            int(layer.keys[0, 0, Key.KEY]), int(layer.registers[0, 0, Register.T]) + 1
+        )
+        return self._advance(
+            layer, np.tile(self._actions, (count, 1)), np.tile(marks, count * len(self._useful))
+        )
 
     def _advance(
         self, layer: _Together, actions: NDArray[np.int64], chance: NDArray[np.uint64]

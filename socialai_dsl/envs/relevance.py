@@ -54,12 +54,17 @@ _RECORDS = (
 
 _WHOLE_UTTERANCE = (Register.TEMPLATE, Register.NOUN, Register.UTTERANCE)
 
-_LAST_TURN = (Field.LAST, Field.TOGGLED)
+_OF_MEMBERS = ((Field.LAST, Field.TOGGLED), (Field.POKED,))
+"""Fields of members of the cast that only code reads: what they did in the last turn; whether they were poked."""
+
 _COMPARISONS = (Op.IF_EQ, Op.IF_NE, Op.IF_LT, Op.IF_LE)
 _DRAWS = frozenset(op for op, entry in TABLE.items() if entry.draws and entry.results)
 """They write what they draw."""
 
 _CHANCY = frozenset(op for op, entry in TABLE.items() if entry.draws and not entry.results)
+_TURNS = (Op.TURN_TO, Op.GO_TO, Op.GO_NEXT_TO, Op.FACE)
+"""They draw left or right."""
+
 _VALUES = frozenset(op for op, entry in TABLE.items() if entry.op_class is OpClass.VALUE and not entry.draws)
 
 Instruction = tuple[Op, tuple[int, int, int]]
@@ -75,6 +80,8 @@ class Relevance:
         whole_utterance: whether utterances of one class may have different effects.
         chance: whether anything but what is said is drawn after the reset.
         drawn: whether anything at all is drawn after the reset, if only which line is said.
+        choices: the sites that are drawn at after the reset, with how many results each has; None where that is known
+            only when it is drawn.
     """
 
     registers: NDArray[np.intp]
@@ -82,6 +89,7 @@ class Relevance:
     whole_utterance: bool
     chance: bool
     drawn: bool
+    choices: tuple[tuple[int, int], ...] | None
 
     def of_rows(self, registers: NDArray[np.int16]) -> NDArray[np.int16]:
         """What matters of registers, int16 (..., R), as int16 (..., N)."""
@@ -100,7 +108,7 @@ class Relevance:
         )
         ignored |= {name.register for name in program.registers if name.fleeting} - read_before
         ignored |= {register for register in (Register.T, *_clocks(program)) if register not in limits}
-        ignored |= {register for register in _lasts(program) if register not in limits}
+        ignored |= {register for register in _of_members(program, *_OF_MEMBERS) if register not in limits}
         h = program.header
         for first, size in ((Header.LOG, Header.LOG_SIZE), (Header.HEARD, Header.HEARD_SIZE)):
             ignored |= set(range(h(first), h(first) + h(size)))
@@ -113,6 +121,7 @@ class Relevance:
             or any(op == Op.HEARD_NOUN for block in blocks for op, _ in block),
             any(_draws_matter(program, block) for block in blocks),
             any(op in (*_DRAWS, *_CHANCY) for block in blocks for op, _ in block),
+            _choices(blocks),
         )
 
 
@@ -166,16 +175,17 @@ def _limits(blocks: list[list[Instruction]]) -> dict[int, int]:
 
 
 def _of_entities(program: Program, blocks: list[list[Instruction]]) -> dict[int, int]:
-    """What instructions read of entities by name of the field; only what was done in the last turn may be left out."""
-    if any(op == Op.FIELD and operands[2] in _LAST_TURN for block in blocks for op, operands in block):
-        return dict.fromkeys(_lasts(program), _UNLIMITED)
-    return {}
+    """What instructions read of entities by name of the field; only what code alone reads may be left out."""
+    named = {operands[2] for block in blocks for op, operands in block if op == Op.FIELD}
+    read = [fields for fields in _OF_MEMBERS if not named.isdisjoint(fields)]
+    return dict.fromkeys(_of_members(program, *read), _UNLIMITED)
 
 
-def _lasts(program: Program) -> list[int]:
-    """Registers of what members of the cast did in their last turns."""
+def _of_members(program: Program, *groups: tuple[Field, ...]) -> list[int]:
+    """Registers of these fields of the members of the cast."""
     members = [number for number, entity in enumerate(program.entities) if entity.role != "object"]
-    return [FIRST_ENTITY + ENTITY_FIELDS * number + field for number in members for field in _LAST_TURN]
+    fields = [field for group in groups for field in group]
+    return [FIRST_ENTITY + ENTITY_FIELDS * number + field for number in members for field in fields]
 
 
 def _clocks(program: Program) -> list[int]:
@@ -186,6 +196,14 @@ def _frame_column(program: Program, column: FrameColumn) -> list[int]:
     start, rows = program.header(Header.FRAME_AT), program.header(Header.FRAMES)
     table = program.words[start : start + rows * FrameColumn.COLUMNS].reshape(rows, FrameColumn.COLUMNS)
     return [int(word) for word in table[:, column]]
+
+
+def _choices(blocks: list[list[Instruction]]) -> tuple[tuple[int, int], ...] | None:
+    """The sites that are drawn at, with how many results each has; None where that is not fixed."""
+    drawn = {(op, operands) for block in blocks for op, operands in block if op in _DRAWS | _CHANCY}
+    if any(op not in (*_TURNS, Op.CHOOSE) for op, _ in drawn):
+        return None
+    return tuple(sorted({(site, 2 if op in _TURNS else count) for op, (_, count, site) in drawn}))
 
 
 def _draws_matter(program: Program, block: list[Instruction]) -> bool:

@@ -11,15 +11,17 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
+from math import prod
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.draws import GOLDEN, MASK, mix
+from socialai_dsl.draws import GOLDEN, MASK, below, draw, mix
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.effort import Clock
+from socialai_dsl.envs.redrawn import sites_of
 from socialai_dsl.envs.relevance import Relevance
 from socialai_dsl.envs.table import Table
 from socialai_dsl.envs.vector_env import ScenarioVectorEnv
@@ -31,6 +33,9 @@ STATES: Final = 300_000
 _ROWS: Final = 4096
 CHANCES: Final = 6
 """How many draws are tried of each step in which something is drawn; the first is the episode's own."""
+
+_TRIED: Final = 64
+"""Among so many draws those that fall otherwise are looked for."""
 
 
 class Verdict(Enum):
@@ -101,9 +106,8 @@ class Search:
         self._witness = witness
         self._relevance = Relevance.of(program)
         actions = useful_actions(program, self._relevance.whole_utterance)
-        chances = CHANCES if self._relevance.chance else 1
-        self._actions = np.repeat(actions, chances, axis=0)
-        self._marks = np.tile(marks(chances), len(actions))
+        self._chances = Chances(program, self._relevance, self._relevance.chance)
+        self._actions = np.repeat(actions, self._chances.count, axis=0)
         self._at_once = max(1, _ROWS // len(self._actions))
         self._table = Table([program], self._at_once * len(self._actions), 1)
         self._table.reset(0, None)
@@ -163,7 +167,8 @@ class Search:
         state.boards[:used] = np.repeat(layer.boards[part], choices, axis=0)
         keys = np.repeat(layer.keys[part], choices, axis=0)
         episode_keys = keys[:, Key.KEY].copy()
-        keys[:, Key.KEY] ^= np.tile(self._marks, len(nodes))
+        marks = self._chances.marks(int(layer.keys[0, Key.KEY]), int(layer.registers[0, Register.T]) + 1)
+        keys[:, Key.KEY] ^= np.tile(marks, used // self._chances.count)
         state.keys[:used] = keys
         ports.actions[:used] = np.tile(self._actions, (len(nodes), 1))
         self._table.batch.step(Task.STEP_ONLY)
@@ -175,7 +180,7 @@ class Search:
         wins = np.flatnonzero(ended & self._wins[reached[:, Register.OUTCOME]])
         if len(wins):
             # Of several take one without foreign chance, if there is one.
-            best = min(wins.tolist(), key=lambda row: int(self._marks[row % choices] != 0))
+            best = min(wins.tolist(), key=lambda row: row % self._chances.count != 0)
             return int(nodes[best // choices]), best % choices
         going = np.flatnonzero(~ended)
         digests = self._digests(reached[going])
@@ -214,9 +219,39 @@ class Search:
         return choices[::-1]
 
     def _plan(self, choices: list[int]) -> tuple[NDArray[np.int64], ...] | None:
-        if any(self._marks[one] != 0 for one in choices):
+        if any(one % self._chances.count != 0 for one in choices):
             return None
         return tuple(self._actions[one].copy() for one in choices)
+
+
+class Chances:
+    """Which draws a search tries of each step: the episode's own first, then others, of which none falls alike.
+
+    Args:
+        program: what is played.
+        relevance: what matters in it.
+        drawn: whether anything that is drawn matters.
+    """
+
+    def __init__(self, program: Program, relevance: Relevance, drawn: bool) -> None:
+        ways = CHANCES if relevance.choices is None else prod(count for _, count in relevance.choices)
+        self.count = min(CHANCES, ways) if drawn else 1
+        sites = sites_of(program)
+        self._choices = [(*sites[site], count) for site, count in relevance.choices or ()]
+        self._all = 1 < self.count == ways
+
+    def marks(self, key: int, step: int) -> NDArray[np.uint64]:
+        """What to change an episode's key by, (count,); the first changes nothing. `step` is that of the draws."""
+        if not self._all or not self._choices:
+            return marks(self.count)
+        found: dict[tuple[int, ...], int] = {}
+        for mark in marks(_TRIED).tolist():
+            drawn = tuple(
+                below(draw(key ^ mark, place, step, number), count) for place, number, count in self._choices
+            )
+            found.setdefault(drawn, mark)
+        tried = [*found.values(), *[0] * self.count]
+        return np.array(tried[: self.count], np.uint64)
 
 
 def marks(chances: int) -> NDArray[np.uint64]:

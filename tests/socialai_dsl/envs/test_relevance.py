@@ -5,7 +5,10 @@ from pathlib import Path
 import pytest
 
 import socialai_dsl
+from socialai_dsl.draws import below, draw
+from socialai_dsl.envs.redrawn import sites_of
 from socialai_dsl.envs.relevance import Relevance
+from socialai_dsl.envs.search import Chances
 from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Field, Header, Op, Program, Register
 
 SCENARIO = """
@@ -138,3 +141,22 @@ def test_what_is_written_anew_in_every_step_does_not_count(tmp_path: Path) -> No
     fleeting = {name.register for name in pending.registers if name.fleeting}
     assert fleeting
     assert not fleeting & set(Relevance.of(pending).registers.tolist())
+
+
+def test_that_somebody_was_poked_counts_only_where_code_asks(tmp_path: Path) -> None:
+    keeper = FIRST_ENTITY + ENTITY_FIELDS + Field.POKED
+    assert keeper not in Relevance.of(program(tmp_path)).registers
+    assert keeper in Relevance.of(program(tmp_path, success="keeper.was_poked")).registers
+
+
+def test_of_a_turn_round_both_ways_are_tried_and_no_more(tmp_path: Path) -> None:
+    turning = program(tmp_path, activity="face(agent)")
+    relevance = Relevance.of(turning)
+    ((site, count),) = relevance.choices or ()
+    assert count == 2
+    place, number = sites_of(turning)[site]
+    chances = Chances(turning, relevance, True)
+    for step in range(1, 20):
+        marks = chances.marks(12345, step).tolist()
+        assert marks[0] == 0
+        assert sorted(below(draw(12345 ^ mark, place, step, number), 2) for mark in marks) == [0, 1]
