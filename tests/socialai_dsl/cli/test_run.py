@@ -375,7 +375,7 @@ def test_parts_of_ones_own_that_are_wrong_are_said_in_one_line(option: str, caps
 
 
 def test_a_scripted_scenario_is_guided_unless_another_recipe_is_asked_for(capsys: Capture) -> None:
-    few = ["--frames", "1024", "--envs", "8", "--threads", "1", "--eval-episodes", "5", "--device", "cpu"]
+    few = ["--frames", "2048", "--envs", "8", "--threads", "1", "--eval-episodes", "5", "--device", "cpu"]
     assert run_main(["help", *few, "--out", "here"]) == 0
     result, config = result_of("here"), json.loads(Path("here/config.json").read_text())
     assert (result["scenario"], result["recipe"], result["guide"]) == ("help", "guided", "script")
@@ -386,9 +386,9 @@ def test_a_scripted_scenario_is_guided_unless_another_recipe_is_asked_for(capsys
     rows = [json.loads(line) for line in Path("here/metrics.jsonl").read_text().splitlines()]
     assert rows[0]["led"] == 1 > rows[-1]["led"]
     capsys.readouterr()
-    assert run_main(["--resume", "here", "--frames", "2048"]) == 2
+    assert run_main(["--resume", "here", "--frames", "4096"]) == 2
     (said,) = capsys.readouterr().err.splitlines()
-    assert "--frames: got 2048, expected 1024, because guide and schedules" in said
+    assert "--frames: got 4096, expected 2048, because guide and schedules" in said
     assert json.loads(Path("here/config.json").read_text()) == config, "it can still be resumed as it was"
     assert run_main(["--resume", "here", "--frames", "-1"]) == 2
     assert "--frames: Input should be greater than or equal to 0, got -1" in capsys.readouterr().err
