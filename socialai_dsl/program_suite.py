@@ -109,11 +109,6 @@ def unscripted(playable: Playable) -> tuple[str, ...]:
     return tuple(name for name, program in programs if not program.header(Header.FLAGS) & Flag.AGENT_FRAME)
 
 
-def is_scripted(playable: Playable) -> bool:
-    """Whether the agent follows a frame, in every member of a suite."""
-    return not unscripted(playable)
-
-
 def prefixed(member: str, name: str) -> str:
     """How a name of one member is called among those of several."""
     return f"{member}: {name}"

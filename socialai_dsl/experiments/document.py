@@ -86,8 +86,8 @@ def config_of(cell: Cell, seed: int = 0) -> RunConfig:
         pydantic.ValidationError: its options contradict each other.
     """
     given: dict[str, Any] = {"scenario": cell.scenario, "agent": cell.agent, "seed": seed}
-    options = {**{name: value for name, value in cell.options.items() if name != "hyper"}}
-    options |= dict(cell.options.get("hyper", {}))
+    options = {name: value for name, value in cell.options.items() if name != "hyper"}
+    options |= cell.options.get("hyper", {})
     if not cell.trains:
         kept = {name: options[name] for name in OF_ANY_AGENT if name in options}
         return resolved_config(given | kept | {"frames": 0})

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import socialai_dsl as sd
 from socialai_dsl.program import Program
-from socialai_dsl.program_suite import ProgramSuite, is_scripted, mixture
+from socialai_dsl.program_suite import ProgramSuite, mixture, unscripted
 
 FOLDER = Path(__file__).parents[1] / "data" / "suites"
 
@@ -52,9 +52,9 @@ def test_what_means_something_while_a_member_plays() -> None:
 
 
 def test_scripted_only_if_all_are() -> None:
-    assert is_scripted(program("talkitout+oracle"))
-    assert not is_scripted(program("talkitout"))
-    assert not is_scripted(suite("pair.yaml"))
+    assert unscripted(program("talkitout+oracle")) == ()
+    assert unscripted(program("talkitout")) == ("talkitout",)
+    assert unscripted(suite("pair.yaml"))
 
 
 def test_a_mixture_shares_texts_but_keeps_each_members_own_pairs() -> None:
