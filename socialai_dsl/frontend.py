@@ -27,7 +27,7 @@ from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, S
 from socialai_dsl.loader import Resolved, resolve
 from socialai_dsl.loader.files import display_name
 from socialai_dsl.schema import Scenario
-from socialai_dsl.semantics.terms import Checked
+from socialai_dsl.semantics.plans import Checked
 from socialai_dsl.source import Source, Span
 
 __all__ = [
@@ -76,13 +76,17 @@ class CheckResult:
         return any(d.severity is Severity.ERROR for d in self.diagnostics)
 
 
-def load(name: str | Path) -> Loaded:
+def load(name: str | Path, texts: Mapping[Path, Source] | None = None) -> Loaded:
     """A scenario or suite by path or shipped name, with variants and parameters: `talkitout+unsocial`, `a.yaml?n=2`.
+
+    Args:
+        name: which one.
+        texts: see `check`.
 
     Raises:
         ScenarioError: with all findings, if one of them is an error.
     """
-    result = check(name)
+    result = check(name, texts)
     if result.has_errors:
         raise ScenarioError(result.diagnostics, result.sources)
     loaded = _loaded(result)

@@ -48,6 +48,15 @@ class ObjectTypeModel(Model):
         default_factory=dict, description="status: what the status and orientation channels show"
     )
     color: Word = Field("random", description="where a scenario gives none")
+    look: Word | None = Field(None, description="what it is drawn as; its own name by default")
+    letters: str = Field(
+        min_length=1, description="of text pictures, one for each status; the last serves the rest"
+    )
+    mark: str | None = Field(
+        None,
+        max_length=1,
+        description="before its letter, in place of its colour's, where it has its own colour",
+    )
 
     def compiled(self, name: str) -> ObjectType:
         """The type with statuses as numbers."""
@@ -67,6 +76,9 @@ class ObjectTypeModel(Model):
             rolls=frozenset(map(number, self.rolls)),
             expired={number(before): number(after) for before, after in self.expired.items()},
             shown={number(status): channels for status, channels in self.shown.items()},
+            look=self.look or name,
+            letters=self.letters,
+            mark=self.mark,
         )
 
 
@@ -92,6 +104,12 @@ def prelude() -> Prelude:
         {name: model.compiled(name) for name, model in library.types.items()},
         {name: model.color for name, model in library.types.items()},
     )
+
+
+@cache
+def types_by_code() -> dict[int, ObjectType]:
+    """The object types by their number in the type channel."""
+    return {type_.code: type_ for type_ in prelude().types.values()}
 
 
 @cache

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 import socialai_dsl
+from socialai_dsl.analysis.effort import Effort
+from socialai_dsl.analysis.properties import Verdict, by_default, check_property
 from socialai_dsl.cli import main
-from socialai_dsl.envs.effort import Effort
-from socialai_dsl.envs.properties import Verdict, by_default, check_property
 from socialai_dsl.frontend import check
 
 DOCS = Path(__file__).parents[1] / "docs"

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.cli.check import check_scenario, scenarios_of
 from socialai_dsl.diagnostics import CODES, render_text
-from socialai_dsl.envs.effort import Effort
 from socialai_dsl.frontend import CheckResult, check
 
 FOLDER = Path(__file__).parents[1] / "docs" / "diagnostics"

@@ -14,12 +14,12 @@ import socialai_dsl
 from socialai_dsl import frontend
 from socialai_dsl.cli import main
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, ObjectTypeModel, prelude, shared_grammars
-from socialai_dsl.program import COLORS, DIRECTIONS, Field, Flag, FrameColumn, Header, Op, TypeColumn
-from socialai_dsl.schema import PRIMITIVES
+from socialai_dsl.program import Field, Flag, FrameColumn, Header, Op, TypeColumn
 from socialai_dsl.schema.annotations import CALLED, keys_of
 from socialai_dsl.schema.behaviour import SlotType
 from socialai_dsl.schema.experiment import Experiment
 from socialai_dsl.semantics.signatures import SIGNATURES, WORDS
+from socialai_dsl.vocabulary import COLORS, DIRECTIONS, PRIMITIVES
 from tests.tiny import Folder
 
 ROOT = Path(__file__).parents[1]

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 import socialai_dsl
-from socialai_dsl.cli.evaluation import Player, evaluate_agent
+from socialai_dsl.cli.evaluation import evaluate_agent
+from socialai_dsl.cli.player import Player
 from trainer.config import RunConfig
 from trainer.ppo import train
 

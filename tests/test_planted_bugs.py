@@ -17,8 +17,8 @@ import pytest
 from socialai_dsl.compiler import compile_scenario
 from socialai_dsl.frontend import load
 from socialai_dsl.program import FrameColumn, Header, Program
-from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.terms import Checked, FramePlan, RulePlan
+from socialai_dsl.semantics import plans, terms
+from socialai_dsl.semantics.plans import Checked, FramePlan, RulePlan
 from tests.agreement import Disagreement, Pair, agree
 from tests.reference import bodies
 from tests.reference.interpreter import Action, Reference, Result
@@ -56,11 +56,11 @@ def last_rule_wins(plan: FramePlan) -> FramePlan:
 
 
 def any_place(item: Any) -> Any:
-    return replace(item, where=None) if isinstance(item, terms.Placing) else item
+    return replace(item, where=None) if isinstance(item, plans.Placing) else item
 
 
 def any_color(item: Any) -> Any:
-    return replace(item, distinct_from=()) if isinstance(item, terms.Coloring) else item
+    return replace(item, distinct_from=()) if isinstance(item, plans.Coloring) else item
 
 
 def liar_may_be_right(rule: RulePlan) -> RulePlan:

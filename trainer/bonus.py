@@ -135,6 +135,5 @@ def build_bonus(config: RunConfig, num_envs: int) -> Bonus | None:
         return None
     if config.bonus in SHIPPED:
         return EpisodicBonus(config, num_envs)
-    methods = ("step", "state", "load_state")
-    bonus: Bonus = load_class(config.bonus, "bonus", SHIPPED, methods, config.code_folder)(config, num_envs)
+    bonus: Bonus = load_class(config.bonus, "bonus", SHIPPED, Bonus, config.code_folder)(config, num_envs)
     return bonus

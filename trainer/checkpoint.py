@@ -52,10 +52,10 @@ class CheckpointMeta(BaseModel):
     image_shape: tuple[int, int, int]
     vocabulary: list[str] = Field(max_length=100_000)
     program_sha256: str = Field(max_length=64)
-    scenario: str = Field("", max_length=10_000)
-    actions: list[str] = Field(default_factory=list, max_length=1_000)
-    templates: list[str] = Field(default_factory=list, max_length=10_000)
-    nouns: list[str] = Field(default_factory=list, max_length=10_000)
+    scenario: str = Field(max_length=10_000)
+    actions: list[str] = Field(max_length=1_000)
+    templates: list[str] = Field(max_length=10_000)
+    nouns: list[str] = Field(max_length=10_000)
     frames: int = Field(ge=0)
     update: int = Field(ge=0)
     torch_version: str = Field(max_length=100)
@@ -74,18 +74,7 @@ class Checkpoint:
     def part(self, prefix: str) -> dict[str, Tensor]:
         """The tensors under `prefix.`, without it."""
         start = prefix + "."
-        return {
-            name.removeprefix(start): value for name, value in self.tensors.items() if name.startswith(start)
-        }
-
-
-def _plain(value: Tensor) -> Tensor:
-    return value.detach().cpu().contiguous()
-
-
-def path_of(directory: Path, meta: CheckpointMeta) -> Path:
-    """The file of a checkpoint."""
-    return directory / f"{meta.frames:015d}.safetensors"
+        return {name[len(start) :]: value for name, value in self.tensors.items() if name.startswith(start)}
 
 
 def write(directory: Path, checkpoint: Checkpoint, keep: int = 2) -> Path:
@@ -97,7 +86,7 @@ def write(directory: Path, checkpoint: Checkpoint, keep: int = 2) -> Path:
         OSError: it cannot be written, for example because the disk is full; earlier checkpoints are untouched.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    path = path_of(directory, checkpoint.meta)
+    path = directory / f"{checkpoint.meta.frames:015d}.safetensors"
     write_file(path, checkpoint)
     for old in [*sorted(directory.glob("*.safetensors"))[:-keep], *directory.glob("*.tmp")]:
         old.unlink(missing_ok=True)
@@ -121,7 +110,11 @@ def write_file(path: Path, checkpoint: Checkpoint) -> None:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
         raise
-    _sync_directory(path.parent)
+    descriptor = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)  # of the new name
+    finally:
+        os.close(descriptor)
 
 
 def weights_only(checkpoint: Checkpoint) -> Checkpoint:
@@ -130,17 +123,9 @@ def weights_only(checkpoint: Checkpoint) -> Checkpoint:
     return Checkpoint(checkpoint.meta, net)
 
 
-def _sync_directory(directory: Path) -> None:
-    descriptor = os.open(directory, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
 def _encode(checkpoint: Checkpoint) -> bytes:
     """The file's bytes; the digest is that of the same bytes with zeros in its place."""
-    tensors = {name: _plain(value) for name, value in checkpoint.tensors.items()}
+    tensors = {name: value.detach().cpu().contiguous() for name, value in checkpoint.tensors.items()}
     metadata = {"meta": checkpoint.meta.model_dump_json(), "sha256": _NO_DIGEST}
     blank = safetensors.torch.save(tensors, metadata)
     return _with_digest(blank, hashlib.sha256(blank).hexdigest())
@@ -209,21 +194,16 @@ def _read_file(path: Path) -> Checkpoint:
 
 
 def restore_net(
-    checkpoint: Checkpoint,
-    spec: NetSpec,
-    vocabulary: list[str],
-    net: str | None = None,
-    folder: Path = Path(),
+    checkpoint: Checkpoint, spec: NetSpec, net: str | None = None, folder: Path = Path()
 ) -> ActorCritic:
-    """Build the checkpoint's network for environments described by `spec` and `vocabulary`.
+    """Build the checkpoint's network for environments described by `spec`.
 
     Word embeddings follow the spelling; words the checkpoint never met keep fresh ones, and a warning lists the
     differences.
 
     Args:
         checkpoint: result of `read`.
-        spec: spaces of the environments it is to play.
-        vocabulary: their words by token id.
+        spec: spaces and words of the environments it is to play.
         net: name of the network, needed if it is not a shipped one, because a file must not choose what is imported.
         folder: where the file of such a network is looked for first.
 
@@ -231,14 +211,12 @@ def restore_net(
         CheckpointError: actions or images have another shape, or the weights are not those of the network.
     """
     meta = checkpoint.meta
-    if meta.action_sizes != spec.action_sizes:
-        raise CheckpointError(
-            f"checkpoint is for actions {meta.action_sizes}, but the scenario has {spec.action_sizes}"
-        )
-    if meta.image_shape != spec.image_shape:
-        raise CheckpointError(
-            f"checkpoint is for images {meta.image_shape}, but the scenario has {spec.image_shape}"
-        )
+    for what, made, wanted in (
+        ("actions", meta.action_sizes, spec.action_sizes),
+        ("images", meta.image_shape, spec.image_shape),
+    ):
+        if made != wanted:
+            raise CheckpointError(f"checkpoint is for {what} {made}, but the scenario has {wanted}")
     name = meta.config.net
     if ":" in name and net != name:
         raise CheckpointError(
@@ -246,18 +224,17 @@ def restore_net(
         )
     model = build_net(name, spec, meta.config.seed, meta.config.precision, folder)
     weights = checkpoint.part("net")
-    if vocabulary != meta.vocabulary:
-        _warn_of_words(meta.vocabulary, vocabulary)
+    if list(spec.vocabulary) != meta.vocabulary:
+        _warn_of_words(set(meta.vocabulary), set(spec.vocabulary))
         _move_words(weights, model, meta.vocabulary)
     _check_weights(weights, model.state_dict())
     model.load_state_dict(weights)
     return model
 
 
-def _warn_of_words(old: list[str], new: list[str]) -> None:
-    missing, unused = sorted(set(new) - set(old)), sorted(set(old) - set(new))
-    parts = [f"new words it never met: {', '.join(missing)}"] if missing else []
-    parts += [f"words not used here: {', '.join(unused)}"] if unused else []
+def _warn_of_words(old: set[str], new: set[str]) -> None:
+    parts = [f"new words it never met: {', '.join(sorted(new - old))}"] if new - old else []
+    parts += [f"words not used here: {', '.join(sorted(old - new))}"] if old - new else []
     detail = "; ".join(parts) or "the same words in another order"
     warnings.warn(f"the checkpoint's vocabulary differs ({detail})", stacklevel=4)
 
@@ -270,11 +247,8 @@ def _move_words(weights: dict[str, Tensor], model: ActorCritic, vocabulary: list
         raise CheckpointError(f"checkpoint's vocabulary does not fit its network: {error}") from error
     position = {word: index for index, word in enumerate(old)}
     for name in model.word_rows:
-        source = weights.get(name)
-        fresh = model.state_dict()[name].clone()
-        if source is None or len(source.shape) != len(fresh.shape) or source.shape[1:] != fresh.shape[1:]:
-            raise CheckpointError(f"checkpoint's {name} does not fit its network")
-        if len(source) < len(old):
+        source, fresh = weights.get(name), model.state_dict()[name].clone()
+        if source is None or source.shape[1:] != fresh.shape[1:] or len(source) < len(old):
             raise CheckpointError(f"checkpoint's {name} does not fit its vocabulary")
         for index, word in enumerate(model.reader.words):
             if word in position:
@@ -290,11 +264,8 @@ def _check_weights(weights: dict[str, Tensor], expected: dict[str, Tensor]) -> N
             f"checkpoint's weights are not those of its network (first difference: {unlike[0]})"
         )
     for name, value in weights.items():
-        if value.shape != expected[name].shape or value.dtype != expected[name].dtype:
-            got, wanted = (
-                (tuple(value.shape), value.dtype),
-                (tuple(expected[name].shape), expected[name].dtype),
-            )
+        got, wanted = [(tuple(one.shape), one.dtype) for one in (value, expected[name])]
+        if got != wanted:
             raise CheckpointError(f"checkpoint's {name}: got {got}, expected {wanted}")
         if not bool(torch.isfinite(value).all()):
             raise CheckpointError(f"checkpoint's {name} holds numbers that are not finite")

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -93,6 +92,9 @@ class RunConfig(BaseModel):
     imitation_coef: float = _option(
         1.0, "weight of the cross-entropy to the guide's actions (measured)", ge=0
     )
+    imitation_floor: float = _option(
+        0.0, "cross-entropy of a step, nats, below which it is imitated well enough and left alone", ge=0
+    )
 
     horizon: int = _option(32, "steps of each environment in one rollout (measured)", ge=1)
     bptt: int = _option(0, "steps that back-propagation through time goes back; 0: the whole rollout", ge=0)
@@ -108,6 +110,9 @@ class RunConfig(BaseModel):
         None, "learning rate at the end, reached linearly; null: it stays as it is", gt=0
     )
     adam_eps: float = _option(1e-5, "Adam's epsilon (paper)", gt=0)
+    adam_beta2: float = _option(
+        0.999, "how much of Adam's mean of squared gradients is kept from step to step", ge=0, lt=1
+    )
     gamma: float = _option(0.99, "discount per step (paper)", ge=0, le=1)
     gae_lambda: float = _option(
         0.95, "lambda of generalised advantage estimation (measured; paper .99)", ge=0, le=1
@@ -211,6 +216,13 @@ class RunConfig(BaseModel):
         """See `code_folder`."""
         return code_folder(self.scenario)
 
+    @property
+    def own_files(self) -> dict[str, Path]:
+        """The files of the user's own classes beside the scenario, by the option that names them."""
+        named = {option: getattr(self, option) for option in ("net", "bonus", "curriculum", "guide")}
+        files = {option: code_file(name, self.code_folder) for option, name in named.items() if ":" in name}
+        return {option: file for option, file in files.items() if file.is_file()}
+
 
 def code_folder(scenario: str) -> Path:
     """Where `mine:Net` is looked for first: the folder of the scenario's file; the present one if that is a name."""
@@ -218,17 +230,23 @@ def code_folder(scenario: str) -> Path:
     return file.parent if file.suffix in (".yaml", ".yml") else Path()
 
 
-FLAGS: Final = tuple(n for n, f in RunConfig.model_fields.items() if f.json_schema_extra["role"] == "flag")  # type: ignore[index]
+def code_file(name: str, folder: Path) -> Path:
+    """Where the class `module:Class` is looked for first."""
+    return folder.resolve() / (name.partition(":")[0].replace(".", "/") + ".py")
+
+
+def _options(key: str, value: Any) -> tuple[str, ...]:
+    fields = RunConfig.model_fields.items()
+    return tuple(name for name, field in fields if field.json_schema_extra[key] == value)  # type: ignore[index]
+
+
+FLAGS: Final = _options("role", "flag")
 """Options with a flag of their own, under its name with `_` for `-`."""
 
-HYPER: Final = tuple(n for n, f in RunConfig.model_fields.items() if f.json_schema_extra["role"] == "hyper")  # type: ignore[index]
+HYPER: Final = _options("role", "hyper")
 """Options given by `--hyper`."""
 
-WITHOUT_EFFECT: Final = frozenset(
-    n
-    for n, f in RunConfig.model_fields.items()
-    if not f.json_schema_extra["result"]  # type: ignore[index]
-)
+WITHOUT_EFFECT: Final = frozenset(_options("result", False))
 """Options that do not change what is computed in an update; a resumed run may have others."""
 
 
@@ -245,24 +263,22 @@ class Preset:
     source: str
 
 
-_PAPER: Final[Mapping[str, Any]] = MappingProxyType(
-    {
-        "frames": 30_000_000,
-        "envs": 16,
-        "horizon": 40,
-        "bptt": 10,
-        # One rollout of 640 frames is one minibatch: the released code's batch of 1280 exceeds what it collects.
-        "minibatches": 1,
-        "lr": 1e-4,
-        "adam_eps": 1e-5,
-        "gae_lambda": 0.99,
-        "clip_value": True,
-        "normalize_advantages": False,
-        "update": "chunks",
-        "loss": "per_head",
-        "bootstrap_timeouts": False,
-    }
-)
+_PAPER: Final[Mapping[str, Any]] = {
+    "frames": 30_000_000,
+    "envs": 16,
+    "horizon": 40,
+    "bptt": 10,
+    # One rollout of 640 frames is one minibatch: the released code's batch of 1280 exceeds what it collects.
+    "minibatches": 1,
+    "lr": 1e-4,
+    "adam_eps": 1e-5,
+    "gae_lambda": 0.99,
+    "clip_value": True,
+    "normalize_advantages": False,
+    "update": "chunks",
+    "loss": "per_head",
+    "bootstrap_timeouts": False,
+}
 
 NET_PRESETS: Final[Mapping[str, Preset]] = {
     "paper-reference": Preset(_PAPER, "SocialAI 1.0, table of hyper-parameters; update of the released code"),
@@ -272,9 +288,11 @@ NET_PRESETS: Final[Mapping[str, Preset]] = {
 }
 """Networks that bring numbers of their own."""
 
+_ALONE: Final = Preset({}, "PPO from the reward alone, which is what the paper's experiments compare")
+
 RECIPES: Final[Mapping[str, Preset]] = {
-    "plain": Preset({}, "the defaults"),
-    "paper": Preset({}, "PPO from the reward alone, which is what the paper's experiments compare"),
+    "plain": _ALONE,
+    "paper": _ALONE,
     "guided": Preset(
         {
             "guide": "script",
@@ -283,6 +301,11 @@ RECIPES: Final[Mapping[str, Preset]] = {
             "minibatches": 16,
             "lr_end": 1e-4,
             "entropy_coef_end": 0.002,
+            # Imitation ends with tiny gradients. Remembered for longer, they would make the first steps of PPO, whose
+            # gradients are large, up to six times too long.
+            "adam_beta2": 0.95,
+            # A policy imitated to certainty draws nothing else any more, so that PPO can only break it.
+            "imitation_floor": 0.01,
             # Imitation leaves little to learn; without a limit PPO unlearns it in its first updates.
             "target_kl": 0.02,
         },

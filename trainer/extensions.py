@@ -7,12 +7,15 @@ import importlib
 import importlib.util
 import sys
 from collections.abc import Sequence
+from inspect import isfunction
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from trainer.config import code_file
 
-def load_class(name: str, option: str, shipped: Sequence[str], methods: Sequence[str], folder: Path) -> Any:
+
+def load_class(name: str, option: str, shipped: Sequence[str], needed: type, folder: Path) -> Any:
     """Find the class that `module:Class` names.
 
     The module is `module.py` in `folder`, or one that Python finds by itself.
@@ -21,7 +24,7 @@ def load_class(name: str, option: str, shipped: Sequence[str], methods: Sequence
         name: what the user typed.
         option: the option it was typed for, to begin messages with.
         shipped: the names that need no module.
-        methods: what the class must have.
+        needed: a class whose public methods it must have.
         folder: where its file is looked for first, the scenario's own.
 
     Raises:
@@ -37,6 +40,7 @@ def load_class(name: str, option: str, shipped: Sequence[str], methods: Sequence
     found = getattr(module, class_name, None)
     if not isinstance(found, type):
         raise ValueError(f"{option}: {file} has no class {class_name!r}")
+    methods = [name for name, method in vars(needed).items() if isfunction(method) and name[0] != "_"]
     lacking = [method for method in methods if not callable(getattr(found, method, None))]
     lacking += sorted(getattr(found, "__abstractmethods__", ()))
     if lacking:
@@ -44,19 +48,8 @@ def load_class(name: str, option: str, shipped: Sequence[str], methods: Sequence
     return found
 
 
-def own_file(name: str, folder: Path) -> Path | None:
-    """The file in `folder` that `module:Class` is read from; None where it is read from elsewhere, or ships."""
-    module, colon, _ = name.partition(":")
-    file = _file_of(module, folder)
-    return file if colon and file.is_file() else None
-
-
-def _file_of(module: str, folder: Path) -> Path:
-    return folder.resolve() / (module.replace(".", "/") + ".py")
-
-
 def _load_module(name: str, option: str, folder: Path) -> ModuleType:
-    file = _file_of(name, folder)
+    file = code_file(name, folder)
     try:
         return _load_file(file) if file.is_file() else importlib.import_module(name)
     except ModuleNotFoundError as error:
@@ -69,9 +62,14 @@ def _load_module(name: str, option: str, folder: Path) -> ModuleType:
         raise ValueError(f"{option}: {file} cannot be imported: {type(error).__name__}: {error}") from error
 
 
+_beside: dict[Path, dict[str, ModuleType]] = {}
+"""What the files of a folder imported from it, by folder: modules that other folders may have under the same names."""
+
+
 def _load_file(file: Path) -> ModuleType:
-    """Import a file under a name of its own, so that equally named files of two folders do not meet."""
-    unique = f"{file.stem}_{hashlib.sha256(str(file).encode()).hexdigest()[:12]}"
+    """Import a file, once for each content, so that equally named files of two folders do not meet."""
+    digest = hashlib.sha256(f"{file}\0".encode() + file.read_bytes()).hexdigest()
+    unique = f"{file.stem}_{digest[:12]}"
     if unique in sys.modules:
         return sys.modules[unique]
     spec = importlib.util.spec_from_file_location(unique, file)
@@ -79,7 +77,10 @@ def _load_file(file: Path) -> ModuleType:
     assert spec.loader is not None, "internal: a .py file has a loader"
     module = importlib.util.module_from_spec(spec)
     sys.modules[unique] = module
-    sys.path.insert(0, str(file.parent))  # for the modules beside it
+    known = set(sys.modules)
+    beside = _beside.setdefault(file.parent, {})
+    sys.modules.update(beside)
+    sys.path.insert(0, str(file.parent))
     try:
         spec.loader.exec_module(module)
     except BaseException:
@@ -87,4 +88,13 @@ def _load_file(file: Path) -> ModuleType:
         raise
     finally:
         sys.path.remove(str(file.parent))
+        found = [name for name in sys.modules.keys() - known if _lies_in(file.parent, name)]
+        beside.update({name: sys.modules.pop(name) for name in found})
     return module
+
+
+def _lies_in(folder: Path, name: str) -> bool:
+    """Whether an imported module is a file of the folder, or in a package there."""
+    top = name.partition(".")[0]
+    places = (folder / f"{top}.py", folder / top / "__init__.py")
+    return top in sys.modules and Path(getattr(sys.modules[top], "__file__", None) or "") in places

@@ -1,4 +1,4 @@
-"""Features of frames, each distinct frame computed once: while acting (`Actor`) and while learning (`Minibatch`).
+"""Features of frames while acting, each distinct frame computed once.
 
 Of 8,192 frames of a rollout a few hundred images and histories are distinct. Both are kept in tables; a history is
 encoded from its longest known beginning, the features of a pair of the two are computed once.
@@ -6,9 +6,10 @@ encoded from its longest known beginning, the features of a pair of the two are 
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
@@ -18,25 +19,13 @@ from torch import Tensor
 from trainer.errors import ObservationError
 from trainer.nets import ActorCritic
 
-if TYPE_CHECKING:
-    from trainer.rollout import Rollout
-
 Int64 = NDArray[np.int64]
-
-# Fixed odd multipliers; one per column, so that equal rows and only they (up to 2**-64) get equal ids.
-_MULTIPLIERS = np.random.Generator(np.random.PCG64(0x5EED)).integers(
-    1, 2**63, size=4096, dtype=np.uint64
-) * np.uint64(2) + np.uint64(1)
 
 
 def content_ids(rows: NDArray[np.generic]) -> Int64:
-    """Return 64-bit ids, int64 (E,), equal for equal rows of an integer array (E, ...) of at most 4096 columns."""
-    flat = rows.reshape(len(rows), -1)
-    if flat.shape[1] > len(_MULTIPLIERS):
-        raise ValueError(f"rows: got {flat.shape[1]} columns, expected at most {len(_MULTIPLIERS)}")
-    total = flat.astype(np.uint64) @ _MULTIPLIERS[: flat.shape[1]]
-    ids: Int64 = (total ^ (total >> np.uint64(29))).view(np.int64)
-    return ids
+    """64-bit ids, int64 (E,), equal for equal rows of an array (E, ...) and, up to 2**-64, only for them."""
+    digests = (hashlib.blake2b(row.tobytes(), digest_size=8).digest() for row in rows)
+    return np.frombuffer(b"".join(digests), np.int64)
 
 
 class DistinctRows:
@@ -72,23 +61,18 @@ class DistinctRows:
                 they are rows `size - K` to `size - 1`.
         """
         unique, first, inverse = np.unique(ids, return_index=True, return_inverse=True)
-        found = [self._row_of.get(key, -1) for key in unique.tolist()]
-        rows = np.array(found, np.int64)
+        rows = np.array([self._row_of.get(key, -1) for key in unique.tolist()], np.int64)
         missing = np.flatnonzero(rows < 0)
         if len(missing):
             fresh_rows = np.arange(self.size, self.size + len(missing))
             rows[missing] = fresh_rows
             self._row_of.update(zip(unique[missing].tolist(), fresh_rows.tolist(), strict=True))
-            self._reserve(self.size + len(missing))
+            if self.size + len(missing) > len(self._data):
+                spare = np.zeros_like(self._data, shape=(self.size + len(missing), *self._data.shape[1:]))
+                self._data = np.concatenate((self._data, spare))
             self._data[fresh_rows] = read(values[first[missing]])
             self.size += len(missing)
         return rows[inverse], first[missing].astype(np.int64)
-
-    def _reserve(self, size: int) -> None:
-        if size > len(self._data):
-            grown = np.zeros((max(size, 2 * len(self._data)), *self._data.shape[1:]), self._data.dtype)
-            grown[: self.size] = self._data[: self.size]
-            self._data = grown
 
 
 @dataclass(frozen=True)
@@ -111,24 +95,14 @@ class PrefixTree:
     leaves: Int64
 
 
-def history_lengths(tokens: NDArray[np.generic]) -> Int64:
-    """Return the number of words, int64 (D,), of 0-padded histories (D, L)."""
-    lengths: Int64 = np.count_nonzero(tokens, axis=1).astype(np.int64)
-    return lengths
-
-
 def prefix_tree(tokens: NDArray[np.generic]) -> PrefixTree:
     """Build the tree of 0-padded histories, integer (D, L), duplicates allowed.
 
     A history that lost its oldest utterances (it outgrew the buffer) is a path of its own, which is exactly the
     history the agent observes. The cost is a sort of the D rows plus work in proportion to the states.
     """
-    lengths = history_lengths(tokens)
-    longest = int(lengths.max(initial=0))
-    count = len(tokens)
-    if longest == 0:
-        empty = np.zeros(0, np.int64)
-        return PrefixTree(empty, empty, [0], np.zeros(count, np.int64))
+    lengths = np.count_nonzero(tokens, axis=1)
+    count, longest = len(tokens), int(lengths.max(initial=1))
     words = np.ascontiguousarray(tokens[:, :longest].astype(">u2"))
     order = np.argsort(words.view(f"V{2 * longest}").ravel(), kind="stable")
     words, sorted_lengths = words[order], lengths[order]
@@ -152,7 +126,7 @@ def prefix_tree(tokens: NDArray[np.generic]) -> PrefixTree:
 
     leaves = np.empty(count, np.int64)
     leaves[order] = state(sorted_lengths - 1, np.arange(count))
-    offsets = np.concatenate(([0], np.cumsum(np.bincount(depth, minlength=longest)))).tolist()
+    offsets = np.concatenate(([0], np.cumsum(np.bincount(depth)))).tolist()
     return PrefixTree(words[row, depth].astype(np.int64), state(depth - 1, row), offsets, leaves)
 
 
@@ -230,9 +204,9 @@ class Actor:
         begin, self._features = self.pairs.size - len(pairs), _with_room(self._features, self.pairs.size)
         image_rows, image_index = np.unique(pairs[:, 0], return_inverse=True)
         history_rows, text_index = np.unique(pairs[:, 1], return_inverse=True)
-        prepared = self.net.prepare(self._move(self.images.data[image_rows]))
-        texts = self._texts[self._move(history_rows)]
-        features = self.net.perceive(prepared, texts, self._move(image_index), self._move(text_index))
+        prepared = self.net.prepare(self.move(self.images.data[image_rows]))
+        texts = self._texts[self.move(history_rows)]
+        features = self.net.perceive(prepared, texts, self.move(image_index), self.move(text_index))
         self._features[begin : self.pairs.size] = features
 
     def _read(self, tokens: NDArray[np.int16]) -> NDArray[np.int16]:
@@ -249,10 +223,8 @@ class Actor:
         rows, fresh = self.histories.add(ids, tokens, self._read)
         if len(fresh):
             words: NDArray[Any] = self.histories.data[before:]
-            lengths = history_lengths(words)
-            parents = (
-                np.zeros(len(fresh), np.int64) if self._last_history is None else self._last_history[fresh]
-            )
+            lengths = np.count_nonzero(words, axis=1)
+            parents = np.zeros_like(fresh) if self._last_history is None else self._last_history[fresh]
             known = self._lengths[parents]
             same = self.histories.data[parents] == words
             prefix = (same | (np.arange(self._length) >= known[:, None])).all(axis=1)
@@ -267,134 +239,26 @@ class Actor:
         """Encode histories given the row and length of the known beginning and the number of new words of each."""
         if not known.any():
             tree = prefix_tree(words)
-            states: Tensor = self.net.dialogue(
-                self._move(tree.tokens), self._move(tree.parents), tree.offsets
-            )
-            return states[self._move(tree.leaves)]
+            states: Tensor = self.net.dialogue(*self.move_tree(tree))
+            return states[self.move(tree.leaves)]
         order = np.argsort(-new, kind="stable")
         columns = known[order, None] + np.arange(new.max())
         suffix = np.take_along_axis(words[order].astype(np.int64), np.minimum(columns, self._length - 1), 1)
-        texts = self._texts[self._move(parents[order])]
-        encoded = self.net.dialogue.extend(texts, self._move(suffix), new[order].tolist(), self._words)
-        return torch.empty_like(encoded).index_copy_(0, self._move(order), encoded)
+        texts = self._texts[self.move(parents[order])]
+        encoded = self.net.dialogue.extend(texts, self.move(suffix), new[order].tolist(), self._words)
+        return torch.empty_like(encoded).index_copy_(0, self.move(order), encoded)
 
-    def _move(self, array: NDArray[np.generic]) -> Tensor:
+    def move(self, array: NDArray[Any]) -> Tensor:
+        """The array as a tensor on the network's device."""
         return torch.from_numpy(np.ascontiguousarray(array)).to(self.device)
+
+    def move_tree(self, tree: PrefixTree) -> tuple[Tensor, Tensor, list[int]]:
+        """Tokens, parents and offsets of a tree, as an encoder of dialogues takes them."""
+        return self.move(tree.tokens), self.move(tree.parents), tree.offsets
 
 
 def _with_room(table: Tensor, rows: int) -> Tensor:
-    """The table itself, or a copy with at least twice its rows, so that `rows` fit."""
+    """The table itself, or a copy with more rows, so that `rows` fit."""
     if rows <= len(table):
         return table
-    grown = table.new_zeros(max(rows, 2 * len(table)), table.shape[1])
-    grown[: len(table)] = table
-    return grown
-
-
-@dataclass(frozen=True)
-class Batch:
-    """Frames that the loss is taken over.
-
-    Attributes:
-        actions: int64 (N, 4). log_probs: float32 (N, 4), of the acting policy, before masking.
-        values: float32 (N,), of the acting critic.
-        advantages: float32 (N,). returns: float32 (N,), the targets of the value.
-        lead: what a guide did and advised; None without a guide.
-    """
-
-    actions: Tensor
-    log_probs: Tensor
-    values: Tensor
-    advantages: Tensor
-    returns: Tensor
-    lead: LeadBatch | None = None
-
-
-@dataclass(frozen=True)
-class LeadBatch:
-    """A guide's part in the frames of a batch; see `guides.Lead`.
-
-    Attributes:
-        actions: int64 (N, 4), the guide's.
-        led: bool (N,), whether the guide acted instead of the policy.
-        weights: float32 (N,), how much each action is imitated.
-    """
-
-    actions: Tensor
-    led: Tensor
-    weights: Tensor
-
-
-@dataclass(frozen=True)
-class Minibatch:
-    """Whole environments of a rollout with their distinct frames, prepared once and used in every epoch.
-
-    Attributes:
-        batch: the frames, time-major: N = T * B.
-        starts: bool (T, B). memory: (B, *shape) before the first step.
-        prepared: the net's view of the distinct images.
-        tokens, parents, offsets: prefix tree of the distinct histories.
-        image_index, text_index: int64 (P,), image and tree state of each distinct pair.
-        frame_index: int64 (N,), pair of each frame.
-    """
-
-    batch: Batch
-    starts: Tensor
-    memory: Tensor
-    prepared: Any
-    tokens: Tensor
-    parents: Tensor
-    offsets: list[int]
-    image_index: Tensor
-    text_index: Tensor
-    frame_index: Tensor
-
-    def evaluate(self, net: ActorCritic) -> tuple[Tensor, Tensor]:
-        """Logits (N, sum of sizes) and values (N,) of the frames under the present weights."""
-        text = net.dialogue(self.tokens, self.parents, self.offsets)
-        features = net.perceive(self.prepared, text, self.image_index, self.text_index)
-        steps, count = self.starts.shape
-        frames = features.index_select(0, self.frame_index).view(steps, count, -1)
-        logits, values = net.heads(net.memory(frames, self.starts, self.memory).flatten(0, 1))
-        return logits, values
-
-
-def make_minibatch(
-    actor: Actor, rollout: Rollout, advantages: Tensor, returns: Tensor, envs: Tensor, stretch: int
-) -> Minibatch:
-    """Cut the environments `envs`, int64 (B,), out of a rollout, in stretches of `stretch` steps side by side."""
-
-    def cut(array: Tensor) -> Tensor:
-        """(T, E, ...) to (stretch, T / stretch * B, ...), the stretches of one time side by side."""
-        chosen = array.index_select(1, envs.to(array.device))
-        return chosen.view(-1, stretch, *chosen.shape[1:]).transpose(0, 1).flatten(1, 2)
-
-    pair_rows, frame_index = np.unique(cut(torch.from_numpy(rollout.pair_rows)).numpy(), return_inverse=True)
-    pairs = actor.pairs.data[pair_rows]
-    image_rows, image_index = np.unique(pairs[:, 0], return_inverse=True)
-    history_rows, history_index = np.unique(pairs[:, 1], return_inverse=True)
-    tree = prefix_tree(actor.histories.data[history_rows])
-    device = actor.device
-
-    def move(array: np.ndarray[Any, Any]) -> Tensor:
-        return torch.from_numpy(np.ascontiguousarray(array)).to(device)
-
-    return Minibatch(
-        Batch(
-            cut(rollout.actions).flatten(0, 1),
-            cut(rollout.log_probs).flatten(0, 1),
-            cut(rollout.values).flatten(),
-            cut(advantages).flatten(),
-            cut(returns).flatten(),
-            None if rollout.lead is None else LeadBatch(*(cut(part).flatten(0, 1) for part in rollout.lead)),
-        ),
-        cut(torch.from_numpy(rollout.starts)).to(device),
-        rollout.memories.index_select(1, envs.to(device)).flatten(0, 1),
-        actor.net.prepare(move(actor.images.data[image_rows])),
-        move(tree.tokens),
-        move(tree.parents),
-        tree.offsets,
-        move(image_index),
-        move(tree.leaves[history_index]),
-        move(frame_index.reshape(-1)),
-    )
+    return torch.cat((table, table.new_zeros(rows, table.shape[1])))

@@ -13,13 +13,11 @@ from trainer.extensions import load_class
 
 SHIPPED = ("none", "script")
 
-Actions = TypeVar("Actions")
-Flags = TypeVar("Flags")
-Weights = TypeVar("Weights")
+Array = TypeVar("Array")
 
 
-class Lead(NamedTuple, Generic[Actions, Flags, Weights]):
-    """What a guide does in one step of E environments; a rollout has it as tensors (T, E, ...).
+class Lead(NamedTuple, Generic[Array]):
+    """What a guide does in one step of E environments: arrays; of a rollout, tensors (T, E, ...).
 
     Attributes:
         actions: int64 (E, 4), what the guide would do now.
@@ -30,12 +28,12 @@ class Lead(NamedTuple, Generic[Actions, Flags, Weights]):
             imitation, of others advice. 0: nothing is imitated.
     """
 
-    actions: Actions
-    led: Flags
-    weights: Weights
+    actions: Array
+    led: Array
+    weights: Array
 
 
-StepLead = Lead[NDArray[np.int64], NDArray[np.bool_], NDArray[np.float32]]
+StepLead = Lead[NDArray[Any]]
 
 
 class Guide(Protocol):
@@ -107,6 +105,5 @@ def build_guide(config: RunConfig, envs: Any) -> Guide | None:
         return None
     if config.guide == "script":
         return ScriptGuide(config, envs)
-    methods = ("lead", "state", "load_state")
-    guide: Guide = load_class(config.guide, "guide", SHIPPED, methods, config.code_folder)(config, envs)
+    guide: Guide = load_class(config.guide, "guide", SHIPPED, Guide, config.code_folder)(config, envs)
     return guide

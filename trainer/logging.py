@@ -9,10 +9,9 @@ import os
 import time
 import uuid
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import torch
 
@@ -59,25 +58,14 @@ def episode_metrics(
     }
 
 
-class Tracker(Protocol):
-    """Takes a run's figures to somewhere else, such as `WandbTracker`; it may never stop the run."""
-
-    def open(self) -> None:
-        """Begin, or go on.
-
-        Raises:
-            ValueError: it cannot begin; the message says what to do.
-        """
-
-    def write(self, scalars: Mapping[str, float], frames: int) -> None:
-        """Take the figures of the update that reached `frames`."""
-
-    def close(self) -> None:
-        """End."""
+def guide_metrics(tally: EpisodeTally, frames: int) -> dict[str, float | None]:
+    """Share of a rollout's frames that a guide made, and of those in which the policy would have done the same."""
+    agreement = tally.agreed_steps / tally.led_steps if tally.led_steps else None
+    return {"led": tally.led_steps / frames, "agreement": agreement}
 
 
 class MetricsLog:
-    """`metrics.jsonl`, and, if wanted, TensorBoard events in a run directory and a tracker elsewhere.
+    """`metrics.jsonl`, and, if wanted, TensorBoard events in a run directory and W&B.
 
     Opening it cuts file and events back to `update`, so that a resumed run's log equals that of one that never
     stopped. TensorBoard's steps and the tracker's are frames.
@@ -88,14 +76,19 @@ class MetricsLog:
     """
 
     def __init__(
-        self, run_dir: Path, update: int, tensorboard: bool, frames: int = 0, tracker: Tracker | None = None
+        self,
+        run_dir: Path,
+        update: int,
+        tensorboard: bool,
+        frames: int = 0,
+        tracker: WandbTracker | None = None,
     ) -> None:
-        self._path = run_dir / FILE_NAME
-        _cut_back(self._path, update)
+        path = run_dir / FILE_NAME
+        _cut_back(path, update)
         self._tracker = tracker
         if tracker is not None:
             tracker.open()
-        self._file = self._path.open("a", encoding="utf-8")
+        self._file = path.open("a", encoding="utf-8")
         self._events: Any = None
         if tensorboard:
             from torch.utils.tensorboard import SummaryWriter
@@ -103,13 +96,11 @@ class MetricsLog:
             # A reader drops what an earlier part of the run wrote from this step on.
             self._events = SummaryWriter(str(run_dir), purge_step=frames + 1)
 
-    def write(self, update: int, row: Mapping[str, Any]) -> None:
-        """Append the row of one update, which reached `row["frames"]` frames."""
-        self._file.write(json.dumps({"update": update, **row}, allow_nan=False) + "\n")
+    def write(self, row: Mapping[str, Any]) -> None:
+        """Append the row of one update."""
+        self._file.write(json.dumps(row, allow_nan=False) + "\n")
         self._file.flush()
-        if self._events is None and self._tracker is None:
-            return
-        found = scalars({name: value for name, value in row.items() if name != "frames"})
+        found = scalars({name: value for name, value in row.items() if name not in ("update", "frames")})
         if self._events is not None:
             for name, value in found.items():
                 self._events.add_scalar(name, value, row["frames"])
@@ -125,15 +116,12 @@ class MetricsLog:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         """Close the files; where something went wrong before, that they cannot be closed either is no news."""
-        with contextlib.suppress(OSError) if error is not None else contextlib.nullcontext():
-            self._file.close()
-        if self._events is not None:
+        for written in (self._file, self._events):
             with contextlib.suppress(OSError) if error is not None else contextlib.nullcontext():
-                self._events.close()
+                if written is not None:
+                    written.close()
         if self._tracker is not None:
             self._tracker.close()
 
@@ -150,34 +138,30 @@ def scalars(row: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
 
 
 def _cut_back(path: Path, update: int) -> None:
-    """Drop the rows after `update`, and what a killed or failing machine left unfinished."""
-    if not path.exists():
-        return
-    kept = []
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True):
-        if not line.endswith("\n") or not 0 < _update_of(line) <= update:
-            break
-        kept.append(line)
-    temporary = path.with_suffix(".tmp")
-    temporary.write_text("".join(kept), encoding="utf-8")
-    temporary.replace(path)
+    """Drop the rows after `update`."""
+    if path.exists():
+        rows = [
+            row for row in _rows(path) if isinstance(row.get("update"), int) and 0 < row["update"] <= update
+        ]
+        temporary = path.with_suffix(".tmp")
+        temporary.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+        temporary.replace(path)
 
 
-def _update_of(line: str) -> int:
-    """The number of the update a row is of; 0 if it is no row."""
-    try:
-        number = json.loads(line)["update"]
-    except (ValueError, KeyError, TypeError):
-        return 0
-    return number if isinstance(number, int) else 0
+def _rows(path: Path) -> list[dict[str, Any]]:
+    """The rows of a file, but for what a killed or failing machine left unfinished."""
+    rows = []
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+        with contextlib.suppress(ValueError):
+            rows.append(json.loads(line))
+    return [row for row in rows if isinstance(row, dict)]
 
 
 def record_start(run_dir: Path, update: int, frames: int, config: RunConfig) -> None:
     """Append a line to `starts.jsonl`: when, from where on, and what must be equal for two runs to be equal to the bit.
 
-    Warns if the last start was under other conditions.
-
-    The file is never cut back: it tells how often a run was stopped.
+    Warns if the last start was under other conditions. The file is never cut back: it tells how often a run was
+    stopped.
 
     Raises:
         OSError: it cannot be written.
@@ -187,13 +171,10 @@ def record_start(run_dir: Path, update: int, frames: int, config: RunConfig) -> 
     values = (str(torch.__version__), cpu, config.device, config.threads)
     around = dict(zip(SURROUNDINGS, values, strict=True))
     path = run_dir / STARTS
-    text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
-    known = _rows(text)
-    if known and update > 0:
+    if update and path.exists() and (known := _rows(path)):
+        last = known[-1]
         changed = [
-            f"{name} {known[-1].get(name)} -> {around[name]}"
-            for name in SURROUNDINGS
-            if known[-1].get(name) != around[name]
+            f"{name} {last.get(name)} -> {now}" for name, now in around.items() if last.get(name) != now
         ]
         if changed:
             warnings.warn(
@@ -202,24 +183,12 @@ def record_start(run_dir: Path, update: int, frames: int, config: RunConfig) -> 
                 stacklevel=3,
             )
     row = {"time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), "update": update, "frames": frames}
-    with path.open("a", encoding="utf-8") as file:
-        unfinished = "\n" if text and not text.endswith("\n") else ""  # by a process killed while writing
-        file.write(unfinished + json.dumps(row | around) + "\n")
+    with path.open("a+b") as file:
+        file.seek(max(file.seek(0, os.SEEK_END) - 1, 0))
+        unfinished = "" if file.read() in (b"", b"\n") else "\n"  # by a process killed while writing
+        file.write((unfinished + json.dumps(row | around) + "\n").encode())
         file.flush()
         os.fsync(file.fileno())
-
-
-def _rows(text: str) -> list[dict[str, Any]]:
-    """The lines that are whole."""
-    rows = []
-    for line in text.splitlines():
-        try:
-            row = json.loads(line)
-        except ValueError:
-            continue
-        if isinstance(row, dict):
-            rows.append(row)
-    return rows
 
 
 class TrackingWarning(UserWarning):
@@ -251,18 +220,24 @@ class WandbTracker:
             raise ValueError(
                 "W&B is not installed: pip install 'socialai-dsl[wandb]', or leave out --wandb"
             ) from None
-        self._project, self._run_dir, self._config, self._name = project, run_dir, dict(config), name
+        self._shown = {"project": project, "config": dict(config), "name": name}
+        self._run_dir = run_dir
         self._run: Any = None
 
     def open(self) -> None:
-        """See `Tracker.open`."""
+        """Begin, or go on where the run was.
+
+        Raises:
+            ValueError: it cannot begin; the message says what to do.
+        """
+        path = self._run_dir / _ID_FILE
+        if not path.exists():
+            path.write_text(uuid.uuid4().hex[:12] + "\n", encoding="utf-8")
         try:
             self._run = self._wandb.init(
-                project=self._project,
-                name=self._name,
-                id=self._identity(),
+                **self._shown,
+                id=path.read_text(encoding="utf-8").strip(),
                 dir=str(self._run_dir),
-                config=self._config,
                 resume="allow",
                 # The terminal shows the progress; W&B is not to copy what is printed.
                 settings=self._wandb.Settings(console="off"),
@@ -271,40 +246,29 @@ class WandbTracker:
             raise ValueError(f"W&B cannot begin: {type(error).__name__}: {error}") from error
 
     def write(self, scalars: Mapping[str, float], frames: int) -> None:
-        """See `Tracker.write`."""
-        if self._run is None:
-            return
-        try:
+        """Take the figures of the update that reached `frames`."""
+        with self._forgiven():
             # A resumed run makes again what came after its checkpoint.
-            if frames >= self._run.step:
+            if self._run is not None and frames >= self._run.step:
                 self._run.log(dict(scalars), step=frames)
-        except Exception as error:
-            self._give_up(error)
 
     def close(self) -> None:
-        """See `Tracker.close`."""
-        if self._run is None:
-            return
+        """End."""
+        with self._forgiven():
+            if self._run is not None:
+                self._run.finish()
+        self._run = None
+
+    @contextlib.contextmanager
+    def _forgiven(self) -> Iterator[None]:
+        """Give up, with a warning, where sending fails."""
         try:
-            self._run.finish()
+            yield
         except Exception as error:
-            self._give_up(error)
-        self._run = None
-
-    def _give_up(self, error: Exception) -> None:
-        self._run = None
-        warnings.warn(
-            f"W&B gets no more figures ({type(error).__name__}: {error}); training goes on, and they are all in "
-            f"{self._run_dir / 'metrics.jsonl'}",
-            TrackingWarning,
-            stacklevel=2,
-        )
-
-    def _identity(self) -> str:
-        """The run's name for machines, made once and kept in its folder."""
-        path = self._run_dir / _ID_FILE
-        if path.exists():
-            return path.read_text(encoding="utf-8").strip()
-        made = uuid.uuid4().hex[:12]
-        path.write_text(made + "\n", encoding="utf-8")
-        return made
+            self._run = None
+            warnings.warn(
+                f"W&B gets no more figures ({type(error).__name__}: {error}); training goes on, and they are all in "
+                f"{self._run_dir / FILE_NAME}",
+                TrackingWarning,
+                stacklevel=2,
+            )

@@ -16,9 +16,8 @@ from trainer import actions as heads
 from trainer import checkpoint as checkpoints
 from trainer.checkpoint import CheckpointMeta
 from trainer.features import Actor, Int64
-from trainer.nets import ActorCritic
+from trainer.nets import ActorCritic, NetSpec
 from trainer.nets.memory import emptied
-from trainer.session import net_spec
 
 # Encodings kept before they are made anew, so that endless play does not fill the memory.
 _REMEMBERED_FRAMES = 1 << 16
@@ -70,9 +69,7 @@ class CheckpointPolicy:
         path, program = Path(path), envs.unwrapped.program
         saved = path / checkpoints.FOLDER
         checkpoint = checkpoints.read(saved if saved.is_dir() else path)
-        restored = checkpoints.restore_net(
-            checkpoint, net_spec(envs.unwrapped), list(program.vocabulary), net, folder
-        )
+        restored = checkpoints.restore_net(checkpoint, NetSpec.of(envs.unwrapped), net, folder)
         warn_of_differences(checkpoint.meta, program)
         return cls(restored.to(device), greedy, seed)
 
@@ -93,18 +90,36 @@ class CheckpointPolicy:
             return alone
         return self._act(images, tokens)
 
+    @torch.no_grad()
+    def think(self, observation: Observation) -> tuple[list[list[float]], float]:
+        """What the agent makes of a single observation, which it remembers as after `act`.
+
+        Returns:
+            The probabilities of each head's choices, and the return that it expects.
+        """
+        logits, values = self._look(observation["image"][None], observation["tokens"][None])
+        heads_of = torch.split(logits[0], list(self.net.spec.action_sizes))
+        return [torch.softmax(head, -1).tolist() for head in heads_of], float(values[0])
+
     def _act(self, images: NDArray[np.uint8], tokens: NDArray[np.int16]) -> Int64:
-        if self._actor is None or self._actor.pairs.size > _REMEMBERED_FRAMES:
-            self._actor = Actor(self.net, tokens.shape[1])
-        self._require(len(tokens))
-        _, features = self._actor.see(images, tokens)
-        output, self._memory = self.net.memory.step(features, self._memory)
-        logits, _ = self.net.heads(output)
+        logits, _ = self._look(images, tokens)
         if not self._greedy:
             noise = torch.from_numpy(self._streams.gumbel(len(tokens), logits.shape[1]))
             logits = logits + noise.to(logits.device)
         chosen: Int64 = heads.choose(logits, self.net.spec.action_sizes).cpu().numpy()
         return chosen
+
+    def _look(
+        self, images: NDArray[np.uint8], tokens: NDArray[np.int16]
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Logits of all heads side by side, and values; the memory goes on."""
+        if self._actor is None or self._actor.pairs.size > _REMEMBERED_FRAMES:
+            self._actor = Actor(self.net, tokens.shape[1])
+        self._require(len(tokens))
+        _, features = self._actor.see(images, tokens)
+        output, self._memory = self.net.memory.step(features, self._memory)
+        found: tuple[torch.Tensor, torch.Tensor] = self.net.heads(output)
+        return found
 
     def _require(self, count: int) -> None:
         """Begin with an empty memory if another number of environments is played now."""
@@ -117,31 +132,21 @@ class TransferWarning(UserWarning):
 
 
 def warn_of_differences(meta: CheckpointMeta, program: Any) -> None:
-    """Warn if a checkpoint is played on another program than it was made for, naming what differs.
+    """Warn if a checkpoint is played on another program than it was made for: what the agent's choices mean there.
 
     Words of the dialogue are left out: `checkpoint.restore_net` moves them, and warns by itself.
     """
     if meta.program_sha256 == program.sha256:
         return
-    made_for = f"{meta.scenario} " if meta.scenario else ""
-    message = (
-        f"the agent was trained on {made_for}(program {meta.program_sha256[:8]}) "
+    parts = [
+        f"the agent was trained on {meta.scenario} (program {meta.program_sha256[:8]}) "
         f"and plays {program.name} ({program.sha256[:8]})"
-    )
-    parts = [message, *_differences(meta, program)]
+    ]
+    for what in ("actions", "templates", "nouns"):
+        old, new = list(getattr(meta, what)), list(getattr(program, what))
+        if old != new:
+            parts.append(f"{what}: {_changes(old, new)}")
     warnings.warn("; ".join(parts), TransferWarning, stacklevel=3)
-
-
-def _differences(meta: CheckpointMeta, program: Any) -> list[str]:
-    """What each choice of the agent's action means, where that has changed."""
-    if not meta.actions:  # made before checkpoints knew
-        return []
-    compared = (
-        ("actions", meta.actions, program.actions),
-        ("templates", meta.templates, program.templates),
-        ("nouns", meta.nouns, program.nouns),
-    )
-    return [f"{what}: {_changes(old, new)}" for what, old, new in compared if list(old) != list(new)]
 
 
 def _changes(old: Sequence[str], new: Sequence[str]) -> str:

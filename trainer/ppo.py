@@ -11,9 +11,8 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -22,14 +21,10 @@ from trainer import actions as heads
 from trainer import checkpoint as checkpoints
 from trainer.config import RunConfig
 from trainer.errors import CheckpointError, ObservationError, TrainingStopped
-from trainer.features import Batch, Minibatch, make_minibatch
-from trainer.logging import MetricsLog, Tracker, episode_metrics, record_start
-from trainer.nets import ActorCritic
+from trainer.logging import MetricsLog, WandbTracker, episode_metrics, guide_metrics, record_start
+from trainer.minibatch import Batch, Minibatch, minibatches
 from trainer.rollout import Rollout, collect
 from trainer.session import Session
-
-_SMALLEST_SHARE = 1024
-"""Frames below which a thread of its own costs more, waiting for Python's interpreter lock, than it brings."""
 
 Mapper = Callable[[Callable[[Minibatch], Any], Iterable[Minibatch]], Iterable[Any]]
 """`map`, or that of a pool of threads."""
@@ -72,14 +67,10 @@ def compute_gae(
     return advantages
 
 
-def estimate_advantages(session: Session, rollout: Rollout) -> tuple[Tensor, Tensor]:
-    """Advantages as the loss takes them, and returns (the value's targets), (T, E) both, on the network's device."""
-    config, device = session.config, session.actor.device
-
-    def move(array: Any) -> Tensor:
-        return torch.from_numpy(array).to(device)
-
-    raw = compute_gae(
+def estimate_advantages(session: Session, rollout: Rollout) -> Batch:
+    """All frames of a rollout, (T, E, ...), with advantages as the loss takes them, and returns."""
+    config, move = session.config, session.actor.move
+    advantages = compute_gae(
         move(rollout.rewards).float(),
         rollout.values,
         rollout.next_value,
@@ -89,46 +80,38 @@ def estimate_advantages(session: Session, rollout: Rollout) -> tuple[Tensor, Ten
         config.gamma,
         config.gae_lambda,
     )
-    returns = raw + rollout.values
-    if not config.normalize_advantages:
-        return raw, returns
-    own = raw if rollout.lead is None else raw[~rollout.lead.led]
-    if len(own) == 0:  # a guide made every step
-        return raw, returns
-    return (raw - own.mean()) / (own.std(correction=0) + 1e-8), returns
+    returns = advantages + rollout.values
+    own = advantages if rollout.lead is None else advantages[~rollout.lead.led]
+    if config.normalize_advantages and len(own):  # a guide may have made every step
+        advantages = (advantages - own.mean()) / (own.std(correction=0) + 1e-8)
+    return Batch(rollout.actions, rollout.log_probs, rollout.values, advantages, returns, rollout.lead)
 
 
 # -- loss ---------------------------------------------------------------------------------------------------------
 
-STATISTICS = (
-    "loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction", "imitation_loss", "grad_norm",
-)  # fmt: skip
-_KL = STATISTICS.index("approx_kl")
 
-
-@dataclass(frozen=True)
-class LossParts:
-    """Parts of the loss, scalars.
+class LossParts(NamedTuple):
+    """Parts of the loss, scalars; all but the first are without gradients.
 
     Attributes:
-        total: what is minimised; only this one carries gradients.
-        policy, value, entropy: its terms before their coefficients; entropy in nats.
+        loss: what is minimised.
+        policy_loss, value_loss, entropy: its terms before their coefficients; entropy in nats.
         approx_kl: estimated divergence of the new policy from the one that acted (Schulman 2020, k3).
         clip_fraction: share of ratios outside the clipping range.
-        imitation: cross-entropy between the policy and a guide's actions.
+        imitation_loss: cross-entropy between the policy and a guide's actions.
     """
 
-    total: Tensor
-    policy: Tensor
-    value: Tensor
+    loss: Tensor
+    policy_loss: Tensor
+    value_loss: Tensor
     entropy: Tensor
     approx_kl: Tensor
     clip_fraction: Tensor
-    imitation: Tensor
+    imitation_loss: Tensor
 
-    def row(self) -> Tensor:
-        """`STATISTICS` but the last, (7,), without gradients."""
-        return torch.stack([part.detach() for part in vars(self).values()])
+
+STATISTICS = (*LossParts._fields, "grad_norm")
+"""What is known of a gradient step; the last is the gradient's norm before clipping."""
 
 
 def ppo_loss(
@@ -169,35 +152,29 @@ def ppo_loss(
         near = batch.values + (values - batch.values).clamp(-config.clip, config.clip)
         value = torch.maximum(value, (near - batch.returns).square())
     if config.loss == "joint":
-        entropy = heads.joint_entropy(logits, entropies, sizes)  # (N,)
-    else:
-        entropy = (entropies * mask).sum(-1)  # (N,), of the heads that took part
-    entropy = entropy * own
-    imitation = torch.zeros((), device=logits.device)
-    if batch.lead is not None:
-        imitation = imitation_loss(logits, batch.lead.actions, batch.lead.weights, sizes)
-    if config.loss == "joint":
+        entropy = heads.joint_entropy(logits, entropies, sizes) * own  # (N,)
         policy_term, value_term, entropy_term = policy.mean(), value.mean(), entropy.mean()
     else:
-        policy_term = (policy * mask).mean()
-        value_term = (value[:, None] * mask).mean()
+        entropy = (entropies * mask).sum(-1) * own  # (N,), of the heads that took part
+        policy_term, value_term = (policy * mask).mean(), (value[:, None] * mask).mean()
         entropy_term = entropy.mean() / len(sizes)
     total = policy_term + config.value_coef * value_term - entropy_coef * entropy_term
+    imitation = torch.zeros((), device=logits.device)
     if batch.lead is not None:
+        imitation = imitation_loss(
+            logits, batch.lead.actions, batch.lead.weights, sizes, config.imitation_floor
+        )
         total = total + config.imitation_coef * imitation
     with torch.no_grad():
-        return LossParts(
-            total,
-            policy_term.detach(),
-            value_term.detach(),
-            entropy.mean(),
-            (ratio - 1 - log_ratio).mean(),
-            ((ratio - 1).abs() > config.clip).float().mean(),
-            imitation.detach(),
-        )
+        kl = (ratio - 1 - log_ratio).mean()
+        clip_fraction = ((ratio - 1).abs() > config.clip).float().mean()
+        known = (policy_term, value_term, entropy.mean(), kl, clip_fraction, imitation)
+        return LossParts(total, *(part.detach() for part in known))
 
 
-def imitation_loss(logits: Tensor, actions: Tensor, weights: Tensor, sizes: tuple[int, ...]) -> Tensor:
+def imitation_loss(
+    logits: Tensor, actions: Tensor, weights: Tensor, sizes: tuple[int, ...], floor: float
+) -> Tensor:
     """Weighted mean cross-entropy between the policy and given actions: behaviour cloning (Pomerleau 1991).
 
     Args:
@@ -205,19 +182,19 @@ def imitation_loss(logits: Tensor, actions: Tensor, weights: Tensor, sizes: tupl
         actions: int64 (N, 4); template and noun count only where they speak.
         weights: (N,) of the frames.
         sizes: choices of each head.
+        floor: nats; a frame below it counts as that much and has no gradient.
     """
     log_probs = heads.log_probs(logits, actions, sizes) * heads.spoken_mask(actions)  # (N, 4)
-    return -(log_probs.sum(-1) * weights).mean()
+    return ((-log_probs.sum(-1)).clamp(min=floor) * weights).mean()
 
 
 # -- update -------------------------------------------------------------------------------------------------------
 
 
-def update(session: Session, rollout: Rollout, mapper: Mapper = map, threads: int = 1) -> dict[str, float]:
-    """Improve the network on one rollout: `epochs` passes over `minibatches` groups of whole environments.
+def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str, float]:
+    """Improve the network on one rollout: `epochs` passes over its minibatches, each a gradient step.
 
-    The groups are drawn anew for each rollout and visited in a new order in each epoch. A group's environments are
-    shared by the threads; their gradients are added up.
+    A minibatch's shares are differentiated by the mapper's threads; their gradients are added up.
 
     Returns:
         Means over the minibatches of `STATISTICS` by name, and the share of the value's variance that the critic
@@ -226,45 +203,47 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map, threads: in
     Raises:
         TrainingStopped: a loss or a gradient is not finite; the weights are as the last good step left them.
     """
-    config, generator = session.config, session.generator
-    advantages, returns = estimate_advantages(session, rollout)
-    stretch = config.bptt or config.horizon
-    order = torch.randperm(config.envs, generator=generator)
-    groups = [
-        [
-            make_minibatch(session.actor, rollout, advantages, returns, share, stretch)
-            for share in envs.tensor_split(
-                max(1, min(threads, len(envs) * config.horizon // _SMALLEST_SHARE))
-            )
-        ]
-        for envs in order.tensor_split(config.minibatches)
-    ]
+    limit = session.config.target_kl
+    batch = estimate_advantages(session, rollout)
     steps: list[Tensor] = []
-    for _ in range(config.epochs):
-        for index in torch.randperm(len(groups), generator=generator).tolist():
-            steps.append(_step(session, groups[index], mapper))
-            if config.target_kl is not None and float(steps[-1][_KL]) > config.target_kl:
-                return summarize(steps, rollout.values, returns)
-    return summarize(steps, rollout.values, returns)
+    for shares in minibatches(session, rollout, batch):
+        steps.append(_step(session, shares, mapper))
+        if limit is not None and float(steps[-1][STATISTICS.index("approx_kl")]) > limit:
+            break
+    means = torch.stack(steps).mean(0).tolist()
+    unexplained = (batch.returns - batch.values).var(correction=0) / (batch.returns.var(correction=0) + 1e-8)
+    return dict(zip(STATISTICS, means, strict=True)) | {"explained_variance": 1 - float(unexplained)}
 
 
 def _step(session: Session, shares: Sequence[Minibatch], mapper: Mapper) -> Tensor:
-    """One gradient step on a group of environments, given in shares; returns `STATISTICS`."""
+    """One gradient step on a minibatch; returns `STATISTICS`, the gradient's norm before clipping among them.
+
+    Raises:
+        TrainingStopped: the loss or the gradient is not finite; the weights are as they were.
+    """
     net, config = session.actor.net, session.config
     parameters = list(net.parameters())
-    total = sum(len(share.batch.returns) for share in shares)
-    entropy_coef = session.entropy_coef
+    total = sum(share.frames for share in shares)
+    sizes, entropy_coef = net.spec.action_sizes, session.entropy_coef
 
     def differentiate(share: Minibatch) -> tuple[Tensor, Sequence[Tensor | None]]:
-        logits, values = share.evaluate(net)
-        loss = ppo_loss(share.batch, logits, values, net.spec.action_sizes, config, entropy_coef)
-        weight = len(share.batch.returns) / total
-        return loss.row() * weight, torch.autograd.grad(loss.total * weight, parameters, allow_unused=True)
+        parts = [ppo_loss(*part, sizes, config, entropy_coef) for part in share.evaluate(net)]
+        weight = share.frames / total
+        loss = torch.stack([part.loss for part in parts]).mean() * weight
+        statistics = torch.stack([torch.stack(part).detach() for part in parts]).mean(0) * weight
+        return statistics, torch.autograd.grad(loss, parameters, allow_unused=True)
 
     results = list(mapper(differentiate, shares))
     for parameter, *gradients in zip(parameters, *(gradients for _, gradients in results), strict=True):
         _add_up(parameter, gradients)
-    return descend(net, session.optimizer, torch.stack([row for row, _ in results]).sum(0), config)
+    statistics = torch.stack([row for row, _ in results]).sum(0)
+    if not bool(torch.isfinite(statistics[0])):
+        raise TrainingStopped("the loss is not a finite number")
+    norm = nn.utils.clip_grad_norm_(parameters, config.max_grad_norm)
+    if not bool(torch.isfinite(norm)):
+        raise TrainingStopped("a gradient is not a finite number")
+    session.optimizer.step()
+    return torch.cat((statistics, norm[None]))
 
 
 def _add_up(parameter: Tensor, gradients: Sequence[Tensor | None]) -> None:
@@ -284,65 +263,16 @@ def _add_up(parameter: Tensor, gradients: Sequence[Tensor | None]) -> None:
         parameter.grad.add_(gradient)
 
 
-def descend(
-    net: ActorCritic, optimizer: torch.optim.Optimizer, statistics: Tensor, config: RunConfig
-) -> Tensor:
-    """Clip the gradients that lie in the parameters and make the optimiser's step.
-
-    Returns:
-        `STATISTICS`: the given ones, those of the loss, and the gradient's norm before clipping.
-
-    Raises:
-        TrainingStopped: the loss or the gradient is not finite; the weights are as they were.
-    """
-    if not bool(torch.isfinite(statistics[0])):
-        raise TrainingStopped("the loss is not a finite number")
-    norm = nn.utils.clip_grad_norm_(net.parameters(), config.max_grad_norm)
-    if not bool(torch.isfinite(norm)):
-        raise TrainingStopped("a gradient is not a finite number")
-    optimizer.step()
-    return torch.cat((statistics, norm[None]))
-
-
-def summarize(steps: list[Tensor], values: Tensor, returns: Tensor) -> dict[str, float]:
-    """Means of the gradient steps' `STATISTICS` by name, and the share of the value's variance that was explained."""
-    means = torch.stack(steps).mean(0).tolist()
-    unexplained = (returns - values).var(correction=0) / (returns.var(correction=0) + 1e-8)
-    return dict(zip(STATISTICS, means, strict=True)) | {"explained_variance": 1 - float(unexplained)}
-
-
 # -- training loop ------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a run has come, reported after every update.
-
-    Attributes:
-        frames, total_frames: environment steps made and to be made.
-        frames_per_second: of the last update, collection and learning together.
-        success_rate: of the agent's own episodes that ended in the last update; None if none did.
-        remaining_seconds: estimate from this call's speed so far.
-        update: updates made.
-        row: all figures of the update, as `metrics.jsonl` has them.
-    """
-
-    frames: int
-    total_frames: int
-    frames_per_second: float
-    success_rate: float | None
-    remaining_seconds: float
-    update: int
-    row: Mapping[str, Any]
 
 
 def train(
     config: RunConfig,
     envs: Any,
     run_dir: Path,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[Mapping[str, Any]], None] | None = None,
     resume: bool = False,
-    tracker: Tracker | None = None,
+    tracker: WandbTracker | None = None,
     program: Any = None,
 ) -> Path:
     """Train a network and return the path of its final checkpoint.
@@ -355,7 +285,7 @@ def train(
         config: every number.
         envs: vector environment with same-step auto-reset, as `socialai_dsl.make_vec` gives; fresh, not yet reset.
         run_dir: directory of the run, made if missing.
-        progress: called after every update.
+        progress: called after every update with its row, as `metrics.jsonl` has it.
         resume: continue the run in `run_dir`.
         tracker: takes the figures elsewhere as well.
         program: of the scenario that the agent is for, where a guide plays a variant of it; default the environments'.
@@ -388,54 +318,39 @@ def _loop(
     folder: Path,
     log: MetricsLog,
     mapper: Mapper,
-    progress: Callable[[Progress], None] | None,
+    progress: Callable[[Mapping[str, Any]], None] | None,
 ) -> None:
     """Collect, learn, record, save, until all updates are made."""
-    from trainer.chunks import update_chunks
-
     config, envs = session.config, session.envs
-    began, first = time.perf_counter(), session.update
     session.actor.net.train()
-    counted, then = envs.counters(), began
+    counted, then = envs.counters(), time.perf_counter()
     while session.update < config.updates:
         for group in session.optimizer.param_groups:
             group["lr"] = session.learning_rate
         rollout = collect(session)
-        if config.update == "chunks":
-            losses = update_chunks(session, rollout)
-        else:
-            losses = update(session, rollout, mapper, config.threads)
+        losses = update(session, rollout, mapper)
         _check(session, losses)
         session.update += 1
         before, counted = counted, envs.counters()
         before_time, then = then, time.perf_counter()
-        speed = config.frames_per_update / (then - before_time)
         row: dict[str, Any] = {
+            "update": session.update,
             "frames": session.frames,
-            "frames_per_second": round(speed, 1),
+            "frames_per_second": round(config.frames_per_update / (then - before_time), 1),
             **losses,
             "bonus": rollout.bonus,
+            **episode_metrics(rollout.tally, before, counted),
         }
-        row |= episode_metrics(rollout.tally, before, counted)
         if config.guide == "none":
             del row["imitation_loss"]
         else:
-            row.update(_guidance(rollout))
-        log.write(session.update, row)
+            row |= guide_metrics(rollout.tally, config.frames_per_update)
+        log.write(row)
         if session.update % config.checkpoint_every == 0 and session.update < config.updates:
             log.sync()
             _save(session, folder)
         if progress is not None:
-            left = (config.updates - session.update) * (then - began) / (session.update - first)
-            total = config.updates * config.frames_per_update
-            progress(Progress(session.frames, total, speed, row["success"], left, session.update, row))
-
-
-def _guidance(rollout: Rollout) -> dict[str, float | None]:
-    """Share of the steps that a guide made, and of those in which the policy would have done the same."""
-    tally = rollout.tally
-    agreement = tally.agreed_steps / tally.led_steps if tally.led_steps else None
-    return {"led": tally.led_steps / rollout.values.numel(), "agreement": agreement}
+            progress(row)
 
 
 @contextlib.contextmanager
@@ -473,9 +388,9 @@ def _check(session: Session, losses: Mapping[str, float]) -> None:
         name: value for name, value in session.actor.net.state_dict().items() if value.is_floating_point()
     }
     finite = torch.stack([torch.isfinite(value).all() for value in numbers.values()]).tolist()
-    for name, is_finite in zip(numbers, finite, strict=True):
-        if not is_finite:
-            raise TrainingStopped(f"the network's {name} holds numbers that are not finite")
+    if not all(finite):
+        name = list(numbers)[finite.index(False)]
+        raise TrainingStopped(f"the network's {name} holds numbers that are not finite")
 
 
 @contextlib.contextmanager
@@ -486,8 +401,8 @@ def _explained(session: Session, folder: Path) -> Iterator[None]:
     except BrokenPipeError:  # of the terminal that progress is shown on, not of a file
         raise
     except (TrainingStopped, ObservationError, OSError) as error:
-        saved = sorted(folder.glob("*.safetensors"))
-        kept = f"the last good checkpoint is {saved[-1]}" if saved else "there is no checkpoint yet"
+        saved = max(folder.glob("*.safetensors"), default=None)
+        kept = f"the last good checkpoint is {saved}" if saved else "there is no checkpoint yet"
         reason = f"cannot write: {error}" if isinstance(error, OSError) else str(error)
         where = f"training stopped after {session.frames} frames (update {session.update})"
         raise TrainingStopped(f"{where}: {reason}; {kept}") from error

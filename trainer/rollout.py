@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
@@ -17,9 +17,7 @@ from trainer.errors import TrainingStopped
 from trainer.features import Actor, Int64
 from trainer.guides import Lead, StepLead
 from trainer.nets.memory import emptied
-
-if TYPE_CHECKING:
-    from trainer.session import Session
+from trainer.session import Session, State
 
 
 @dataclass
@@ -42,41 +40,6 @@ class EpisodeTally:
     all_episodes: int = 0
     led_steps: int = 0
     agreed_steps: int = 0
-
-
-@dataclass
-class RolloutState:
-    """What one rollout hands to the next.
-
-    Attributes:
-        image: uint8 (E, H, W, C), tokens: int16 (E, L): the current observation.
-        starts: bool (E,), whether the current observation begins an episode.
-        memory: float32 (E, *shape), before the current observation.
-        returns: float64 (E,), lengths: int64 (E,) of the running episodes.
-        led: bool (E,), whether a guide took part in the running episode.
-    """
-
-    image: NDArray[np.uint8]
-    tokens: NDArray[np.int16]
-    starts: NDArray[np.bool_]
-    memory: Tensor
-    returns: NDArray[np.float64]
-    lengths: Int64
-    led: NDArray[np.bool_]
-
-    @classmethod
-    def initial(cls, observation: dict[str, NDArray[Any]], memory: Tensor) -> RolloutState:
-        """The state after a reset that returned `observation`, with an empty memory."""
-        count = len(observation["tokens"])
-        return cls(
-            observation["image"].copy(),
-            observation["tokens"].copy(),
-            np.ones(count, np.bool_),
-            memory,
-            np.zeros(count),
-            np.zeros(count, np.int64),
-            np.zeros(count, np.bool_),
-        )
 
 
 @dataclass
@@ -108,7 +71,7 @@ class Rollout:
     next_value: Tensor
     pair_rows: Int64
     memories: Tensor
-    lead: Lead[Tensor, Tensor, Tensor] | None = None
+    lead: Lead[Tensor] | None = None
     tally: EpisodeTally = field(default_factory=EpisodeTally)
     bonus: float = 0.0
 
@@ -180,12 +143,9 @@ def _follow(session: Session, rollout: Rollout, t: int) -> StepLead:
     state, guide = session.state, session.guide
     assert guide is not None, "internal: there is a guide"
     lead = guide.lead(session.envs, state.starts, min(session.frames / session.config.frames, 1.0))
-    for name, shape in (
-        ("actions", (len(state.starts), 4)),
-        ("led", (len(state.starts),)),
-        ("weights", (len(state.starts),)),
-    ):
-        _require_shape(f"guide: {name} of lead", getattr(lead, name), shape)
+    for name, part in zip(Lead._fields, lead, strict=True):
+        shape = (*state.starts.shape, 4) if name == "actions" else state.starts.shape
+        _require_shape(f"guide: {name} of lead", part, shape)
     if lead.led.any():
         led, actions = torch.from_numpy(lead.led), torch.from_numpy(lead.actions)
         own = rollout.actions[t].cpu()
@@ -209,8 +169,8 @@ def _step(session: Session, rollout: Rollout, t: int) -> dict[str, NDArray[Any]]
     state.lengths += 1
     if config.bootstrap_timeouts and cut.any():
         which = np.flatnonzero(cut)
-        rollout.bootstrap[t, which] = _value_of(session, final_observation(infos, which), which)
-    success = ended_info(infos, "success", ended & False).astype(np.bool_)
+        rollout.bootstrap[t, which] = _values_at_the_end(session, infos["final_obs"], which)
+    success = infos.get("success", np.zeros_like(ended))  # (E,)
     if ended.any():
         _count(rollout.tally, state, ended, cut, success)
     if session.tutor is not None:
@@ -230,21 +190,6 @@ def _require_shape(what: str, array: Any, shape: tuple[int, ...]) -> None:
         raise ValueError(f"{what}: got the shape {np.shape(array)}, expected {shape}")
 
 
-def ended_info(infos: dict[str, Any], key: str, default: NDArray[Any]) -> NDArray[Any]:
-    """Value of `key` at the episodes' ends, shape (E,): from `infos` itself or from its `final_info`."""
-    if key in infos:
-        return np.asarray(infos[key])
-    return np.asarray(infos.get("final_info", {}).get(key, default))
-
-
-def final_observation(infos: dict[str, Any], ended: Int64) -> dict[str, NDArray[Any]]:
-    """Last observations of the environments `ended`, from either form Gymnasium gives `final_obs` in."""
-    final = infos["final_obs"]
-    if isinstance(final, dict):
-        return {key: np.asarray(value)[ended] for key, value in final.items()}
-    return {key: np.stack([final[e][key] for e in ended]) for key in ("image", "tokens")}
-
-
 def _ids(envs: Any) -> tuple[Int64, Int64]:
     return envs.image_ids(), envs.history_ids()
 
@@ -259,36 +204,33 @@ def _value_ahead(session: Session) -> Tensor:
     return value
 
 
-def _value_of(session: Session, observation: dict[str, NDArray[Any]], which: Int64) -> NDArray[np.float32]:
-    """Value of last observations (K, ...) of the environments `which`, int64 (K,), given the memory before them."""
+def _values_at_the_end(session: Session, final: dict[str, NDArray[Any]], which: Int64) -> NDArray[np.float32]:
+    """Value of the last observations (E, ...) of the environments `which`, int64 (K,), given the memory before them."""
     net = session.actor.net
-    probe = Actor(net, observation["tokens"].shape[1])
+    probe = Actor(net, final["tokens"].shape[1])
+    memory = session.state.memory[torch.from_numpy(which)]
     with _frozen_statistics(net):
-        _, features = probe.see(observation["image"], observation["tokens"])
-    output, _ = net.memory.step(features, session.state.memory[torch.from_numpy(which)])
-    value: NDArray[np.float32] = net.heads(output)[1].cpu().numpy()
+        _, features = probe.see(final["image"][which], final["tokens"][which])
+        value: NDArray[np.float32] = net.heads(net.memory.step(features, memory)[0])[1].cpu().numpy()
     return value
 
 
 @contextlib.contextmanager
 def _frozen_statistics(net: nn.Module) -> Iterator[None]:
     """Leave the running statistics of batch normalisation as they are, so that each observation counts once."""
-    norms = [
-        part for part in net.modules() if isinstance(part, nn.BatchNorm1d | nn.BatchNorm2d | nn.BatchNorm3d)
-    ]
-    tracking = [norm.track_running_stats for norm in norms]
+    norms: list[Any] = [part for part in net.modules() if getattr(part, "track_running_stats", False)]
     for norm in norms:
         norm.track_running_stats = False
     try:
         yield
     finally:
-        for norm, before in zip(norms, tracking, strict=True):
-            norm.track_running_stats = before
+        for norm in norms:
+            norm.track_running_stats = True
 
 
 def _count(
     tally: EpisodeTally,
-    state: RolloutState,
+    state: State,
     ended: NDArray[np.bool_],
     timed_out: NDArray[np.bool_],
     success: NDArray[np.bool_],

@@ -8,20 +8,54 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
-from trainer import checkpoint as checkpoints
 from trainer.bonus import Bonus, build_bonus
-from trainer.checkpoint import Checkpoint, CheckpointMeta
+from trainer.checkpoint import Checkpoint, CheckpointMeta, restore_net
 from trainer.config import WITHOUT_EFFECT, RunConfig
-from trainer.curricula import Leaves, Tutor, build_curriculum
+from trainer.curricula import Curriculum, Leaves, Tutor, build_curriculum
 from trainer.errors import CheckpointError
-from trainer.features import Actor
+from trainer.features import Actor, Int64
 from trainer.guides import Guide, build_guide
 from trainer.nets import NetSpec, build_net
-from trainer.rollout import RolloutState
 
 _ADAM = ("step", "exp_avg", "exp_avg_sq")
+
+
+@dataclass
+class State:
+    """The environments as the agent last met them: what one rollout hands to the next.
+
+    Attributes:
+        image: uint8 (E, H, W, C), tokens: int16 (E, L): the current observation.
+        starts: bool (E,), whether the current observation begins an episode.
+        memory: float32 (E, *shape), before the current observation.
+        returns: float64 (E,), lengths: int64 (E,) of the running episodes.
+        led: bool (E,), whether a guide took part in the running episode.
+    """
+
+    image: NDArray[np.uint8]
+    tokens: NDArray[np.int16]
+    starts: NDArray[np.bool_]
+    memory: Tensor
+    returns: NDArray[np.float64]
+    lengths: Int64
+    led: NDArray[np.bool_]
+
+    @classmethod
+    def initial(cls, observation: dict[str, NDArray[Any]], memory: Tensor) -> State:
+        """The state after a reset that returned `observation`, with an empty memory."""
+        count = len(observation["tokens"])
+        return cls(
+            observation["image"].copy(),
+            observation["tokens"].copy(),
+            np.ones(count, np.bool_),
+            memory,
+            np.zeros(count),
+            np.zeros(count, np.int64),
+            np.zeros(count, np.bool_),
+        )
 
 
 @dataclass
@@ -39,7 +73,7 @@ class Session:
     program: Any
     actor: Actor
     optimizer: torch.optim.Adam
-    state: RolloutState
+    state: State
     generator: torch.Generator
     bonus: Bonus | None = None
     tutor: Tutor | None = None
@@ -78,7 +112,7 @@ class Session:
         if program is not None:
             _check_alike(program, envs.program)
         folder = config.code_folder
-        net = build_net(config.net, net_spec(envs), config.seed, config.precision, folder).to(config.device)
+        net = build_net(config.net, NetSpec.of(envs), config.seed, config.precision, folder).to(config.device)
         tutor = None
         if config.curriculum != "none":
             tutor = Tutor(build_curriculum(config.curriculum, Leaves.of(envs), folder), envs)
@@ -92,8 +126,10 @@ class Session:
             envs,
             envs.program if program is None else program,
             Actor(net, observation["tokens"].shape[1]),
-            torch.optim.Adam(net.parameters(), lr=config.lr, eps=config.adam_eps, fused=True),
-            RolloutState.initial(observation, net.memory.initial(config.envs)),
+            torch.optim.Adam(
+                net.parameters(), config.lr, (0.9, config.adam_beta2), config.adam_eps, fused=True
+            ),
+            State.initial(observation, net.memory.initial(config.envs)),
             torch.Generator().manual_seed(config.seed),
             bonus,
             tutor,
@@ -102,31 +138,24 @@ class Session:
 
     def checkpoint(self) -> Checkpoint:
         """Everything needed to continue exactly."""
-        net = self.actor.net
+        net, program = self.actor.net, self.program
         tensors: dict[str, Tensor] = {f"net.{name}": value for name, value in net.state_dict().items()}
         for name, parameter in net.named_parameters():
             for key, value in self.optimizer.state.get(parameter, {}).items():
                 tensors[f"adam.{key}.{name}"] = value
-        if self.tutor is not None:
-            tensors["curriculum"] = torch.from_numpy(self.tutor.state())
-        if self.guide is not None:
-            tensors["guide"] = _as_tensor(json.dumps(self.guide.state()).encode())
+        for name, part in self._parts_in_json():
+            tensors[name] = _as_tensor(json.dumps(part.state()).encode())
         if self.bonus is not None:
             for name, array in self.bonus.state().items():
                 tensors[f"bonus.{name}"] = torch.from_numpy(np.asarray(array))
+        for name, value in vars(self.state).items():
+            tensors[f"state.{name}"] = torch.as_tensor(value)
         tensors["rng"] = self.generator.get_state()
-        tensors["state.memory"] = self.state.memory
-        for name in _STATE:
-            tensors[f"state.{name}"] = torch.from_numpy(getattr(self.state, name))
         tensors["envs"] = _as_tensor(self.envs.snapshot())
-        return Checkpoint(self._meta(), tensors)
-
-    def _meta(self) -> CheckpointMeta:
-        spec, program = self.actor.net.spec, self.program
-        return CheckpointMeta(
+        meta = CheckpointMeta(
             config=self.config,
-            action_sizes=spec.action_sizes,
-            image_shape=spec.image_shape,
+            action_sizes=net.spec.action_sizes,
+            image_shape=net.spec.image_shape,
             vocabulary=list(program.vocabulary),
             program_sha256=program.sha256,
             scenario=program.name,
@@ -137,6 +166,12 @@ class Session:
             update=self.update,
             torch_version=str(torch.__version__),
         )
+        return Checkpoint(meta, tensors)
+
+    def _parts_in_json(self) -> list[tuple[str, Curriculum | Guide]]:
+        """Curriculum and guide, if there are any, by the names that their states have in a checkpoint."""
+        parts = (("curriculum", getattr(self.tutor, "curriculum", None)), ("guide", self.guide))
+        return [(name, part) for name, part in parts if part is not None]
 
     def load(self, checkpoint: Checkpoint) -> None:
         """Continue from a checkpoint of this very run, in a session begun with the same configuration.
@@ -145,13 +180,8 @@ class Session:
             CheckpointError: it is of another scenario, of other options, or incomplete.
         """
         self._check_same_run(checkpoint.meta)
-        net = checkpoints.restore_net(
-            checkpoint,
-            self.actor.net.spec,
-            list(self.program.vocabulary),
-            self.config.net,
-            self.config.code_folder,
-        )
+        spec, config = self.actor.net.spec, self.config
+        net = restore_net(checkpoint, spec, config.net, config.code_folder)
         try:
             self.actor.net.load_state_dict(net.state_dict())
             self._load_adam(checkpoint)
@@ -160,10 +190,10 @@ class Session:
             if self.bonus is not None:
                 self.bonus.load_state({k: v.numpy() for k, v in checkpoint.part("bonus").items()})
             self.envs.restore(checkpoint.tensors["envs"].numpy().tobytes())
+            for name, part in self._parts_in_json():
+                part.load_state(json.loads(checkpoint.tensors[name].numpy().tobytes()))
             if self.tutor is not None:
-                self.tutor.load_state(checkpoint.tensors["curriculum"].numpy())
-            if self.guide is not None:
-                self.guide.load_state(json.loads(checkpoint.tensors["guide"].numpy().tobytes()))
+                self.tutor.resume()
         except (KeyError, ValueError, RuntimeError, TypeError) as error:
             raise CheckpointError(f"checkpoint cannot continue this run: {error}") from error
         self.update = checkpoint.meta.update
@@ -179,12 +209,9 @@ class Session:
         changed = [name for name in new if name not in free and old[name] != new[name]]
         if changed:
             detail = ", ".join(f"{name}: {old[name]} -> {new[name]}" for name in changed)
-            why = (
-                " (guide and schedules reach from the first frame to the last)"
-                if changed == ["frames"]
-                else ""
-            )
-            raise CheckpointError(f"a run resumes only with the same settings; changed: {detail}{why}")
+            if changed == ["frames"]:
+                detail += " (guide and schedules reach from the first frame to the last)"
+            raise CheckpointError(f"a run resumes only with the same settings; changed: {detail}")
 
     @torch.no_grad()
     def _load_adam(self, checkpoint: Checkpoint) -> None:
@@ -206,19 +233,15 @@ class Session:
         )
 
     def _load_state(self, stored: dict[str, Tensor]) -> None:
-        state = self.state
-        for name in _STATE:
-            present, value = getattr(state, name), stored[name].numpy()
-            if value.shape != present.shape or value.dtype != present.dtype:
+        for name, present in vars(self.state).items():
+            value, wanted = stored[name], torch.as_tensor(present)
+            if value.shape != wanted.shape or value.dtype != wanted.dtype:
                 raise ValueError(
-                    f"state.{name}: got {value.shape} {value.dtype}, expected {present.shape} {present.dtype}"
+                    f"state.{name}: got {tuple(value.shape)} {value.dtype}, "
+                    f"expected {tuple(wanted.shape)} {wanted.dtype}"
                 )
-            setattr(state, name, np.array(value))
-        if stored["memory"].shape != state.memory.shape:
-            raise ValueError(
-                f"state.memory: got {tuple(stored['memory'].shape)}, expected {tuple(state.memory.shape)}"
-            )
-        state.memory = stored["memory"].to(state.memory)
+            is_tensor = isinstance(present, Tensor)
+            setattr(self.state, name, value.to(present) if is_tensor else value.numpy().copy())
 
 
 def _check_alike(program: Any, played: Any) -> None:
@@ -226,24 +249,12 @@ def _check_alike(program: Any, played: Any) -> None:
     for name in ("actions", "templates", "nouns", "vocabulary"):
         own, others = list(getattr(program, name)), list(getattr(played, name))
         if own != others:
-            strange = sorted(set(own) ^ set(others))
+            strange = ", ".join(sorted(set(own) ^ set(others))) or "the same in another order"
             raise ValueError(
-                f"guide: {played.name} with its script has other {name} than without it"
-                f"{': ' + ', '.join(strange) if strange else ', in another order'}; let both have the same, or train "
-                "without a guide"
+                f"guide: {played.name} with its script has other {name} than without it: {strange}; let both have "
+                "the same, or train without a guide"
             )
-
-
-_STATE = ("image", "tokens", "starts", "returns", "lengths", "led")
 
 
 def _as_tensor(data: bytes) -> Tensor:
     return torch.frombuffer(bytearray(data), dtype=torch.uint8)
-
-
-def net_spec(envs: Any) -> NetSpec:
-    """Shapes a network must have for this environment, single or vector."""
-    many = hasattr(envs, "single_action_space")
-    actions = envs.single_action_space if many else envs.action_space
-    observations = envs.single_observation_space if many else envs.observation_space
-    return NetSpec.of(actions, observations, envs.program.vocabulary)

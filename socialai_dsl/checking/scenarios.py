@@ -9,10 +9,11 @@ from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, S
 from socialai_dsl.library import prelude, shared_grammars
 from socialai_dsl.loader import Resolved
 from socialai_dsl.parameters import Substituted, substitute
-from socialai_dsl.schema import PRIMITIVES, Scenario
+from socialai_dsl.schema import Scenario
 from socialai_dsl.schema.shape import Shaped, model_of
 from socialai_dsl.semantics.check import check_meaning
-from socialai_dsl.semantics.terms import Checked
+from socialai_dsl.semantics.plans import Checked
+from socialai_dsl.vocabulary import PRIMITIVES
 
 _OF_THE_GRAMMAR = frozenset({"S401", "S402"})
 """What may be wrong because a patch changed the grammar."""

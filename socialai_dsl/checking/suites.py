@@ -11,6 +11,7 @@ from socialai_dsl.checking.scenarios import Draft, draft_of, meaning_of, naming_
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
 from socialai_dsl.loader import Member, Resolved
 from socialai_dsl.loader.leaves import NODE_KEYS, parameters_of
+from socialai_dsl.loader.members import check_splits, members_of
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.schema.suite import Entry, Split, Suite
 from socialai_dsl.semantics.suite import shared_actions, shared_space
@@ -160,7 +161,7 @@ def _members(suite: Suite, resolved: Resolved, own: DiagnosticBag) -> Sequence[M
     about = DiagnosticBag()
     _check_splits(suite, resolved, about)
     try:
-        members = resolved.members()
+        members = members_of(resolved)
     except ScenarioError as error:
         own.extend(error.diagnostics)
         misspelt = [d.message for d in error.diagnostics]
@@ -203,7 +204,7 @@ def _check_splits(suite: Suite, resolved: Resolved, bag: DiagnosticBag) -> None:
     if len(list(bag)) > before:
         return
     try:
-        resolved.check_splits()
+        check_splits(resolved)
     except ScenarioError as error:
         bag.extend(error.diagnostics)
 

@@ -8,7 +8,7 @@ from typing import Final
 
 from socialai_dsl.diagnostics import Diagnostic, Severity
 from socialai_dsl.loader import Data, DataPath, Resolved
-from socialai_dsl.loader.document import Style
+from socialai_dsl.loader.offsets import Style
 from socialai_dsl.source import Span
 
 _SPOKEN: Final = frozenset({"say", "hears", "templates", "nouns", "name"})

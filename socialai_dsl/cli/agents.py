@@ -4,7 +4,7 @@ import argparse
 import json
 import os
 import traceback
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Final, get_args
@@ -20,7 +20,7 @@ from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, RunConfig
 if TYPE_CHECKING:
     from socialai_dsl.checking import Loaded
     from socialai_dsl.program_suite import Playable
-    from trainer.logging import Tracker
+    from trainer.logging import WandbTracker
 
 _AUTOMATIC: Final = {
     "device": "a graphics card where there is one",
@@ -316,7 +316,7 @@ def train_agent(
     from socialai_dsl.cli.learnt import Learnt
     from socialai_dsl.cli.progress import TrainingProgress
     from trainer.errors import TrainingStopped
-    from trainer.ppo import Progress, train
+    from trainer.ppo import train
 
     played = _played(config)
     envs = socialai_dsl.make_vec(played, num_envs=config.envs, copy=False, autoreset_mode="SameStep")
@@ -325,9 +325,8 @@ def train_agent(
     try:
         with TrainingProgress(total, stream) as shown:
 
-            def report(progress: Progress) -> None:
-                said = learnt.sentence(progress.row)
-                shown.update(progress.frames, progress.success_rate, progress.frames_per_second, said)
+            def report(row: Mapping[str, Any]) -> None:
+                shown.update(row["frames"], row["success"], row["frames_per_second"], learnt.sentence(row))
 
             return train(config, envs, folder, report, resume, _tracker(config, folder), program)
     except TrainingStopped as error:
@@ -359,10 +358,7 @@ def _played(config: RunConfig) -> str:
 
 def _place_in_own_code(config: RunConfig, error: BaseException) -> str | None:
     """`file:line` where the user's network, bonus, curriculum or guide raised an error; None if none of them did."""
-    from trainer.extensions import own_file
-
-    names = (config.net, config.bonus, config.curriculum, config.guide)
-    files = {str(file) for name in names if (file := own_file(name, config.code_folder)) is not None}
+    files = {str(file) for file in config.own_files.values()}
     places = [
         f"{frame.filename}:{frame.lineno}"
         for frame in traceback.extract_tb(error.__traceback__)
@@ -371,7 +367,7 @@ def _place_in_own_code(config: RunConfig, error: BaseException) -> str | None:
     return places[-1] if places else None
 
 
-def _tracker(config: RunConfig, folder: Path) -> "Tracker | None":
+def _tracker(config: RunConfig, folder: Path) -> "WandbTracker | None":
     """Where the figures go besides the folder, if anywhere."""
     if config.wandb is None:
         return None

@@ -89,7 +89,8 @@ def scenarios_of(experiment: "Experiment") -> Iterable[str]:
 
 def _played(scenario: str, agent: str) -> "Level | None":
     """None where the scenario has no script."""
-    from socialai_dsl.cli.evaluation import Player, evaluate_agent
+    from socialai_dsl.cli.evaluation import evaluate_agent
+    from socialai_dsl.cli.player import Player
     from socialai_dsl.reporting.analysis import Level
 
     try:
@@ -101,9 +102,9 @@ def _played(scenario: str, agent: str) -> "Level | None":
 
 def _alone(loaded: "Loaded") -> "Level | None":
     """None where there is no NPC."""
+    from socialai_dsl.analysis.depth import without_npcs
+    from socialai_dsl.analysis.effort import Effort
     from socialai_dsl.checking import LoadedScenario
-    from socialai_dsl.envs.depth import without_npcs
-    from socialai_dsl.envs.effort import Effort
     from socialai_dsl.reporting.analysis import Level
 
     assert isinstance(loaded, LoadedScenario), "internal: a suite is no room"

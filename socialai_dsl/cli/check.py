@@ -12,8 +12,8 @@ from socialai_dsl.cli.errors import Exit, UsageError
 from socialai_dsl.cli.terminal import ProgressLine
 
 if TYPE_CHECKING:
+    from socialai_dsl.analysis.effort import Effort
     from socialai_dsl.checking import LoadedScenario
-    from socialai_dsl.envs.effort import Effort
 
 SUMMARY: Final = "verify what scenarios claim in `check`, and that everything in them can happen and be known"
 
@@ -75,7 +75,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
         raise UsageError(f"--states: got {arguments.states}, expected at least 1")
     if arguments.seed < 0:
         raise UsageError(f"--seed: got {arguments.seed}, expected at least 0")
-    from socialai_dsl.envs.effort import Clock, Effort
+    from socialai_dsl.analysis.effort import Clock, Effort
 
     progress = ProgressLine(sys.stderr)
     reports: list[ScenarioReport] = []
@@ -115,9 +115,9 @@ def check_scenario(
         deep: also try what success takes.
         say: takes the lines of the report as they come.
     """
-    from socialai_dsl.envs.coverage import coverage
-    from socialai_dsl.envs.depth import depth
-    from socialai_dsl.envs.properties import Trial, by_default
+    from socialai_dsl.analysis.coverage import coverage
+    from socialai_dsl.analysis.depth import depth
+    from socialai_dsl.analysis.properties import Trial, by_default
 
     place = loaded.resolved.key_span(("outcome",))
     report = ScenarioReport(called, effort.rooms, effort.seed, place)

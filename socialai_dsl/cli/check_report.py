@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 from socialai_dsl.diagnostics import Diagnostic, Severity
 
 if TYPE_CHECKING:
-    from socialai_dsl.envs.alone import Alone
-    from socialai_dsl.envs.coverage import Coverage
-    from socialai_dsl.envs.depth import Depth
-    from socialai_dsl.envs.properties import Report
-    from socialai_dsl.semantics.terms import PropertyPlan
+    from socialai_dsl.analysis.alone import Alone
+    from socialai_dsl.analysis.coverage import Coverage
+    from socialai_dsl.analysis.depth import Depth
+    from socialai_dsl.analysis.properties import Report
+    from socialai_dsl.semantics.plans import PropertyPlan
     from socialai_dsl.source import Span
 
 

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from socialai_dsl.analysis.tally import Part, Tally
     from socialai_dsl.checking import Loaded
-    from socialai_dsl.envs.tally import Part, Tally
 
 SUMMARY: Final = "count how often each rule, state and outcome came about, and say what never did"
 
@@ -66,8 +66,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
 def _add(report: "Report", name: str, arguments: argparse.Namespace) -> None:
     """Let the agents play one scenario."""
+    from socialai_dsl.analysis.tally import parts_of
     from socialai_dsl.checking import LoadedSuite
-    from socialai_dsl.envs.tally import parts_of
     from socialai_dsl.frontend import load
 
     loaded = load(name)
@@ -100,27 +100,37 @@ def _played(scenario: str, agent: str, episodes: int, seed: int) -> "Tally":
     import numpy as np
 
     import socialai_dsl
+    from socialai_dsl.analysis.tally import tally
     from socialai_dsl.cli.agents import require_trainer
-    from socialai_dsl.cli.evaluation import Player, make_policy
-    from socialai_dsl.envs.tally import tally
+    from socialai_dsl.cli.player import Player, make_policy
+    from socialai_dsl.compilation import scenarios_of
+    from socialai_dsl.frontend import load
 
+    played = scenarios_of(load(scenario))
     envs: Any = socialai_dsl.make_vec(
         scenario, num_envs=min(episodes, _TOGETHER), copy=False, autoreset_mode="Disabled"
     )
     try:
         if agent == "oracle":
-            return tally(envs, lambda seen: envs.scripted_actions(), _nothing_to_forget, episodes, seed)
+            return tally(
+                envs, played, lambda seen: envs.scripted_actions(), _nothing_to_forget, episodes, seed
+            )
         if agent == "random":
             generator, sizes = np.random.default_rng(seed), envs.single_action_space.nvec
             shape = (envs.num_envs, len(sizes))
             return tally(
-                envs, lambda seen: generator.integers(0, sizes, shape), _nothing_to_forget, episodes, seed
+                envs,
+                played,
+                lambda seen: generator.integers(0, sizes, shape),
+                _nothing_to_forget,
+                episodes,
+                seed,
             )
         require_trainer()
         policy, told = make_policy(Player(agent, seed=seed), envs)
         for warning in told:
             print(f"socialai: {printable(warning)}", file=sys.stderr)
-        return tally(envs, policy.act, policy.reset, episodes, seed)
+        return tally(envs, played, policy.act, policy.reset, episodes, seed)
     except ValueError as error:
         raise UsageError(str(error)) from error
     finally:

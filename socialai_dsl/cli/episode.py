@@ -11,36 +11,14 @@ from PIL import Image
 
 from socialai_dsl.cli.endings import Ending
 from socialai_dsl.diagnostics import printable
-from socialai_dsl.envs.panel import DialogueLine, Face, compose_frame
 from socialai_dsl.program_suite import Playable
+from socialai_dsl.render.panel import DialogueLine, Face, compose_frame
+from socialai_dsl.replay.steps import Step, describe_step
 
 _STEP_MILLISECONDS: Final = 450
 _END_MILLISECONDS: Final = 2500
 _PALETTE_COLOURS: Final = 160
 _ENDING_WIDTH: Final = 52
-
-
-@dataclass(frozen=True)
-class Step:
-    """One step of an episode, in words.
-
-    Attributes:
-        t: counted from 1.
-        action: the primitive's name, "none" where the agent did not move.
-        said: the agent's utterance, None if it was silent.
-        heard: lines `Name: text`, in the order spoken.
-    """
-
-    t: int
-    action: str
-    said: str | None
-    heard: tuple[str, ...]
-
-    @property
-    def dialogue(self) -> list[DialogueLine]:
-        """What was said in this step, the agent first."""
-        own = [DialogueLine(self.t, "You", self.said)] if self.said is not None else []
-        return own + [_heard_line(self.t, line) for line in self.heard]
 
 
 @dataclass
@@ -132,22 +110,6 @@ def record(
             compose_frame(env.render(), dialogue, _caption(episode, step, ended), now=step.t, cast=cast)
         )
     return episode
-
-
-def describe_step(
-    program: Playable, action: Sequence[int] | NDArray[np.int64], t: int, utterance: str
-) -> Step:
-    """Put an action and what was heard into words."""
-    primitive, speaks, template, noun = (int(part) for part in action)
-    words = [*program.actions, "none"]
-    said = program.templates[template].replace("<noun>", program.nouns[noun]) if speaks else None
-    heard = () if utterance == "NA" else tuple(utterance.splitlines())
-    return Step(t, words[primitive], said, heard)
-
-
-def _heard_line(t: int, line: str) -> DialogueLine:
-    name, separator, text = line.partition(": ")
-    return DialogueLine(t, name, text) if separator else DialogueLine(t, "", line)
 
 
 def _caption(episode: Episode, step: Step, ended: bool) -> list[str]:

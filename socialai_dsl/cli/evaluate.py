@@ -1,4 +1,4 @@
-"""This module is `socialai evaluate`: play the test set with an agent that was trained before, perhaps elsewhere."""
+"""This module is `socialai evaluate`: play the test set with a trained agent, a script, chance or a language model."""
 
 import argparse
 import json
@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.arguments import natural, positive
 from socialai_dsl.cli.errors import Exit, UsageError
-from socialai_dsl.cli.run_folder import SETTINGS, read_json, versions, write_text
+from socialai_dsl.cli.language_model import PREFIX, add_options, default_folder
+from socialai_dsl.cli.run_folder import RESULT, SETTINGS, read_json, versions, write_json, write_text
 from trainer.config import code_folder
 
 if TYPE_CHECKING:
     from socialai_dsl.cli.evaluation import Evaluation
+    from socialai_dsl.cli.player import Player
 
-SUMMARY: Final = "evaluate a trained agent on its own or another scenario's test set"
+SUMMARY: Final = "evaluate a trained agent, a script, chance or a language model on a scenario's test set"
 FIGURES: Final = "evaluation.json"
 _RECORDED: Final = 3
 
@@ -22,7 +24,7 @@ _RECORDED: Final = 3
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
     parser.add_argument(
-        "run", metavar="RUN_DIR", help="a run's folder or a checkpoint; also random or oracle"
+        "run", metavar="RUN_DIR", help="a run's folder or a checkpoint; also random, oracle or llm:MODEL"
     )
     parser.add_argument(
         "--on", action="append", metavar="SCENARIO", help="what to play (default: the run's own); repeatable"
@@ -50,7 +52,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="DIR",
-        help=f"write {FIGURES}, and for each scenario a folder with films, transcripts and a list of all episodes",
+        help=f"write {FIGURES}, and for each scenario a folder with {RESULT}, films, transcripts, a page that replays "
+        "them and a list of all episodes; `socialai report` takes these folders",
     )
     parser.add_argument(
         "--record",
@@ -61,46 +64,64 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json", action="store_true", help="print an array with one object for each scenario"
     )
+    add_options(parser)
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Evaluate on each scenario."""
-    from socialai_dsl.cli.agents import require_trainer, resolve_device
-    from socialai_dsl.cli.evaluation import Player, evaluate_agent
+    from socialai_dsl.cli.evaluation import evaluate_agent
     from socialai_dsl.cli.evaluation_report import write_episodes
 
     if arguments.record is not None and arguments.out is None:
         raise UsageError("--record: expected --out DIR as well, where the recordings go")
     if arguments.run == "human" and arguments.json:
         raise UsageError("--json: the agent 'human' plays on standard output")
-    require_trainer()
-    has_own = arguments.on is None or (Path(arguments.run) / SETTINGS).is_file()
-    player = Player(
-        arguments.run,
-        resolve_device(arguments.device),
-        arguments.greedy,
-        arguments.seed,
-        arguments.net,
-        code_folder(_own_scenario(arguments.run) if has_own else arguments.on[0]),
-    )
+    player = _player(arguments)
+    out = player.out if player.options is not None else arguments.out
     results = []
-    for scenario in arguments.on or [_own_scenario(arguments.run)]:
+    for scenario in arguments.on or [own_scenario(arguments.run)]:
         evaluation = evaluate_agent(player, scenario, arguments.episodes)
         for warning in evaluation.warnings:
             print(f"warning: {warning}", file=sys.stderr)
         results.append(_result(evaluation))
         if not arguments.json:
             print(_table(evaluation, results[-1]["eval"]), flush=True)
-        if arguments.out is not None:
+        if out is not None:
             count = _RECORDED if arguments.record is None else arguments.record
-            place = write_episodes(evaluation, arguments.out, count, f"agent {arguments.run}")
+            place = write_episodes(evaluation, out, count, f"agent {arguments.run}")
+            # As a run that trained nothing, so that reports take it as one.
+            write_json(place / SETTINGS, {key: results[-1][key] for key in ("scenario", "agent", "seed")})
+            write_json(place / RESULT, results[-1])
             if not arguments.json:
                 print(f"\nepisodes written to {place}\n", flush=True)
             # After each scenario, so that nothing is lost should the agent not fit the next one.
-            write_text(arguments.out / FIGURES, _text(results) + "\n")
+            write_text(out / FIGURES, _text(results) + "\n")
     if arguments.json:
         print(_text(results))
     return Exit.GOOD
+
+
+def _player(arguments: argparse.Namespace) -> "Player":
+    """Who plays; a trained agent needs PyTorch, the others do not."""
+    from socialai_dsl.cli.player import Player
+
+    agent = arguments.run
+    if agent.startswith(PREFIX):
+        return Player(agent, out=arguments.out or default_folder(agent), options=arguments)
+    if agent in ("random", "oracle", "human"):
+        return Player(agent, seed=arguments.seed)
+    from socialai_dsl.cli.agents import require_trainer, resolve_device
+
+    require_trainer()
+    has_own = arguments.on is None or (Path(agent) / SETTINGS).is_file()
+    return Player(
+        agent,
+        resolve_device(arguments.device),
+        arguments.greedy,
+        arguments.seed,
+        arguments.net,
+        code_folder(own_scenario(agent) if has_own else arguments.on[0]),
+    )
 
 
 def _text(results: list[dict[str, Any]]) -> str:
@@ -132,7 +153,12 @@ def _table(evaluation: "Evaluation", figures: dict[str, Any]) -> str:
     return "\n\n".join("\n".join(lines) for lines in parts if lines)
 
 
-def _own_scenario(agent: str) -> str:
+def own_scenario(agent: str) -> str:
+    """The scenario on which the agent of a run's folder was trained.
+
+    Raises:
+        UsageError: it is not such a folder.
+    """
     run = Path(agent)
     if not (run / SETTINGS).is_file():
         raise UsageError(f"--on: {run} does not say which scenario it was trained on; name one")

@@ -1,52 +1,26 @@
 """This module plays the test set with an agent and keeps what is needed to count, describe and record its episodes."""
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.endings import Ending, endings_of
 from socialai_dsl.cli.errors import UsageError
+from socialai_dsl.cli.player import Player, make_policy
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from socialai_dsl.checking import Loaded
     from socialai_dsl.cli.episode import Episode
     from socialai_dsl.evaluation import EvalResult, Policy
     from socialai_dsl.program_suite import Playable
+    from socialai_dsl.replay import Trace
+    from socialai_dsl.replay.tracing import Think
 
 # Test episodes played together: enough to be fast, and no result depends on it.
 _TOGETHER: Final = 125
-
-
-@dataclass(frozen=True)
-class Player:
-    """Who plays, and how.
-
-    Attributes:
-        agent: `random`, `oracle`, `human`, or the path of a run, of a folder of checkpoints or of one of them.
-        device: where a network runs.
-        greedy: whether a network takes its most probable action instead of sampling.
-        seed: of what a network or `random` draws; rooms do not depend on it.
-        net: name of a network that does not ship, whose code is imported if a checkpoint asks for it.
-        folder: where the file of such a network is looked for first.
-    """
-
-    agent: str
-    device: str = "cpu"
-    greedy: bool = False
-    seed: int = 0
-    net: str | None = None
-    folder: Path = Path()
-
-    @property
-    def manner(self) -> str:
-        """How actions come about, in a phrase; empty where there is nothing to say."""
-        if self.agent in ("oracle", "human"):
-            return ""
-        return "most probable actions" if self.greedy else f"sampled actions, seed {self.seed}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,21 +28,24 @@ class Evaluation:
     """Test episodes as an agent played them.
 
     Attributes:
-        scenario: as it was asked for. program: the scenario's.
+        scenario: as it was asked for. about: what its file says of it. program: the scenario's.
         player: who played.
         result: what came of it.
         endings: in the order of the program's outcomes.
         actions: of each episode, int64 (4,) each.
         warnings: what the agent's checkpoint does not know of this scenario, and the like.
+        more: figures that count for this agent alone.
     """
 
     scenario: str
+    about: str
     program: "Playable"
     player: Player
     result: "EvalResult"
     endings: Sequence[Ending]
     actions: "Mapping[int, list[NDArray[np.int64]]]"
     warnings: Sequence[str] = field(default_factory=tuple)
+    more: Mapping[str, Any] = field(default_factory=dict)
 
     def figures(self) -> dict[str, Any]:
         """The figures as a JSON-able object."""
@@ -86,7 +63,7 @@ class Evaluation:
             "endings": [ending.figures(shares[ending.name], result.episodes) for ending in self.endings],
             "rules": dict(result.rules),
         }
-        figures |= _by_member(self.program, shares)
+        figures |= {**_by_member(self.program, shares), **self.more}
         if self.player.agent == "oracle":
             # A room that the script does not solve is worth looking at: it can be played again by its number.
             figures["unsolved"] = (~result.success).nonzero()[0].tolist()
@@ -94,9 +71,12 @@ class Evaluation:
 
     def pick(self, success: bool, count: int) -> list[int]:
         """Numbers of up to `count` episodes that succeeded, or failed: each way of ending has its turn."""
+        from socialai_dsl.llm.episode import INVALID
+
         queues = [
             ((self.result.outcome == i) & (self.result.success == success)).nonzero()[0].tolist()
-            for i in range(len(self.result.names))
+            for i, name in enumerate(self.result.names)
+            if name != INVALID  # what a reply ended cannot be played again
         ]
         queues.sort(key=len, reverse=True)
         rounds = [queue[turn] for turn in range(count) for queue in queues if turn < len(queue)]
@@ -128,13 +108,63 @@ class Evaluation:
         finally:
             env.close()
 
+    def traces(self, count: int) -> "list[Trace]":
+        """Up to `count` failures and as many successes, for a replay."""
+        return [self.trace(number) for success in (False, True) for number in self.pick(success, count)]
+
+    def trace(self, number: int) -> "Trace":
+        """Play test episode `number` once more, and trace it with what a trained agent made of it."""
+        import socialai_dsl
+        from socialai_dsl.replay import trace_of
+
+        env = socialai_dsl.make(self.scenario)
+        try:
+            return trace_of(
+                env,
+                self.actions[number],
+                {"options": {"test_episode": number}},
+                scenario=self.scenario,
+                agent=self.player.agent,
+                episode=f"test episode {number}",
+                endings={ending.name: ending.text for ending in self.endings},
+                about=self.about,
+                think=self._think(env, number),
+            )
+        finally:
+            env.close()
+
+    def _think(self, env: Any, number: int) -> "Think | None":
+        """Asks a trained agent what it makes of each observation of an episode; None for any other."""
+        import numpy as np
+
+        from socialai_dsl.replay import Thought
+
+        if not self.player.is_trained:
+            return None
+        policy: Any = make_policy(self.player, env)[0]
+        policy.reset(np.ones(1, np.bool_), np.array([number]))
+
+        def think(observation: Any) -> Thought:
+            probabilities, value = policy.think(observation)
+            rounded = [[round(share, 4) for share in head] for head in probabilities]
+            return Thought(probabilities=rounded, value=round(value, 4))
+
+        return think
+
+
+def about_of(loaded: "Loaded") -> str:
+    """What a file says of itself."""
+    data = loaded.resolved.data
+    return str(data.get("about", "")) if isinstance(data, dict) else ""
+
 
 def evaluate_agent(player: Player, scenario: str, episodes: int) -> Evaluation:
     """Play test episodes 0 to `episodes - 1` of a scenario.
 
     Raises:
         ScenarioError: the scenario has mistakes.
-        UsageError: the checkpoint or the script does not fit it.
+        UsageError: the checkpoint or the script does not fit it, or a language model does not answer.
+        RunFailed: a language model has spent its budget.
     """
     import socialai_dsl
 
@@ -143,7 +173,16 @@ def evaluate_agent(player: Player, scenario: str, episodes: int) -> Evaluation:
     endings = endings_of(loaded, program)
     if player.agent == "human":
         result, played = _let_a_person_play(scenario, program, episodes)
-        return Evaluation(scenario, program, player, result, endings, played)
+        return Evaluation(scenario, about_of(loaded), program, player, result, endings, played)
+    if player.options is not None:
+        from socialai_dsl.cli.language_model import let_a_model_play
+
+        result, played, others, more = let_a_model_play(
+            player.agent, scenario, program, episodes, player.out, player.options
+        )
+        return Evaluation(
+            scenario, about_of(loaded), program, player, result, [*endings, *others], played, more=more
+        )
 
     from socialai_dsl.cli.agents import with_script
     from socialai_dsl.evaluation import evaluate
@@ -163,29 +202,7 @@ def evaluate_agent(player: Player, scenario: str, episodes: int) -> Evaluation:
     finally:
         envs.close()
     actions = {number: policy.played[number][:length] for number, length in enumerate(result.lengths)}
-    return Evaluation(scenario, program, player, result, endings, actions, told)
-
-
-def make_policy(player: Player, envs: Any) -> "tuple[Policy, list[str]]":
-    """What plays, and what is to be known about it, such as that it was trained on something else.
-
-    Raises:
-        ValueError: the checkpoint does not fit the environments.
-    """
-    from socialai_dsl.evaluation import RandomPolicy, ScriptedPolicy
-
-    if player.agent == "random":
-        return RandomPolicy(tuple(int(n) for n in envs.single_action_space.nvec), player.seed), []
-    if player.agent == "oracle":
-        return ScriptedPolicy(envs), []
-    from trainer.play import CheckpointPolicy
-
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        policy = CheckpointPolicy.load(
-            Path(player.agent), envs, player.greedy, player.seed, player.device, player.net, player.folder
-        )
-    return policy, [str(warning.message) for warning in caught]
+    return Evaluation(scenario, about_of(loaded), program, player, result, endings, actions, told)
 
 
 class _Remembering:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from socialai_dsl.cli.run_folder import RESULT, scenario_folder_name, write_text
+from socialai_dsl.cli.run_folder import REPLAY, RESULT, scenario_folder_name, write_text
 
 if TYPE_CHECKING:
     from socialai_dsl.cli.evaluation import Evaluation
@@ -32,9 +32,21 @@ def summary_rows(figures: Mapping[str, Any]) -> list[Row]:
         for member, played in figures.get("members", {}).items()
         if played["share"] > 0
     ]
+    if "invalid_rate" in figures:
+        rows += _model_rows(figures)
     if figures.get("unsolved"):
         rows.append(("unsolved", _numbers(figures["unsolved"])))
     return rows
+
+
+def _model_rows(figures: Mapping[str, Any]) -> list[Row]:
+    """What counts for language models alone."""
+    tokens = f"{figures['prompt_tokens']:,} read and {figures['completion_tokens']:,} written"
+    rows = [
+        ("invalid", f"{figures['invalid_rate']:.1%} of {figures['replies']:,} replies"),
+        ("tokens", tokens + (", estimated" if figures["tokens_estimated"] else "")),
+    ]
+    return rows + ([("cost", f"${figures['cost']:.4f}")] if figures["cost"] is not None else [])
 
 
 def ending_rows(figures: Mapping[str, Any]) -> list[tuple[str, str, str]]:
@@ -76,7 +88,7 @@ def aligned(rows: Sequence[Row]) -> list[str]:
 
 
 def write_episodes(evaluation: "Evaluation", folder: Path, count: int, label: str) -> Path:
-    """Record up to `count` failures and as many successes, and list all episodes.
+    """Record up to `count` failures and as many successes, a page with them included, and list all episodes.
 
     Args:
         evaluation: what was played.
@@ -87,6 +99,8 @@ def write_episodes(evaluation: "Evaluation", folder: Path, count: int, label: st
     Raises:
         OSError: a file cannot be written.
     """
+    from socialai_dsl.replay.page import replay_page
+
     place = folder / scenario_folder_name(evaluation.scenario)
     place.mkdir(parents=True, exist_ok=True)
     for success in (False, True):
@@ -95,6 +109,8 @@ def write_episodes(evaluation: "Evaluation", folder: Path, count: int, label: st
             name = f"{'success' if success else 'failure'}-{number:03d}"
             write_text(place / f"{name}.txt", episode.transcript())
             episode.save_film(place / f"{name}.gif")
+    if traces := evaluation.traces(count):
+        write_text(place / REPLAY, replay_page(traces))
     write_text(place / "episodes.csv", _episodes(evaluation))
     return place
 

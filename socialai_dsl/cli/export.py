@@ -84,11 +84,10 @@ def _new_folder(out: Path) -> Path:
 def _write(run: Path, out: Path, config: "RunConfig", loaded: "Loaded", checkpoint: "Checkpoint") -> None:
     from trainer import checkpoint as checkpoints
     from trainer.config import code_folder
-    from trainer.extensions import own_file
 
     moved = Moved.of(loaded, config.scenario)
     moved.copy(out)
-    code = own_file(config.net, config.code_folder)
+    code = config.own_files.get("net")
     if code is not None:
         there = out / code_folder(moved.scenario) / code.relative_to(config.code_folder.resolve())
         there.parent.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,5 @@
 """What an agent has learnt so far, in words, from the rates at which rules fire and episodes end."""
 
-import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
@@ -8,7 +7,6 @@ from socialai_dsl.checking import Loaded, LoadedSuite
 from socialai_dsl.cli.endings import Ending
 
 _UTTERANCES_SHOWN: Final = 2
-_WORDS: Final = re.compile(r"[^.\[\]]+")
 
 
 class Learnt:
@@ -17,10 +15,15 @@ class Learnt:
     def __init__(self, loaded: Loaded, endings: Sequence[Ending]) -> None:
         """Speak of this scenario, whose episodes end so."""
         self._endings = endings
-        data = loaded.resolved.data
-        self._data: Mapping[str, Any] = (
-            data if isinstance(data, dict) and not isinstance(loaded, LoadedSuite) else {}
-        )
+        frames = () if isinstance(loaded, LoadedSuite) else loaded.checked.frames
+        self._heard = {
+            rule.name: (frame.member, rule.hears[0].text)
+            for frame in frames
+            for state in frame.states
+            for rule in (*state.first, *state.then)
+            if len(rule.hears) == 1
+        }
+        """Rule -> the member whose it is, and the one utterance that it waits for."""
 
     def sentence(self, row: Mapping[str, Any]) -> str:
         """What happened in the episodes of an update.
@@ -39,9 +42,8 @@ class Learnt:
         """Which utterances were answered by whom, how often an episode, the most frequent first."""
         answers: dict[str, dict[str, float]] = {}
         for name, rate in rules.items():
-            who = name.partition(".")[0]
-            heard = self._heard(name, who) if rate else None
-            if rate and heard:
+            if rate and name in self._heard:
+                who, heard = self._heard[name]
                 by_whom = answers.setdefault(heard, {})
                 by_whom[who] = by_whom.get(who, 0.0) + rate
         often = sorted(answers.items(), key=lambda answer: -sum(answer[1].values()))[:_UTTERANCES_SHOWN]
@@ -52,25 +54,6 @@ class Learnt:
             for heard, by_whom in often
         )
         return "per episode " + ", ".join(parts) if often else ""
-
-    def _heard(self, rule: str, member: str) -> str | None:
-        """The utterance that a rule of a member waits for; None if it waits for none, or for one of several."""
-        _, *path = _WORDS.findall(rule)
-        cast = self._data.get("cast", {}).get(member, {})
-        frame = cast.get("frame") if isinstance(cast, dict) else None
-        frames = self._data.get("frames", {})
-        node: Any = frames.get(path[0]) if path and path[0] in frames else frame
-        for step in path[1:]:
-            if isinstance(node, dict) and "states" in node and step in node["states"]:
-                node = node["states"][step]
-            elif isinstance(node, dict):
-                node = node.get(step)
-            elif isinstance(node, list) and step.isdigit() and int(step) < len(node):
-                node = node[int(step)]
-            else:
-                return None
-        heard = node.get("hears") if isinstance(node, dict) else None
-        return heard if isinstance(heard, str) else None
 
     def _ends(self, outcomes: Mapping[str, float | None]) -> str:
         """How the episodes ended."""

@@ -64,6 +64,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     _write_schema(Path(_SCHEMA))
     print(f"wrote {', '.join(map(str, files))}; check with: socialai validate {name}.yaml")
     print(f"play with: socialai play {name}.yaml")
+    print(f"see it while you write: socialai studio {name}.yaml")
     return Exit.GOOD
 
 

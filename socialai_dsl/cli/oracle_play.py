@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from socialai_dsl.envs.effort import Clock
-    from socialai_dsl.envs.search import Finding
+    from socialai_dsl.analysis.effort import Clock
+    from socialai_dsl.analysis.search import Finding
 
 _TOGETHER: Final = 1000
 
@@ -167,7 +167,7 @@ def _search(
     scenario: str, indices: list[int], seed: int, states: int, clock: "Clock | None"
 ) -> "list[Finding]":
     import socialai_dsl
-    from socialai_dsl.envs.search import search_rooms
+    from socialai_dsl.analysis.search import search_rooms
 
     if not indices:
         return []

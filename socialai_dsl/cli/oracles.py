@@ -58,7 +58,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     if arguments.seed < 0:
         raise UsageError(f"--seed: got {arguments.seed}, expected at least 0")
     names = arguments.scenarios or [name for name in shipped_scenarios() if "oracle" in variants_of(name)]
-    from socialai_dsl.envs.effort import Clock
+    from socialai_dsl.analysis.effort import Clock
 
     reports, progress = [], ProgressLine(sys.stderr)
     for name in names:

@@ -15,13 +15,13 @@ from textual.suggester import Suggester
 from textual.widgets import Input, OptionList, Static
 
 from socialai_dsl.cli.play_game import Game, Played
-from socialai_dsl.cli.play_words import ahead
 from socialai_dsl.cli.typed import Phrases, split_line
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.engine.errors import RoomError
-from socialai_dsl.envs.canvas import INK
-from socialai_dsl.envs.panel import DialogueLine
-from socialai_dsl.envs.tiles import PALETTE
+from socialai_dsl.envs.view import ahead
+from socialai_dsl.render.canvas import INK
+from socialai_dsl.render.panel import DialogueLine
+from socialai_dsl.render.tiles import PALETTE
 
 Episodes = Callable[[int], tuple[str, dict[str, Any]] | None]
 """Number, counted from 0 -> title and arguments of `env.reset`; None after the last one."""

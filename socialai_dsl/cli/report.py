@@ -126,7 +126,7 @@ def _write(analysis: "Analysis", out: Path) -> None:
     from socialai_dsl.reporting.sections import compose
     from socialai_dsl.reporting.tables import as_csv, as_parquet, tables
 
-    document = compose(analysis, version("socialai-dsl"))
+    document = compose(analysis, version("socialai-dsl"), out)
     figures = out / FIGURES
     figures.mkdir(exist_ok=True)
     for name, image in document.images.items():

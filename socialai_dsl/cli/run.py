@@ -9,6 +9,7 @@ from typing import IO, TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.errors import Exit, UsageError
 from socialai_dsl.cli.run_folder import (
+    REPLAY,
     RESULT,
     SETTINGS,
     create_run_folder,
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from trainer.config import RunConfig
 
 SUMMARY: Final = "train an agent on a scenario, evaluate it and write pictures and figures"
+
+_REPLAYED: Final = 5
+"""So many failures, and so many successes."""
 
 BUILT_IN_AGENTS: Final = ("ppo", "random", "oracle", "human")
 
@@ -48,7 +52,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
     """Do the whole run."""
     import socialai_dsl
     from socialai_dsl.cli.agents import require_trainer
-    from socialai_dsl.cli.evaluation import Player, evaluate_agent
+    from socialai_dsl.cli.evaluation import evaluate_agent
+    from socialai_dsl.cli.player import Player
 
     require_trainer()
     config = _resumed(arguments) if arguments.resume else _started(arguments)
@@ -184,11 +189,10 @@ def _draw_curve(config: "RunConfig", program: "Playable", folder: Path, result: 
 def _write_card(
     config: "RunConfig", loaded: "Loaded", folder: Path, weights: Path, result: dict[str, Any]
 ) -> None:
+    from socialai_dsl.cli.evaluation import about_of
     from socialai_dsl.cli.model_card import FILE, model_card
 
-    data = loaded.resolved.data
-    about = str(data.get("about", "")) if isinstance(data, dict) else ""
-    write_text(folder / FILE, model_card(config, result, about, folder, weights))
+    write_text(folder / FILE, model_card(config, result, about_of(loaded), folder, weights))
 
 
 def _size(program: "Playable") -> str:
@@ -198,7 +202,13 @@ def _size(program: "Playable") -> str:
 
 
 def _record(evaluation: "Evaluation", folder: Path, label: str) -> None:
-    """Film the first success, or the first episode if there is none, and where there are both, the first failure."""
+    """Film the first success, or the first episode if there is none, and where there are both, the first failure.
+
+    A page replays some failures and successes.
+    """
+    from socialai_dsl.replay.page import replay_page
+
+    write_text(folder / REPLAY, replay_page(evaluation.traces(_REPLAYED)))
     success = evaluation.result.success
     shown = {"episode": int(success.argmax())}
     if success.any() and not success.all():
@@ -217,4 +227,5 @@ def _table(result: dict[str, Any], folder: Path) -> str:
         seconds, speed = result["train_seconds"], result["frames_per_second"]
         rows.append(("training", f"{result['frames']:,} frames in {seconds:.0f} s, {speed:,.0f} frames/s"))
     rows.append(("written to", str(folder)))
+    rows.append(("to look at", str(folder / REPLAY)))
     return "\n".join(["", *aligned(rows), "", *ending_lines(result["eval"])])

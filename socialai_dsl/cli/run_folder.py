@@ -10,6 +10,7 @@ from typing import Any, Final
 from socialai_dsl.atomic import write_json as write_json
 from socialai_dsl.atomic import write_text as write_text
 from socialai_dsl.cli.errors import UsageError
+from socialai_dsl.experiments.folder import REPLAY as REPLAY
 
 RESULT: Final = "result.json"
 SETTINGS: Final = "config.json"
@@ -22,11 +23,6 @@ def scenario_folder_name(spec: str) -> str:
     name, plus, variants = Path(path).name.partition("+")
     name = name.removesuffix(".yaml").removesuffix(".yml")
     return name + plus + variants + ("," if mark else "") + parameters.replace("&", ",").replace("/", "_")
-
-
-def base_name(spec: str) -> str:
-    """`scenarios/talkitout.yaml+unsocial?a=1` -> `talkitout`."""
-    return scenario_folder_name(spec.partition("?")[0]).partition("+")[0]
 
 
 def create_run_folder(out: Path | None, spec: str, seed: int) -> Path:

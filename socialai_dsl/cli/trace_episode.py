@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from socialai_dsl.cli.errors import UsageError
 from socialai_dsl.cli.typed import Phrases, split_line
@@ -12,12 +12,6 @@ from socialai_dsl.diagnostics import printable
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-    from socialai_dsl.program import Program
-    from socialai_dsl.program_suite import Playable
-
-_NOT_STATE: Final = ("t", "heard", "pending", "last")
-"""What `describe` says beside what the room is like."""
 
 
 @dataclass
@@ -157,6 +151,7 @@ class Traced:
     def steps(self, trace: Trace) -> Iterator[TraceStep]:
         """Play on to the end, or as far as there is something typed."""
         from socialai_dsl.program_suite import outcome_name
+        from socialai_dsl.replay.state import changes
 
         env, before = self._env.unwrapped, trace.state
         while trace.outcome is None:
@@ -191,10 +186,14 @@ class Traced:
 
     def _cast(self, info: dict[str, Any]) -> tuple[str, ...]:
         """The agent and the NPCs of what is played."""
+        from socialai_dsl.replay.state import cast_of, played
+
         return cast_of(played(self._env.unwrapped.program, info))
 
     def _names(self) -> tuple[str, ...]:
         """The same of everything that may be played."""
+        from socialai_dsl.replay.state import cast_of
+
         program = self._env.unwrapped.program
         programs = getattr(program, "programs", (program,))
         return tuple(dict.fromkeys(name for one in programs for name in cast_of(one)))
@@ -227,7 +226,7 @@ class Traced:
 
     def _policy(self) -> Any:
         from socialai_dsl.cli.agents import require_trainer
-        from socialai_dsl.cli.evaluation import Player, make_policy
+        from socialai_dsl.cli.player import Player, make_policy
 
         require_trainer()
         try:
@@ -247,39 +246,6 @@ def _origin(seed: int | None, options: dict[str, Any]) -> str:
     return f"seed {seed}{room}"
 
 
-def played(program: "Playable", info: dict[str, Any]) -> "Program":
-    """The program of an episode: of a suite the member's that `info` names."""
-    from socialai_dsl.program_suite import ProgramSuite
-
-    if not isinstance(program, ProgramSuite):
-        return program
-    return program.programs[program.members.index(info["member"])]
-
-
-def cast_of(program: "Program") -> tuple[str, ...]:
-    """The agent and the NPCs, by name."""
-    return tuple(str(entity) for entity in program.entities if entity.role != "object")
-
-
 def is_among(who: str, names: Sequence[str]) -> bool:
     """Whether somebody is named, or is a member of a group that is."""
     return who in names or who.partition("[")[0] in names
-
-
-def changes(before: dict[str, Any], after: dict[str, Any]) -> dict[str, tuple[Any, Any]]:
-    """What differs between two states, by address: `honest.state`, `doors[1].state`, `let.exit`."""
-    old, new = dict(_leaves(before, "")), dict(_leaves(after, ""))
-    return {key: (old.get(key), new.get(key)) for key in {**old, **new} if old.get(key) != new.get(key)}
-
-
-def _leaves(value: Any, address: str) -> Iterator[tuple[str, Any]]:
-    """Values by address; a place counts as one, and so does all of a memory."""
-    if isinstance(value, dict):
-        for key, part in value.items():
-            if address or key not in _NOT_STATE:
-                yield from _leaves(part, f"{address}.{key}" if address else key)
-    elif isinstance(value, list) and value and isinstance(value[0], dict):
-        for index, part in enumerate(value):
-            yield from _leaves(part, f"{address}[{index}]")
-    else:
-        yield address, value

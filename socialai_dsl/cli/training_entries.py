@@ -10,7 +10,6 @@ from typing import Any
 import torch
 
 import socialai_dsl
-from trainer.chunks import update_chunks
 from trainer.config import RunConfig, configure
 from trainer.ppo import threads_of, update
 from trainer.rollout import collect
@@ -119,10 +118,7 @@ def own_updates(config: RunConfig, envs: Any, every_frame: bool) -> Iterator[Upd
             began = time.perf_counter()
             rollout = collect(session)
             seconds = time.perf_counter() - began
-            if config.update == "chunks":
-                update_chunks(session, rollout)
-            else:
-                update(session, rollout, mapper, config.threads)
+            update(session, rollout, mapper)
             session.update += 1
             yield Update(seconds, count.take())
 

@@ -125,8 +125,8 @@ def _tried(result: "CheckResult", arguments: argparse.Namespace) -> tuple[Diagno
     """What trying the scenario of a file out shows, or the members of a suite; told to people as it goes."""
     if result.checked is None and result.suite is None:
         return ()
+    from socialai_dsl.analysis.effort import Clock, Effort
     from socialai_dsl.cli.check import STATES, check_scenario, scenarios_of
-    from socialai_dsl.envs.effort import Clock, Effort
 
     found: list[Diagnostic] = []
     progress = ProgressLine(sys.stderr)

@@ -5,23 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from socialai_dsl.compiler.assembler import Label, constant
-from socialai_dsl.compiler.cells import NOWHERE
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.lines import Lines
-from socialai_dsl.compiler.registers import entity_register, label
+from socialai_dsl.compiler.registers import NOWHERE, entity_register, label
 from socialai_dsl.program import MOST_CHOICES, Body, Field, Op
-from socialai_dsl.semantics.terms import (
-    BOOL,
-    Activity,
-    CellOf,
-    Checked,
-    Const,
-    FieldOf,
-    Measure,
-    ObjectType,
-    Read,
-    Term,
-)
+from socialai_dsl.semantics.plans import Activity, Checked
+from socialai_dsl.semantics.terms import BOOL, CellOf, Const, FieldOf, Measure, ObjectType, Read, Term
 
 _BODIES = {"left": Body.LEFT, "right": Body.RIGHT, "forward": Body.FORWARD, "toggle": Body.TOGGLE}
 GOING = ("go_to", "go_next_to", "enter")
@@ -140,6 +129,8 @@ class Activities:
                 block.emit(Op.POINT, own, to.value(way))
             case "stop_pointing":
                 block.emit(Op.BODY, constant(Body.STOP_POINTING))
+            case "stay_near":
+                self._stay_near(activity)
             case "flee":
                 away = self._turned_round(
                     to.into_temporary(Op.QUADRANT, own, self._present(activity.args[0]))
@@ -184,6 +175,19 @@ class Activities:
             block.emit(Op.BODY, constant(body))
             block.skip(done)
             block.bind(following)
+        block.emit(Op.BODY, constant(Body.NONE))
+        block.bind(done)
+
+    def _stay_near(self, activity: Activity) -> None:
+        """Go next to the goal while it is farther away than that."""
+        to, block, own = self.to, self.to.block, constant(self.entity)
+        goal = self._present(activity.args[0])
+        near, done = Label(), Label()
+        distance = to.into_temporary(Op.DISTANCE, own, goal)
+        block.test(Op.IF_LT, to.value(activity.args[1]), distance, near)
+        block.emit(Op.GO_NEXT_TO, own, goal, self.turn)
+        block.skip(done)
+        block.bind(near)
         block.emit(Op.BODY, constant(Body.NONE))
         block.bind(done)
 

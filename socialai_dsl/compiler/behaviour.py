@@ -6,20 +6,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from socialai_dsl.compiler.activities import ACTING, ACTS, GOING, NOTHING, Activities, has_aim
-from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Sites, constant
-from socialai_dsl.compiler.beliefs import perceive
-from socialai_dsl.compiler.classes import Classes
+from socialai_dsl.compiler.allocation import Allocation
+from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.deferred import Deferred
 from socialai_dsl.compiler.effects import Effects
 from socialai_dsl.compiler.expressions import Expressions, chance_word
 from socialai_dsl.compiler.folding import FALSE, SEVERAL, Facts, fold, fold_whole
-from socialai_dsl.compiler.homes import Homes
-from socialai_dsl.compiler.lines import Lines
-from socialai_dsl.compiler.probes import NO_PROBES, Asked, Probes
-from socialai_dsl.compiler.registers import Registers, state_names
+from socialai_dsl.compiler.memories import perceive
+from socialai_dsl.compiler.probes import Asked
+from socialai_dsl.compiler.registers import state_names
 from socialai_dsl.program import Op
-from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.terms import BOOL, Checked, FramePlan, RulePlan, StepPlan, Type
+from socialai_dsl.semantics import plans, terms
+from socialai_dsl.semantics.plans import FramePlan, RulePlan, StepPlan
+from socialai_dsl.semantics.terms import BOOL, Type
 
 FOR_EVER = -1
 AGENT = 0
@@ -39,35 +38,16 @@ class FrameCode:
     deferred: int
 
 
-@dataclass
-class Behaviour:
-    """Compiles the frames of a scenario into rows of the state table.
-
-    Attributes:
-        rules: name of each counted rule, in the order of their counters.
-    """
-
-    checked: Checked
-    registers: Registers
-    classes: Classes
-    sites: Sites
-    lines: Lines
-    homes: Homes
-    code: CodeTable
-    rules: list[str]
-    inbox_of: dict[str, int]
-    probes: Probes = NO_PROBES
-
-    def frame(self, number: int, frame: FramePlan) -> FrameCode:
-        """The code of frame instance `number`."""
-        compiler = _FrameCompiler(self, number, frame)
-        return FrameCode(compiler.rows(), compiler.perceive(), compiler.deferred())
+def frame_code(allocation: Allocation, number: int, frame: FramePlan) -> FrameCode:
+    """The code of frame instance `number`: rows of the state table, and what is shared by its states."""
+    compiler = _FrameCompiler(allocation, number, frame)
+    return FrameCode(compiler.rows(), compiler.perceive(), compiler.deferred())
 
 
 class _FrameCompiler:
     """One frame as one member plays it."""
 
-    def __init__(self, shared: Behaviour, number: int, frame: FramePlan) -> None:
+    def __init__(self, shared: Allocation, number: int, frame: FramePlan) -> None:
         self.shared, self.number, self.frame = shared, number, frame
         self.states = state_names(frame)
         self.clock = shared.registers.by_path[f"{frame.member}.clock"]
@@ -89,7 +69,7 @@ class _FrameCompiler:
         self._is_agents = frame.entity == AGENT
         self.later = Deferred(frame, self.speaker, shared.registers, shared.lines)
 
-    def _range_of_aim(self, activity: terms.Activity) -> Type:
+    def _range_of_aim(self, activity: plans.Activity) -> Type:
         highest = self.shared.registers.cut(activity.args[0].type).high
         return Type("int", NOTHING, ACTING if activity.name in ACTS else highest)
 
@@ -135,7 +115,7 @@ class _FrameCompiler:
     def _row(
         self,
         k: int,
-        activity: terms.Activity | None,
+        activity: plans.Activity | None,
         first: Callable[[Expressions], None],
         then: Callable[[Expressions], None],
     ) -> list[int]:
@@ -159,13 +139,9 @@ class _FrameCompiler:
         return addresses
 
     def _expressions(self, facts: Facts) -> Expressions:
-        shared = self.shared
-        inbox = shared.inbox_of[self.frame.member]
-        to = Expressions(Block(), shared.checked, shared.registers, shared.classes, shared.sites, inbox)
-        to.facts = facts
-        return to
+        return self.shared.expressions(facts, self.shared.inbox_of[self.frame.member])
 
-    def _activity(self, activity: terms.Activity | None, label: str, aim: int | None) -> int:
+    def _activity(self, activity: plans.Activity | None, label: str, aim: int | None) -> int:
         if activity is None or activity.name == "stay":
             return 0
         to = self._expressions(Facts())

@@ -1,16 +1,17 @@
-"""When the value of a term can change after the reset: never, with the statuses of objects, or at any time."""
+"""What can change in an episode: who moves, turns, leaves and appears, and with that the value of a term."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import fields
 from enum import IntEnum
 from typing import assert_never
 
 from socialai_dsl.compiler.folding import substitute
-from socialai_dsl.compiler.mobility import Mobility, numbers_of, plans
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.terms import Checked, Const, Entity, Term
+from socialai_dsl.semantics.plans import Activity, Checked, Effect, Entity, RulePlan, StepPlan
+from socialai_dsl.semantics.signatures import ACTIVITIES
+from socialai_dsl.semantics.terms import Const, Term
+from socialai_dsl.trees import children
 
 _LOOKING = ("faces", "faces_toward", "eye_contact")
 _OVER_OBJECTS = ("looks_at", "unobstructed")
@@ -95,9 +96,7 @@ class Changes:
 
     def _parts(self, term: Term) -> When:
         """Of a term that only combines others."""
-        values = (getattr(term, item.name) for item in fields(term))
-        parts = (part for value in values for part in (value if isinstance(value, tuple) else (value,)))
-        return max((self.of(part) for part in parts if isinstance(part, Term)), default=When.NEVER)
+        return max((self.of(part) for part in children(term) if isinstance(part, Term)), default=When.NEVER)
 
     def _items(self, term: terms.Quantified) -> When:
         conditions = [
@@ -171,3 +170,87 @@ class Changes:
             return When.NEVER
         turns = any(thing.number in self.turning for thing in self._things(term))
         return When.ANY_TIME if turns else When.NEVER
+
+
+# -- what moves and leaves -------------------------------------------------------------------------------------
+
+
+class Mobility:
+    """Numbers of entities.
+
+    Attributes:
+        turning, walking: those whose direction or place can change. vanishing: those that can leave the room or come
+        into it. contents: those that may lie in others. pointing: whether anybody points.
+    """
+
+    def __init__(self, checked: Checked) -> None:
+        # The agent does what it likes.
+        self.turning, self.walking = {0}, {0}
+        self.vanishing: set[int] = set()
+        self.contents: set[int] = set()
+        self.pointing = False
+        for number, activity in activities(checked):
+            self._act(number, activity)
+        for plan in plans(checked):
+            for effect in plan.causes:
+                self._cause(effect)
+        for entity in checked.entities:
+            if entity.type is not None and entity.type.rolls:
+                self.walking.add(entity.number)
+            if entity.type is not None and entity.type.pushed:
+                self.turning.add(entity.number)
+            if entity.contains:
+                self.vanishing |= {entity.number, *entity.contains}
+                self.contents |= set(entity.contains)
+        self.walking |= self.contents
+
+    def _act(self, number: int, activity: Activity) -> None:
+        self.pointing |= activity.name == "point"
+        moves = ACTIVITIES[activity.name].moves
+        if moves != "stays":
+            self.turning.add(number)
+        if moves == "walks":
+            self.walking.add(number)
+
+    def _cause(self, effect: Effect) -> None:
+        targets = {number for target in effect.entities for number in numbers_of(target)}
+        if effect.name in ("vanish", "move_into", "put"):
+            self.vanishing |= targets
+        if effect.name in ("move_into", "put"):
+            self.walking |= targets
+        if effect.name == "move_into":
+            self.contents |= targets
+
+
+def leaving(checked: Checked) -> frozenset[int]:
+    """The entities that leave the room at some time.
+
+    Any may be out of it from the beginning, for want of a free cell, say, or as a layout has it.
+    """
+    return frozenset(Mobility(checked).vanishing)
+
+
+def numbers_of(term: Term) -> list[int]:
+    """The entities that a term may name."""
+    return [term.value] if isinstance(term, Const) else list(range(term.type.low, term.type.high + 1))
+
+
+def plans(checked: Checked) -> Iterable[RulePlan | StepPlan]:
+    """Everything that has effects."""
+    yield from checked.rules
+    for frame in checked.frames:
+        yield from frame.steps
+        for state in frame.states:
+            yield from (*state.first, *state.then)
+
+
+def activities(checked: Checked) -> Iterable[tuple[int, Activity]]:
+    """Who may do what."""
+    for frame in checked.frames:
+        for step in frame.steps:
+            yield frame.entity, step.activity
+        for state in frame.states:
+            yield frame.entity, state.activity
+            for rule in (*state.first, *state.then):
+                if rule.do is not None:
+                    yield frame.entity, rule.do

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import fields, is_dataclass
-from typing import Any, TypeVar
+from collections.abc import Iterable
+from typing import TypeVar
 
-from socialai_dsl.semantics.terms import Activity, Checked, HeardNoun, Pattern, Speaker
+from socialai_dsl.semantics.plans import Activity, Checked
+from socialai_dsl.semantics.terms import HeardNoun, Pattern, Speaker
+from socialai_dsl.trees import every
 from socialai_dsl.vocabulary import normal
 
 _Kind = TypeVar("_Kind")
@@ -29,8 +30,8 @@ class Classes:
     """
 
     def __init__(self, checked: Checked) -> None:
-        self.patterns = list(dict.fromkeys(parts(checked, Pattern)))
-        self.speakers_matter = any(True for kind in (Speaker, HeardNoun) for _ in parts(checked, kind))
+        self.patterns = list(dict.fromkeys(every(Pattern, checked)))
+        self.speakers_matter = any(True for kind in (Speaker, HeardNoun) for _ in every(kind, checked))
         self.sets: list[frozenset[int]] = []
         self.said: dict[tuple[int, Pattern | None], frozenset[int]] = {}
         self._nouns = {normal(text): noun for pattern in self.patterns for text, noun in pattern.nouns}
@@ -41,7 +42,7 @@ class Classes:
         for texts in self._texts:
             for text in sorted(texts):
                 self.of_text(text)
-        performs = any(activity.name == "perform" for activity in parts(checked.frames, Activity))
+        performs = any(activity.name == "perform" for activity in every(Activity, checked.frames))
         self.of_performed = [
             self._number(self._of_pair(k, nouns) | self._of_text(text))
             for k, text in enumerate(texts_of_pairs(checked))
@@ -99,15 +100,3 @@ class Classes:
 def texts_of_pairs(checked: Checked) -> list[str]:
     """Texts of all pairs, row by row."""
     return [template.replace("<noun>", noun) for template in checked.templates for noun in checked.nouns]
-
-
-def parts(node: Any, kind: type[_Kind]) -> Iterator[_Kind]:
-    """All parts of this kind, in order of the fields."""
-    if isinstance(node, kind):
-        yield node
-    if isinstance(node, tuple):
-        for item in node:
-            yield from parts(item, kind)
-    elif is_dataclass(node):
-        for field in fields(node):
-            yield from parts(getattr(node, field.name), kind)

@@ -86,13 +86,10 @@ class _Code:
 
     def _entries(self) -> Iterator[tuple[int, Header]]:
         """Addresses where code starts, and the word or table of the header that names them."""
-        h, words = self.program.header, self.program.words
         for word in _ENTRIES:
-            yield h(word), word
-        states = h(Header.STATES) * (1 + 2 * (h(Header.CLASSES) + 1))
-        for table, size in ((Header.STATE_AT, states), (Header.OUTCOME_AT, 8 * h(Header.CLASSES))):
-            for pc in words[h(table) : h(table) + size]:
-                yield int(pc), table
+            yield self.program.header(word), word
+        for table in (Header.STATE_AT, Header.OUTCOME_AT):
+            yield from ((pc, table) for pc in self.program.table(table).ravel().tolist())
         for pc in _of_frames(self.program):
             yield pc, Header.FRAME_AT
 
@@ -169,19 +166,14 @@ class _Code:
 
 def _of_frames(program: Program) -> Iterator[int]:
     """Addresses in the frame table."""
-    for number in range(program.header(Header.FRAMES)):
-        at = program.header(Header.FRAME_AT) + FrameColumn.COLUMNS * number
-        for column in (FrameColumn.PERCEIVE, FrameColumn.DEFERRED):
-            yield int(program.words[at + column])
+    for row in program.table(Header.FRAME_AT).tolist():
+        yield from (row[FrameColumn.PERCEIVE], row[FrameColumn.DEFERRED])
 
 
 def _of_agent(program: Program) -> frozenset[int]:
     """Addresses of the code that chooses what the agent does, if it follows a frame."""
-    h, words = program.header, program.words
-    if not h(Header.FLAGS) & Flag.AGENT_FRAME or not h(Header.FRAMES):
+    if not program.header(Header.FLAGS) & Flag.AGENT_FRAME or not program.header(Header.FRAMES):
         return frozenset()
-    frame = h(Header.FRAME_AT)
-    columns = 1 + 2 * (h(Header.CLASSES) + 1)
-    first = h(Header.STATE_AT) + columns * int(words[frame + FrameColumn.ROWS])
-    rows = words[first : first + columns * int(words[frame + FrameColumn.STATES])]
-    return frozenset(int(pc) for pc in rows)
+    frame = program.table(Header.FRAME_AT)[0].tolist()
+    first, count = frame[FrameColumn.ROWS], frame[FrameColumn.STATES]
+    return frozenset(program.table(Header.STATE_AT)[first : first + count].ravel().tolist())

@@ -11,7 +11,8 @@ from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.registers import Registers
 from socialai_dsl.program import Op
-from socialai_dsl.semantics.terms import Const, Entity, FramePlan, RulePlan, Term, Type
+from socialai_dsl.semantics.plans import Entity, FramePlan, RulePlan
+from socialai_dsl.semantics.terms import Const, Term, Type
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,13 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from socialai_dsl.compiler.assembler import Label, constant
+from socialai_dsl.compiler.changes import numbers_of
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.homes import Homes
 from socialai_dsl.compiler.lines import Lines
-from socialai_dsl.compiler.mobility import numbers_of
 from socialai_dsl.compiler.registers import Registers, label
 from socialai_dsl.program import TEMPORARY, Field, Op
-from socialai_dsl.semantics.terms import Effect, Entity, RulePlan, StepPlan, Term
+from socialai_dsl.semantics.plans import Effect, Entity, RulePlan, StepPlan
+from socialai_dsl.semantics.terms import Term
 
 _TARGETS = {"open": "open", "close": "closed", "lock": "locked", "reveal": "opened"}
 

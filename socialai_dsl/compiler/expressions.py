@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import cached_property
 
-from socialai_dsl.compiler.assembler import LARGEST, Block, Label, Sites, constant
-from socialai_dsl.compiler.cells import LoopCell, coordinate, count_cells, one_cell
-from socialai_dsl.compiler.classes import SILENCE, Classes
-from socialai_dsl.compiler.folding import TRUE, Facts, fold, fold_whole, substitute
-from socialai_dsl.compiler.mobility import leaving
+from socialai_dsl.compiler.assembler import Label, constant
+from socialai_dsl.compiler.cells import coordinate, count_cells, one_cell
+from socialai_dsl.compiler.classes import SILENCE
+from socialai_dsl.compiler.emitter import Emitter, LoopCell
+from socialai_dsl.compiler.folding import fold, fold_whole
 from socialai_dsl.compiler.quantifiers import count_things, first_thing, nearest_thing, picked_thing
-from socialai_dsl.compiler.registers import Registers, entity_register, found_path, said_path, state_names
+from socialai_dsl.compiler.registers import entity_register, found_path, said_path, state_names
 from socialai_dsl.compiler.selects import among, asks, selected_condition, selected_value
 from socialai_dsl.program import CONSTANT, TEMPORARY, Field, Op, Register
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.terms import Checked, Const, Term
+from socialai_dsl.semantics.terms import Const, Term
 
 _FIELDS = {
     "x": Field.X,
@@ -67,40 +66,8 @@ def chance_word(probability: float) -> int:
     return round(probability * 65536)
 
 
-class Expressions:
-    """Emits conditions and values into one block.
-
-    Attributes:
-        block: where to. site: path of the picks of the value being emitted. facts: what is known. inbox: first register
-        of the inbox of the member whose frame this is, or -1.
-        loop: the cell that the loop over cells is at, outside of loops None.
-        failed: label to skip to when a pick finds nothing; None: it takes the first item.
-        is_bare: whether the board does not show what stands in the room, as while a room is set up.
-        has_drawn: whether some of the code had to have it shown.
-    """
-
-    def __init__(
-        self,
-        block: Block,
-        checked: Checked,
-        registers: Registers,
-        classes: Classes,
-        sites: Sites,
-        inbox: int = -1,
-    ) -> None:
-        self.block, self.checked, self.registers = block, checked, registers
-        self.classes, self.sites, self.inbox = classes, sites, inbox
-        self.site = ""
-        self.facts = Facts()
-        self.loop: LoopCell | None = None
-        self.failed: Label | None = None
-        self.is_bare = False
-        self.has_drawn = False
-
-    @cached_property
-    def leaving(self) -> frozenset[int]:
-        """The entities of which it is still written down where they were when they are out of the room."""
-        return leaving(self.checked)
+class Expressions(Emitter):
+    """Emits conditions and values of every kind."""
 
     # --- conditions ---
 
@@ -111,13 +78,8 @@ class Expressions:
         self.condition(fold_whole(sited.term, self.facts, self.classes), otherwise)
         self.failed = failed
 
-    def condition(self, term: Term, otherwise: Label) -> None:
-        """Fall through if `term` holds, else skip to `otherwise`."""
-        mark = self.block.taken
-        self._condition(term, otherwise)
-        self.block.release(mark)
-
-    def _condition(self, term: Term, otherwise: Label) -> None:
+    def test(self, term: Term, otherwise: Label) -> None:
+        """See `Emitter.test`."""
         block = self.block
         match term:
             case Const():
@@ -194,23 +156,6 @@ class Expressions:
         self.block.skip(otherwise)
         self.block.bind(false)
         return None
-
-    def one_of(self, op: Op, left: int, numbers: frozenset[int], otherwise: Label) -> None:
-        """Whether a class (or state) is among these numbers."""
-        if not numbers:
-            self.block.skip(otherwise)
-            return
-        found = Label()
-        *rest, last = (
-            n if op == Op.IF_HEARD else constant(n) for n in sorted(numbers)
-        )  # IF_HEARD takes the class itself
-        for number in rest:
-            following = Label()
-            self.block.test(op, left, number, following)
-            self.block.skip(found)
-            self.block.bind(following)
-        self.block.test(op, left, last, otherwise)
-        self.block.bind(found)
 
     def _said_by(self, term: terms.SaidBy, otherwise: Label) -> None:
         """Whether what an NPC has said in this step is one of its lines that fit."""
@@ -350,32 +295,10 @@ class Expressions:
         number = self.into_temporary(Op.MAX, number, constant(term.type.low))
         return self.into_temporary(Op.MIN, number, constant(term.type.high))
 
-    def saturated(self, term: Term) -> int:
-        """The operand of a value that is cut to its type: of things that are gone, places and distances are odd."""
-        value = self.value(term)
-        if term.type.kind != "int" or isinstance(term, Const | terms.Read | terms.World):
-            return value
-        value = self.into_temporary(Op.MAX, value, self.number(term.type.low))
-        return self.into_temporary(Op.MIN, value, self.number(term.type.high))
-
-    def number(self, value: int) -> int:
-        """The operand of a known value: a constant, or computed where it is too large for one."""
-        if -LARGEST <= value <= LARGEST:
-            return constant(value)
-        quotient, rest = divmod(value, LARGEST)
-        product = self.into_temporary(Op.MUL, self.number(quotient), constant(LARGEST))
-        return self.into_temporary(Op.ADD, product, constant(rest))
-
     def sited_copy(self, sited: terms.Sited) -> int:
         """The same in a temporary that nothing else changes or reads."""
         value = self.sited_value(sited)
         return value if TEMPORARY <= value < CONSTANT // 2 else self.into_temporary(Op.LOAD, value)
-
-    def into_temporary(self, op: Op, b: int, c: int = 0) -> int:
-        """A fresh temporary with the result of an instruction."""
-        result = self.block.temporary()
-        self.block.emit(op, result, b, c)
-        return result
 
     def _operation(self, term: terms.Operation) -> int:
         if term.op in ("abs", "neg"):
@@ -399,7 +322,3 @@ class Expressions:
         self.block.emit(Op.LOAD, result, constant(1))
         self.block.bind(false)
         return result
-
-    def instance(self, term: terms.Quantified, item: Const) -> Term:
-        """The condition of a quantifier for one of its items."""
-        return fold(substitute(term.condition or TRUE, term.variable, item), self.facts, self.classes)

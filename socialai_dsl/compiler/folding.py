@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from socialai_dsl.compiler.classes import SILENCE, Classes
@@ -11,6 +11,7 @@ from socialai_dsl.program import Body
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.build import may_find_nothing
 from socialai_dsl.semantics.terms import BOOL, Const, Term
+from socialai_dsl.trees import every, rebuilt
 
 TRUE = Const(BOOL, 1)
 FALSE = Const(BOOL, 0)
@@ -44,7 +45,7 @@ def fold(term: Term, facts: Facts, classes: Classes) -> Term:
         return Const(term.type, facts.action)
     if isinstance(term, terms.PokedNow) and _toggles_nothing(facts) and not may_find_nothing(term.entity):
         return FALSE
-    return _decide(rebuild(term, lambda part: fold(part, facts, classes)))
+    return _decide(rebuilt(term, lambda part: fold(part, facts, classes)))
 
 
 def _toggles_nothing(facts: Facts) -> bool:
@@ -64,34 +65,19 @@ def _never_true(term: Term) -> bool:
     return term == FALSE
 
 
-def rebuild(term: Term, change: Callable[[Term], Term]) -> Term:
-    """The same kind of node with `change` applied to the terms right below it."""
-    changes: dict[str, Any] = {}
-    for item in fields(term):
-        value = getattr(term, item.name)
-        if isinstance(value, Term):
-            changes[item.name] = change(value)
-        elif isinstance(value, tuple) and any(isinstance(part, Term) for part in value):
-            changes[item.name] = tuple(change(part) if isinstance(part, Term) else part for part in value)
-    return replace(term, **changes) if changes else term
-
-
 def substitute(term: Term, name: str, value: Const) -> Term:
     """The term with the quantifier's variable replaced by one of its items."""
     if isinstance(term, terms.Variable):
         return value if term.name == name else term
     if isinstance(term, terms.Quantified) and term.variable == name:
         return term
-    return rebuild(term, lambda part: substitute(part, name, value))
+    found: Term = rebuilt(term, lambda part: substitute(part, name, value))
+    return found
 
 
 def mentions(term: Any, kind: type, such: Callable[[Any], bool] = lambda _: True) -> bool:
     """Whether a term of this kind, and such a one, stands anywhere in the tree."""
-    if isinstance(term, kind) and such(term):
-        return True
-    if isinstance(term, tuple):
-        return any(mentions(part, kind, such) for part in term)
-    return is_dataclass(term) and any(mentions(getattr(term, item.name), kind, such) for item in fields(term))
+    return any(map(such, every(kind, term)))
 
 
 def _truth(value: bool) -> Const:

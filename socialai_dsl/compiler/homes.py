@@ -6,13 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from socialai_dsl.compiler.assembler import Block, Label, constant
-from socialai_dsl.compiler.cells import NOWHERE, ROW
+from socialai_dsl.compiler.cells import ROW
+from socialai_dsl.compiler.changes import Mobility, numbers_of, plans
 from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.compiler.mobility import Mobility, numbers_of, plans
-from socialai_dsl.compiler.registers import Registers, entity_register, label
+from socialai_dsl.compiler.registers import NOWHERE, Registers, entity_register, label
 from socialai_dsl.program import CELL, Field, Op
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.terms import BOOL, Checked, Entity, Type
+from socialai_dsl.semantics.plans import Checked, Entity
+from socialai_dsl.semantics.terms import BOOL, Type
 
 
 @dataclass(frozen=True, slots=True)

@@ -228,8 +228,8 @@ class _Checked:
     def _state(self, frame: int, state: int) -> str | None:
         if problem := self.literal(frame, 0, self.h(Header.FRAMES) - 1):
             return problem
-        at = self.h(Header.FRAME_AT) + FrameColumn.COLUMNS * frame + FrameColumn.STATES
-        return self.literal(state, 0, int(self.program.words[at]) - 1)
+        states = int(self.program.table(Header.FRAME_AT)[frame, FrameColumn.STATES])
+        return self.literal(state, 0, states - 1)
 
     def _count(self) -> str | None:
         return self.literal(self.words[0], 0, len(self.program.rules) - 1)

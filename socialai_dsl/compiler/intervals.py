@@ -168,5 +168,4 @@ def greatest_status(program: Program, entity: int) -> int:
     """The last status of an object; the greatest status code of an NPC."""
     if program.entities[entity].role == "object":
         return max(1, len(program.entities[entity].states)) - 1
-    at = program.header(Header.ENTITY_AT) + entity * EntityColumn.COLUMNS
-    return int(program.words[at + EntityColumn.KIND])
+    return int(program.table(Header.ENTITY_AT)[entity, EntityColumn.KIND])

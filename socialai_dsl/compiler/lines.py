@@ -8,22 +8,13 @@ from itertools import product
 from math import prod
 
 from socialai_dsl.compiler.assembler import Label, constant
-from socialai_dsl.compiler.classes import Classes, parts, texts_of_pairs
+from socialai_dsl.compiler.classes import Classes, texts_of_pairs
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.registers import Registers, said_path
 from socialai_dsl.program import Op
-from socialai_dsl.semantics.terms import (
-    Activity,
-    Checked,
-    Const,
-    Entity,
-    Line,
-    Pattern,
-    SaidBy,
-    Term,
-    Type,
-    Variable,
-)
+from socialai_dsl.semantics.plans import Activity, Checked, Entity
+from socialai_dsl.semantics.terms import Const, Line, Pattern, SaidBy, Term, Type, Variable
+from socialai_dsl.trees import every
 from socialai_dsl.vocabulary import normal, words
 
 UNKNOWN = 1
@@ -231,14 +222,14 @@ class Lines:
 
 def note_what_is_said(checked: Checked, lines: Lines, registers: Registers) -> None:
     """Where somebody asks what an NPC has said: find all lines there are, and make room to note them."""
-    asked = list(parts(checked, SaidBy))
+    asked = list(every(SaidBy, checked))
     if not asked:
         return
     for frame in checked.frames:
         speaker = checked.entities[frame.entity]
-        for said in parts(frame, Line):
+        for said in every(Line, frame):
             lines.bounds(speaker, said)
-        for activity in parts(frame, Activity):
+        for activity in every(Activity, frame):
             if activity.name == "perform":
                 lines.first_performed(speaker)
     for number in sorted({term.entity for term in asked}):

@@ -1,4 +1,4 @@
-"""What is remembered to code: `prev(...)` and open memories at the start of a step, the agent's acts at its end."""
+"""What is kept, to code: `prev(...)` and open memories as a step begins, acts as it ends, beliefs at each turn."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from socialai_dsl.compiler.effects import store
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.registers import found_path, said_path
 from socialai_dsl.program import Op, Register
-from socialai_dsl.semantics.terms import Drawn, MemoryPlan, Sited
+from socialai_dsl.semantics.plans import Drawn, MemoryPlan
+from socialai_dsl.semantics.terms import Sited
 
 
 def remember(to: Expressions) -> None:
@@ -79,3 +80,24 @@ def push_acts(to: Expressions) -> None:
         block.emit(Op.MIN, filled, more, constant(memory.length))
         block.release(mark)
         block.bind(shut)
+
+
+# -- beliefs ---------------------------------------------------------------------------------------------------
+
+
+def perceive(to: Expressions, member: str) -> None:
+    """Emit the beliefs of a member, in order: each that it can make out takes its value."""
+    block = to.block
+    for belief in to.checked.beliefs:
+        if belief.member != member:
+            continue
+        unseen = Label()
+        mark = block.taken
+        if belief.when is not None:
+            to.sited_condition(belief.when, unseen)
+        to.failed = unseen
+        value = to.sited_copy(belief.value)
+        to.failed = None
+        store(to.registers, block.emit, belief.path, value)
+        block.bind(unseen)
+        block.release(mark)

@@ -2,40 +2,33 @@
 
 from __future__ import annotations
 
-from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Sites
-from socialai_dsl.compiler.classes import Classes
+from itertools import product
+
+from socialai_dsl.compiler.allocation import Allocation
+from socialai_dsl.compiler.assembler import Label
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import FALSE, Facts, fold_whole
-from socialai_dsl.compiler.probes import NO_PROBES, Probes
-from socialai_dsl.compiler.registers import Registers
+from socialai_dsl.compiler.probes import Probes
 from socialai_dsl.program import Body, Op
-from socialai_dsl.semantics.terms import Checked
+from socialai_dsl.semantics.plans import Checked
 
 _BODIES = range(Body.NONE + 1)
 """What the agent can do."""
 
 
-def outcome_table(
-    checked: Checked,
-    registers: Registers,
-    classes: Classes,
-    sites: Sites,
-    code: CodeTable,
-    probes: Probes = NO_PROBES,
-) -> list[int]:
+def outcome_table(allocation: Allocation) -> list[int]:
     """Addresses by (class, action), row by row."""
+    checked, probes, code = allocation.checked, allocation.probes, allocation.code
+    classes = range(allocation.classes.count)
     if probes.recording:
-        to = Expressions(Block(), checked, registers, classes, sites)
+        to = allocation.expressions()
         _first_that_holds(to, checked, probes)
-        return [code.add(to.block, "outcome")] * (classes.count * 8)
+        return [code.add(to.block, "outcome")] * (len(classes) * len(_BODIES))
     table = []
-    for said in range(classes.count):
-        for action in map(Body, _BODIES):
-            facts = Facts(said=said, action=action)
-            to = Expressions(Block(), checked, registers, classes, sites)
-            to.facts = facts
-            _first_that_holds(to, checked, probes)
-            table.append(code.add(to.block, f"outcome after class {said}, {action.name.lower()}"))
+    for said, action in product(classes, map(Body, _BODIES)):
+        to = allocation.expressions(Facts(said=said, action=action))
+        _first_that_holds(to, checked, probes)
+        table.append(code.add(to.block, f"outcome after class {said}, {action.name.lower()}"))
     return table
 
 

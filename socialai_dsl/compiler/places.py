@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from socialai_dsl.compiler.assembler import Label, constant
-from socialai_dsl.compiler.cells import keep_each
+from socialai_dsl.compiler.cells import (
+    EVERYWHERE,
+    conjuncts,
+    fill_rectangle,
+    is_about_cell,
+    keep_each,
+    keep_shape,
+)
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import mentions
-from socialai_dsl.compiler.shapes import EVERYWHERE, conjuncts, fill_rectangle, is_about_cell, keep_shape
 from socialai_dsl.program import Counting, Field, Op, Register, Side
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.geometry import EXACT
-from socialai_dsl.semantics.terms import Placing, Region, Term
+from socialai_dsl.semantics.plans import Placing, Region
+from socialai_dsl.semantics.terms import Term
 
 _SIDES = {"top": Side.TOP, "bottom": Side.BOTTOM, "left": Side.LEFT, "right": Side.RIGHT}
 

@@ -19,8 +19,9 @@ from socialai_dsl.grammar import unparse
 from socialai_dsl.program import Op, Program, RegisterName
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.build import all_of
+from socialai_dsl.semantics.plans import Checked, OutcomePlan, RulePlan, StepPlan
 from socialai_dsl.semantics.readings import Reading, Readings
-from socialai_dsl.semantics.terms import BOOL, Checked, Const, OutcomePlan, RulePlan, StepPlan, Term, Type
+from socialai_dsl.semantics.terms import BOOL, Const, Term, Type
 
 _LEAST, _GREATEST = -32768, 32767
 _MOST_VALUES = 6

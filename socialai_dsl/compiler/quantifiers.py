@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from socialai_dsl.compiler.assembler import Label, constant
+from socialai_dsl.compiler.emitter import Emitter
 from socialai_dsl.program import Op, Register
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.terms import Const
@@ -20,25 +19,22 @@ _MOST_OTHERS = 127
 _LAST_NEAREST = 255
 """What `Op.NEAREST` has room for."""
 
-if TYPE_CHECKING:
-    from socialai_dsl.compiler.expressions import Expressions
 
-
-def count_things(to: Expressions, term: terms.Quantified) -> int:
+def count_things(to: Emitter, term: terms.Quantified) -> int:
     """A temporary with the number of things that the condition holds for."""
     if len(term.items) > _SET:
         return _count_one_by_one(to, term)
     return to.into_temporary(Op.COUNT_BITS, _mask(to, term))
 
 
-def first_thing(to: Expressions, term: terms.Quantified) -> int:
+def first_thing(to: Emitter, term: terms.Quantified) -> int:
     """The operand of the first thing that the condition holds for."""
     if len(term.items) > _SET:
         return _nth(to, term, to.into_temporary(Op.LOAD, constant(0)))
     return _chosen(to, term, Op.LOWEST_BIT)
 
 
-def _mask(to: Expressions, term: terms.Quantified) -> int:
+def _mask(to: Emitter, term: terms.Quantified) -> int:
     """A temporary whose bit i says whether item i holds."""
     mask = to.block.temporary()
     to.block.emit(Op.LOAD, mask, constant(0))
@@ -50,7 +46,7 @@ def _mask(to: Expressions, term: terms.Quantified) -> int:
     return mask
 
 
-def picked_thing(to: Expressions, term: terms.Quantified) -> int:
+def picked_thing(to: Emitter, term: terms.Quantified) -> int:
     """The operand of a drawn thing among those that the condition holds for."""
     site = to.sites.row(term.site or to.site, term.ordinal)
     if (other := _but_one(term)) is not None:
@@ -80,21 +76,21 @@ def _but_one(term: terms.Quantified) -> terms.Term | None:
     return None
 
 
-def _any_other(to: Expressions, term: terms.Quantified, one: terms.Term, site: int) -> int:
+def _any_other(to: Emitter, term: terms.Quantified, one: terms.Term, site: int) -> int:
     """One of all of them less the one, without asking of each whether it is that."""
     assert site <= _LAST_SITE, "internal: more draw sites than an instruction can name"
     packed = site | term.items[0].value << 16 | len(term.items) << 24
     return to.into_temporary(Op.DRAW_OTHER, to.value(one), packed)
 
 
-def _chosen(to: Expressions, term: terms.Quantified, op: Op, site: int = 0) -> int:
+def _chosen(to: Emitter, term: terms.Quantified, op: Op, site: int = 0) -> int:
     mask = _mask(to, term)
     if to.failed is not None:
         to.block.test(Op.IF_NE, mask, constant(0), to.failed)
     return _item(to, term.items, to.into_temporary(op, mask, site))
 
 
-def _count_one_by_one(to: Expressions, term: terms.Quantified) -> int:
+def _count_one_by_one(to: Emitter, term: terms.Quantified) -> int:
     total = to.into_temporary(Op.LOAD, constant(0))
     for item in term.items:
         following = Label()
@@ -104,7 +100,7 @@ def _count_one_by_one(to: Expressions, term: terms.Quantified) -> int:
     return total
 
 
-def _nth(to: Expressions, term: terms.Quantified, left: int) -> int:
+def _nth(to: Emitter, term: terms.Quantified, left: int) -> int:
     """The thing that comes after `left` others that the condition holds for as well; none: as for small groups."""
     block = to.block
     result = to.into_temporary(Op.LOAD, constant(term.items[0].value))
@@ -125,7 +121,7 @@ def _nth(to: Expressions, term: terms.Quantified, left: int) -> int:
     return result
 
 
-def _item(to: Expressions, items: tuple[Const, ...], position: int) -> int:
+def _item(to: Emitter, items: tuple[Const, ...], position: int) -> int:
     """The item at a position that is in a temporary."""
     values = [item.value for item in items]
     if values == list(range(values[0], values[0] + len(values))):
@@ -139,7 +135,7 @@ def _item(to: Expressions, items: tuple[Const, ...], position: int) -> int:
     return result
 
 
-def nearest_thing(to: Expressions, term: terms.Quantified) -> int:
+def nearest_thing(to: Emitter, term: terms.Quantified) -> int:
     """The operand of the nearest thing that the condition holds for."""
     assert term.to is not None
     block, items = to.block, term.items
@@ -173,6 +169,6 @@ def nearest_thing(to: Expressions, term: terms.Quantified) -> int:
     return result
 
 
-def _far(to: Expressions) -> int:
+def _far(to: Emitter) -> int:
     """How far away what is not in the room is from everything."""
     return to.into_temporary(Op.ADD, Register.WIDTH, Register.HEIGHT)

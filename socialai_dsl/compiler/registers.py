@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from socialai_dsl.compiler.cells import NOWHERE
 from socialai_dsl.program import CELL, ENTITY_FIELDS, FIRST_ENTITY, Field, RegisterName
 from socialai_dsl.semantics.build import may_find_nothing
-from socialai_dsl.semantics.terms import ACTION, BOOL, Checked, Drawn, Entity, FramePlan, MemoryPlan, Type
+from socialai_dsl.semantics.plans import Checked, Drawn, Entity, FramePlan, MemoryPlan
+from socialai_dsl.semantics.terms import ACTION, BOOL, Type
+from socialai_dsl.vocabulary import FINISHED
+
+NOWHERE = CELL - 1
+"""The cell of what is in no cell."""
 
 
 def entity_register(entity: int, which: Field) -> int:
@@ -103,4 +107,4 @@ def state_names(frame: FramePlan) -> tuple[str, ...]:
     """Names of a frame's states in the order of their numbers; nameless entries of `steps` are step0, step1, ..."""
     if frame.states:
         return tuple(state.name for state in frame.states)
-    return (*(step.state or f"step{i}" for i, step in enumerate(frame.steps)), "finished")
+    return (*(step.state or f"step{i}" for i, step in enumerate(frame.steps)), FINISHED)

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Set
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from socialai_dsl.compiler.assembler import LARGEST, Label, constant
+from socialai_dsl.compiler.emitter import Emitter
 from socialai_dsl.program import Op
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.terms import Const, Read, Select, Term
-
-if TYPE_CHECKING:
-    from socialai_dsl.compiler.expressions import Expressions
 
 _MASK_BITS = LARGEST.bit_length()
 """How many numbers a set in one operand can tell apart."""
@@ -27,7 +24,7 @@ class _Switch:
     cases: dict[Term, set[int]]
 
 
-def selected_value(to: Expressions, term: Select) -> int:
+def selected_value(to: Emitter, term: Select) -> int:
     """The operand in which the selected value is."""
     switch = _switch(term)
     if switch is not None:
@@ -49,7 +46,7 @@ def selected_value(to: Expressions, term: Select) -> int:
     return result
 
 
-def selected_condition(to: Expressions, term: Select, otherwise: Label) -> None:
+def selected_condition(to: Emitter, term: Select, otherwise: Label) -> None:
     """Fall through if the selected condition holds, else skip to `otherwise`."""
     switch = _switch(term)
     if switch is None or not all(isinstance(value, Const) for value in switch.cases):
@@ -61,7 +58,7 @@ def selected_condition(to: Expressions, term: Select, otherwise: Label) -> None:
     among(to, switch.read, true, otherwise)
 
 
-def _overwrite(to: Expressions, switch: _Switch, take: Callable[[Term], None]) -> None:
+def _overwrite(to: Emitter, switch: _Switch, take: Callable[[Term], None]) -> None:
     """The commonest value, then each other one in its cases."""
     commonest = _commonest(switch)
     take(commonest)
@@ -77,7 +74,7 @@ def _commonest(switch: _Switch) -> Term:
     return max(switch.cases, key=lambda value: len(switch.cases[value]))
 
 
-def _branches(to: Expressions, term: Select, switch: _Switch | None, take: Callable[[Term], None]) -> None:
+def _branches(to: Emitter, term: Select, switch: _Switch | None, take: Callable[[Term], None]) -> None:
     """Test one condition after the other; what needs most words to ask for comes last and is not asked for."""
     block = to.block
     done = Label()
@@ -147,7 +144,7 @@ def _shift(switch: _Switch) -> int | None:
     return shifts.pop() if len(shifts) == 1 else None
 
 
-def among(to: Expressions, read: Read, numbers: Set[int], otherwise: Label) -> None:
+def among(to: Emitter, read: Read, numbers: Set[int], otherwise: Label) -> None:
     """Fall through if the register holds one of these numbers."""
     block, register, low, high = to.block, to.value(read), read.type.low, read.type.high
     numbers = numbers & set(range(low, high + 1))

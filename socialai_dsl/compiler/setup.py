@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from socialai_dsl.compiler.assembler import Label, constant
 from socialai_dsl.compiler.behaviour import FOR_EVER
+from socialai_dsl.compiler.consequences import ComputedStatuses
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import fold
 from socialai_dsl.compiler.homes import Homes
 from socialai_dsl.compiler.places import Places
 from socialai_dsl.compiler.registers import entity_register, state_names
-from socialai_dsl.compiler.statuses import ComputedStatuses
-from socialai_dsl.program import COLORS, Field, Op, Register
-from socialai_dsl.semantics.terms import (
+from socialai_dsl.program import Field, Op, Register
+from socialai_dsl.semantics.plans import (
     Checked,
     Coloring,
     Drawn,
@@ -20,8 +20,9 @@ from socialai_dsl.semantics.terms import (
     FramePlan,
     Placing,
     RoomPlan,
-    Term,
 )
+from socialai_dsl.semantics.terms import Term
+from socialai_dsl.vocabulary import COLORS
 
 ALL_COLORS = (1 << len(COLORS)) - 1
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
-from socialai_dsl.compiler.assembler import CodeTable, Sites
+from socialai_dsl.compiler.allocation import Allocation
 from socialai_dsl.compiler.behaviour import FrameCode
-from socialai_dsl.compiler.classes import Classes
-from socialai_dsl.compiler.lines import Lines
-from socialai_dsl.compiler.registers import Registers, state_names
-from socialai_dsl.compiler.rooms import WALL, room_templates
+from socialai_dsl.compiler.lowering import Lowered
+from socialai_dsl.compiler.registers import state_names
 from socialai_dsl.program import (
-    BODY_WORDS,
-    CODES_OF_TYPES,
     EntityColumn,
     EntityName,
     Flag,
@@ -22,50 +20,33 @@ from socialai_dsl.program import (
     Outcome,
     Program,
     TypeColumn,
+    pack_cell,
 )
-from socialai_dsl.semantics.terms import Checked, Entity, ObjectType
+from socialai_dsl.semantics.geometry import interior_cells
+from socialai_dsl.semantics.plans import Checked, Entity, RoomPlan
+from socialai_dsl.semantics.terms import ObjectType
+from socialai_dsl.vocabulary import ACTIONS, COLORS, EMPTY, NPC, WALL
 
 
 class Tables:
-    """Collects the tables of one scenario; `program` lays them out.
+    """The tables of one scenario, laid out in the words of a program.
 
-    Registers of inboxes, of what is heard and of the log are reserved here, since only now their sizes are known.
+    Registers of what is heard and of the log are reserved here, since only now it is known how many there are.
     """
 
-    def __init__(
-        self,
-        checked: Checked,
-        registers: Registers,
-        classes: Classes,
-        sites: Sites,
-        lines: Lines,
-        code: CodeTable,
-    ) -> None:
-        self.checked, self.registers, self.classes = checked, registers, classes
-        self.sites, self.lines, self.code = sites, lines, code
-        # A member hears each of the others at most once between two of its turns.
-        self.inbox_size = 1 + len(checked.frames)
-        self.entry_size = 3 if classes.speakers_matter else 1
-        self.inbox = 0
+    def __init__(self, allocation: Allocation, lowered: Lowered) -> None:
+        self.allocation, self.lowered = allocation, lowered
+        self.checked, self.registers, self.classes = (
+            allocation.checked,
+            allocation.registers,
+            allocation.classes,
+        )
+        self.sites, self.lines, self.code = allocation.sites, allocation.lines, allocation.code
 
-    def reserve_inboxes(self) -> dict[str, int]:
-        """First register of the inbox of each member with a frame: a count, then entries."""
-        self.inbox = self.registers.reserve(0)
-        return {frame.member: self.registers.reserve(self._inbox_registers) for frame in self.checked.frames}
-
-    @property
-    def _inbox_registers(self) -> int:
-        return 1 + self.entry_size * self.inbox_size
-
-    def program(
-        self,
-        entries: dict[Header, int],
-        flags: int,
-        frames: list[FrameCode],
-        outcomes: list[int],
-        rules: tuple[str, ...],
-    ) -> Program:
-        """Lay out everything; see program.Header for the order. `flags` are those that the code decides."""
+    def program(self) -> Program:
+        """Lay out everything; see program.Header for the order."""
+        frames, outcomes = self.lowered.frames, self.lowered.outcomes
+        rules = tuple(self.allocation.rules)
         checked, lines = self.checked, self.lines
         length = lines.history_length
         heard_size = max(1, len(lines.speakers))
@@ -82,9 +63,7 @@ class Tables:
 
         types = _TypeTable(checked)
         table(Header.CODE_AT, [word for row in self.code.instructions for word in row])
-        table(
-            Header.ACTION_AT, [*(BODY_WORDS.index(action) for action in checked.actions), len(BODY_WORDS) - 1]
-        )
+        table(Header.ACTION_AT, [*(ACTIONS.index(action) for action in checked.actions), len(ACTIONS) - 1])
         table(Header.CLASS_AT, self.classes.of_pair)
         table(Header.ENTITY_AT, [word for entity in checked.entities for word in _entity_row(entity, types)])
         table(Header.TYPE_AT, [word for row in types.rows for word in row])
@@ -97,7 +76,7 @@ class Tables:
         table(Header.SITE_AT, self.sites.words())
         table(Header.CLASS_SET_AT, self.classes.set_words())
 
-        header |= entries | {
+        header |= self.lowered.entries | {
             Header.SIZE: Header.END + len(body),
             Header.REGISTERS: max(self.registers.next_free, self.registers.end),
             Header.CANVAS_WIDTH: checked.room.canvas[0],
@@ -109,20 +88,20 @@ class Tables:
             Header.NOUNS: len(checked.nouns),
             Header.CLASSES: self.classes.count,
             Header.HORIZON: checked.horizon,
-            Header.FLAGS: flags | self._flags(),
+            Header.FLAGS: self._flags(),
             Header.TOKENS: length,
             Header.LOG: log,
             Header.LOG_SIZE: log_size,
             Header.HEARD: heard,
             Header.HEARD_SIZE: heard_size,
-            Header.INBOX: self.inbox,
-            Header.INBOX_SIZE: self.inbox_size,
+            Header.INBOX: self.allocation.inbox,
+            Header.INBOX_SIZE: self.allocation.inbox_size,
             Header.FRAMES: len(frames),
             Header.DEADLY: types.deadly,
             Header.MIN_WIDTH: checked.room.width[0],
             Header.MIN_HEIGHT: checked.room.height[0],
             Header.HEIGHTS: checked.room.height[1] - checked.room.height[0] + 1,
-            Header.OUTSIDE: WALL,
+            Header.OUTSIDE: WALL_CELL,
             Header.INSTRUCTIONS: len(self.code.instructions),
             Header.LINES: len(lines.texts),
             Header.STATES: sum(len(frame.rows) for frame in frames),
@@ -156,7 +135,6 @@ class Tables:
             vocabulary=lines.vocabulary,
             source_map=tuple(self.code.spans),
             labels=dict(self.code.labels),
-            origin=checked,
         )
 
     def _flags(self) -> int:
@@ -170,20 +148,21 @@ class Tables:
             Flag.OCCLUSION: checked.room.occlusion,
             Flag.ROLLS: any(entity.type and entity.type.rolls for entity in checked.entities),
             Flag.HEARD_BY: self.classes.speakers_matter,
+            Flag.SETTLE_ALWAYS: self.allocation.computed.settle_always,
         }
         return sum(flag for flag, on in flags.items() if on)
 
     def _frame_rows(self, frames: list[FrameCode]) -> list[int]:
         words = []
         first_row = 0
-        for number, (made, frame) in enumerate(zip(frames, self.checked.frames, strict=True)):
+        for made, frame in zip(frames, self.checked.frames, strict=True):
             row = dict.fromkeys(FrameColumn, 0) | {
                 FrameColumn.ENTITY: frame.entity,
                 FrameColumn.STATE: self.registers.by_path[f"{frame.member}.frame"],
                 FrameColumn.CLOCK: self.registers.by_path[f"{frame.member}.clock"],
                 FrameColumn.ROWS: first_row,
                 FrameColumn.STATES: len(state_names(frame)),
-                FrameColumn.INBOX: self.inbox + number * self._inbox_registers,
+                FrameColumn.INBOX: self.allocation.inbox_of[frame.member],
                 FrameColumn.PERCEIVE: made.perceive,
                 FrameColumn.DEFERRED: made.deferred,
             }
@@ -213,8 +192,8 @@ class _TypeTable:
     def __init__(self, checked: Checked) -> None:
         self.rows: list[list[int]] = []
         self.deadly = 0
-        self.agent = self._add(code=CODES_OF_TYPES["empty"], status=0, toggled=0)
-        self.npc = self._add(code=CODES_OF_TYPES["npc"], status=0, toggled=0, transparent=1)
+        self.agent = self._add(code=EMPTY, status=0, toggled=0)
+        self.npc = self._add(code=NPC, status=0, toggled=0, transparent=1)
         self._first: dict[ObjectType, int] = {}
         for kind in [
             *(e.type for e in checked.entities if e.type),
@@ -288,3 +267,59 @@ def _entity_name(entity: Entity) -> EntityName:
     kind = entity.type.name if entity.type else entity.kind
     states = entity.type.states if entity.type else ()
     return EntityName(entity.key, entity.index, entity.role, kind, states)
+
+
+# -- room templates --------------------------------------------------------------------------------------------
+
+
+EMPTY_CELL = pack_cell(EMPTY)
+WALL_CELL = pack_cell(WALL, COLORS.index("grey"))
+
+
+def room_templates(room: RoomPlan) -> list[int]:
+    """The room table, row by row: sizes by width, then height."""
+    (low_width, high_width), (low_height, high_height) = room.width, room.height
+    return [
+        word
+        for width in range(low_width, high_width + 1)
+        for height in range(low_height, high_height + 1)
+        for word in _template(room, width, height)
+    ]
+
+
+def _template(room: RoomPlan, width: int, height: int) -> list[int]:
+    columns, rows = room.canvas
+    cells = [[EMPTY_CELL] * columns for _ in range(rows)]
+    solid = [(1 << columns) - 1] * rows
+    floor, opaque = [0] * rows, [0] * rows
+    for x, y in product(range(width), range(height)):
+        if x in (0, width - 1) or y in (0, height - 1):
+            cells[y][x] = WALL_CELL
+            opaque[y] |= 1 << x
+        else:
+            solid[y] &= ~(1 << x)
+            floor[y] |= 1 << x
+    for kind, region, _span in room.build:
+        for x, y in interior_cells(region, (width, height)):
+            _build(kind, x, y, cells, solid, floor, opaque)
+    columns_too = [sum((row >> x & 1) << y for y, row in enumerate(opaque)) for x in range(columns)]
+    return [*(cell for row in cells for cell in row), WALL_CELL, *solid, *floor, *opaque, *columns_too]
+
+
+def _build(
+    kind: ObjectType,
+    x: int,
+    y: int,
+    cells: list[list[int]],
+    solid: list[int],
+    floor: list[int],
+    opaque: list[int],
+) -> None:
+    shown = kind.shown.get(kind.initial, (kind.initial, 0))
+    cells[y][x] = pack_cell(kind.code, kind.color, *shown)
+    floor[y] &= ~(1 << x)
+    for rows, here in (
+        (solid, kind.initial not in kind.walkable),
+        (opaque, kind.initial not in kind.transparent),
+    ):
+        rows[y] = rows[y] | 1 << x if here else rows[y] & ~(1 << x)

@@ -7,6 +7,7 @@ so an entity, a line, a status or a coordinate that could be out of range is fou
 from __future__ import annotations
 
 from itertools import pairwise
+from math import prod
 
 from socialai_dsl.compiler.code_verifier import verify_code
 from socialai_dsl.compiler.intervals import inbox_registers
@@ -18,10 +19,8 @@ from socialai_dsl.program import (
     EntityColumn,
     FrameColumn,
     Header,
-    LineColumn,
     Program,
     TypeColumn,
-    room_words,
 )
 
 __all__ = ["InvalidProgramError", "verify"]
@@ -44,23 +43,15 @@ def _require(condition: bool, message: str) -> None:
         raise InvalidProgramError(message)
 
 
+_TABLES = (
+    *(Header.CODE_AT, Header.ACTION_AT, Header.CLASS_AT, Header.ENTITY_AT, Header.TYPE_AT, Header.ROOM_AT),
+    *(Header.FRAME_AT, Header.STATE_AT, Header.OUTCOME_AT, Header.LINE_AT, Header.SITE_AT),
+    Header.CLASS_SET_AT,
+)
+
+
 def _sizes(program: Program) -> dict[Header, int]:
-    h = program.header
-    width, height = h(Header.CANVAS_WIDTH), h(Header.CANVAS_HEIGHT)
-    return {
-        Header.CODE_AT: 4 * h(Header.INSTRUCTIONS),
-        Header.ACTION_AT: h(Header.PRIMITIVES) + 1,
-        Header.CLASS_AT: h(Header.TEMPLATES) * h(Header.NOUNS),
-        Header.ENTITY_AT: h(Header.ENTITIES) * EntityColumn.COLUMNS,
-        Header.TYPE_AT: h(Header.TYPE_ROWS) * TypeColumn.COLUMNS,
-        Header.ROOM_AT: h(Header.HEIGHTS) * room_words(width, height),
-        Header.FRAME_AT: h(Header.FRAMES) * FrameColumn.COLUMNS,
-        Header.STATE_AT: h(Header.STATES) * (1 + 2 * (h(Header.CLASSES) + 1)),
-        Header.OUTCOME_AT: h(Header.CLASSES) * 8,
-        Header.LINE_AT: h(Header.LINES) * LineColumn.COLUMNS,
-        Header.SITE_AT: 2 * h(Header.SITES),
-        Header.CLASS_SET_AT: h(Header.CLASS_SETS) * h(Header.CLASS_SET_WORDS),
-    }
+    return {table: prod(program.shape(table)) for table in _TABLES}
 
 
 def _header(program: Program) -> None:
@@ -129,44 +120,36 @@ def _inside(program: Program, table: Header, count: int, low: int, high: int) ->
 
 def _entities(program: Program) -> None:
     h = program.header
-    rows = h(Header.TYPE_ROWS)
+    types = program.table(Header.TYPE_AT).tolist()
     _require(len(program.entities) == h(Header.ENTITIES), "entities without names")
     for number, entity in enumerate(program.entities):
-        at = h(Header.ENTITY_AT) + EntityColumn.COLUMNS * number
-        first = int(program.words[at + EntityColumn.TYPE])
+        row = program.table(Header.ENTITY_AT)[number].tolist()
+        first = row[EntityColumn.TYPE]
         statuses = max(1, len(entity.states))
-        _require(first >= 0 and first + statuses <= rows, f"the type of {entity} is out of range")
-        kind, view = (int(program.words[at + column]) for column in (EntityColumn.KIND, EntityColumn.VIEW))
+        _require(first >= 0 and first + statuses <= len(types), f"the type of {entity} is out of range")
+        kind, view, pushed_by = (
+            row[column] for column in (EntityColumn.KIND, EntityColumn.VIEW, EntityColumn.PUSHED_BY)
+        )
         _require(0 <= kind < 256, f"the status code of {entity} does not fit into the picture")
         _require(0 < view <= 2 * MAX_SIDE, f"{entity} sees {view} cells far")
-        pushed_by = int(program.words[at + EntityColumn.PUSHED_BY])
         _require(pushed_by in (0, 1), f"{entity} is pushed by {pushed_by}")
-        for status in range(statuses):
-            row = h(Header.TYPE_AT) + TypeColumn.COLUMNS * (first + status)
+        for status in types[first : first + statuses]:
             toggled, pushed, rolls = (
-                int(program.words[row + column])
-                for column in (TypeColumn.TOGGLED, TypeColumn.PUSHED, TypeColumn.ROLLS)
+                status[column] for column in (TypeColumn.TOGGLED, TypeColumn.PUSHED, TypeColumn.ROLLS)
             )
             _require(0 <= toggled < statuses, f"a toggle gives {entity} a status it does not have")
             _require(0 <= pushed < statuses, f"a push gives {entity} a status it does not have")
             _require(0 <= rolls <= statuses, f"what stops {entity} gives it a status it does not have")
-    for row in range(rows):
-        at = h(Header.TYPE_AT) + TypeColumn.COLUMNS * row
-        _require(0 < int(program.words[at + TypeColumn.CODE]) < 32, f"type row {row} has no type code")
+    for number, status in enumerate(types):
+        _require(0 < status[TypeColumn.CODE] < 32, f"type row {number} has no type code")
         for column in (TypeColumn.STATUS, TypeColumn.ORIENTATION):
-            _require(
-                0 <= int(program.words[at + column]) < 256, f"type row {row} does not fit into the picture"
-            )
+            _require(0 <= status[column] < 256, f"type row {number} does not fit into the picture")
 
 
 def _frames(program: Program) -> None:
     h = program.header
     named = {name.register: name for name in program.registers}
-    for number in range(h(Header.FRAMES)):
-        at = h(Header.FRAME_AT) + FrameColumn.COLUMNS * number
-        row = {
-            column: int(program.words[at + column]) for column in FrameColumn if column != FrameColumn.COLUMNS
-        }
+    for number, row in enumerate(program.table(Header.FRAME_AT).tolist()):
         _require(
             0 <= row[FrameColumn.ENTITY] <= h(Header.NPCS), f"frame {number} moves what is no cast member"
         )
@@ -190,9 +173,7 @@ def _lines(program: Program) -> None:
     tokens_end = h(Header.SITE_AT)
     _require(len(program.lines) == h(Header.LINES) < 32767, "lines without texts")
     _require(h(Header.TOKENS) >= 8, "no room for a history")
-    for number in range(h(Header.LINES)):
-        at = h(Header.LINE_AT) + LineColumn.COLUMNS * number
-        first, count, heard_as, noun = (int(word) for word in program.words[at : at + LineColumn.COLUMNS])
+    for number, (first, count, heard_as, noun) in enumerate(program.table(Header.LINE_AT).tolist()):
         _require(1 <= count <= h(Header.TOKENS), f"line {number} does not fit into the history")
         inside = first >= 0 and h(Header.TOKEN_AT) + first + count <= tokens_end
         _require(inside, f"words of line {number} are out of range")

@@ -10,7 +10,8 @@ from socialai_dsl.compiler.homes import Homes
 from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.probes import NO_PROBES, Probes
 from socialai_dsl.program import Op
-from socialai_dsl.semantics.terms import BOOL, RulePlan
+from socialai_dsl.semantics.plans import RulePlan
+from socialai_dsl.semantics.terms import BOOL
 
 
 def world_rules(

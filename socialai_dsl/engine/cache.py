@@ -55,7 +55,12 @@ def cache_folder() -> Path | None:
 def fingerprint() -> str:
     """Digest of everything that compiled code depends on."""
     package = Path(__file__).parents[1]
-    sources = [*(package / "engine").glob("*.py"), *(package / "program").glob("*.py"), package / "draws.py"]
+    sources = [
+        *(package / "engine").glob("*.py"),
+        *(package / "program").glob("*.py"),
+        package / "draws.py",
+        package / "vocabulary.py",
+    ]
     digest = hashlib.sha256()
     for source in sorted(sources):
         digest.update(source.name.encode())

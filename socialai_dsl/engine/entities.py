@@ -33,12 +33,6 @@ def is_present(row: Row, entity: int) -> bool:
 
 
 @inline
-def is_npc(row: Row, entity: int) -> bool:
-    """Whether the entity is an NPC."""
-    return 1 <= entity <= row.program[Header.NPCS]
-
-
-@inline
 def is_at(row: Row, entity: int, x: int, y: int) -> bool:
     """Whether the entity is in the room and in this cell."""
     return (

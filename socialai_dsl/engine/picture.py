@@ -12,18 +12,9 @@ from socialai_dsl.engine.pointers import uint16_of
 from socialai_dsl.engine.shadows import lit_cells
 from socialai_dsl.engine.state import AGENT, NOTHING, Book, Link, Row, Trait
 from socialai_dsl.engine.views import CELLS, OWN_LOOK, OWN_PLACE
-from socialai_dsl.program import (
-    CODES_OF_TYPES,
-    LAST_ACTS,
-    NO_GESTURE,
-    VIEW,
-    Body,
-    Field,
-    Flag,
-    Header,
-)
+from socialai_dsl.program import LAST_ACTS, NO_GESTURE, VIEW, Body, Field, Flag, Header
+from socialai_dsl.vocabulary import NPC
 
-_NPC = CODES_OF_TYPES["npc"]
 _HALF = np.int64(VIEW // 2)
 _EVERYWHERE = np.uint64((1 << 64) - 1)
 _WITH_GESTURES = 6
@@ -116,7 +107,7 @@ def _show_npcs(row: Row, extra: NDArray[np.uint16], picture: NDArray[np.uint16])
         if place < 0 or npc_at(row, field(row, npc, Field.X), field(row, npc, Field.Y)) != npc:
             continue
         look = row.image[place]
-        shown = -np.int64(look & 0xFF == _NPC)
+        shown = -np.int64(look & 0xFF == NPC)
         if flags & Flag.EGOCENTRIC:
             turned = (look & 0xFFFFFF) | _relative(look >> 24, own) << 24
             look ^= (look ^ turned) & shown

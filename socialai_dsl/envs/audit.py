@@ -97,11 +97,10 @@ def _rooms_that_fit(program: Program) -> int:
 
 def _entities(program: Program) -> list[Range]:
     ranges: list[Range] = []
-    start = program.header(Header.ENTITY_AT)
+    kinds = program.table(Header.ENTITY_AT)[:, EntityColumn.KIND].tolist()
     for number, entity in enumerate(program.entities):
         # The status of an NPC is its code in the picture, that of the agent is 0.
-        kind = start + EntityColumn.COLUMNS * number + EntityColumn.KIND
-        greatest_status = len(entity.states) - 1 if entity.states else int(program.words[kind])
+        greatest_status = len(entity.states) - 1 if entity.states else kinds[number]
         greatest = {
             Field.X: (-1, program.header(Header.CANVAS_WIDTH) - 1),
             Field.Y: (-1, program.header(Header.CANVAS_HEIGHT) - 1),
@@ -130,10 +129,8 @@ def _speech(program: Program) -> list[Range]:
 
 def _frames(program: Program) -> list[Range]:
     h = program.header
-    start, rows = h(Header.FRAME_AT), h(Header.FRAMES)
-    table = program.words[start : start + rows * FrameColumn.COLUMNS].reshape(rows, FrameColumn.COLUMNS)
     ranges: list[Range] = []
-    for row in table.tolist():
+    for row in program.table(Header.FRAME_AT).tolist():
         ranges += [
             (row[FrameColumn.STATE], 1, 0, row[FrameColumn.STATES] - 1),
             (row[FrameColumn.CLOCK], 1, 0, h(Header.HORIZON)),

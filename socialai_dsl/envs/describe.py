@@ -8,11 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.envs.addresses import Acts, Addresses, addresses_of
-from socialai_dsl.envs.values import TURN_WORDS, entry_words, shown, utterance_text
+from socialai_dsl.envs.values import entry_words, shown, utterance_text
 from socialai_dsl.program import (
-    BODY_WORDS,
-    COLORS,
-    DIRECTIONS,
     ENTITY_FIELDS,
     FIRST_ENTITY,
     Body,
@@ -23,6 +20,7 @@ from socialai_dsl.program import (
     Register,
     RegisterName,
 )
+from socialai_dsl.vocabulary import ACTIONS, COLORS, DIRECTIONS, TURN_WORDS
 
 Row = NDArray[np.int16]
 
@@ -128,18 +126,16 @@ def _last(program: Program, registers: Row) -> dict[str, Any]:
     silent = template < 0 or noun < 0
     poked = int(registers[Register.POKED])
     return {
-        "action": BODY_WORDS[int(registers[Register.ACTION])],
+        "action": ACTIONS[int(registers[Register.ACTION])],
         "said": None if silent else utterance_text(program, 1 + template * len(program.nouns) + noun),
         "poked": str(program.entities[poked]) if poked >= 0 else None,
     }
 
 
 def _pending(program: Program, registers: Row) -> dict[str, list[Any]]:
-    start, rows = program.header(Header.FRAME_AT), program.header(Header.FRAMES)
-    table = program.words[start : start + rows * FrameColumn.COLUMNS].reshape(rows, FrameColumn.COLUMNS)
     words = entry_words(program)
     pending: dict[str, list[Any]] = {}
-    for row in table.tolist():
+    for row in program.table(Header.FRAME_AT).tolist():
         inbox = row[FrameColumn.INBOX]
         if count := int(registers[inbox]):
             heard = registers[inbox + 1 : inbox + 1 + words * count].reshape(count, words).tolist()

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.compilation import Part, Probe, Value, scenario_of, with_probes
+from socialai_dsl.compilation import Part, Probe, Value, compile_probed
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.recording import Recording
@@ -23,17 +23,9 @@ from socialai_dsl.envs.ways import Moment
 from socialai_dsl.program import EntityColumn, Header, LineColumn, Program, Register
 from socialai_dsl.program_suite import ProgramSuite
 from socialai_dsl.schema.base import Model
+from socialai_dsl.semantics.plans import Checked, FramePlan, OutcomePlan, RulePlan, StepPlan
 from socialai_dsl.semantics.readings import Readings
-from socialai_dsl.semantics.terms import (
-    Checked,
-    Const,
-    FramePlan,
-    OutcomePlan,
-    Read,
-    RulePlan,
-    StepPlan,
-    Term,
-)
+from socialai_dsl.semantics.terms import Const, Read, Term
 from socialai_dsl.source import Span
 
 _TO_IT: Final = ("go_to", "enter")
@@ -47,15 +39,15 @@ class Explainer:
     """Plays the last step of an environment again and reads what was noted.
 
     Args:
-        program: what the environment plays.
+        program: what the environment plays. scenario: what it was compiled from.
         suite: the suite it is a member of, None if it plays alone.
         number: which member it is.
     """
 
-    def __init__(self, program: Program, suite: ProgramSuite | None, number: int) -> None:
-        self._checked = scenario_of(program)
+    def __init__(self, program: Program, scenario: Checked, suite: ProgramSuite | None, number: int) -> None:
+        self._checked = scenario
         self._program = program
-        self._probed = with_probes(program)
+        self._probed = compile_probed(scenario)
         self._table = Table([_alone(self._probed.program, suite, number)], 1, 1)
         self._table.reset(0, None)
 
@@ -203,15 +195,13 @@ class _Notes:
         return "heard " + " and ".join(dict.fromkeys(f'"{text}"' for text in texts))
 
     def _voice(self) -> tuple[int, int]:
-        at = self.program.header(Header.ENTITY_AT)
-        near, far = (int(self.program.words[at + column]) for column in (EntityColumn.NEAR, EntityColumn.FAR))
-        return near, far
+        agent = self.program.table(Header.ENTITY_AT)[0]
+        return int(agent[EntityColumn.NEAR]), int(agent[EntityColumn.FAR])
 
     def _text(self, number: int) -> str:
         """A line of this class: one that was said in this step, if it can be told."""
         program = self.program
-        at, count = program.header(Header.LINE_AT), program.header(Header.LINES)
-        table = program.words[at : at + LineColumn.COLUMNS * count].reshape(count, LineColumn.COLUMNS)
+        table = program.table(Header.LINE_AT)
         first, heard = program.header(Header.HEARD), int(self.registers[Register.HEARD])
         lines = [int(line) for line in self.registers[first : first + heard]]
         fitting = np.flatnonzero(table[:, LineColumn.CLASS] == number).tolist()

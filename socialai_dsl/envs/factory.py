@@ -8,8 +8,8 @@ from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
-from socialai_dsl.checking import LoadedSuite
-from socialai_dsl.compilation import compile_loaded
+from socialai_dsl.checking import Loaded, LoadedSuite
+from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.envs.scenario_env import ScenarioEnv
 from socialai_dsl.envs.starts import check_starts
 from socialai_dsl.envs.vector_env import ScenarioVectorEnv
@@ -21,9 +21,10 @@ Scenario = str | Path | Playable
 
 def playable_of(scenario: Scenario) -> Playable:
     """The program of a scenario, or the programs of a suite, given by name or path, or itself."""
-    if isinstance(scenario, Playable):
-        return scenario
-    loaded = load(scenario)
+    return scenario if isinstance(scenario, Playable) else _compiled(load(scenario))
+
+
+def _compiled(loaded: Loaded) -> Playable:
     playable = compile_loaded(loaded)
     if isinstance(loaded, LoadedSuite) and isinstance(playable, ProgramSuite):
         check_starts(loaded, playable)
@@ -36,7 +37,10 @@ def make(scenario: Scenario, render_mode: str | None = None) -> ScenarioEnv:
     Raises:
         ScenarioError: the scenario does not exist or has mistakes; `.diagnostics` lists them all.
     """
-    return ScenarioEnv(playable_of(scenario), render_mode)
+    if isinstance(scenario, Playable):
+        return ScenarioEnv(scenario, render_mode)
+    loaded = load(scenario)
+    return ScenarioEnv(_compiled(loaded), render_mode, scenarios_of(loaded))
 
 
 def make_vec(

@@ -12,7 +12,6 @@ from socialai_dsl.engine.state import PIN_NONE
 from socialai_dsl.envs.addresses import Acts, addresses_of
 from socialai_dsl.envs.sharing import may_lie_over
 from socialai_dsl.envs.values import (
-    TURN_WORDS,
     cell_pair,
     entry_words,
     meant,
@@ -22,9 +21,6 @@ from socialai_dsl.envs.values import (
     word,
 )
 from socialai_dsl.program import (
-    BODY_WORDS,
-    COLORS,
-    DIRECTIONS,
     ENTITY_FIELDS,
     FIRST_ENTITY,
     Field,
@@ -34,6 +30,7 @@ from socialai_dsl.program import (
     Register,
     RegisterName,
 )
+from socialai_dsl.vocabulary import ACTIONS, COLORS, DIRECTIONS, TURN_WORDS
 
 _WORDS: dict[str, tuple[Field, Sequence[str]]] = {
     "facing": (Field.DIR, DIRECTIONS),
@@ -325,7 +322,7 @@ class _Layout:
         self._mapping("last", given)
         _only("last", given, ("action", "said", "poked"))
         if given.get("action") is not None:
-            self.row[Register.ACTION] = word("last.action", given["action"], BODY_WORDS)
+            self.row[Register.ACTION] = word("last.action", given["action"], ACTIONS)
             self._set(0, Field.LAST, int(self.row[Register.ACTION]))
         if given.get("said") is not None:
             self._said(utterance_number(self.program, given["said"], "last.said"))
@@ -340,7 +337,7 @@ class _Layout:
         template, noun = divmod(pair, len(self.program.nouns))
         self.row[Register.UTTERANCE] = utterance
         self.row[Register.TEMPLATE], self.row[Register.NOUN] = template, noun
-        self.row[Register.CLASS] = self.program.words[self.program.header(Header.CLASS_AT) + pair]
+        self.row[Register.CLASS] = self.program.table(Header.CLASS_AT)[template, noun]
 
     # --- what was heard ---
 
@@ -360,13 +357,9 @@ class _Layout:
         if not given:
             return
         self._mapping("pending", given)
-        start, rows = self.program.header(Header.FRAME_AT), self.program.header(Header.FRAMES)
-        table = self.program.words[start : start + rows * FrameColumn.COLUMNS].reshape(
-            rows, FrameColumn.COLUMNS
-        )
         inboxes = {
             str(self.program.entities[row[FrameColumn.ENTITY]]): row[FrameColumn.INBOX]
-            for row in table.tolist()
+            for row in self.program.table(Header.FRAME_AT).tolist()
         }
         for key, classes in given.items():
             if key not in inboxes:

@@ -9,18 +9,9 @@ import numpy as np
 from gymnasium import spaces
 
 from socialai_dsl.engine.batch import Part
-from socialai_dsl.program import (
-    BODY_WORDS,
-    NO_GESTURE,
-    VIEW,
-    Body,
-    EntityColumn,
-    Header,
-    Program,
-    TypeColumn,
-    room_words,
-)
+from socialai_dsl.program import NO_GESTURE, VIEW, Body, EntityColumn, Header, Program, TypeColumn, room_words
 from socialai_dsl.program_suite import Playable, ProgramSuite, mixture, prefixed
+from socialai_dsl.vocabulary import ACTIONS
 
 
 @dataclass(frozen=True)
@@ -127,15 +118,13 @@ def _endings(member: str, program: Program, playable: Playable) -> list[str]:
 
 def _body(program: Program, word: str) -> int:
     """A body action that a scenario lacks does nothing in it."""
-    return BODY_WORDS.index(word) if word in program.actions else int(Body.NONE)
+    return ACTIONS.index(word) if word in program.actions else int(Body.NONE)
 
 
 def _highest_codes(program: Program) -> tuple[int, int, int, int]:
     """The greatest value of each channel of the picture."""
     h, words = program.header, program.words
-    types = words[h(Header.TYPE_AT) :][: h(Header.TYPE_ROWS) * TypeColumn.COLUMNS].reshape(
-        -1, TypeColumn.COLUMNS
-    )
+    types = program.table(Header.TYPE_AT)
     rooms = words[h(Header.ROOM_AT) : h(Header.FRAME_AT)].view(np.uint32) if h(Header.FRAME_AT) else words[:0]
     width, height = h(Header.CANVAS_WIDTH), h(Header.CANVAS_HEIGHT)
     cells = rooms.reshape(-1, room_words(width, height))[:, : width * height + 1]
@@ -149,7 +138,4 @@ def _highest_codes(program: Program) -> tuple[int, int, int, int]:
 
 
 def _kinds(program: Program) -> list[int]:
-    h = program.header
-    start, rows = h(Header.ENTITY_AT), h(Header.ENTITIES)
-    table = program.words[start : start + rows * EntityColumn.COLUMNS].reshape(rows, EntityColumn.COLUMNS)
-    return table[:, EntityColumn.KIND].tolist()  # type: ignore[no-any-return]
+    return program.table(Header.ENTITY_AT)[:, EntityColumn.KIND].tolist()  # type: ignore[no-any-return]

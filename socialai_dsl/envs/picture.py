@@ -2,40 +2,71 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.envs.gestures import gestures_of
-from socialai_dsl.envs.panel import Face
-from socialai_dsl.envs.render import draw_ansi, draw_grid, figures
 from socialai_dsl.envs.table import Table
-from socialai_dsl.envs.tiles import NPC, Code, draw_tile
 from socialai_dsl.program import (
     ENTITY_FIELDS,
     FIRST_ENTITY,
     VIEW,
     EntityColumn,
+    EntityName,
     Field,
     Flag,
     Header,
     Program,
     TypeColumn,
 )
+from socialai_dsl.render.gestures import Gesture, gestures_of
+from socialai_dsl.render.grid import draw_ansi, draw_grid, figures
+from socialai_dsl.render.panel import Face
+from socialai_dsl.render.tiles import NPC, Code, draw_tile
 
 _DOWN = 1
 
 
-def frame(table: Table, row: int, mode: str, tile: int = 32) -> Any:
-    """uint8 (H * tile, W * tile, 3) for rgb_array, a text for ansi."""
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What a picture of the room shows.
+
+    Attributes:
+        codes: uint8 (H, W, 4), each cell's type, colour, status and orientation.
+        agent: x, y, direction.
+        seen: bool (H, W), the cells in the agent's field of view.
+        below: (x, y) -> the object in whose cell an NPC stands.
+        gestures: (x, y) -> where the NPC there points and what it did last.
+    """
+
+    codes: NDArray[np.uint8]
+    agent: tuple[int, int, int]
+    seen: NDArray[np.bool_]
+    below: dict[tuple[int, int], Code]
+    gestures: dict[tuple[int, int], Gesture]
+
+
+def scene(table: Table, row: int) -> Scene:
+    """What a row of the table looks like."""
     codes, agent = table.cells(row)
     width, height = table.room(row)
-    gestures = gestures_of(table.program(row), table.state.registers[row])
+    return Scene(
+        codes[:height, :width],
+        agent,
+        _seen(table, row, agent)[:height, :width],
+        _under_npcs(table, row),
+        gestures_of(table.program(row), table.state.registers[row]),
+    )
+
+
+def frame(table: Table, row: int, mode: str, tile: int = 32) -> Any:
+    """uint8 (H * tile, W * tile, 3) for rgb_array, a text for ansi."""
+    shown = scene(table, row)
     if mode == "ansi":
-        return "\n".join([plain_text(table, row), *figures(codes[:height, :width], gestures)])
-    seen = _seen(table, row, agent)[:height, :width]
-    return draw_grid(codes[:height, :width], agent, seen, tile, _under_npcs(table, row), gestures)
+        return "\n".join([plain_text(table, row), *figures(shown.codes, shown.gestures)])
+    return draw_grid(shown.codes, shown.agent, shown.seen, tile, shown.below, shown.gestures)
 
 
 def plain_text(table: Table, row: int) -> str:
@@ -50,13 +81,10 @@ def coloured_text(table: Table, row: int) -> str:
 
     Where the scenario shows its agent gestures, lines below the room say who points and who did what last.
     """
-    codes, agent = table.cells(row)
-    width, height = table.room(row)
-    seen = _seen(table, row, agent)[:height, :width]
-    gestures = gestures_of(table.program(row), table.state.registers[row])
-    shown = {place: gesture for place, gesture in gestures.items() if gesture.words}
-    told = figures(codes[:height, :width], shown, shown)
-    return "\n".join([draw_ansi(codes[:height, :width], agent, colour=True, seen=seen), *told])
+    found = scene(table, row)
+    shown = {place: gesture for place, gesture in found.gestures.items() if gesture.words}
+    told = figures(found.codes, shown, shown)
+    return "\n".join([draw_ansi(found.codes, found.agent, colour=True, seen=found.seen), *told])
 
 
 def cast_of(table: Table, row: int, tile: int = 32) -> list[Face]:
@@ -64,20 +92,25 @@ def cast_of(table: Table, row: int, tile: int = 32) -> list[Face]:
 
     All look down; those that have left are shown as well.
     """
-    program, registers = table.program(row), table.state.registers[row]
-    if program.header(Header.FLAGS) & Flag.NPCS_HIDDEN:
+    if table.program(row).header(Header.FLAGS) & Flag.NPCS_HIDDEN:
         return []
-    described = table.describe(row)
-    faces = []
-    for number, entity in enumerate(program.entities):
-        if entity.role != "npc":
-            continue
-        fields = registers[FIRST_ENTITY + ENTITY_FIELDS * number :]
-        code = (NPC, int(fields[Field.COLOR]), int(fields[Field.STATUS]), _DOWN)
+    described, faces = table.describe(row), []
+    for entity, code in looks_of_npcs(table, row).items():
         member = described[entity.key] if entity.index is None else described[entity.key][entity.index]
         name = f": {member['name']}" if "name" in member else ""
         faces.append(Face(f"{entity}{name}", draw_tile(code, None, False, tile)))
     return faces
+
+
+def looks_of_npcs(table: Table, row: int) -> dict[EntityName, Code]:
+    """The look of each NPC in a row, as if it looked down; also of those that have left or are hidden."""
+    program, registers = table.program(row), table.state.registers[row]
+    return {
+        entity: (NPC, int(fields[Field.COLOR]), int(fields[Field.STATUS]), _DOWN)
+        for number, entity in enumerate(program.entities)
+        if entity.role == "npc"
+        for fields in [registers[FIRST_ENTITY + ENTITY_FIELDS * number :]]
+    }
 
 
 def _under_npcs(table: Table, row: int) -> dict[tuple[int, int], Code]:

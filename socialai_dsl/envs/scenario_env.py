@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from socialai_dsl.engine.calls import BAD_ACTION, TRUNCATED, Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.actions import encode_action
-from socialai_dsl.envs.panel import Face
-from socialai_dsl.envs.picture import cast_of, coloured_text, frame, plain_text
+from socialai_dsl.envs.picture import Scene, cast_of, coloured_text, frame, looks_of_npcs, plain_text, scene
 from socialai_dsl.envs.recording import Recording
 from socialai_dsl.envs.table import Table
-from socialai_dsl.program import Register
+from socialai_dsl.program import EntityName, Register
 from socialai_dsl.program_suite import Playable, ProgramSuite
+from socialai_dsl.render.panel import Face
+from socialai_dsl.render.tiles import Code
+from socialai_dsl.semantics.plans import Checked
 
 Observation = dict[str, NDArray[Any]]
 
@@ -37,11 +39,14 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
     Args:
         program: what `socialai_dsl.compile` returns, for a scenario or a suite.
         render_mode: rgb_array, ansi or human (a picture in the terminal).
+        scenarios: what the program, or each of a suite's, was compiled from; only `scenario` and `explain` need it.
     """
 
     metadata = {"render_modes": ["rgb_array", "ansi", "human"], "render_fps": 4}  # noqa: RUF012 - Gymnasium's protocol
 
-    def __init__(self, program: Playable, render_mode: str | None = None) -> None:
+    def __init__(
+        self, program: Playable, render_mode: str | None = None, scenarios: Sequence[Checked] = ()
+    ) -> None:
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             modes = ", ".join(self.metadata["render_modes"])
             raise ValueError(f"render_mode: got {render_mode!r}; expected None or one of {modes}")
@@ -69,6 +74,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._recording = Recording.of(self._table, 0)
         self._last_act: Recording | None = None
         self._explainers: dict[str, Any] = {}
+        self._scenarios = tuple(scenarios)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -169,6 +175,20 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         """The state in the scenario's own names; can be put back as a layout."""
         return self._table.describe(0)
 
+    @property
+    def scenario(self) -> Checked:
+        """What the program of this episode was compiled from.
+
+        Raises:
+            ValueError: the environment was made from a program.
+        """
+        return self._scenario(self._table.number(0))
+
+    def _scenario(self, number: int) -> Checked:
+        if not self._scenarios:
+            raise ValueError(f"got an environment of a program; expected make({self.program.name!r})")
+        return self._scenarios[number]
+
     def explain(self) -> dict[str, Any]:
         """Which rules fired in the last step, and for the others that could have, why they did not.
 
@@ -180,7 +200,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         episode, so this is for looking, not for every step of training.
 
         Raises:
-            ValueError: no step has been taken since `reset` or `restore`.
+            ValueError: no step has been taken since `reset` or `restore`, or the environment was made from a program.
         """
         recording = self._last_act or self._recording
         if not recording.actions:
@@ -189,9 +209,10 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         program = self._table.programs[number]
         from socialai_dsl.envs.explain import Explainer  # the compiler is needed for this alone
 
+        scenario = self._scenario(number)
         if program.sha256 not in self._explainers:
             suite = self.program if isinstance(self.program, ProgramSuite) else None
-            self._explainers[program.sha256] = Explainer(program, suite, number)
+            self._explainers[program.sha256] = Explainer(program, scenario, suite, number)
         # Where another act has begun, the registers are that one's.
         reached = self._registers if self._last_act is None else None
         explained: dict[str, Any] = self._explainers[program.sha256].explain(recording, reached)
@@ -233,6 +254,14 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
     def coloured_text(self) -> str:
         """The room as text with escape codes for colours; what the agent has in view has a lighter ground."""
         return coloured_text(self._table, 0)
+
+    def scene(self) -> Scene:
+        """What a picture of the room shows now."""
+        return scene(self._table, 0)
+
+    def looks_of_npcs(self) -> dict[EntityName, Code]:
+        """The look of each NPC, as if it looked down; also of those that have left or are hidden."""
+        return looks_of_npcs(self._table, 0)
 
     def cast(self) -> list[Face]:
         """The NPCs of this episode that the agent can see, each with a label and a picture of its face."""

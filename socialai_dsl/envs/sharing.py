@@ -23,10 +23,9 @@ def may_lie_over(program: Program) -> frozenset[int]:
 
 def _is_walkable(program: Program, number: int) -> bool:
     """Whether an object can be walked on in one of its statuses."""
-    entities, types = program.header(Header.ENTITY_AT), program.header(Header.TYPE_AT)
-    first = int(program.words[entities + EntityColumn.COLUMNS * number + EntityColumn.TYPE])
-    rows = range(first, first + len(program.entities[number].states))
-    return any(program.words[types + TypeColumn.COLUMNS * row + TypeColumn.WALKABLE] for row in rows)
+    first = int(program.table(Header.ENTITY_AT)[number, EntityColumn.TYPE])
+    statuses = slice(first, first + len(program.entities[number].states))
+    return bool(program.table(Header.TYPE_AT)[statuses, TypeColumn.WALKABLE].any())
 
 
 def _put_anywhere(program: Program) -> frozenset[int]:

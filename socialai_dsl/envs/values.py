@@ -8,17 +8,13 @@ from typing import Any
 import numpy as np
 
 from socialai_dsl.diagnostics import did_you_mean
-from socialai_dsl.program import BODY_WORDS, CELL, Flag, Header, Program, RegisterName
+from socialai_dsl.program import CELL, Flag, Header, Program, RegisterName
 
 NOWHERE = "nowhere"
 """The cell of what is not in the room."""
 
 SILENCE = ""
 """The utterance of who says nothing."""
-
-
-TURN_WORDS = (*BODY_WORDS, "point", "stop pointing")
-"""What an NPC did in its last turn, by Body."""
 
 
 def entry_words(program: Program) -> int:

@@ -51,7 +51,13 @@ def document_of(loaded: LoadedExperiment, profile: str | None) -> dict[str, Any]
         "conditions": [_condition(cell, loaded.folder) for cell in cells],
         "runs": [
             {
-                "id": run_id(cell, seed, programs[cell.scenario], weights.get(cell.agent, cell.agent)),
+                "id": run_id(
+                    cell,
+                    seed,
+                    programs[cell.scenario],
+                    weights.get(cell.agent, cell.agent),
+                    _code_digests(cell, loaded.folder),
+                ),
                 "condition": cell.name,
                 "seed": seed,
             }
@@ -63,7 +69,7 @@ def document_of(loaded: LoadedExperiment, profile: str | None) -> dict[str, Any]
     }
 
 
-def run_id(cell: Cell, seed: int, program: str, agent: str) -> str:
+def run_id(cell: Cell, seed: int, program: str, agent: str, code: Mapping[str, str]) -> str:
     """The name of a run's folder: a hash of all that decides what the run computes.
 
     Args:
@@ -71,11 +77,13 @@ def run_id(cell: Cell, seed: int, program: str, agent: str) -> str:
         seed: its own.
         program: digest of the compiled scenario.
         agent: its name, or the digest of its weights.
+        code: option -> digest of the file of the user's own that it names.
     """
     options = config_of(cell, seed).model_dump(
         exclude={"scenario", "agent", "recipe", *(WITHOUT_EFFECT - {"frames"})}
     )
-    text = json.dumps(options | {"program": program, "agent": agent}, sort_keys=True, ensure_ascii=True)
+    decisive = options | {"program": program, "agent": agent} | ({"code": dict(code)} if code else {})
+    text = json.dumps(decisive, sort_keys=True, ensure_ascii=True)
     return hashlib.sha256(text.encode()).hexdigest()[:_ID_LENGTH]
 
 
@@ -139,7 +147,7 @@ def differences(kept: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]:
         if name in runs_before and runs_before[name].keys() != runs_now[name].keys()
     ]
     found += [
-        f"`{name}`: its scenario or its checkpoint has changed since"
+        f"`{name}`: its scenario, its checkpoint or its code has changed since"
         for name in runs_now
         if name in before
         and before[name] == now[name]
@@ -197,6 +205,12 @@ def _source_digest(loaded: LoadedExperiment) -> str:
     """Of the texts of the experiment's own files."""
     texts = [source.text for _, source in sorted(loaded.resolved.files.items())]
     return hashlib.sha256("\0".join(texts).encode()).hexdigest()
+
+
+def _code_digests(cell: Cell, folder: Path) -> dict[str, str]:
+    """Of the files of the user's own classes, by option."""
+    config = config_of(cell).model_copy(update={"scenario": from_anywhere(cell.scenario, folder)})
+    return {name: hashlib.sha256(file.read_bytes()).hexdigest() for name, file in config.own_files.items()}
 
 
 def _weights_digest(path: Path) -> str:

@@ -6,9 +6,11 @@ always the leftmost character of the node), so a loader can turn it into file:li
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, fields
-from typing import Literal
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from socialai_dsl import trees
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,12 +21,7 @@ class Node:
 
     def children(self) -> Iterator[Expr]:
         """The sub-expressions in source order."""
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, Node):
-                yield value  # type: ignore[misc]
-            elif isinstance(value, tuple):
-                yield from (item for item in value if isinstance(item, Node))  # type: ignore[misc]
+        yield from trees.children(self)
 
     def walk(self) -> Iterator[Expr]:
         """This node and everything below it, depth first, in source order."""
@@ -202,3 +199,12 @@ Expr = (
     | Negative
     | Placed
 )
+
+
+def moved(node: Expr, place: Callable[[int], int]) -> Expr:
+    """The same tree with every offset changed."""
+    offsets: dict[str, Any] = {
+        name: place(getattr(node, name)) for name in ("at", "name_at") if hasattr(node, name)
+    }
+    found: Expr = replace(trees.rebuilt(node, lambda part: moved(part, place)), **offsets)
+    return found

@@ -82,25 +82,9 @@ def _parse_slot(inner: str, offset: int) -> ast.Expr:
     if not inner.strip():
         raise ParseProblem("S202", "an empty slot `<>`", offset - 1)
     try:
-        return shift(parse_expression(inner), offset)
+        return ast.moved(parse_expression(inner), lambda at: at + offset)
     except ParseProblem as problem:
         raise ParseProblem(problem.code, problem.message, problem.offset + offset, problem.hint) from None
-
-
-def shift(node: ast.Expr, by: int) -> ast.Expr:
-    """The same tree with every offset moved by `by`."""
-    changes: dict[str, Any] = {}
-    for name in node.__dataclass_fields__:
-        value = getattr(node, name)
-        if name in ("at", "name_at"):
-            changes[name] = value + by
-        elif isinstance(value, ast.Node):
-            changes[name] = shift(value, by)  # type: ignore[arg-type]
-        elif isinstance(value, tuple):
-            changes[name] = tuple(shift(v, by) if isinstance(v, ast.Node) else v for v in value)  # type: ignore[arg-type]
-        else:
-            changes[name] = value
-    return type(node)(**changes)
 
 
 @cache
@@ -126,7 +110,7 @@ class _ToAst(Transformer_NonRecursive):  # type: ignore[type-arg]
 
     def text(self, meta: Any, items: list[Any]) -> Any:
         inner = parse_text(str(items[0])[1:-1])
-        return self._made(shift(inner, meta.start_pos + 1))
+        return self._made(ast.moved(inner, lambda at: at + meta.start_pos + 1))
 
     def yes(self, meta: Any, items: list[Any]) -> Any:
         return self._made(ast.Truth(True, at=meta.start_pos))

@@ -4,27 +4,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from enum import Enum
 from pathlib import Path
 from typing import TypeAlias
 
+from socialai_dsl.loader.offsets import Style, source_indices
 from socialai_dsl.source import Source, Span
 
 Data: TypeAlias = "str | int | float | bool | list[Data] | dict[str, Data] | None"
 DataPath: TypeAlias = tuple[str | int, ...]
 """Keys and list indices from the root of a document to one of its parts; () is the root."""
-
-
-class Style(Enum):
-    """How a part is written."""
-
-    PLAIN = "plain"
-    SINGLE = "'"
-    DOUBLE = '"'
-    LITERAL = "|"
-    FOLDED = ">"
-    MAPPING = "mapping"
-    SEQUENCE = "sequence"
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,8 +107,6 @@ class Document(Positions):
 
     def place_in_scalar(self, path: DataPath, offset: int, width: int) -> Span:
         """The place of one character of an existing scalar; the start of anything else."""
-        from socialai_dsl.loader.offsets import source_indices
-
         node = self.node(path)
         place = node.value
         if node.style in (Style.MAPPING, Style.SEQUENCE):

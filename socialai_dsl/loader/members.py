@@ -6,14 +6,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
-from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
 from socialai_dsl.loader.document import Data, DataPath
 from socialai_dsl.loader.leaves import MAX_LEAVES, Leaf, label_of, leaves_of, parameters_of
-
-if TYPE_CHECKING:
-    from socialai_dsl.loader.resolved import Resolved
+from socialai_dsl.loader.resolved import Resolved
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-
-from socialai_dsl.loader.document import Style
+from enum import Enum
 
 _WHITE = " \t\n\r"
 _ESCAPE_DIGITS = {"x": 2, "u": 4, "U": 8}
@@ -12,6 +11,18 @@ _ESCAPED = {
     "0": "\0", "a": "\a", "b": "\b", "t": "\t", "\t": "\t", "n": "\n", "v": "\v", "f": "\f", "r": "\r",
     "e": "\x1b", "N": "\x85", "_": "\xa0", "L": "\u2028", "P": "\u2029",
 }  # fmt: skip
+
+
+class Style(Enum):
+    """How a part is written."""
+
+    PLAIN = "plain"
+    SINGLE = "'"
+    DOUBLE = '"'
+    LITERAL = "|"
+    FOLDED = ">"
+    MAPPING = "mapping"
+    SEQUENCE = "sequence"
 
 
 def source_indices(text: str, start: int, end: int, style: Style, value: str) -> list[int]:

@@ -11,9 +11,10 @@ from typing import Any
 import yaml
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag
-from socialai_dsl.loader.document import Data, DataPath, Document, NodeSpan, Style
+from socialai_dsl.loader.document import Data, DataPath, Document, NodeSpan
 from socialai_dsl.loader.files import FORBIDDEN, checked, display_name, forbidden_character, read_source
 from socialai_dsl.loader.limits import MAX_DEPTH, MAX_EVENTS, MAX_SCALAR
+from socialai_dsl.loader.offsets import Style
 from socialai_dsl.loader.scalars import read_plain
 from socialai_dsl.loader.texts import value_at
 from socialai_dsl.loader.yaml_errors import explain

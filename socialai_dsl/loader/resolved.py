@@ -12,7 +12,6 @@ from socialai_dsl.loader.document import DataPath, Document, Positions
 from socialai_dsl.loader.files import is_file
 from socialai_dsl.loader.library import Library, yaml_files
 from socialai_dsl.loader.limits import MAX_CHAIN
-from socialai_dsl.loader.members import Member, check_splits, members_of
 from socialai_dsl.loader.names import (
     Part,
     ScenarioName,
@@ -205,23 +204,6 @@ class Resolved(Positions):
                 if not abstract:
                     found.append(file)
         return found
-
-    def members(self) -> tuple[Member, ...]:
-        """The members of a suite in order: of the split that `?split=` chooses, with the variants passed on.
-
-        Raises:
-            ScenarioError: whatever is wrong with the members; S503 if no member can take a variant; S206 if there is
-                no such split.
-        """
-        return members_of(self)
-
-    def check_splits(self) -> None:
-        """Whether every split names members, also those that are not chosen.
-
-        Raises:
-            ScenarioError: whatever is wrong with them.
-        """
-        check_splits(self)
 
     def varied(self, variant: Part) -> Resolved | None:
         """This scenario with a variant that a suite passes on; None if it has no such variant."""

@@ -190,11 +190,6 @@ class Instruction:
         return OpClass(self.op >> CLASS_BITS)
 
     @cached_property
-    def arity(self) -> int:
-        """How many of its operands are used."""
-        return max((k + 1 for k in range(3) if self.operands[k].kind is not Kind.UNUSED), default=0)
-
-    @cached_property
     def reads(self) -> tuple[int, ...]:
         """Positions of the operands that name registers or temporaries to read."""
         return tuple(k for k, operand in enumerate(self.operands) if operand.kind in _READ)

@@ -149,12 +149,14 @@ def read_runs(folders: Sequence[Path]) -> Experiment:
         ValueError: a folder is not that of a run.
     """
     grouped: dict[tuple[str, str], list[tuple[dict[str, Any], Run]]] = {}
+    called = [folder.name for folder in folders]
     for folder in folders:
         settings = _settings(folder, [])
         if settings is None or not isinstance(settings.get("scenario"), str):
             raise ValueError(f"{folder}: expected the folder of a run, with its config.json")
         seed = settings.get("seed")
-        run = _read_run(folder, folder.name, seed if isinstance(seed, int) else 0)
+        name = folder.name if called.count(folder.name) == 1 else folder.as_posix()
+        run = _read_run(folder, name, seed if isinstance(seed, int) else 0)
         grouped.setdefault((str(settings["scenario"]), _column(settings)), []).append((settings, run))
     conditions = []
     for (scenario, column), members in grouped.items():

@@ -27,6 +27,7 @@ class Cell:
     Attributes:
         text: what it says. lines: smaller lines below it.
         tone: how it is meant. code: whether it is written as code. meter: a picture of it.
+        link: where the text leads, as seen from the page.
     """
 
     text: str
@@ -34,6 +35,7 @@ class Cell:
     tone: Literal["", "warning", "muted", "strong"] = ""
     code: bool = False
     meter: Meter | None = None
+    link: str | None = None
 
 
 @dataclass(frozen=True)

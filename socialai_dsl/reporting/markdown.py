@@ -65,6 +65,8 @@ def _row(cells: Sequence[str]) -> str:
 
 def _cell(cell: Cell) -> str:
     text = _escaped(cell.text)
+    if cell.link:
+        text = f"[{text}]({cell.link})"
     if cell.tone == "strong":
         text = f"**{text}**"
     return "<br>".join([text, *map(_escaped, cell.lines)])

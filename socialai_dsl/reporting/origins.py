@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Final
+from urllib.parse import quote
 
+from socialai_dsl.experiments.folder import REPLAY
 from socialai_dsl.reporting.analysis import RISING, SOLVED, Analysis, Ceilings, Level, Summary
 from socialai_dsl.reporting.collect import Run
 from socialai_dsl.reporting.document import Block, Cell, Folded, Heading, Items, Meter, Table
@@ -39,8 +43,8 @@ def _level(level: Level | None) -> Cell:
     return Cell(f"{level.value:.3f} ± {level.error:.3f}", (level.source,), meter=Meter(level.value))
 
 
-def run_blocks(analysis: Analysis) -> Iterator[Block]:
-    """Every run, in a table."""
+def run_blocks(analysis: Analysis, place: Path) -> Iterator[Block]:
+    """Every run, in a table of a report that will lie at `place`."""
     rows = [
         [
             Cell(condition.entry.name),
@@ -55,6 +59,7 @@ def run_blocks(analysis: Analysis) -> Iterator[Block]:
             if run.result is not None and run.result.frames_per_second
             else NONE,
             Cell(run.id, code=True),
+            _replay(run, place),
         ]
         for condition in analysis.experiment.conditions
         for run in condition.runs
@@ -75,6 +80,7 @@ def run_blocks(analysis: Analysis) -> Iterator[Block]:
                     ">time",
                     ">frames/s",
                     "folder",
+                    "episodes",
                 ],
                 rows,
                 "Success, return (sum of an episode's rewards) and length (steps): means over the test episodes. Time: "
@@ -82,6 +88,14 @@ def run_blocks(analysis: Analysis) -> Iterator[Block]:
             )
         ],
     )
+
+
+def _replay(run: Run, place: Path) -> Cell:
+    """A link to the page on which episodes of a run can be watched."""
+    page = run.folder / REPLAY
+    if not page.is_file():
+        return NONE
+    return Cell("watch", link=quote(Path(os.path.relpath(page, place)).as_posix()))
 
 
 def provenance_blocks(analysis: Analysis, version: str) -> Iterator[Block]:

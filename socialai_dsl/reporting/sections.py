@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from pathlib import Path
 
 from socialai_dsl.reporting.analysis import Analysis
 from socialai_dsl.reporting.document import Block, Document, Folded, Items, Text
@@ -23,12 +24,13 @@ from socialai_dsl.reporting.style import styled
 from socialai_dsl.reporting.wording import count_of, duration
 
 
-def compose(analysis: Analysis, version: str) -> Document:
+def compose(analysis: Analysis, version: str, place: Path) -> Document:
     """The whole report.
 
     Args:
         analysis: its figures.
         version: of the package that makes it.
+        place: the folder where the report will lie.
     """
     images, experiment = Images(), analysis.experiment
     subtitle = f"profile {experiment.profile}" if experiment.profile else ""
@@ -41,7 +43,7 @@ def compose(analysis: Analysis, version: str) -> Document:
             blocks += section_blocks(section, f"part{number}", analysis.ceilings, images)
         blocks += ending_blocks(analysis, images)
     blocks += ceiling_blocks(analysis)
-    blocks += run_blocks(analysis)
+    blocks += run_blocks(analysis, place)
     blocks += provenance_blocks(analysis, version)
     blocks += method_blocks(analysis)
     return Document(f"Report: {experiment.name}", subtitle, blocks, images.made)

@@ -15,11 +15,10 @@ from socialai_dsl.schema.behaviour import (
     WorldRule,
 )
 from socialai_dsl.schema.properties import OnlyThrough, Property
-from socialai_dsl.schema.scenario import PRIMITIVES, Memory, Outcome, Parameter, Reward, Scenario, Sequence
+from socialai_dsl.schema.scenario import Memory, Outcome, Parameter, Reward, Scenario, Sequence
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
 
 __all__ = [
-    "PRIMITIVES",
     "Belief",
     "CastMember",
     "FirstRule",

@@ -19,9 +19,8 @@ from socialai_dsl.schema.behaviour import (
 )
 from socialai_dsl.schema.properties import Property
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
+from socialai_dsl.vocabulary import PRIMITIVES, Primitive
 
-Primitive = Literal["left", "right", "forward", "pickup", "drop", "toggle", "done"]
-PRIMITIVES: tuple[Primitive, ...] = ("left", "right", "forward", "pickup", "drop", "toggle", "done")
 """The agent's body actions in the order of the paper (appendix, action space)."""
 
 

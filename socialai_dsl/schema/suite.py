@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, JsonValue, StringConstraints, Tag
 
 from socialai_dsl.schema.base import WORD_SCHEMA, Model, Prose, Word, _as_tuple
-from socialai_dsl.schema.scenario import Primitive
 from socialai_dsl.schema.world import UtteranceGrammar
+from socialai_dsl.vocabulary import Primitive
 
 MemberName = Annotated[str, Field(min_length=1, max_length=200)]
 """The path of a scenario, relative to the suite's file, with variants and parameters."""

@@ -14,7 +14,7 @@ from itertools import product
 from random import Random
 from typing import Final
 
-from socialai_dsl.semantics import terms
+from socialai_dsl.semantics import plans, terms
 from socialai_dsl.semantics.build import compute, walk
 from socialai_dsl.semantics.findings import Findings
 from socialai_dsl.semantics.geometry import (
@@ -27,7 +27,8 @@ from socialai_dsl.semantics.geometry import (
     value,
     wall_cells,
 )
-from socialai_dsl.semantics.terms import Checked, Const, Placing, Region, Term
+from socialai_dsl.semantics.plans import Checked, Placing, Region
+from socialai_dsl.semantics.terms import Const, Term
 
 _ROOMS: Final = 100
 _FEWEST: Final = 20
@@ -166,9 +167,9 @@ class _Room:
         self.absent: set[int] = set()
         self.effort = 0
 
-    def do(self, item: terms.Setup) -> None:
+    def do(self, item: plans.Setup) -> None:
         """Draw one thing."""
-        if isinstance(item, terms.Drawn):
+        if isinstance(item, plans.Drawn):
             self._registers[item.path] = self._value(item.value.term)
         elif isinstance(item, Placing) and (item.when is None or self._value(item.when)):
             self._place(item)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
@@ -11,30 +11,20 @@ from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import contents, resolve_groups
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.findings import FailedError
-from socialai_dsl.semantics.resolve_attributes import ENTITY, somewhere, status_of
+from socialai_dsl.semantics.plans import Activity, Effect
+from socialai_dsl.semantics.resolve_attributes import status_of
+from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
 from socialai_dsl.semantics.scope import Scope
 from socialai_dsl.semantics.sequences import performed
 from socialai_dsl.semantics.signatures import ACTIVITIES, EFFECTS, SYNONYMS
-from socialai_dsl.semantics.terms import (
-    ACTION,
-    DIRECTION,
-    TURN,
-    Activity,
-    Const,
-    Effect,
-    FieldOf,
-    Measure,
-    Term,
-    Type,
-)
+from socialai_dsl.semantics.terms import ACTION, DIRECTION, TURN, Const, FieldOf, Measure, Term, Type
 from socialai_dsl.semantics.wording import described, quoted, with_article, wrong_count
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
 
 _STATUS_AFTER = {"reveal": "opened", "open": "open", "close": "closed", "lock": "locked", "unlock": "locked"}
 """The status that an object must be able to have for an effect to make sense."""
 
+_TYPES = {"entity": ENTITY, "direction": DIRECTION, "turn": TURN, "int": INT}
+"""What is expected of an argument, by what the signature takes."""
 _TO_CELLS = frozenset({"go_to", "go_next_to", "face"})
 """Activities for which a cell will do."""
 
@@ -64,9 +54,11 @@ def activity(resolver: Resolver, path: DataPath, raw: str | None, scope: Scope) 
         return Activity("perform", performed(resolver, args[0], scope), site, span)
     if name in ("push", "point", "follow"):
         return _at_something(resolver, name, args, Activity("stay", (), site, span), scope)
-    expected = {"direction": DIRECTION, "turn": TURN}.get(signature.takes[0], ENTITY) if args else None
-    terms = tuple(_argument(resolver, name, arg, expected, scope) for arg in args)
-    return Activity(cast(Any, name), terms, site, span)
+    terms = tuple(
+        _argument(resolver, name, arg, _TYPES[takes], scope)
+        for takes, arg in zip(signature.takes, args, strict=True)
+    )
+    return Activity(name, terms, site, span)
 
 
 def _check_mover(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> None:
@@ -86,7 +78,7 @@ def _at_something(
         assert scope.member is not None, "internal: an activity is somebody's"
         own = resolver.symbols.numbers[scope.member]
         way = Measure(
-            DIRECTION, "dir_to", (Const(Type("entity", own, own), own), somewhere(resolver, args[0], scope))
+            DIRECTION, "dir_to", (Const(Type("entity", own, own), own), resolver.somewhere(args[0], scope))
         )
         return replace(written, name="point", args=(way,))
     what = _argument(resolver, name, args[0], ENTITY, scope)
@@ -132,7 +124,7 @@ def _argument(resolver: Resolver, name: str, node: ast.Expr, expected: Any, scop
         hint = f"`{name}(nearest(d in {group} to self){more})`, or draw one in `let` with `pick({group})`"
         raise resolver.fail("S204", f"`{group}` is a group: say which of them", node, scope, hint=hint)
     if name in _TO_CELLS:
-        return somewhere(resolver, node, scope)
+        return resolver.somewhere(node, scope)
     term = resolver.value(node, expected, scope)
     if name == "enter":
         _check_entrance(resolver, term, node, scope)
@@ -229,7 +221,7 @@ def _target(
         message = f"what is taken out of the room vanishes: `{quoted(subject)}.vanish`"
         raise resolver.fail("S204", message, node, scope)
     if name == "put":
-        return somewhere(resolver, node, scope)
+        return resolver.somewhere(node, scope)
     holder = resolver.value(node, ENTITY, scope)
     contents.check_holder(resolver, holder, node, scope)
     for entity in entities:

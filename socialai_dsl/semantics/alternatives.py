@@ -5,29 +5,20 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from socialai_dsl.semantics.build import all_of, one_of
 from socialai_dsl.semantics.terms import Compare, Const, Select, Term, Type
 from socialai_dsl.semantics.wording import spoken
 
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
-
 V = TypeVar("V")
 
 
-def register_of(member: str) -> str:
-    """The register that says which file was drawn."""
-    return f"{member}.one_of"
-
-
-def drawn(resolver: Resolver, member: str, among: Iterable[int]) -> Term | None:
-    """Whether one of these alternatives of a member was drawn; None if that is certain."""
+def drawn(which: Term | None, among: Iterable[int]) -> Term | None:
+    """Whether the file that was drawn, whose number `which` is, is one of these; None if that is certain."""
     numbers = sorted(set(among))
-    if len(numbers) == len(resolver.symbols.alternatives[member]):
+    if which is None or len(numbers) == which.type.size:
         return None
-    which = resolver.registers.read(register_of(member))
     return one_of(which, [Const(which.type, number) for number in numbers])
 
 
@@ -39,26 +30,26 @@ def by_value(values: Sequence[V]) -> dict[V, list[int]]:
     return found
 
 
-def select(resolver: Resolver, member: str, terms: Sequence[Term]) -> Term:
-    """The value that belongs to the alternative that was drawn."""
+def select(which: Term | None, terms: Sequence[Term]) -> Term:
+    """The value that belongs to the file that was drawn, whose number `which` is."""
     kinds = {term.type.kind for term in terms}
     assert len(kinds) == 1, "internal: alternatives of different kinds"
     if len(set(terms)) == 1:
         return terms[0]
+    assert which is not None, "internal: nothing is drawn, and the values differ"
     if kinds == {"text"}:
-        return _text(resolver, member, terms)
+        return _text(which, terms)
     type_ = terms[0].type
     for term in terms[1:]:
         type_ = replace(type_, low=min(type_.low, term.type.low), high=max(type_.high, term.type.high))
-    return _cases(resolver, member, [_of_type(term, type_) for term in terms], type_)
+    return _cases(which, [_of_type(term, type_) for term in terms], type_)
 
 
 def _of_type(term: Term, type_: Type) -> Term:
     return replace(term, type=type_) if isinstance(term, Const) else term
 
 
-def _cases(resolver: Resolver, member: str, terms: Sequence[Term], type_: Type) -> Term:
-    which = resolver.registers.read(register_of(member))
+def _cases(which: Term, terms: Sequence[Term], type_: Type) -> Term:
     default = Counter(terms).most_common(1)[0][0]
     cases = [
         (Compare("==", which, Const(which.type, number)), term)
@@ -68,9 +59,8 @@ def _cases(resolver: Resolver, member: str, terms: Sequence[Term], type_: Type) 
     return Select(type_, tuple(case for case, _ in cases), tuple(term for _, term in cases), default)
 
 
-def _text(resolver: Resolver, member: str, terms: Sequence[Term]) -> Term:
+def _text(which: Term, terms: Sequence[Term]) -> Term:
     """Texts have words of their own, so the result has the words of all."""
-    which = resolver.registers.read(register_of(member))
     return text_of(
         [(Compare("==", which, Const(which.type, number)), term) for number, term in enumerate(terms)]
     )

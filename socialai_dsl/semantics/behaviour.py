@@ -4,46 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.schema import FirstRule, Rule, State, Step, ThenRule
 from socialai_dsl.schema.behaviour import Effects
 from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics import texts
 from socialai_dsl.semantics.activities import activity, effect
 from socialai_dsl.semantics.build import all_of, any_of
 from socialai_dsl.semantics.findings import FailedError, dotted, surviving
 from socialai_dsl.semantics.hearing import Alternative, asks_for_noun, binding, bound, with_nouns
+from socialai_dsl.semantics.plans import Activity, Effect, FramePlan, RulePlan, StatePlan, StepPlan
+from socialai_dsl.semantics.resolver import INT, Resolver
 from socialai_dsl.semantics.scope import Draws, PlayedFrame, Scope
-from socialai_dsl.semantics.terms import (
-    BOOL,
-    Activity,
-    Compare,
-    Const,
-    Effect,
-    FramePlan,
-    Heard,
-    Line,
-    Read,
-    RulePlan,
-    Sited,
-    StatePlan,
-    StepPlan,
-    Term,
-    Type,
-)
+from socialai_dsl.semantics.signatures import ACTIVITIES
+from socialai_dsl.semantics.terms import BOOL, Compare, Const, Heard, Line, Read, Sited, Term, Type
 
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
-
-_INT = Type("int", 0, 0)
 _FOR_EVER = -1
 
 ANYTHING = "any"
 """`hears: any` is whatever anybody says."""
-
-_ENDLESS = frozenset({"face", "stay", "choose", "flee", "follow", "wander"})
-"""Activities that never end by themselves."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +56,7 @@ def lines_of(resolver: Resolver, played: PlayedFrame) -> Spoken:
             with surviving():
                 hearing = isinstance(entry, Rule) and bool(entry.hears)
                 scope = replace(_scope(played, (*path, "say"), f"{address}.say"), hearing=hearing)
-                spoken.lines[path] = resolver.utterances.line((*path, "say"), entry.say, scope)
+                spoken.lines[path] = texts.line(resolver, (*path, "say"), entry.say, scope)
     return spoken
 
 
@@ -99,7 +79,7 @@ def plan(resolver: Resolver, played: PlayedFrame, spoken: Spoken) -> FramePlan:
 def assigned(resolver: Resolver, register: str, raw: object, path: DataPath, scope: Scope) -> Sited:
     """The value that a register is set to; it makes room for it."""
     known = resolver.registers.read(register)
-    expected = _INT if known.type.kind == "int" and not known.type.words else known.type
+    expected = INT if known.type.kind == "int" and not known.type.words else known.type
     term = resolver.written(path, raw, expected, scope)  # type: ignore[arg-type]
     resolver.registers.widen(register, term.type)
     return Sited(term, scope.draws.site, resolver.findings.at(path))
@@ -190,7 +170,7 @@ class _Planner:
             with surviving():
                 text = resolver.findings.text(place, raw)
                 scope = _scope(self.played, place, f"{address}.hears")
-                found.append(resolver.utterances.patterns(text, scope, resolver.findings.at(place), True))
+                found.append(texts.patterns(resolver, text, scope, resolver.findings.at(place), True))
         return found
 
     def _after(
@@ -201,9 +181,9 @@ class _Planner:
         if rule.after is None:
             return 0, when
         resolver = self.resolver
-        term: Term = Const(_INT, 0)
+        term: Term = Const(INT, 0)
         with surviving():
-            term = resolver.written(place, rule.after, _INT, self._scope(place, f"{address}.after"))
+            term = resolver.written(place, rule.after, INT, self._scope(place, f"{address}.after"))
         if isinstance(term, Const):
             if term.value < 0:
                 resolver.findings.error(
@@ -292,7 +272,9 @@ class _Planner:
         self.resolver.readings.entries[name] = step
         duration, lasted = self._duration((*path, "for"), step.for_, f"{address}.for")
         head = (step.do or "").partition("(")[0].strip()
-        endless = doing is not None and (doing.name in _ENDLESS or head in _ENDLESS)
+        endless = doing is not None and any(
+            name in ACTIVITIES and ACTIVITIES[name].endless for name in (doing.name, head)
+        )
         if step.do is not None and step.until is None and step.for_ is None and endless:
             findings = self.resolver.findings
             message = f"`{step.do}` never ends by itself: add `until:` or `for:`"
@@ -318,7 +300,7 @@ class _Planner:
             return _FOR_EVER, None
         findings, horizon = self.resolver.findings, self.resolver.symbols.scenario.horizon
         try:
-            term = self.resolver.written(path, raw, _INT, self._scope(path, site))  # type: ignore[arg-type]
+            term = self.resolver.written(path, raw, INT, self._scope(path, site))  # type: ignore[arg-type]
         except FailedError:
             return None, None
         if isinstance(term, Const):

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.alternatives import of_each
 from socialai_dsl.semantics.findings import surviving
+from socialai_dsl.semantics.plans import Activity, BeliefPlan, FramePlan, StatePlan
 from socialai_dsl.semantics.registers import Declaration
+from socialai_dsl.semantics.resolver import ENTITY, Resolver
 from socialai_dsl.semantics.scope import Scope, at_every_step, reset_scope
-from socialai_dsl.semantics.terms import BOOL, Activity, BeliefPlan, FramePlan, Sited, StatePlan, Term, Type
+from socialai_dsl.semantics.terms import BOOL, Sited, Term
 from socialai_dsl.source import Span
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
-
-
-_ENTITY = Type("entity", 0, 0)
 
 
 def register_of(member: str, key: str) -> str:
@@ -68,7 +63,7 @@ def watching(member: str, number: int, span: Span) -> FramePlan:
 
 def believed(resolver: Resolver, owner: ast.Attribute, node: ast.Attribute, scope: Scope) -> Term:
     """`sally.believes.toy_in`; of several members, what the one believes who is meant."""
-    who = resolver.value(owner.subject, _ENTITY, scope)
+    who = resolver.value(owner.subject, ENTITY, scope)
     members = [resolver.symbols.member_of(number) for number in range(who.type.low, who.type.high + 1)]
     if None in members:
         raise resolver.fail("S211", "only a member of the cast believes something", owner, scope)

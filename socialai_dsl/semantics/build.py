@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
+from socialai_dsl import trees
 from socialai_dsl.semantics.terms import (
     BOOL,
     Compare,
     Const,
     HeardNoun,
     Logic,
-    ObjectType,
     Operation,
     Quantified,
     Read,
@@ -32,6 +31,11 @@ LARGEST = 1 << 62
 def integer(low: int, high: int | None = None) -> Type:
     """The numbers from low to high."""
     return Type("int", low, low if high is None else high)
+
+
+def entity(number: int) -> Const:
+    """An inhabitant of the room as a known value."""
+    return Const(Type("entity", number, number), number)
 
 
 def number(value: int) -> Const:
@@ -130,26 +134,13 @@ def changed(value: Any, change: Callable[[Term], Term | None]) -> Any:
     """A copy of a term, plan or tuple with every term replaced for which `change` gives another."""
     if isinstance(value, tuple):
         return tuple(changed(part, change) for part in value)
-    if isinstance(value, Term):
-        other = change(value)
-        if other is not None:
-            return other
-    elif not is_dataclass(value) or isinstance(value, Type | ObjectType | type):
-        return value
-    parts = {field.name: getattr(value, field.name) for field in fields(value)}
-    return replace(value, **{name: changed(part, change) for name, part in parts.items()})
+    other = change(value) if isinstance(value, Term) else None
+    return other if other is not None else trees.rebuilt(value, lambda part: changed(part, change))
 
 
-def walk(term: Any) -> Iterator[Term]:
+def walk(tree: Any) -> Iterator[Term]:
     """All terms in a term, a plan or a tuple of them, depth first."""
-    if isinstance(term, tuple | list):
-        for part in term:
-            yield from walk(part)
-    elif isinstance(term, Term):
-        yield term
-        yield from _parts(term)
-    elif is_dataclass(term) and not isinstance(term, Type | ObjectType | type):
-        yield from _parts(term)
+    return (node for node in trees.walk(tree) if isinstance(node, Term))
 
 
 def draws(term: Term) -> bool:
@@ -175,10 +166,3 @@ def may_find_nothing(term: Term) -> bool:
 def is_own_noun(term: Term) -> bool:
     """Whether a term is `agent.noun`: while the agent is silent, that is unlike any noun."""
     return isinstance(term, World) and term.name == "noun"
-
-
-def _parts(value: Any) -> Iterator[Term]:
-    for field in fields(value):
-        part = getattr(value, field.name)
-        if not isinstance(part, str | int | Type):
-            yield from walk(part)

@@ -9,7 +9,7 @@ from operator import itemgetter
 from typing import Final
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, did_you_mean
-from socialai_dsl.schema import PRIMITIVES, Scenario, Sequence
+from socialai_dsl.schema import Scenario, Sequence
 from socialai_dsl.schema.base import Expression
 from socialai_dsl.schema.positions import DataPath, Positions
 from socialai_dsl.schema.world import CHANNELS
@@ -20,7 +20,6 @@ from socialai_dsl.semantics import (
     entities,
     sequences,
     setup,
-    shadowing,
     statuses,
     tables,
     world,
@@ -30,16 +29,18 @@ from socialai_dsl.semantics.emptiness import check_placements
 from socialai_dsl.semantics.entities import AGENT, Prelude
 from socialai_dsl.semantics.findings import Findings, Scalar, surviving
 from socialai_dsl.semantics.inhabitants import entities_of
+from socialai_dsl.semantics.plans import Checked, FramePlan, OutcomePlan
 from socialai_dsl.semantics.possible import check_possible
 from socialai_dsl.semantics.properties import properties
-from socialai_dsl.semantics.ranges import Ranges
-from socialai_dsl.semantics.resolve import Resolver
+from socialai_dsl.semantics.registers import Ranges
+from socialai_dsl.semantics.resolve import ScenarioResolver
+from socialai_dsl.semantics.resolver import INT
 from socialai_dsl.semantics.room import room_plan, room_sizes
 from socialai_dsl.semantics.scope import PlayedFrame, at_every_step, frames_of, reset_scope
 from socialai_dsl.semantics.sequences import performs
-from socialai_dsl.semantics.terms import BOOL, Checked, Const, FramePlan, Line, OutcomePlan, Sited, Type
-from socialai_dsl.semantics.utterances import MAX_TEXTS, number_of_texts, texts_of
-from socialai_dsl.semantics.vocabulary import words_in_order
+from socialai_dsl.semantics.terms import BOOL, Const, Line, Sited, Type
+from socialai_dsl.semantics.utterances import MAX_TEXTS, number_of_texts, texts_of, words_in_order
+from socialai_dsl.vocabulary import PRIMITIVES
 
 _MAX_ROUNDS = 24
 
@@ -153,7 +154,7 @@ class _Run:
         sizes = room_sizes(scenario, findings)
         self._symbols = entities.symbols_of(scenario, prelude, sizes, findings)
         self._played = entities.played_frames(self._symbols, findings)
-        self.resolver = Resolver(self._symbols, findings, self._played, words, ranges)
+        self.resolver = ScenarioResolver(self._symbols, findings, self._played, words, ranges)
 
     def checked(self, name: str) -> Checked | None:
         """The checked scenario; None if it cannot be put together."""
@@ -186,7 +187,7 @@ class _Run:
         if findings.bag.has_errors:
             return None
         for plan in plans:
-            shadowing.check_shadowed(plan, findings)
+            checks.check_shadowed(plan, findings)
         self._report_unused()
         names = [resolver.registers.read(f"{member}.name") for member in self._symbols.cast]
         words = words_in_order(scenario.grammar, names, spoken.lines(self._symbols.cast))
@@ -229,13 +230,10 @@ class _Run:
                     message = f"this can be {number_of_texts(line)} different texts; at most {MAX_TEXTS} are possible"
                     self._findings.error("S212", message, line.span)
                 elif member != AGENT:
-                    self.resolver.npc_texts |= dict.fromkeys(texts_of(line))
-                    self.resolver.said_by.setdefault(member, {}).update(dict.fromkeys(texts_of(line)))
+                    self.resolver.utterances.add_npc_texts(member, texts_of(line))
         for member, played in self._played.items():
             if member != AGENT and performs(played.model):
-                texts = dict.fromkeys(self.resolver.utterances.all_texts())
-                self.resolver.npc_texts |= texts
-                self.resolver.said_by.setdefault(member, {}).update(texts)
+                self.resolver.utterances.add_npc_texts(member, self.resolver.utterances.all_texts())
         return _Spoken(found)
 
     def _plans(self, spoken: _Spoken) -> Iterator[FramePlan]:
@@ -264,12 +262,16 @@ class _Run:
                 )
 
     def _report_unused(self) -> None:
-        """Definitions and draws that nothing uses (W317), in a scenario that is written in one file: those of several
+        """Definitions, draws and tables that nothing uses (W317), in a scenario of a single file: those of several
         may be there for what else is built of these files.
         """
         places, scenario = self._findings.places, self._scenario
         drawn = [key for key, value in scenario.let.items() if not isinstance(value, Sequence)]
-        paths: list[DataPath] = [*(("let", key) for key in drawn), *_definitions(scenario)]
+        paths: list[DataPath] = [
+            *(("let", key) for key in drawn),
+            *(("tables", key) for key in scenario.tables),
+            *_definitions(scenario),
+        ]
         parts: list[DataPath] = [(name,) for name in scenario.model_fields_set]
         if len({places.key_span(path).file for path in (*parts, *paths)}) > 1:
             return
@@ -319,7 +321,7 @@ class _Run:
     def _reward(self, raw: Expression, path: DataPath) -> tuple[int, Sited | None]:
         """Per cent of the success reward, or what computes it."""
         scope = at_every_step(reset_scope(path))
-        term = self.resolver.written(path, raw, Type("int", 0, 0), scope)
+        term = self.resolver.written(path, raw, INT, scope)
         span = self._findings.at(path)
         if not isinstance(term, Const):
             return 100, Sited(term, scope.draws.site, span)

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 from socialai_dsl.grammar import ParseProblem, ast, parse_expression
 from socialai_dsl.schema import Frame, Scenario
 from socialai_dsl.schema.behaviour import Effects, Ranged
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.findings import surviving
+from socialai_dsl.semantics.resolver import ENTITY, Resolver
 from socialai_dsl.semantics.scope import Objects, Scope, frames_of, object_scope
 from socialai_dsl.semantics.terms import FieldOf, Term, Type
 from socialai_dsl.semantics.wording import quoted
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
-
-_ENTITY = Type("entity", 0, 0)
 
 
 def holders(resolver: Resolver) -> tuple[int, int] | None:
@@ -35,7 +30,7 @@ def inside_of(resolver: Resolver, objects: Objects, index: int, path: DataPath, 
     """The object that another lies in at first."""
     scope = object_scope(objects, index, path, "inside", at_reset=True)
     node = resolver.findings.expression(path, raw)
-    holder = resolver.value(node, _ENTITY, scope)
+    holder = resolver.value(node, ENTITY, scope)
     check_holder(resolver, holder, node, scope)
     return holder
 

@@ -12,7 +12,8 @@ from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.findings import Findings
 from socialai_dsl.semantics.geometry import EXACT, Cell, Size, UnknownError, interior_cells, value, wall_cells
-from socialai_dsl.semantics.terms import Checked, Const, Placing, Region, Term
+from socialai_dsl.semantics.plans import Checked, Placing, Region
+from socialai_dsl.semantics.terms import Const, Term
 
 _AROUND: Final = ((0, -1), (0, 1), (-1, 0), (1, 0))
 _NAMED: Final = 5

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from collections.abc import Sequence as Items
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema import Frame, ObjectGroup, Ranged, Scenario, Sequence
 from socialai_dsl.schema.base import Expression
 from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.semantics import beliefs, sequences
-from socialai_dsl.semantics.alternatives import register_of, select
+from socialai_dsl.semantics import beliefs, sequences, texts
+from socialai_dsl.semantics.alternatives import select
 from socialai_dsl.semantics.findings import Findings, dotted, surviving
 from socialai_dsl.semantics.registers import Declaration
 from socialai_dsl.semantics.resolve_names import slot_truth
+from socialai_dsl.semantics.resolver import ANY_TEXT, ENTITY, INT, Resolver
 from socialai_dsl.semantics.scope import (
     Define,
     Draws,
@@ -30,24 +31,11 @@ from socialai_dsl.semantics.scope import (
     reset_scope,
 )
 from socialai_dsl.semantics.signatures import WORDS
-from socialai_dsl.semantics.terms import (
-    CELL,
-    COLOR,
-    DIRECTION,
-    Const,
-    ObjectType,
-    Quantified,
-    Sited,
-    Type,
-)
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
+from socialai_dsl.semantics.terms import CELL, COLOR, DIRECTION, Const, ObjectType, Quantified, Sited, Type
+from socialai_dsl.vocabulary import is_plain
 
 AGENT = "agent"
 
-ANY_TEXT = Type("text", 0, -1)
-"""Expected: any text."""
 
 _OF_LAYOUTS = frozenset({"let", "last", "heard", "pending", "memory", "member", "one_of", "state"})
 """Keys of layouts and descriptions beside the names of objects and members of the cast."""
@@ -331,7 +319,7 @@ def check_slots(resolver: Resolver) -> None:
                     if played.model.slots[slot] == "bool":
                         slot_truth(resolver, slot, filled, scope)
                     else:
-                        resolver.utterances.parts(resolver.findings.text(path, str(filled)), scope)
+                        texts.parts(resolver, resolver.findings.text(path, str(filled)), scope)
 
 
 def _check_no_slots(name: str, symbols: Symbols, findings: Findings) -> None:
@@ -400,7 +388,7 @@ def _declare_file(resolver: Resolver, name: str) -> None:
     values = tuple(Const(type_, value) for value in range(len(words)))
     drawn = Quantified(type_, "pick", "each", values, None)
     span = resolver.findings.places.key_span(("cast", name, "one_of"))
-    resolver.registers.put(register_of(name), Sited(drawn, f"cast.{name}.one_of", span))
+    resolver.registers.draw_file(name, Sited(drawn, f"cast.{name}.one_of", span))
 
 
 def declare_name(resolver: Resolver, name: str) -> None:
@@ -414,7 +402,7 @@ def declare_name(resolver: Resolver, name: str) -> None:
     plain = [symbols.cast[name].name is None or is_plain_name(resolver, raw) for raw in raws]
     if all(plain):
         known = [Const(Type("text", 0, 0, (raw,)), 0) for raw in raws]
-        term = select(resolver, name, known)
+        term = select(resolver.registers.drawn_file(name), known)
         if isinstance(term, Const):
             resolver.registers.known(f"{name}.name", term)
         else:
@@ -433,9 +421,8 @@ def declare_name(resolver: Resolver, name: str) -> None:
 
 def is_plain_name(resolver: Resolver, raw: str) -> bool:
     """Whether a name is meant as it is written: words, and not something that is declared, or an attribute of it."""
-    words = raw.replace("'", " ").replace("-", " ").replace(".", " ").split()
-    plain = bool(words) and all(word.isalnum() for word in words)
-    return plain and not (" " not in raw.strip() and words[0] in resolver.symbols.declared)
+    subject = re.split(r"[\s'.-]", raw.strip(" '.-"), maxsplit=1)[0]
+    return is_plain(raw) and not (" " not in raw.strip() and subject in resolver.symbols.declared)
 
 
 def declare_frame(resolver: Resolver, played: PlayedFrame) -> None:
@@ -478,7 +465,7 @@ def _range(resolver: Resolver, path: DataPath, raw: Expression) -> Type:
     node = resolver.findings.expression(path, raw)
     if isinstance(node, ast.Interval):
         scope = reset_scope(path)
-        low, high = (resolver.value(end, Type("int", 0, 0), scope) for end in (node.low, node.high))
+        low, high = (resolver.value(end, INT, scope) for end in (node.low, node.high))
         if isinstance(low, Const) and isinstance(high, Const) and low.value <= high.value:
             return Type("int", low.value, high.value)
     message = "a range is written a..b, from the least to the greatest number"
@@ -490,13 +477,12 @@ def _declare_slot(resolver: Resolver, member: str, slot: str, kind: str) -> None
     alternatives = symbols.alternatives[member]
     if not all(slot in alternative.with_ for alternative in alternatives):
         return
-    entity, number = Type("entity", 0, 0), Type("int", 0, 0)
     types = {
-        "object": entity,
-        "npc": entity,
+        "object": ENTITY,
+        "npc": ENTITY,
         "direction": DIRECTION,
         "color": COLOR,
-        "int": number,
+        "int": INT,
         "noun": symbols.nouns,
         "cell": CELL,
     }

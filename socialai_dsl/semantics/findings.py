@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.grammar import ParseProblem, ast, parse_expression, parse_text
 from socialai_dsl.schema.positions import DataPath, Positions
 from socialai_dsl.source import Span
+from socialai_dsl.trees import rebuilt
 
 Scalar = int | bool | float | str
 
@@ -113,17 +114,8 @@ class Findings:
     def _replaced(self, node: ast.Expr, path: DataPath) -> ast.Expr:
         if isinstance(node, ast.Parameter):
             return self._parameter(node, path)
-        changes: dict[str, Any] = {}
-        for name in node.__dataclass_fields__:
-            value = getattr(node, name)
-            if isinstance(value, ast.Node):
-                changes[name] = self._replaced(value, path)  # type: ignore[arg-type]
-            elif isinstance(value, tuple):
-                changes[name] = tuple(
-                    self._replaced(item, path) if isinstance(item, ast.Node) else item  # type: ignore[arg-type]
-                    for item in value
-                )
-        return replace(node, **changes) if changes else node
+        replaced: ast.Expr = rebuilt(node, lambda part: self._replaced(part, path))
+        return replaced
 
     def _parameter(self, node: ast.Parameter, path: DataPath) -> ast.Expr:
         span = self.at(path, node.at, len(node.id) + 1)
@@ -134,13 +126,13 @@ class Findings:
         value = self.params[node.id]
         if isinstance(value, str):
             try:
-                return _placed_at(parse_expression(value), node.at)
+                return ast.moved(parse_expression(value), lambda _: node.at)
             except ParseProblem as problem:
                 message = f"the value `{value}` of `{node.id}` is not an expression: {problem}"
                 raise self.fail("S206", message, span) from None
         if isinstance(value, float):
             raise self.fail("S204", f"the parameter `{node.id}` is {value:g}, not a whole number", span)
-        return _placed_at(self.expression((), value), node.at)
+        return ast.moved(self.expression((), value), lambda _: node.at)
 
 
 def _extent(node: ast.Expr) -> tuple[int, int]:
@@ -156,22 +148,6 @@ def _extent(node: ast.Expr) -> tuple[int, int]:
             return node.at, len(str(value))
         case _:
             return node.at, 1
-
-
-def _placed_at(node: ast.Expr, at: int) -> ast.Expr:
-    changes: dict[str, Any] = {}
-    for name in node.__dataclass_fields__:
-        value = getattr(node, name)
-        if name in ("at", "name_at"):
-            changes[name] = at
-        elif isinstance(value, ast.Node):
-            changes[name] = _placed_at(value, at)  # type: ignore[arg-type]
-        elif isinstance(value, tuple):
-            changes[name] = tuple(
-                _placed_at(item, at) if isinstance(item, ast.Node) else item  # type: ignore[arg-type]
-                for item in value
-            )
-    return replace(node, **changes)
 
 
 def as_text(text: str, whole: object) -> str:

@@ -8,7 +8,8 @@ from typing import Final
 
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.build import compute
-from socialai_dsl.semantics.terms import Region, Term
+from socialai_dsl.semantics.plans import Region
+from socialai_dsl.semantics.terms import Term
 
 EXACT: Final = frozenset({"column", "row", "rect"})
 """Regions that name their cells: what may overlap can be put there where the room builds something, too."""

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics import resolve_attributes
+from socialai_dsl.semantics import texts
 from socialai_dsl.semantics.build import all_of, any_of, changed, walk
 from socialai_dsl.semantics.findings import FailedError
+from socialai_dsl.semantics.plans import RulePlan
+from socialai_dsl.semantics.resolver import Resolver
 from socialai_dsl.semantics.scope import Scope
 from socialai_dsl.semantics.signatures import VALUES
+from socialai_dsl.semantics.subjects import must_be_agent, subject_of
 from socialai_dsl.semantics.terms import (
     Compare,
     Const,
     HeardNoun,
     Pattern,
-    RulePlan,
     Said,
     SaidBy,
     Select,
@@ -30,9 +31,6 @@ from socialai_dsl.semantics.terms import (
 from socialai_dsl.semantics.wording import quoted
 from socialai_dsl.source import Span
 from socialai_dsl.vocabulary import normal
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
 
 Patterns = tuple[Pattern, ...]
 Alternative = list[tuple[Pattern, Term | None]]
@@ -74,18 +72,17 @@ def said(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
     (argument,) = node.args
     members = dict(speakers(resolver, node, scope))
     if [*members] == ["agent"]:
-        return resolver.utterances.said(argument, scope)
-    span = resolver.findings.node(scope.path, argument)
+        return texts.said(resolver, argument, scope)
     found: list[Term] = []
-    for text, drawn in resolver.utterances.texts(argument, scope):
+    for text, drawn, span in texts.texts(resolver, argument, scope):
         if text.plain is not None:
             _check_said(resolver, text, members, span)
-        for pattern, given in resolver.utterances.patterns(text, scope, span, True):
+        for pattern, given in texts.patterns(resolver, text, scope, span, True):
             conditions = [condition for condition in (drawn, given) if condition is not None]
             for member, meant in members.items():
                 found += [all_of([*meant, one, *conditions]) for one in _has_said(resolver, member, pattern)]
     if not found:
-        raise _never_said(resolver, quoted(argument), members, span)
+        raise _never_said(resolver, quoted(argument), members, resolver.findings.node(scope.path, argument))
     return any_of(found)
 
 
@@ -93,7 +90,7 @@ def _has_said(resolver: Resolver, member: str, pattern: Pattern) -> Iterator[Ter
     """That a member said what a pattern matches; nothing if it never says that."""
     if member == "agent" and pattern.pairs:
         yield Said(pattern)
-    elif pattern.said_by_npcs & resolver.said_by.get(member, {}).keys():
+    elif pattern.said_by_npcs & resolver.utterances.said_by.get(member, {}).keys():
         yield SaidBy(resolver.symbols.numbers[member], pattern)
 
 
@@ -108,7 +105,11 @@ def _sayable(resolver: Resolver, members: Iterable[str]) -> list[str]:
     """Every text that one of some members can say."""
     texts: dict[str, None] = {}
     for member in members:
-        own = resolver.utterances.all_texts() if member == "agent" else resolver.said_by.get(member, {})
+        own = (
+            resolver.utterances.all_texts()
+            if member == "agent"
+            else resolver.utterances.said_by.get(member, {})
+        )
         texts |= dict.fromkeys(own)
     return list(texts)
 
@@ -131,10 +132,10 @@ def speakers(
     """The members of the cast that can stand before the dot, each with the conditions on which it is the one."""
     subject = None if isinstance(node, ast.Name) else node.subject
     if subject is None:
-        resolve_attributes.must_be_agent(resolver, node, scope)
+        must_be_agent(resolver, node, scope)
         return [("agent", [])]
     name = "" if isinstance(node, ast.Name) else node.name
-    who = resolve_attributes.subject_of(resolver, subject, VALUES[name], node, scope)
+    who = subject_of(resolver, subject, VALUES[name], node, scope)
     assert who is not None, "internal: a cell says nothing"
     numbers = [who.value] if isinstance(who, Const) else range(who.type.low, who.type.high + 1)
     members = [resolver.symbols.member_of(number) for number in numbers]

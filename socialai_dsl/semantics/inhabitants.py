@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.schema import CastMember
@@ -13,13 +12,12 @@ from socialai_dsl.semantics.alternatives import select
 from socialai_dsl.semantics.build import number as number_of
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.findings import surviving
+from socialai_dsl.semantics.plans import Entity
+from socialai_dsl.semantics.resolver import INT, Resolver
 from socialai_dsl.semantics.scope import Objects, reset_scope
 from socialai_dsl.semantics.statuses import initial
-from socialai_dsl.semantics.terms import Const, Entity, Read, Term, Type
+from socialai_dsl.semantics.terms import Const, Read, Term
 from socialai_dsl.semantics.wording import with_article
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
 
 VIEW = 7
 """Side of the view square where none is given."""
@@ -48,7 +46,7 @@ def entities_of(resolver: Resolver) -> Iterator[Entity]:
                 if name == AGENT
                 else " or ".join(dict.fromkeys(one.kind or "peer" for one in members)),
                 kind_code=max(codes, default=0),
-                kind_drawn=select(resolver, name, [number_of(c) for c in codes])
+                kind_drawn=select(resolver.registers.drawn_file(name), [number_of(c) for c in codes])
                 if len(set(codes)) > 1
                 else None,
                 name=resolver.registers.read(f"{name}.name"),
@@ -164,7 +162,7 @@ def _voice(resolver: Resolver, name: str, member: CastMember) -> tuple[int, int]
     if raw == "room":
         return 0, symbols.width[1] + symbols.height[1]
     with surviving():
-        term: Term = resolver.written(path, raw, Type("int", 0, 0), reset_scope(path))
+        term: Term = resolver.written(path, raw, INT, reset_scope(path))
         if isinstance(term, Const) and term.value >= 0:
             return 0, term.value
         findings = resolver.findings

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import resolve_groups
 from socialai_dsl.semantics.build import arithmetic, number
 from socialai_dsl.semantics.findings import FailedError, surviving
+from socialai_dsl.semantics.resolver import ENTITY, Resolver
 from socialai_dsl.semantics.scope import Objects, Scope, reset_scope
 from socialai_dsl.semantics.terms import Compare, Const, Select, Term, Type
 from socialai_dsl.semantics.wording import quoted, with_article
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
 
 
 @dataclass(frozen=True)
@@ -83,7 +80,7 @@ def _objects_at(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[int]:
         members = resolve_groups.group(resolver, node, None, scope)
         terms: tuple[Term, ...] = members.items if members.type.kind == "entity" else ()
     else:
-        terms = (resolver.value(node, Type("entity", 0, 0), scope),)
+        terms = (resolver.value(node, ENTITY, scope),)
     known = [term.value for term in terms if isinstance(term, Const)]
     if not known or len(known) < len(terms) or any(resolver.symbols.object_of(n) is None for n in known):
         message = f"`{quoted(node)}` is not an object of the room"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
@@ -12,24 +12,13 @@ from socialai_dsl.schema.base import Expression
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import resolve_groups
 from socialai_dsl.semantics.findings import FailedError
+from socialai_dsl.semantics.plans import Placing, Region
+from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
 from socialai_dsl.semantics.scope import Scope
 from socialai_dsl.semantics.signatures import PLACES
-from socialai_dsl.semantics.terms import (
-    BOOL,
-    SIDE,
-    Const,
-    Placing,
-    Region,
-    Term,
-    Type,
-)
+from socialai_dsl.semantics.terms import BOOL, SIDE, Const, Term, Type
 from socialai_dsl.semantics.wording import quoted
 
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
-
-_INT = Type("int", 0, 0)
-_ENTITY = Type("entity", 0, 0)
 _SIDES: tuple[Literal["top", "bottom", "left", "right"], ...] = ("top", "bottom", "left", "right")
 
 
@@ -56,7 +45,7 @@ def at(resolver: Resolver, spot: Spot, pair: Sequence[Expression], scope: Scope)
             "S104", f"`at` is a cell [x, y]; {len(pair)} numbers given", findings.at(spot.path)
         )
     x, y = (
-        resolver.written((*spot.path, i), raw, _INT, _inside(scope, spot.path, i))
+        resolver.written((*spot.path, i), raw, INT, _inside(scope, spot.path, i))
         for i, raw in enumerate(pair)
     )
     span = findings.at(spot.path)
@@ -109,10 +98,10 @@ def region(resolver: Resolver, node: ast.Expr, scope: Scope, spot: Spot | None =
             return (Region(name),)
         case "column" | "row":
             _takes(resolver, node, args, 1, scope)
-            return (Region(name, (resolver.value(args[0], _INT, scope),)),)
+            return (Region(name, (resolver.value(args[0], INT, scope),)),)
         case "rect":
             _takes(resolver, node, args, 4, scope)
-            return (Region(name, tuple(resolver.value(arg, _INT, scope) for arg in args)),)
+            return (Region(name, tuple(resolver.value(arg, INT, scope) for arg in args)),)
         case "next_to" | "in_front_of":
             _takes(resolver, node, args, 1, scope)
             return tuple(Region(name, (target,)) for target in _targets(resolver, args[0], scope))
@@ -148,14 +137,14 @@ def _takes(resolver: Resolver, node: ast.Expr, args: tuple[ast.Expr, ...], count
 def _targets(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[Term, ...]:
     if resolve_groups.is_group(resolver, node, scope):
         return resolve_groups.group(resolver, node, None, scope).items
-    return (resolver.value(node, _ENTITY, scope),)
+    return (resolver.value(node, ENTITY, scope),)
 
 
 def _each_wall(
     resolver: Resolver, node: ast.Expr, args: tuple[ast.Expr, ...], scope: Scope, spot: Spot | None
 ) -> Region:
     """The wall of this member of the group: top, bottom, left, right in turn."""
-    margin = resolver.value(args[0], _INT, scope) if args else Const(Type("int", 1, 1), 1)
+    margin = resolver.value(args[0], INT, scope) if args else Const(Type("int", 1, 1), 1)
     if len(args) > 1 or not isinstance(margin, Const) or margin.value < 1:
         raise resolver.fail(
             "S211", "`each_wall` takes a number, at least 1: cells from the corners", node, scope

@@ -5,19 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
-from socialai_dsl.semantics import terms
+from socialai_dsl.semantics import plans, terms
 from socialai_dsl.semantics.build import is_own_noun, walk
 from socialai_dsl.semantics.findings import Findings
-from socialai_dsl.semantics.terms import (
-    Checked,
-    Const,
-    Effect,
-    ObjectType,
-    RulePlan,
-    Select,
-    Sited,
-    Term,
-)
+from socialai_dsl.semantics.plans import Checked, Effect, RulePlan
+from socialai_dsl.semantics.terms import Const, ObjectType, Select, Sited, Term
 from socialai_dsl.source import Span
 
 _GIVES: Final = {"open": ("open", "opened"), "close": ("closed", "shut"), "lock": ("locked",)}
@@ -278,7 +270,7 @@ class _Statuses:
             yield entity.status
             return
         path = entity.initial.path
-        drawn = (item for item in self._checked.setup if isinstance(item, terms.Drawn) and item.path == path)
+        drawn = (item for item in self._checked.setup if isinstance(item, plans.Drawn) and item.path == path)
         for item in drawn:
             yield from (part.value for part in walk(item.value.term) if isinstance(part, Const)
                         and part.type.kind == "status")  # fmt: skip

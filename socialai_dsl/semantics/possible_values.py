@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics.findings import FailedError
+from socialai_dsl.semantics.resolver import Resolver
 from socialai_dsl.semantics.terms import COLOR, Const, FieldOf, Quantified, Read, Select, Term
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
 
 _ALL_COLORS = frozenset(range(COLOR.low, COLOR.high + 1))
 _DRAWN_FREELY = ("random", "distinct")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.schema import Property
@@ -12,25 +12,21 @@ from socialai_dsl.schema.base import Expression
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.build import draws, walk
 from socialai_dsl.semantics.findings import FailedError, dotted, surviving
+from socialai_dsl.semantics.plans import Drawn, OutcomePlan, PropertyPlan
+from socialai_dsl.semantics.resolver import Resolver
 from socialai_dsl.semantics.scope import at_every_step, reset_scope
 from socialai_dsl.semantics.terms import (
     BOOL,
     Chance,
     Compare,
     Const,
-    Drawn,
     Logic,
     Not,
-    OutcomePlan,
-    PropertyPlan,
     Quantified,
     Sited,
     Term,
     Variable,
 )
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
 
 _Kind = Literal["reachable", "never", "within", "oracle", "script", "needs", "only_through", "knowable"]
 KINDS: tuple[_Kind, ...] = get_args(_Kind)

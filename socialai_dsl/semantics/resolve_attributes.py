@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics import beliefs, contents, hearing, links, resolve_groups, resolve_names
+from socialai_dsl.semantics import beliefs, contents, hearing, links
 from socialai_dsl.semantics.alternatives import of_each
-from socialai_dsl.semantics.build import any_of, arithmetic, number
+from socialai_dsl.semantics.build import any_of, arithmetic, entity, number
 from socialai_dsl.semantics.findings import FailedError
+from socialai_dsl.semantics.resolver import Resolver
 from socialai_dsl.semantics.scope import Scope
 from socialai_dsl.semantics.signatures import VALUE_SYNONYMS, VALUES, Signature
+from socialai_dsl.semantics.subjects import (
+    check_moment,
+    check_points,
+    check_toggled,
+    must_be_agent,
+    subject_of,
+)
 from socialai_dsl.semantics.terms import (
     ACTION,
     BOOL,
@@ -25,21 +32,12 @@ from socialai_dsl.semantics.terms import (
     FieldOf,
     Here,
     PokedNow,
+    Read,
     Term,
     Type,
     World,
 )
 from socialai_dsl.semantics.wording import quoted, usage, with_article
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
-
-ENTITY = Type("entity", 0, 0)
-"""Expected: somebody or something in the room."""
-
-OF_CELLS = frozenset({"in_line", "unobstructed", "distance", "dir_to", "x", "y"})
-"""What a cell that is no candidate for a placement can be asked as well."""
-
 
 _POINTING = Type("int", 0, 4)
 
@@ -49,85 +47,6 @@ def toggled_by(who: Const, what: Term) -> Term:
     if who.value == 0:
         return PokedNow(what)
     return Compare("==", FieldOf(what.type, who, "toggled"), what)
-
-
-def check_points(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: Scope) -> None:
-    """Report what cannot point: an object, and the agent, which has no arm to do it with."""
-    if who.type.high >= len(resolver.symbols.numbers):
-        raise resolver.fail("S204", f"only NPCs point, so only they have `{name}`", node, scope)
-    if who.type.high == 0:
-        raise resolver.fail("S204", "the agent never points; only NPCs do", node, scope)
-
-
-def check_toggled(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: Scope) -> None:
-    """Report what nobody uses."""
-    if who.type.low < len(resolver.symbols.numbers):
-        message = f"only objects are toggled, so only they have `{name}`"
-        raise resolver.fail("S204", message, node, scope, hint="an NPC is poked: `anna.poked`")
-
-
-def check_moment(resolver: Resolver, signature: Signature, node: ast.Expr, scope: Scope) -> None:
-    """Report what speaks of a step where there is none yet."""
-    if signature.momentary and scope.at_reset:
-        message = (
-            f"`{signature.name}` speaks of a step, but this value is computed once, before the first step"
-        )
-        hint = "a `define` is recomputed at every use" if "let" in scope.path else None
-        if "beliefs" in scope.path:
-            hint = "a belief is there from the start, so it is about something that is true before the first step"
-        raise resolver.fail("S204", message, node, scope, hint=hint)
-
-
-def subject_of(
-    resolver: Resolver, subject: ast.Expr | None, signature: Signature, node: ast.Expr, scope: Scope
-) -> Term | None:
-    """Who a verb is about: what stands before the dot, else the NPC itself. None: the candidate cell."""
-    if subject is None:
-        if scope.member is None:
-            example = "agent" if signature.subject != "object" else "door"
-            raise resolver.fail(
-                "S211", f"`{signature.name}` needs somebody: `{example}.{signature.name}`", node, scope
-            )
-        return resolve_names.entity(resolver.symbols.numbers[scope.member])
-    if isinstance(subject, ast.Name) and subject.id == "here" and "here" not in scope.variables:
-        if not scope.here:
-            raise resolver.fail(
-                "S201", "`here` is the candidate cell; it means something only in a place", subject, scope
-            )
-        if signature.name in OF_CELLS and not signature.cell:
-            return Here(CELL, "cell")
-        if not signature.cell:
-            raise resolver.fail("S211", f"a cell cannot be asked for `{signature.name}`", node, scope)
-        return None
-    if resolve_groups.is_group(resolver, subject, scope):
-        group = quoted(subject)
-        letter = group[0] if group[0].isalpha() else "x"
-        asked = f"{letter}.{usage(signature)}"
-        hint = f"`any({letter} in {group} where {asked} ...)`, or `all`, `first`, `pick`"
-        raise resolver.fail("S204", f"`{group}` is a group: say which of them", subject, scope, hint=hint)
-    who = resolver.value(subject, None, scope)
-    if who.type.kind == "cell" and (signature.cell or signature.name in OF_CELLS):
-        return who
-    return resolver.fit(who, ENTITY, subject, scope)
-
-
-def somewhere(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
-    """Something that has a place: an object, a member of the cast, or a cell."""
-    term = resolver.value(node, None, scope)
-    return term if term.type.kind == "cell" else resolver.fit(term, ENTITY, node, scope)
-
-
-def must_be_agent(resolver: Resolver, node: ast.Call | ast.Attribute | ast.Name, scope: Scope) -> None:
-    """Report what is known of the agent only, asked of somebody else."""
-    subject = None if isinstance(node, ast.Name) else node.subject
-    if subject is None and scope.member == "agent":
-        return
-    if not (isinstance(subject, ast.Name) and subject.id == "agent"):
-        name = node.id if isinstance(node, ast.Name) else node.name
-        hint = "what an NPC has heard is `heard(...)`, or `hears:` in a rule" if name == "said" else None
-        raise resolver.fail(
-            "S211", f"`{name}` is known of the agent only: `agent.{name}`", node, scope, hint=hint
-        )
 
 
 def without_arguments(
@@ -235,7 +154,9 @@ def _attribute(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: 
         case "toggled":
             check_toggled(resolver, name, who, node, scope)
             everybody = range(len(resolver.symbols.numbers))
-            return any_of(toggled_by(resolve_names.entity(number), who) for number in everybody)
+            return any_of(toggled_by(entity(number), who) for number in everybody)
+        case "turns_in_state":
+            return _turns_in_state(resolver, who, node, scope)
         case "kind":
             return _kind(resolver, who, node, scope)
     assert name == "name", f"internal: no meaning for the attribute `{name}`"
@@ -249,6 +170,17 @@ def _name(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
     if len(names) < len(members):
         raise resolver.fail("S204", "only a member of the cast has a name", node, scope)
     return of_each(who, names)
+
+
+def _turns_in_state(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
+    """The clock of a member's frame, which `after` compares as well."""
+    numbers = [who.value] if isinstance(who, Const) else range(who.type.low, who.type.high + 1)
+    members = [resolver.symbols.member_of(number) for number in numbers]
+    if not all(member in resolver.frames for member in members):
+        hint = "members of the cast follow one with `frame:`"
+        raise resolver.fail("S204", "only who follows a frame is in a state", node, scope, hint=hint)
+    turns = Type("int", 0, resolver.symbols.scenario.horizon)
+    return of_each(who, [Read(turns, f"{member}.clock") for member in members])
 
 
 def _kind(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:

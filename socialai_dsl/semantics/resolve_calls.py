@@ -4,24 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics import beliefs, hearing, resolve_groups, resolve_names, tables
-from socialai_dsl.semantics.build import all_of, any_of, arithmetic, draws, number, one_of, walk
+from socialai_dsl.semantics import beliefs, hearing, resolve_groups, resolve_names, tables, texts
+from socialai_dsl.semantics.build import all_of, any_of, arithmetic, draws, entity, number, one_of, walk
 from socialai_dsl.semantics.findings import FailedError
-from socialai_dsl.semantics.resolve_attributes import (
-    ENTITY,
-    check_moment,
-    check_points,
-    check_toggled,
-    must_be_agent,
-    somewhere,
-    subject_of,
-    toggled_by,
-    without_arguments,
-)
+from socialai_dsl.semantics.resolve_attributes import toggled_by, without_arguments
+from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
 from socialai_dsl.semantics.scope import Scope
 from socialai_dsl.semantics.signatures import (
     ACTIVITIES,
@@ -31,6 +22,13 @@ from socialai_dsl.semantics.signatures import (
     VALUE_SYNONYMS,
     VALUES,
     Signature,
+)
+from socialai_dsl.semantics.subjects import (
+    check_moment,
+    check_points,
+    check_toggled,
+    must_be_agent,
+    subject_of,
 )
 from socialai_dsl.semantics.terms import (
     ACTION,
@@ -53,9 +51,7 @@ from socialai_dsl.semantics.terms import (
     World,
 )
 from socialai_dsl.semantics.wording import quoted, usage, wrong_count
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
+from socialai_dsl.vocabulary import FINISHED
 
 _RELATIONS = (
     *("at", "next_to", "in_front_of", "faces", "faces_toward", "eye_contact", "in_line", "can_reach"),
@@ -63,7 +59,6 @@ _RELATIONS = (
 )
 _OF_BODIES = ("in_front_of", "eye_contact")
 """Relations to something that can be turned to somewhere, which a cell is not."""
-_FINISHED = "finished"
 
 
 def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope) -> Term:
@@ -89,7 +84,7 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
             return hearing.said(resolver, node, scope)
         case "heard":
             _listener(resolver, node, scope)
-            return resolver.utterances.heard(argument, scope)
+            return texts.heard(resolver, argument, scope)
         case "did":
             must_be_agent(resolver, node, scope)
             return _did(resolver, argument, scope)
@@ -107,7 +102,7 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
     if node.name in ("sees", "would_see"):
         assert subject is not None, "internal: a cell sees nothing"
         return _sees(resolver, subject, node, scope)
-    other = somewhere(resolver, argument, scope)
+    other = resolver.somewhere(argument, scope)
     assert subject is not None, "internal: only relations have the candidate cell as a subject"
     if node.name == "distance":
         (_, width), (_, height) = resolver.symbols.width, resolver.symbols.height
@@ -183,8 +178,7 @@ def _function(resolver: Resolver, node: ast.Call, expected: Type | None, scope: 
         return Operation(DIRECTION, "turn", (way, number(2)))
     if node.name == "prev":
         return _before(resolver, node, expected, scope)
-    whole = Type("int", 0, 0)
-    args = tuple(resolver.value(argument, whole, scope) for argument in node.args)
+    args = tuple(resolver.value(argument, INT, scope) for argument in node.args)
     return resolver.computed(node.name, args, node, scope)
 
 
@@ -220,9 +214,7 @@ def _relation(resolver: Resolver, name: str, subject: Term | None, argument: ast
             resolver, argument, scope, lambda other: Test(cast(Any, name), subject, other)
         )
     other = (
-        resolver.value(argument, ENTITY, scope)
-        if name in _OF_BODIES
-        else somewhere(resolver, argument, scope)
+        resolver.value(argument, ENTITY, scope) if name in _OF_BODIES else resolver.somewhere(argument, scope)
     )
     return Test(cast(Any, name), subject, other)
 
@@ -249,7 +241,7 @@ def _attention(resolver: Resolver, name: str, subject: Term, node: ast.Call, sco
     if rest:
         return _each(resolver, rest[0], scope, both_look)
     numbers = range(len(resolver.symbols.numbers), resolver.symbols.entities)
-    return any_of(both_look(resolve_names.entity(number)) for number in numbers)
+    return any_of(both_look(entity(number)) for number in numbers)
 
 
 def _toggled_by(resolver: Resolver, what: Term, node: ast.Expr, scope: Scope) -> Term:
@@ -278,7 +270,7 @@ def _each(resolver: Resolver, node: ast.Expr, scope: Scope, relation: Callable[[
     """A relation to something, or to any of a group."""
     if resolve_groups.is_group(resolver, node, scope):
         return resolve_groups.any_member(resolver, node, scope, relation)
-    return relation(somewhere(resolver, node, scope))
+    return relation(resolver.somewhere(node, scope))
 
 
 def _sees(resolver: Resolver, viewer: Term, node: ast.Call, scope: Scope) -> Term:
@@ -322,7 +314,7 @@ def _is_in_state(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
         raise resolver.fail("S310", f"`{called}` follows no frame, so it has no states", node, scope)
     states = list(frame.model.states or ())
     states += [step.state for step in frame.model.steps or () if step.state] + (
-        [_FINISHED] if frame.model.steps else []
+        [FINISHED] if frame.model.steps else []
     )
     if not isinstance(argument, ast.Name | ast.Truth):
         raise resolver.fail("S211", "`is` takes the name of a state", argument, scope)

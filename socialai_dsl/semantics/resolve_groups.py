@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, cast
+from typing import Literal, cast
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics import resolve_attributes, resolve_names
 from socialai_dsl.semantics.build import all_of, between
+from socialai_dsl.semantics.resolver import INT, Resolver
 from socialai_dsl.semantics.scope import Macro, Scope
 from socialai_dsl.semantics.signatures import QUANTIFIERS, WORDS
 from socialai_dsl.semantics.terms import BOOL, CELL, COLOR, Const, Quantified, Term, Type, Variable
 from socialai_dsl.semantics.wording import described, quoted, spoken
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
 
 MAX_GROUP = 256
 MAX_WEIGHT = 100
@@ -102,8 +99,7 @@ def _values(type_: Type) -> tuple[Const, ...]:
 
 
 def _interval(resolver: Resolver, node: ast.Interval, scope: Scope) -> Group:
-    whole = Type("int", 0, 0)
-    low, high = resolver.value(node.low, whole, scope), resolver.value(node.high, whole, scope)
+    low, high = resolver.value(node.low, INT, scope), resolver.value(node.high, INT, scope)
     type_ = Type("int", low.type.low, high.type.high)
     known = isinstance(low, Const) and isinstance(high, Const)
     if type_.size < 1:
@@ -121,7 +117,7 @@ def _alternatives(
     resolver: Resolver, node: ast.Expr, options: tuple[ast.Expr, ...], expected: Type | None, scope: Scope
 ) -> Group:
     parts = [_weighted(resolver, option, scope) for option in options]
-    lead = next((p for _, p in parts if not resolve_names.is_bare(resolver, p, scope)), None)
+    lead = next((p for _, p in parts if not resolver.is_bare(p, scope)), None)
     if expected is None and lead is not None:
         expected = group(resolver, lead, None, scope).type
     items: list[Const] = []
@@ -194,7 +190,7 @@ def quantified(resolver: Resolver, node: ast.Quantifier, expected: Type | None, 
     variable = _named(node.var, scope)
     inner = replace(scope.binding(node.var, Variable(members.type, variable)), nested=scope.nested + 1)
     condition = resolver.value(node.where, BOOL, inner) if node.where is not None else None
-    to = resolve_attributes.somewhere(resolver, node.to, scope) if node.to is not None else None
+    to = resolver.somewhere(node.to, scope) if node.to is not None else None
     return made(cast(Op, node.name), members, variable, condition, scope, ordinal, to)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import chain, pairwise
-from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
@@ -13,41 +12,20 @@ from socialai_dsl.schema import Sequence
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import beliefs, hearing, resolve_attributes
 from socialai_dsl.semantics.alternatives import by_value, drawn, of_each
-from socialai_dsl.semantics.build import FALSE, all_of, any_of
+from socialai_dsl.semantics.build import FALSE, all_of, any_of, entity
 from socialai_dsl.semantics.findings import FailedError, as_text
+from socialai_dsl.semantics.resolver import VOCABULARIES, Resolver
 from socialai_dsl.semantics.scope import Define, Draws, Macro, PlayedFrame, Scope
 from socialai_dsl.semantics.signatures import ACTIVITIES, EFFECTS, PLACES, QUANTIFIERS, VALUES, WORDS
-from socialai_dsl.semantics.terms import (
-    ACTION,
-    BOOL,
-    COLOR,
-    DIRECTION,
-    SIDE,
-    TURN,
-    Const,
-    Here,
-    Term,
-    Type,
-    Variable,
-    World,
-)
+from socialai_dsl.semantics.terms import BOOL, TURN, Const, Here, Term, Type, Variable, World
 from socialai_dsl.semantics.wording import described, usage, words_of
 from socialai_dsl.vocabulary import normal
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
 
 _YES_AND_NO = ("yes", "no", "on", "off", "y", "n", "never", "always")
 _NOBODY_HERE = {
     "self": "the member of the cast who follows a frame; here nobody does",
     "it": "the object that a value belongs to; here there is none",
 }
-_VOCABULARIES = (COLOR, DIRECTION, ACTION, TURN, SIDE)
-
-
-def entity(number: int) -> Const:
-    """One of the room's inhabitants as a known value."""
-    return Const(Type("entity", number, number), number)
 
 
 def name(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope) -> Term:
@@ -126,7 +104,7 @@ def member_truth(resolver: Resolver, frame: PlayedFrame, slot: str, scope: Scope
     cases = []
     for truth, numbers in by_value(truths).items():
         if truth != FALSE:
-            chosen = drawn(resolver, member, numbers)
+            chosen = drawn(resolver.registers.drawn_file(member), numbers)
             cases.append(truth if chosen is None else all_of([chosen, truth]))
     return any_of(cases)
 
@@ -229,7 +207,7 @@ def _word(word: str, expected: Type | None) -> Term | None:
             return Const(expected, expected.low + expected.words.index(word))
         if expected.kind == "text":
             return Const(Type("text", 0, 0, (word,)), 0)
-    for type_ in _VOCABULARIES:
+    for type_ in VOCABULARIES:
         if word in type_.words and not (word == "none" and type_ is TURN):
             return Const(type_, type_.low + type_.words.index(word))
     return None
@@ -306,64 +284,6 @@ def _nearby(expected: Type | None, scope: Scope) -> Iterator[Iterable[str]]:
         yield from (scope.frame.model.slots, scope.frame.model.let, scope.frame.defines)
 
 
-def is_bare(resolver: Resolver, node: ast.Expr, scope: Scope) -> bool:
-    """Whether a value takes its type from its use: a word that names nothing, a text, a number, a wordy `let`."""
-    if isinstance(node, ast.Name):
-        register = _register_of(resolver, node, scope)
-        if register is not None:
-            return resolver.registers.is_wordy(register)
-        return not _names_something(resolver, node.id, scope)
-    return isinstance(node, ast.Text)
-
-
-def _register_of(resolver: Resolver, node: ast.Name, scope: Scope) -> str | None:
-    if node.id in scope.variables:
-        return None
-    frame = scope.frame
-    if frame is not None and frame.register(node.id) in resolver.registers:
-        return frame.register(node.id)
-    if node.id in resolver.symbols.scenario.state:
-        return f"state.{node.id}"
-    return f"let.{node.id}" if node.id in resolver.symbols.scenario.let else None
-
-
-def means_nothing(resolver: Resolver, word: str, scope: Scope) -> bool:
-    """Whether a word is neither declared nor of the language: where a text is expected, it is one."""
-    known = any(word in type_.words for type_ in _VOCABULARIES) or word in WORDS or word in VALUES
-    return not known and not _names_something(resolver, word, scope)
-
-
-def _names_something(resolver: Resolver, word: str, scope: Scope) -> bool:
-    frame = scope.frame
-    if (
-        word in scope.variables
-        or word in resolver.symbols.declared
-        or word in ("t", "W", "H", "self", "it", "cells")
-    ):
-        return True
-    if frame is not None and (word in frame.model.slots or word in frame.model.let or word in frame.defines):
-        return True
-    in_vocabulary = any(word in type_.words for type_ in _VOCABULARIES)
-    return word in VALUES and not in_vocabulary
-
-
-def is_wordy(resolver: Resolver, node: ast.Expr, scope: Scope) -> bool:
-    """Whether an expression comes down to bare words that several vocabularies have, such as `left`."""
-    match node:
-        case ast.Name(id=word):
-            several = sum(word in type_.words for type_ in _VOCABULARIES) > 1
-            return several and is_bare(resolver, node, scope)
-        case ast.Alternatives(options=options):
-            return any(is_wordy(resolver, option, scope) for option in options)
-        case ast.Arithmetic(op="*", right=right):
-            return is_wordy(resolver, right, scope)
-        case ast.Call(name="pick", args=(only,)):
-            return is_wordy(resolver, only, scope)
-        case ast.Quantifier(name="pick" | "first", group=group):
-            return is_wordy(resolver, group, scope)
-    return False
-
-
 def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
     """`subject.name`."""
     if isinstance(node.subject, ast.Attribute) and node.subject.name == "believes":
@@ -400,7 +320,7 @@ def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
                 return member_truth(resolver, played, node.name, scope)
         # Of somebody unknown nobody can say what they have.
         known = node.name in VALUES or node.name in _statuses(resolver)
-        if not known and means_nothing(resolver, node.subject.id, scope):
+        if not known and resolver.means_nothing(node.subject.id, scope):
             raise _unknown(resolver, node.subject, None, scope)
     return resolve_attributes.without_arguments(resolver, node.name, node.subject, node, scope)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
@@ -13,12 +12,11 @@ from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics import places
 from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.findings import FailedError, Findings, surviving
+from socialai_dsl.semantics.plans import Region, RoomPlan
+from socialai_dsl.semantics.resolver import Resolver
 from socialai_dsl.semantics.scope import reset_scope
-from socialai_dsl.semantics.terms import ObjectType, Region, RoomPlan, World
+from socialai_dsl.semantics.terms import ObjectType, World
 from socialai_dsl.source import Span
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
 
 SMALLEST, LARGEST = 3, 30
 """Cells each way: a line of a room and its neighbours are one word of 32 bits."""

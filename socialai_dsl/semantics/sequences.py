@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema import Frame, Sequence
-from socialai_dsl.semantics import resolve_groups, resolve_names
+from socialai_dsl.semantics import resolve_groups
 from socialai_dsl.semantics.build import all_of, number
 from socialai_dsl.semantics.findings import FailedError, surviving
+from socialai_dsl.semantics.plans import MemoryPlan
+from socialai_dsl.semantics.resolver import Resolver
 from socialai_dsl.semantics.scope import Draws, Scope, at_every_step, reset_scope
 from socialai_dsl.semantics.terms import (
     ACTION,
@@ -18,7 +19,6 @@ from socialai_dsl.semantics.terms import (
     Chance,
     Compare,
     Const,
-    MemoryPlan,
     Quantified,
     Read,
     Select,
@@ -27,9 +27,6 @@ from socialai_dsl.semantics.terms import (
     Type,
 )
 from socialai_dsl.semantics.wording import quoted
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
 
 
 @dataclass(frozen=True)
@@ -136,7 +133,7 @@ def _in_slot(resolver: Resolver, member: str, slot: str, looked_at: bool) -> Act
         path = symbols.with_path(member, slot, which)
         node = findings.expression(path, alternative.with_[slot])
         acts = acts_at(resolver, node, Scope(path, Draws(f"cast.{member}.with.{slot}"), member))
-        if acts is None and resolve_names.is_bare(resolver, node, Scope(path, Draws(""), member)):
+        if acts is None and resolver.is_bare(node, Scope(path, Draws(""), member)):
             resolver.value(node, None, Scope(path, Draws(""), member))
         if acts is None or acts.remembered:
             hint = "a sequence is drawn in `let`: {sequence: 3, moves: [left, right, forward]}"
@@ -174,7 +171,7 @@ def incomparable(resolver: Resolver, node: ast.Compare, left: bool, scope: Scope
 def performed(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[Term, ...]:
     """The elements of the sequence that `perform(...)` names."""
     acts = acts_at(resolver, node, scope)
-    if acts is None and resolve_names.is_bare(resolver, node, scope):
+    if acts is None and resolver.is_bare(node, scope):
         resolver.value(node, None, scope)  # a name that means nothing is what is wrong
     if acts is None or acts.remembered:
         message = f"`{quoted(node)}` is not a sequence"

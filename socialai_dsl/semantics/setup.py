@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, pairwise
-from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
@@ -16,35 +15,27 @@ from socialai_dsl.semantics.alternatives import by_value, drawn
 from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.findings import FailedError, surviving
+from socialai_dsl.semantics.plans import Coloring, Drawn, Facing, Placing, Setup
+from socialai_dsl.semantics.resolver import ENTITY, Resolver
 from socialai_dsl.semantics.scope import Objects, Scope, object_scope, reset_scope
 from socialai_dsl.semantics.terms import (
     COLOR,
     DIRECTION,
     CellBeside,
     CellOf,
-    Coloring,
     Compare,
     Const,
-    Drawn,
-    Facing,
     FieldOf,
     Measure,
-    Placing,
     Read,
     Sees,
     Select,
-    Setup,
     Sited,
     Term,
     Test,
-    Type,
 )
 from socialai_dsl.semantics.wording import quoted
 
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
-
-_ENTITY = Type("entity", 0, 0)
 _FACING_TESTS = frozenset({"faces", "faces_toward", "eye_contact", "looks_at"})
 
 
@@ -74,7 +65,7 @@ def _distinct(
 ) -> Iterator[tuple[list[int], Term | None]]:
     """The alternatives of a member that have the same keys, with the condition that one of them was drawn."""
     for numbers in by_value(keys).values():
-        yield numbers, drawn(resolver, name, numbers)
+        yield numbers, drawn(resolver.registers.drawn_file(name), numbers)
 
 
 def _member_placing(resolver: Resolver, name: str, member: CastMember, which: int) -> Placing:
@@ -279,7 +270,7 @@ def _facing(resolver: Resolver, name: str, member: CastMember, which: int) -> Fa
     if isinstance(node, ast.Call) and node.name == "toward" and node.subject is None:
         if len(node.args) != 1:
             raise resolver.fail("S211", "`toward` takes who or what to turn to: toward(agent)", node, scope)
-        return Facing(number, site, span, toward=resolver.value(node.args[0], _ENTITY, scope))
+        return Facing(number, site, span, toward=resolver.value(node.args[0], ENTITY, scope))
     term = resolver.value(node, DIRECTION, scope)
     return Facing(number, site, span, Sited(term, scope.draws.site, span))
 

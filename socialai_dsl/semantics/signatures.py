@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from socialai_dsl.vocabulary import ACTIONS, COLORS, DIRECTIONS, FINISHED, SIDES
+
 Argument = Literal[
     "entity",
     "entities",
@@ -43,6 +45,8 @@ class Signature:
         momentary: it speaks of the current step, so it means nothing before the first.
         cell: `here` may be its subject as well.
         optional: how many of the last arguments may be left out.
+        moves: of an activity, what becomes of who does it.
+        endless: an activity that never ends by itself, so that a step of it says how long it lasts.
     """
 
     name: str
@@ -54,6 +58,8 @@ class Signature:
     momentary: bool = False
     cell: bool = False
     optional: int = 0
+    moves: Literal["walks", "turns", "stays"] = "walks"
+    endless: bool = False
 
 
 def _value(
@@ -68,6 +74,17 @@ def _value(
     optional: int = 0,
 ) -> Signature:
     return Signature(name, subject, takes, gives, "value", doc, momentary, cell, optional)
+
+
+def _activity(
+    name: str,
+    takes: tuple[Argument, ...],
+    doc: str,
+    *,
+    moves: Literal["walks", "turns", "stays"] = "walks",
+    endless: bool = False,
+) -> Signature:
+    return Signature(name, "none", takes, "activity", "activity", doc, moves=moves, endless=endless)
 
 
 SIGNATURES: Final[tuple[Signature, ...]] = (
@@ -98,6 +115,7 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     _value("poked", "entity", (), "condition", "the agent toggled at it in this step", momentary=True),
     _value("was_poked", "entity", (), "condition", "the agent has toggled at it in this episode", momentary=True),
     _value("is", "member", ("state",), "condition", "its frame is in this state", momentary=True),
+    _value("turns_in_state", "member", (), "number", "how many turns its frame has been in its state", momentary=True),
     _value("gone", "entity", (), "condition", "it has vanished", momentary=True),
     # attributes
     _value("color", "entity", (), "color", "its colour"),
@@ -140,26 +158,27 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     Signature("wall", "none", ("side",), "place", "place", "in this wall, not in its corners"),
     Signature("each_wall", "none", ("int",), "place", "place", "one in each wall, n off the corners", optional=1),
     # activities
-    Signature("stay", "none", (), "activity", "activity", "do nothing"),
-    Signature("left", "none", (), "activity", "activity", "a quarter turn left"),
-    Signature("right", "none", (), "activity", "activity", "a quarter turn right"),
-    Signature("forward", "none", (), "activity", "activity", "one cell ahead"),
-    Signature("toggle", "none", (), "activity", "activity", "use what is ahead"),
-    Signature("face", "none", ("entity",), "activity", "activity", "turn towards x, a quarter turn a step"),
-    Signature("turn_to", "none", ("direction",), "activity", "activity", "turn to a direction, a quarter turn a step"),
-    Signature("turn", "none", ("turn",), "activity", "activity", "a quarter turn left or right"),
-    Signature("go_to", "none", ("entity",), "activity", "activity", "walk to the cell of x"),
-    Signature("go_next_to", "none", ("entity",), "activity", "activity", "walk to a cell next to x"),
-    Signature("use", "none", ("entity",), "activity", "activity", "go next to x, face it, toggle it"),
-    Signature("enter", "none", ("entity",), "activity", "activity", "open x if it is closed, then go in"),
-    Signature("push", "none", ("entity", "direction"), "activity", "activity", "go behind x and push it that way"),
-    Signature("point", "none", ("entity",), "activity", "activity", "point the way x lies"),
-    Signature("stop_pointing", "none", (), "activity", "activity", "take the arm down"),
-    Signature("follow", "none", ("entity",), "activity", "activity", "walk next to x, again and again"),
-    Signature("flee", "none", ("entity",), "activity", "activity", "turn away from x and walk"),
-    Signature("perform", "none", ("sequence",), "activity", "activity", "one act of a sequence a turn, words included"),
-    Signature("choose", "none", ("actions",), "activity", "activity", "one at random: choose(a | b | 2 * c)"),
-    Signature("wander", "none", (), "activity", "activity", "choose(forward | left | right)"),
+    _activity("stay", (), "do nothing", moves="stays", endless=True),
+    _activity("left", (), "a quarter turn left", moves="turns"),
+    _activity("right", (), "a quarter turn right", moves="turns"),
+    _activity("forward", (), "one cell ahead"),
+    _activity("toggle", (), "use what is ahead", moves="stays"),
+    _activity("face", ("entity",), "turn towards x, a quarter turn a step", moves="turns", endless=True),
+    _activity("turn_to", ("direction",), "turn to a direction, a quarter turn a step", moves="turns"),
+    _activity("turn", ("turn",), "a quarter turn left or right", moves="turns"),
+    _activity("go_to", ("entity",), "walk to the cell of x"),
+    _activity("go_next_to", ("entity",), "walk to a cell next to x"),
+    _activity("use", ("entity",), "go next to x, face it, toggle it"),
+    _activity("enter", ("entity",), "open x if it is closed, then go in"),
+    _activity("push", ("entity", "direction"), "go behind x and push it that way"),
+    _activity("point", ("entity",), "point the way x lies", moves="stays"),
+    _activity("stop_pointing", (), "take the arm down", moves="stays"),
+    _activity("follow", ("entity",), "walk next to x, again and again", endless=True),
+    _activity("stay_near", ("entity", "int"), "walk towards x while it is more than n cells away", endless=True),
+    _activity("flee", ("entity",), "turn away from x and walk", endless=True),
+    _activity("perform", ("sequence",), "one act of a sequence a turn, words included"),
+    _activity("choose", ("actions",), "one at random: choose(a | b | 2 * c)", endless=True),
+    _activity("wander", (), "choose(forward | left | right)", endless=True),
     # effects
     Signature("open", "object", (), "effect", "effect", "becomes open"),
     Signature("close", "object", (), "effect", "effect", "becomes closed"),
@@ -204,8 +223,7 @@ WORDS: Final = frozenset(
     [s.name for s in SIGNATURES if s.name not in ("name", "kind", "index", "cell")]
     + ["speaker", "objects", "believes", "permuted"]
     + ["here", "it", "self", "t", "W", "H", "cells", "colors", "nouns", "toward", "random", "distinct", "ever"]
-    + ["finished"]
-    + ["red", "green", "blue", "purple", "yellow", "grey", "up", "down", "pickup", "drop", "done", "none"]
-    + ["top", "bottom", "and", "or", "not", "in", "where", "to", "true", "false", "speaker", "room", "agent"]
+    + [FINISHED, *COLORS, *DIRECTIONS, *ACTIONS, *SIDES]
+    + ["and", "or", "not", "in", "where", "to", "true", "false", "speaker", "room", "agent"]
 )  # fmt: skip
 """Words that mean something already, so that nothing an author declares may be called so."""

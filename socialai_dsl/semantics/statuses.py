@@ -4,28 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.build import draws, walk
 from socialai_dsl.semantics.findings import surviving
+from socialai_dsl.semantics.plans import Computed
+from socialai_dsl.semantics.resolver import Resolver
 from socialai_dsl.semantics.scope import Objects, object_scope
-from socialai_dsl.semantics.terms import (
-    BOOL,
-    Computed,
-    Const,
-    FieldOf,
-    Read,
-    Select,
-    Sited,
-    Term,
-    Type,
-)
+from socialai_dsl.semantics.terms import BOOL, Const, FieldOf, Read, Select, Sited, Term, Type
 from socialai_dsl.semantics.wording import with_article
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
 
 _COMPUTED = {"locked": "closed", "tagged": None}
 """Status that follows from a condition -> the status it leaves for, None for the initial one."""

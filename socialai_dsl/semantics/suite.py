@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from itertools import product
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
-from socialai_dsl.schema import PRIMITIVES, Scenario
+from socialai_dsl.schema import Scenario
 from socialai_dsl.schema.positions import Positions
 from socialai_dsl.schema.suite import Suite
-from socialai_dsl.semantics.terms import Checked, FramePlan, Line, Pattern
+from socialai_dsl.semantics.plans import Checked, FramePlan
+from socialai_dsl.semantics.terms import Line, Pattern
 from socialai_dsl.semantics.utterances import texts_of
-from socialai_dsl.vocabulary import normal
+from socialai_dsl.trees import every
+from socialai_dsl.vocabulary import PRIMITIVES, normal
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +103,7 @@ def _check_sayable(
     live = set(product(space.template_maps[number], space.noun_maps[number]))
     sayable = {_text(member, pair): pair for pair in live if min(pair) >= 0}
     known = {normal(text) for text in sayable}
-    needed = [p.text for p in _patterns(member) if p.pairs and not (p.pairs & live or p.said_by_npcs)]
+    needed = [p.text for p in every(Pattern, member) if p.pairs and not (p.pairs & live or p.said_by_npcs)]
     needed += [text for text in _scripted(member) if normal(text) not in known]
     for text in dict.fromkeys(needed):
         near = did_you_mean(text, sayable)
@@ -130,15 +132,3 @@ def _lines(frame: FramePlan) -> Iterator[Line]:
     rules = (rule for state in frame.states for rule in (*state.first, *state.then))
     said = (*(rule.say for rule in rules), *(step.say for step in frame.steps))
     yield from (line for line in said if line is not None)
-
-
-def _patterns(part: object) -> Iterator[Pattern]:
-    """Every set of utterances that something in a checked scenario waits for."""
-    if isinstance(part, Pattern):
-        yield part
-    elif isinstance(part, tuple):
-        for item in part:
-            yield from _patterns(item)
-    elif is_dataclass(part):
-        for field in fields(part):
-            yield from _patterns(getattr(part, field.name))

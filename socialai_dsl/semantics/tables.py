@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.semantics import resolve_names
 from socialai_dsl.semantics.build import all_of
 from socialai_dsl.semantics.findings import FailedError, surviving
 from socialai_dsl.semantics.possible_values import values_of
+from socialai_dsl.semantics.resolver import ANY_TEXT, Resolver
 from socialai_dsl.semantics.scope import Scope, reset_scope
 from socialai_dsl.semantics.terms import Compare, Const, Quantified, Read, Select, Sited, Term, Type, Variable
 from socialai_dsl.semantics.wording import described, quoted, spoken
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
+from socialai_dsl.vocabulary import is_number, is_plain
 
 _PERMUTED = "permuted"
-_ANY_TEXT = Type("text", 0, -1)
 _NO_KEYS = ("entity", "cell", "bool", "utterance")
 """Kinds of values that no words stand for."""
 
@@ -35,6 +31,7 @@ def look_at_all(resolver: Resolver) -> None:
 def looked_up(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
     """`dar(exit.color)`: the value beside the key that the argument is."""
     name = node.name
+    resolver.used.add(("tables", name))
     keys, values = resolver.table(name)
     if len(node.args) != 1:
         raise resolver.fail("S211", f"`{name}` is a table: it takes one key", node, scope)
@@ -57,8 +54,8 @@ def looked_up(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
 
 def _key(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> Term:
     """What is looked up: something that words stand for. A word that means nothing else is itself looked up."""
-    means_nothing = isinstance(node, ast.Name) and resolve_names.means_nothing(resolver, node.id, scope)
-    key = resolver.value(node, _ANY_TEXT if means_nothing else None, scope)
+    means_nothing = isinstance(node, ast.Name) and resolver.means_nothing(node.id, scope)
+    key = resolver.value(node, ANY_TEXT if means_nothing else None, scope)
     if key.type.kind in _NO_KEYS:
         message = f"`{quoted(node)}` is {described(key.type)}; the keys of the table `{name}` are words"
         hint = f"look up its colour: `{name}({quoted(node)}.color)`" if key.type.kind == "entity" else None
@@ -105,9 +102,9 @@ def _word(resolver: Resolver, path: DataPath, raw: object) -> str:
     """What a value of a table is called: a word, a number, a text."""
     if isinstance(raw, str):
         text = raw.strip()
-        if all(part.isalnum() for part in text.replace("-", " ").replace("'", " ").split()):
+        if is_plain(text, "'-") or not text.strip(" '-"):
             return text
-    term = resolver.written(path, raw, _ANY_TEXT if isinstance(raw, str) else None, reset_scope(path))  # type: ignore[arg-type]
+    term = resolver.written(path, raw, ANY_TEXT if isinstance(raw, str) else None, reset_scope(path))  # type: ignore[arg-type]
     if not isinstance(term, Const):
         raise resolver.findings.fail(
             "S204", "a value of a table is known beforehand", resolver.findings.at(path)
@@ -117,7 +114,7 @@ def _word(resolver: Resolver, path: DataPath, raw: object) -> str:
 
 def _as_values(words: Sequence[str]) -> tuple[Term, ...]:
     """The words as values of one type: numbers if all are, else texts."""
-    if all(word.removeprefix("-").isdecimal() for word in words):
+    if all(map(is_number, words)):
         numbers = [int(word) for word in words]
         type_ = Type("int", min(numbers), max(numbers))
         return tuple(Const(type_, value) for value in numbers)
@@ -143,6 +140,7 @@ def _permuted(
         message = f"`{other}` is not a table that is written out"
         span = resolver.findings.node(path, node.args[0])
         raise resolver.findings.fail("S201", message, span, suggestion=near)
+    resolver.used.add(("tables", other))
     keys, values = resolver.table(other)
     order = permutation(resolver, f"tables.{name}", len(keys), path)
     type_ = values[0].type

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.schema import WorldRule
@@ -12,12 +11,10 @@ from socialai_dsl.semantics.activities import effect
 from socialai_dsl.semantics.behaviour import assigned
 from socialai_dsl.semantics.build import draws
 from socialai_dsl.semantics.findings import FailedError, dotted, surviving
+from socialai_dsl.semantics.plans import Effect, RulePlan
+from socialai_dsl.semantics.resolver import Resolver
 from socialai_dsl.semantics.scope import Scope, at_every_step, reset_scope
-from socialai_dsl.semantics.terms import BOOL, Effect, RulePlan, Sited
-
-if TYPE_CHECKING:
-    from socialai_dsl.semantics.resolve import Resolver
-
+from socialai_dsl.semantics.terms import BOOL, Sited
 
 _DOES = ("cause", "set", "reward")
 """Keys of a rule of the world that say what it does."""

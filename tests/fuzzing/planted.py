@@ -12,8 +12,8 @@ import pytest
 
 from socialai_dsl.diagnostics import Diagnostic
 from socialai_dsl.loader import build, patch_paths, reader, scalars
-from socialai_dsl.loader.document import Style
 from socialai_dsl.loader.library import Library
+from socialai_dsl.loader.offsets import Style
 from socialai_dsl.loader.patch_paths import Miss
 from socialai_dsl.loader.scalars import Plain
 from socialai_dsl.loader.tree import Node

@@ -15,8 +15,8 @@ from socialai_dsl.diagnostics import CODES, Diagnostic, ScenarioError, Severity,
 from socialai_dsl.frontend import check
 from socialai_dsl.grammar.parser import MAX_LENGTH, ParseProblem, parse_expression, parse_text
 from socialai_dsl.loader import Document, limits
-from socialai_dsl.loader.document import Style
 from socialai_dsl.loader.files import FORBIDDEN, decoded
+from socialai_dsl.loader.offsets import Style
 from socialai_dsl.loader.reader import read_document
 from socialai_dsl.source import Source
 from tests.fuzzing.playground import SECRET, Playground, listening

@@ -79,7 +79,7 @@ class Activity:
 
     verb: str
     goal: Any = None
-    way: Any = None  # of a push
+    way: Any = None  # of a push; how near to stay
     acting: bool = False  # this turn is that of the toggle or the push itself
 
     def primitive(self, world: World, me: Entity) -> str:
@@ -105,12 +105,15 @@ class Activity:
             return self.element(me)[0]
         if all(where(goal) is None for goal in as_list(self.goal)):
             return "none"
+        if self.verb == "stay_near" and geometry.distance(world, me, self.goal) <= self.way:
+            return "none"
         if self.verb == "push":
             return push(world, me, self.goal, self.way)
         return {
             "face": face,
             "point": point,
             "follow": go_next_to,
+            "stay_near": go_next_to,
             "flee": flee,
             "go_to": go_to,
             "go_next_to": go_next_to,

@@ -137,7 +137,15 @@ def _name(node: ast.Name, context: Context) -> Any:
     }
     if word in words:
         return words[word]()
-    if me is not None and word in ("poked", "was_poked", "gone", "spoke", "action", "pointing"):
+    if me is not None and word in (
+        "poked",
+        "was_poked",
+        "gone",
+        "spoke",
+        "action",
+        "pointing",
+        "turns_in_state",
+    ):
         return attribute(me, word, context)
     if me is not None and context.in_frame and word in ("facing", "cell", "x", "y"):
         return attribute(me, word, context)
@@ -210,6 +218,8 @@ def attribute(subject: Any, name: str, context: Context) -> Any:
         return subject.utterance is not None
     if name == "toggled":
         return bool(subject.toggled_by)
+    if name == "turns_in_state":
+        return subject.clock
     if name in ("kind", "cell", "index", "gone", "poked", "was_poked", "action", "noun", "type"):
         return getattr(subject, name)
     if name == "unlocked_by":

@@ -10,7 +10,7 @@ from typing import Any
 from tests.scenario_fuzzer.declared import STATUSES, Declared, Frame, Thing
 from tests.scenario_fuzzer.phrases import Phrases, Where
 
-ALWAYS_OPEN = ("face", "follow", "flee", "wander", "choose")
+ALWAYS_OPEN = ("face", "follow", "stay_near", "flee", "wander", "choose")
 """Activities that never end by themselves."""
 
 
@@ -143,6 +143,7 @@ class Behaviour:
             lambda: rng.choice(
                 ("choose(left | 2 * forward | stay)", "choose(toggle | forward)", "turn(left)")
             ),
+            lambda: f"stay_near({phrases.entity(where)}, {rng.randint(1, 4)})",
             lambda: f"turn_to({phrases.direction(where)})",
             lambda: f"face({phrases.spot(where)})",
             lambda: f"go_to({phrases.reachable(where)})",

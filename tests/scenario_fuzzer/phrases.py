@@ -153,6 +153,7 @@ class Phrases:
         if where.frame is not None:
             options += [] if where.reset else [*where.frame.numbers, *where.frame.numbers]
             options += ["self.index"] if where.frame.of_group else []
+            options += [] if where.reset else ["turns_in_state"]
         options += [
             lambda: f"{self.entity(where)}.{rng.choice('xy')}",
             lambda: f"{self.entity(where)}.distance({self.entity(where)})",

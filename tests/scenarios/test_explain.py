@@ -90,7 +90,7 @@ def test_what_fired_is_what_fired_in_the_reference(name: str) -> None:
     )
     assert isinstance(loaded, LoadedScenario)
     env, reference, known = (
-        ScenarioEnv(compile_scenario(loaded.checked)),
+        ScenarioEnv(compile_scenario(loaded.checked), scenarios=[loaded.checked]),
         Reference(loaded.resolved),
         addresses(loaded),
     )

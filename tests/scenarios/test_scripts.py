@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 import socialai_dsl as sd
-from socialai_dsl.envs.perceiving import perceived
-from socialai_dsl.envs.properties import Effort, solved_by_script
+from socialai_dsl.analysis.perceiving import perceived
+from socialai_dsl.analysis.properties import Effort, solved_by_script
 
 ROOMS = 40
 PAPER = (

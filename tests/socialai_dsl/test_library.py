@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from socialai_dsl.frontend import check
 from socialai_dsl.library import prelude, shared_grammars
+from socialai_dsl.render.tiles import LOOKS
 
 
 def test_codes_of_the_view():
@@ -12,6 +13,13 @@ def test_codes_of_the_view():
         "wall": 2, "floor": 3, "door": 4, "ball": 6, "box": 7, "lava": 9, "switch": 12, "apple": 13,
         "lever": 14, "generator": 15, "marble": 16, "platform": 17, "fence": 18, "remote_door": 19,
     }  # fmt: skip
+
+
+def test_every_type_has_a_look_and_letters_of_its_own():
+    types = prelude().types.values()
+    assert {type_.look for type_ in types} <= LOOKS.keys()
+    first = [type_.letters[0] for type_ in types]
+    assert len(set(first)) == len(first)
 
 
 def test_a_locked_door_ignores_a_toggle():

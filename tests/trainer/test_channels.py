@@ -9,8 +9,8 @@ import socialai_dsl as sd
 from trainer.checkpoint import read, restore_net
 from trainer.config import RunConfig
 from trainer.errors import CheckpointError
+from trainer.nets import NetSpec
 from trainer.ppo import train
-from trainer.session import net_spec
 
 PLAYROOM = str(Path(__file__).parents[1] / "data" / "playroom.yaml")
 
@@ -23,15 +23,15 @@ def config(net: str) -> RunConfig:
 @pytest.mark.parametrize("net", ["fast", "paper", "paper-reference"])
 def test_six_channels_can_be_learned_from(net: str, tmp_path: Path) -> None:
     envs = sd.make_vec(PLAYROOM, 4, autoreset_mode="SameStep")
-    spec = net_spec(envs)
+    spec = NetSpec.of(envs)
     assert spec.image_shape == (7, 7, 6)
     assert spec.image_high[4:] == (255, 255)
     checkpoint = read(train(config(net), envs, tmp_path))
     assert checkpoint.meta.image_shape == (7, 7, 6)
     other = sd.make_vec("talkitout", 4)
-    spec_of_sizes = net_spec(other)
+    spec_of_sizes = NetSpec.of(other)
     actions = type(spec_of_sizes)(
         spec.action_sizes, spec_of_sizes.image_shape, spec_of_sizes.image_high, spec.vocabulary
     )
     with pytest.raises(CheckpointError, match=r"for images \(7, 7, 6\), but the scenario has \(7, 7, 4\)"):
-        restore_net(checkpoint, actions, list(envs.program.vocabulary))
+        restore_net(checkpoint, actions)

@@ -24,9 +24,10 @@ from tests.trainer.fake_envs import EchoEnvs
 from trainer import checkpoint as checkpoints
 from trainer.checkpoint import Checkpoint, read, restore_net, write
 from trainer.errors import CheckpointError
+from trainer.nets import NetSpec
 from trainer.ppo import update
 from trainer.rollout import collect
-from trainer.session import Session, net_spec
+from trainer.session import Session
 
 ROOT = Path(__file__).parents[2]
 
@@ -40,7 +41,7 @@ def session(small_config: Any) -> Session:
 
 
 def restored(path: Path, envs: Any) -> Any:
-    return restore_net(read(path), net_spec(envs), list(envs.program.vocabulary))
+    return restore_net(read(path), NetSpec.of(envs))
 
 
 def test_reading_gives_back_what_was_written(session: Session, tmp_path: Path) -> None:
@@ -180,7 +181,7 @@ def tampered(session: Session, **changes: torch.Tensor | None) -> Checkpoint:
 def test_weights_that_do_not_fit_are_refused(session: Session, changes: Any, message: str) -> None:
     envs = session.envs
     with pytest.raises(CheckpointError, match=message):
-        restore_net(tampered(session, **changes), net_spec(envs), envs.vocabulary)
+        restore_net(tampered(session, **changes), NetSpec.of(envs))
 
 
 @pytest.mark.parametrize(
@@ -441,16 +442,14 @@ def test_a_vocabulary_that_the_network_has_no_room_for_is_refused(small_config: 
         pytest.warns(UserWarning, match="vocabulary differs"),
         pytest.raises(CheckpointError, match="vocabulary does not fit its network"),
     ):
-        restore_net(
-            Checkpoint(meta, good.tensors), net_spec(session.envs), list(session.envs.program.vocabulary)
-        )
+        restore_net(Checkpoint(meta, good.tensors), NetSpec.of(session.envs))
 
 
 def test_images_of_another_shape_are_refused(session: Session, tmp_path: Path) -> None:
     path = write(tmp_path, session.checkpoint())
-    spec = replace(net_spec(session.envs), image_shape=(7, 7, 6), image_high=(12, 5, 3, 3, 1, 1))
+    spec = replace(NetSpec.of(session.envs), image_shape=(7, 7, 6), image_high=(12, 5, 3, 3, 1, 1))
     with pytest.raises(CheckpointError, match=r"images \(7, 7, 4\).*has \(7, 7, 6\)"):
-        restore_net(read(path), spec, session.envs.vocabulary)
+        restore_net(read(path), spec)
 
 
 def test_another_order_of_the_same_words_changes_nothing_but_the_rows(
@@ -476,7 +475,7 @@ def test_a_file_does_not_choose_what_is_imported(session: Session) -> None:
     meta = good.meta.model_copy(update={"config": good.meta.config.model_copy(update={"net": "this:That"})})
     envs = session.envs
     with pytest.raises(CheckpointError, match="name it"):
-        restore_net(Checkpoint(meta, good.tensors), net_spec(envs), envs.vocabulary)
+        restore_net(Checkpoint(meta, good.tensors), NetSpec.of(envs))
     assert "this" not in sys.modules
 
 

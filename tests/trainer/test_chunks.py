@@ -11,10 +11,10 @@ from torch import Tensor, nn
 
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.plain import encode
-from trainer.chunks import acting_memories, chunk_starts, update_chunks
 from trainer.config import RunConfig, configure
+from trainer.minibatch import acting_memories, chunk_starts
 from trainer.play import CheckpointPolicy
-from trainer.ppo import compute_gae
+from trainer.ppo import compute_gae, update
 from trainer.rollout import Rollout, collect
 from trainer.session import Session
 
@@ -92,7 +92,7 @@ def test_a_chunk_begins_with_the_memory_that_was_last_computed_for_its_first_ste
     session, rollout = played(config)
     rollout = replace(rollout, starts=np.zeros_like(rollout.starts))  # memories go on for ever
     steps = Steps(session, monkeypatch)
-    update_chunks(session, rollout)
+    update(session, rollout)
     first, second, third = (steps.calls[epoch * 4 : epoch * 4 + 4] for epoch in range(3))
     acting = acting_memories(rollout, 4)
     assert rows(first[0][0]) == rows(acting[[0, 4]].flatten(0, 1)), "those of the acting network"
@@ -113,7 +113,7 @@ def test_memories_do_not_reach_into_an_episode(monkeypatch: pytest.MonkeyPatch) 
     marks[6] = True  # the third step of each chunk that begins at 4
     rollout = replace(rollout, starts=marks)
     steps = Steps(session, monkeypatch)
-    update_chunks(session, rollout)
+    update(session, rollout)
     empty = [(given == 0).flatten(1).all(1).sum().item() for given, _ in steps.calls]
     assert empty[1:] == [0, 6, 0], "six environments, each emptied before the marked step only"
 
@@ -141,7 +141,7 @@ def test_batch_norm_sees_the_environments_while_acting_and_one_step_of_all_chunk
     assert seen == [16] * 41, "each step's observations, and the one after the last for its value"
     assert {int(norm.num_batches_tracked) for norm in norms} == {40}, "which counts in the next rollout"
     seen.clear()
-    update_chunks(session, rollout)
+    update(session, rollout)
     assert seen == [64] * 10 + [48] * 10 + [64] * 10 + [48] * 10, "also in the running statistics"
     assert {int(norm.num_batches_tracked) for norm in norms} == {40 + 40}
     assert len(session.optimizer.state) == len(list(net.parameters()))
@@ -181,9 +181,9 @@ def first_values(net: Any, image: np.ndarray, tokens: np.ndarray) -> Tensor:
 
 def test_batch_statistics_make_the_first_ratios_differ_from_one() -> None:
     session, rollout = played(small(epochs=1))
-    assert update_chunks(session, rollout)["approx_kl"] > 1e-6
+    assert update(session, rollout)["approx_kl"] > 1e-6
     session, rollout = played(small(epochs=1, net="paper"))
-    assert update_chunks(session, rollout)["approx_kl"] == pytest.approx(0, abs=1e-6), (
+    assert update(session, rollout)["approx_kl"] == pytest.approx(0, abs=1e-6), (
         "without batch statistics they are one"
     )
 
@@ -206,7 +206,7 @@ def test_the_update_is_that_of_a_plain_loop_over_frames(net: str) -> None:
     )
     twin = copy.deepcopy(session.actor.net)
     expected = plain_update(twin, session, rollout, config)
-    statistics = update_chunks(session, rollout)
+    statistics = update(session, rollout)
     assert statistics["loss"] == pytest.approx(expected, rel=1e-9)
     for (name, got), other in zip(
         session.actor.net.state_dict().items(), twin.state_dict().values(), strict=True
@@ -298,7 +298,7 @@ def test_minibatches_are_of_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     config = small(minibatches=3, epochs=2)
     session, rollout = played(config)
     steps = Steps(session, monkeypatch)
-    update_chunks(session, rollout)
+    update(session, rollout)
     sizes = [len(given) for given, _ in steps.calls]
     assert sizes == [4] * 12 + [4] * 4 + [2] * 4, "12 chunks by four, then 6 shifted ones by four"
 

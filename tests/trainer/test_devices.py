@@ -3,6 +3,7 @@
 There is no card where the tests run, so one is pretended; that the arithmetic is right there is not tested.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.pretend import DevicesMixed, PretendedCard
 from trainer.checkpoint import read
 from trainer.play import CheckpointPolicy
-from trainer.ppo import Progress, train
+from trainer.ppo import train
 
 
 @pytest.mark.parametrize("net", ["fast", "paper", "paper-reference"])
@@ -31,8 +32,8 @@ def test_training_on_a_card_moves_everything_there(net: str, tmp_path: Path, sma
         "checkpoint_every": 1,
     }
 
-    def stop(seen: Progress) -> None:
-        if seen.update == 2:
+    def stop(seen: Mapping[str, Any]) -> None:
+        if seen["update"] == 2:
             raise KeyboardInterrupt
 
     here = read(train(small_config(**settings), EchoEnvs(8, chatter=0.3), tmp_path / "here"))

@@ -1,6 +1,6 @@
 """A network, bonus, curriculum or guide of one's own works from a file beside the scenario; mistakes are named."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from trainer.curricula import Leaves, build_curriculum
 from trainer.guides import build_guide
 from trainer.nets import NetSpec, build_net
 from trainer.play import CheckpointPolicy
-from trainer.ppo import Progress, train
+from trainer.ppo import train
 from trainer.rollout import collect
 from trainer.session import Session
 
@@ -175,11 +175,21 @@ def test_equally_named_files_of_two_folders_do_not_meet(tmp_path: Path) -> None:
     assert sizes == [4, 8, 4]
 
 
-def test_what_lies_beside_the_file_can_be_imported(tmp_path: Path) -> None:
-    (tmp_path / "beside_the_file.py").write_text("SIZE = 12\n")
+def test_what_lies_beside_the_file_can_be_imported_and_is_that_of_its_own_folder(tmp_path: Path) -> None:
     text = "from beside_the_file import SIZE\nfrom trainer.nets import FastNet\n"
-    (tmp_path / "mine.py").write_text(text + "class Net(FastNet):\n    kind_size = SIZE\n")
-    assert build_net("mine:Net", SPEC, 0, folder=tmp_path).kind_size == 12
+    for size in (12, 20):
+        folder = tmp_path / str(size)
+        folder.mkdir()
+        (folder / "beside_the_file.py").write_text(f"SIZE = {size}\n")
+        (folder / "mine.py").write_text(text + "class Net(FastNet):\n    kind_size = SIZE\n")
+        assert build_net("mine:Net", SPEC, 0, folder=folder).kind_size == size
+
+
+def test_a_file_that_was_changed_is_read_again(tmp_path: Path) -> None:
+    for size in (4, 8):
+        text = f"from trainer.nets import FastNet\nclass Net(FastNet):\n    kind_size = {size}\n"
+        (tmp_path / "mine.py").write_text(text)
+        assert build_net("mine:Net", SPEC, 0, folder=tmp_path).kind_size == size
 
 
 def test_a_run_with_everything_of_ones_own_resumes_to_the_same_bits(
@@ -195,8 +205,8 @@ def test_a_run_with_everything_of_ones_own_resumes_to_the_same_bits(
     }
     config = small_config(**own, bptt=4, checkpoint_every=1)
 
-    def stop(seen: Progress) -> None:
-        if seen.update == 1:
+    def stop(seen: Mapping[str, Any]) -> None:
+        if seen["update"] == 1:
             raise KeyboardInterrupt
 
     whole = read(train(config, EchoEnvs(8), tmp_path / "whole"))

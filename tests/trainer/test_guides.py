@@ -1,6 +1,7 @@
 """A guide leads and is imitated; led steps give PPO nothing, and without a guide nothing is different."""
 
 import json
+from collections.abc import Mapping
 from math import log
 from pathlib import Path
 from typing import Any
@@ -14,10 +15,10 @@ from socialai_dsl.evaluation import evaluate
 from tests.trainer.fake_envs import EchoEnvs
 from trainer.checkpoint import read
 from trainer.config import RunConfig
-from trainer.features import Batch, LeadBatch
-from trainer.guides import ScriptGuide
+from trainer.guides import Lead, ScriptGuide
+from trainer.minibatch import Batch
 from trainer.play import CheckpointPolicy
-from trainer.ppo import Progress, estimate_advantages, ppo_loss, train
+from trainer.ppo import estimate_advantages, imitation_loss, ppo_loss, train
 from trainer.rollout import collect
 from trainer.session import Session
 
@@ -33,9 +34,23 @@ def mixed_batch() -> tuple[Batch, torch.Tensor]:
         values=torch.zeros(3),
         advantages=torch.tensor([1e6, -1e6, 2.0]),
         returns=torch.tensor([3.0, 2.0, 3.0]),
-        lead=LeadBatch(actions, torch.tensor([True, True, False]), torch.tensor([1.0, 0.5, 0.0])),
+        lead=Lead(actions, torch.tensor([True, True, False]), torch.tensor([1.0, 0.5, 0.0])),
     )
     return batch, logits
+
+
+def test_what_is_imitated_well_enough_is_left_alone() -> None:
+    likely, unlikely = log(0.995), log(0.6)
+    logits = torch.tensor([[log(0.005), likely, 0, 0, 0, 0, 0, 0], [log(0.4), unlikely, 0, 0, 0, 0, 0, 0]])
+    logits.requires_grad_()
+    actions = torch.tensor([[1, 0, 0, 0], [1, 0, 0, 0]])  # silent
+    silent = log(0.5)
+    loss = imitation_loss(logits, actions, torch.ones(2), (2, 2, 2, 2), floor=0.01 - silent)
+    assert loss.item() == pytest.approx((0.01 - silent - unlikely - silent) / 2)
+    loss.backward()  # type: ignore[no-untyped-call]
+    assert logits.grad is not None
+    assert logits.grad[0].tolist() == [0] * 8
+    assert logits.grad[1, :2].tolist() == pytest.approx([0.4 / 2, -0.4 / 2])
 
 
 def test_the_loss_of_led_and_own_frames_together() -> None:
@@ -46,14 +61,14 @@ def test_the_loss_of_led_and_own_frames_together() -> None:
     value = (1.5**2 + 0.5**2 + 1.5**2) / 3
     entropy = -(2 + 0.6 * 2) * (0.6 * log(0.6) + 0.4 * log(0.4)) / 3
     imitation = -(1.0 * 4 * log(0.6) + 0.5 * (log(0.6) + log(0.4))) / 3  # silent: no template, no noun
-    assert parts.policy.item() == pytest.approx(policy)
-    assert parts.value.item() == pytest.approx(value)
+    assert parts.policy_loss.item() == pytest.approx(policy)
+    assert parts.value_loss.item() == pytest.approx(value)
     assert parts.entropy.item() == pytest.approx(entropy)
-    assert parts.imitation.item() == pytest.approx(imitation)
-    assert parts.total.item() == pytest.approx(policy + 0.5 * value - 0.01 * entropy + 0.7 * imitation)
+    assert parts.imitation_loss.item() == pytest.approx(imitation)
+    assert parts.loss.item() == pytest.approx(policy + 0.5 * value - 0.01 * entropy + 0.7 * imitation)
     assert parts.approx_kl.item() == pytest.approx((1.2**4 - 1 - 4 * log(1.2)) / 3, rel=1e-5)
 
-    parts.total.backward()  # type: ignore[no-untyped-call]
+    parts.loss.backward()  # type: ignore[no-untyped-call]
     assert logits.grad is not None
     # Cross-entropy: probability minus what was shown; nothing of advantage, ratio or entropy.
     assert logits.grad[0].tolist() == pytest.approx([0.7 * 0.4 / 3, -0.7 * 0.4 / 3] * 4)
@@ -79,7 +94,7 @@ def test_advantages_are_normalised_over_the_agent_s_own_steps(small_config: Any)
     assert rollout.lead is not None
     led = rollout.lead.led
     assert 0 < led.sum() < led.numel()
-    advantages, _ = estimate_advantages(session, rollout)
+    advantages = estimate_advantages(session, rollout).advantages
     own = advantages[~led]
     assert own.mean().item() == pytest.approx(0, abs=1e-6)
     assert own.std(correction=0).item() == pytest.approx(1, abs=1e-3)
@@ -161,8 +176,8 @@ def test_a_guided_run_stopped_and_resumed_ends_with_the_same_bits(tmp_path: Path
         pass
 
     def stop_after(update: int) -> Any:
-        def progress(seen: Progress) -> None:
-            if seen.update == update:
+        def progress(seen: Mapping[str, Any]) -> None:
+            if seen["update"] == update:
                 raise Stop
 
         return progress

@@ -43,12 +43,12 @@ def updates(run_dir: Path) -> list[int]:
 def test_a_log_is_cut_back(tail: str, tmp_path: Path) -> None:
     with MetricsLog(tmp_path, 0, tensorboard=False) as log:
         for update in range(1, 5):
-            log.write(update, {"loss": 0.5})
+            log.write({"update": update, "loss": 0.5})
     with (tmp_path / "metrics.jsonl").open("a") as file:
         file.write(tail)
     with MetricsLog(tmp_path, 2, tensorboard=False) as log:
         assert updates(tmp_path) == [1, 2]
-        log.write(3, {"loss": 0.25})
+        log.write({"update": 3, "loss": 0.25})
         log.sync()
     assert updates(tmp_path) == [1, 2, 3]
 
@@ -58,7 +58,7 @@ def test_numbers_json_does_not_know_are_not_written(tmp_path: Path) -> None:
         MetricsLog(tmp_path, 0, tensorboard=False) as log,
         pytest.raises(ValueError, match="not JSON compliant"),
     ):
-        log.write(1, {"loss": float("nan")})
+        log.write({"update": 1, "loss": float("nan")})
 
 
 def points(run_dir: Path, tag: str) -> list[tuple[int, float]]:
@@ -73,13 +73,20 @@ def points(run_dir: Path, tag: str) -> list[tuple[int, float]]:
 def test_tensorboard_counts_frames_and_forgets_what_is_made_again(tmp_path: Path) -> None:
     with MetricsLog(tmp_path, 0, tensorboard=True) as log:
         for update in range(1, 6):
-            log.write(update, {"frames": 64 * update, "loss": 0.5, "outcomes": {"won": 0.25, "lost": None}})
+            log.write(
+                {
+                    "update": update,
+                    "frames": 64 * update,
+                    "loss": 0.5,
+                    "outcomes": {"won": 0.25, "lost": None},
+                }
+            )
     assert points(tmp_path, "loss") == [(64 * update, 0.5) for update in range(1, 6)]
     # TensorBoard reads files in order of their names: second, process, and then a number of which 10 is before 9.
     time.sleep(1)
     with MetricsLog(tmp_path, 2, tensorboard=True, frames=128) as log:
         for update in range(3, 7):
-            log.write(update, {"frames": 64 * update, "loss": 0.25, "outcomes": {"won": 0.25}})
+            log.write({"update": update, "frames": 64 * update, "loss": 0.25, "outcomes": {"won": 0.25}})
     expected = [(64, 0.5), (128, 0.5), (192, 0.25), (256, 0.25), (320, 0.25), (384, 0.25)]
     assert points(tmp_path, "loss") == expected
     assert [step for step, _ in points(tmp_path, "outcomes/won")] == [step for step, _ in expected]
@@ -88,7 +95,7 @@ def test_tensorboard_counts_frames_and_forgets_what_is_made_again(tmp_path: Path
 def test_what_was_synced_is_in_tensorboard_though_nothing_was_closed(tmp_path: Path) -> None:
     """As after a kill right behind a checkpoint."""
     with MetricsLog(tmp_path, 0, tensorboard=True) as log:
-        log.write(1, {"frames": 64, "loss": 0.5})
+        log.write({"update": 1, "frames": 64, "loss": 0.5})
         log.sync()
         assert points(tmp_path, "loss") == [(64, 0.5)]
 

@@ -10,7 +10,7 @@ from torch import Tensor
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.plain import encode
 from trainer.config import RunConfig
-from trainer.features import make_minibatch
+from trainer.minibatch import Batch, cut_out
 from trainer.nets import ActorCritic
 from trainer.nets.memory import emptied
 from trainer.rollout import Rollout, collect
@@ -84,12 +84,13 @@ def test_agrees_with_reencoding_every_frame(net_name: str, distinct: bool) -> No
     assert rollout.starts.any(), "episodes must begin within the rollout"
     assert max(np.count_nonzero(o["tokens"], axis=1).max() for o in seen) > 8, "histories must be long"
     zeros = torch.zeros(STEPS, ENVS)
-    minibatch = make_minibatch(session.actor, rollout, zeros, zeros, torch.arange(ENVS), STRETCH)
+    batch = Batch(rollout.actions, rollout.log_probs, rollout.values, zeros, zeros)
+    minibatch = cut_out(session.actor, rollout, batch, torch.arange(ENVS), STRETCH)
     shared = len(minibatch.image_index) < STEPS * ENVS
     assert shared == distinct, "duplicates must be removed exactly where that was asked for"
 
     expected = [by_stretch(array) for array in reference(net, rollout, seen)]
-    got = minibatch.evaluate(net)
+    ((_, *got),) = minibatch.evaluate(net)
     for one, other in zip(got, expected, strict=True):
         assert one.dtype == torch.float64
         assert furthest(one, other) < 1e-12

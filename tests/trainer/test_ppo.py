@@ -13,8 +13,8 @@ from torch import Tensor
 
 from tests.trainer.fake_envs import EchoEnvs
 from trainer.config import RunConfig
-from trainer.features import Batch, make_minibatch
-from trainer.ppo import compute_gae, ppo_loss, update
+from trainer.minibatch import Batch, cut_out
+from trainer.ppo import compute_gae, estimate_advantages, ppo_loss, update
 from trainer.rollout import collect
 from trainer.session import Session
 
@@ -94,15 +94,15 @@ def test_joint_loss_of_a_spoken_action() -> None:
     batch, logits = one_frame(True, advantage=-2.0, acting=0.5, now=0.6)
     parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config(), ENTROPY)
     ratio = 1.2**4
-    assert parts.policy.item() == pytest.approx(2 * ratio, rel=1e-5), (
+    assert parts.policy_loss.item() == pytest.approx(2 * ratio, rel=1e-5), (
         "a bad action's growing ratio is not clipped"
     )
-    assert parts.value.item() == pytest.approx(1.5**2)
+    assert parts.value_loss.item() == pytest.approx(1.5**2)
     entropy = (2 + 0.6 * 2) * entropy_of(
         0.6
     )  # template and noun count where something is said, in 0.6 of the cases
     assert parts.entropy.item() == pytest.approx(entropy, rel=1e-5)
-    assert parts.total.item() == pytest.approx(2 * ratio + 0.5 * 2.25 - ENTROPY * entropy, rel=1e-5)
+    assert parts.loss.item() == pytest.approx(2 * ratio + 0.5 * 2.25 - ENTROPY * entropy, rel=1e-5)
     assert parts.clip_fraction.item() == 1
     assert parts.approx_kl.item() == pytest.approx(ratio - 1 - log(ratio), rel=1e-4)
 
@@ -111,7 +111,7 @@ def test_joint_loss_clips_a_good_action_s_ratio() -> None:
     batch, logits = one_frame(True, advantage=2.0, acting=0.5, now=0.6)
     assert ppo_loss(
         batch, logits, torch.tensor([1.5]), SIZES, config(), ENTROPY
-    ).policy.item() == pytest.approx(-2 * 1.2)
+    ).policy_loss.item() == pytest.approx(-2 * 1.2)
 
 
 def test_silence_leaves_template_and_noun_out() -> None:
@@ -119,8 +119,8 @@ def test_silence_leaves_template_and_noun_out() -> None:
     logits = torch.tensor([[log(0.4), log(0.6), log(0.6), log(0.4), log(0.2), log(0.8), log(0.9), log(0.1)]])
     logits.requires_grad_()
     parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config(), 0.0)
-    assert parts.policy.item() == pytest.approx(2 * (0.6 / 0.5) ** 2, rel=1e-5)
-    parts.total.backward()  # type: ignore[no-untyped-call]
+    assert parts.policy_loss.item() == pytest.approx(2 * (0.6 / 0.5) ** 2, rel=1e-5)
+    parts.loss.backward()  # type: ignore[no-untyped-call]
     assert logits.grad is not None
     assert (logits.grad[0, 4:] == 0).all(), "what was not said must not be learnt from"
     assert (logits.grad[0, :4] != 0).all()
@@ -145,7 +145,7 @@ def test_the_entropy_is_that_of_all_actions_and_so_is_its_gradient(sizes: tuple[
     assert torch.allclose(joint.sum(1), torch.ones(5, dtype=torch.float64))
     expected = -(joint * joint.log()).sum(1).mean()
     assert parts.entropy.item() == pytest.approx(expected.item(), rel=1e-12)
-    (got,) = torch.autograd.grad(parts.total, logits)
+    (got,) = torch.autograd.grad(parts.loss, logits)
     (wanted,) = torch.autograd.grad(-expected, logits)
     assert torch.allclose(got, wanted, rtol=0, atol=1e-12)
     assert wanted[:, sizes[0] : sizes[0] + 2].abs().min() > 1e-4, "p(speak) matters"
@@ -161,13 +161,13 @@ def test_per_head_loss_masks_and_averages_each_head() -> None:
     primitive, speak = -2 * min(1.2, 1.2), -2 * (0.45 / 0.5)
     entropies = entropy_of(0.6) + entropy_of(0.55)
     expected = (primitive + speak) / 4 + 0.5 * 2.25 * 2 / 4 - 0.01 * entropies / 4
-    assert parts.total.item() == pytest.approx(expected, rel=1e-5)
+    assert parts.loss.item() == pytest.approx(expected, rel=1e-5)
 
 
 def test_clipped_value_loss_takes_the_worse_of_the_two() -> None:
     batch, logits = one_frame(True, advantage=0.0, acting=0.5, now=0.5)
     parts = ppo_loss(batch, logits, torch.tensor([2.5]), SIZES, config(clip_value=True), ENTROPY)
-    assert parts.value.item() == pytest.approx((1.2 - 3) ** 2), (
+    assert parts.value_loss.item() == pytest.approx((1.2 - 3) ** 2), (
         "acting value 1, change clipped to 0.2, return 3"
     )
 
@@ -187,9 +187,9 @@ def test_per_head_value_loss_weighs_frames_by_the_heads_that_took_part() -> None
     parts = ppo_loss(batch, logits.expand(2, -1), torch.tensor([2.5, 0.5]), SIZES, settings, ENTROPY)
     clipped = (1.2 - 3) ** 2  # worse than (2.5 - 3) ** 2
     plain = (0.5 - 1.5) ** 2  # worse than (0.8 - 1.5) ** 2
-    assert parts.value.item() == pytest.approx((4 * clipped + 2 * plain) / 8)
+    assert parts.value_loss.item() == pytest.approx((4 * clipped + 2 * plain) / 8)
     entropies = 6 * log(2) / 8
-    assert parts.total.item() == pytest.approx(0.5 * parts.value.item() - 0.01 * entropies)
+    assert parts.loss.item() == pytest.approx(0.5 * parts.value_loss.item() - 0.01 * entropies)
 
 
 @pytest.mark.parametrize(
@@ -204,7 +204,7 @@ def test_per_head_value_loss_weighs_frames_by_the_heads_that_took_part() -> None
 def test_each_head_clips_its_own_ratio(advantage: float, now: float, expected: float) -> None:
     batch, logits = one_frame(True, advantage, acting=0.5, now=now)
     parts = ppo_loss(batch, logits, torch.tensor([3.0]), SIZES, config(loss="per_head"), ENTROPY)
-    assert parts.policy.item() == pytest.approx(expected, rel=1e-5), "the mean of four equal heads"
+    assert parts.policy_loss.item() == pytest.approx(expected, rel=1e-5), "the mean of four equal heads"
 
 
 def played(config: RunConfig) -> tuple[Session, Any]:
@@ -221,12 +221,10 @@ def test_the_update_sees_the_policy_that_acted(net: str, bptt: int, small_config
     """Before the first step the minibatch gives the log-probabilities and values recorded while acting."""
     config = small_config(net=net, bptt=bptt)
     session, rollout = played(config)
-    advantages = torch.zeros_like(rollout.values)
+    batch = estimate_advantages(session, rollout)
     for envs in (torch.tensor([0, 3, 5]), torch.tensor([1, 2, 4, 6, 7])):
-        minibatch = make_minibatch(
-            session.actor, rollout, advantages, advantages, envs, bptt or config.horizon
-        )
-        logits, values = minibatch.evaluate(session.actor.net)
+        minibatch = cut_out(session.actor, rollout, batch, envs, bptt or config.horizon)
+        ((_, logits, values),) = minibatch.evaluate(session.actor.net)
         assert torch.allclose(values, minibatch.batch.values, atol=1e-5)
         parts = ppo_loss(
             minibatch.batch, logits, values, session.actor.net.spec.action_sizes, config, ENTROPY
@@ -239,7 +237,8 @@ def test_minibatches_hold_whole_environments_in_time_order(small_config: Any) ->
     config = small_config(bptt=4)
     session, rollout = played(config)
     marks = torch.arange(config.horizon)[:, None] * 100.0 + torch.arange(config.envs)
-    minibatch = make_minibatch(session.actor, rollout, marks, marks, torch.tensor([5, 2]), 4)
+    batch = replace(estimate_advantages(session, rollout), advantages=marks)
+    minibatch = cut_out(session.actor, rollout, batch, torch.tensor([5, 2]), 4)
     got = minibatch.batch.advantages.view(4, 4)
     assert got.tolist() == [
         [t * 100.0 + 5, t * 100.0 + 2, (t + 4) * 100.0 + 5, (t + 4) * 100.0 + 2] for t in range(4)
@@ -259,8 +258,8 @@ def test_an_update_makes_the_better_action_likelier(small_config: Any) -> None:
     before = rollout.log_probs[..., 0][favoured].mean().item()
     update(session, rollout)
     group = torch.arange(config.envs)
-    minibatch = make_minibatch(session.actor, rollout, rollout.values, rollout.values, group, config.horizon)
-    logits, _ = minibatch.evaluate(session.actor.net)
+    minibatch = cut_out(session.actor, rollout, estimate_advantages(session, rollout), group, config.horizon)
+    ((_, logits, _),) = minibatch.evaluate(session.actor.net)
     chosen = torch.log_softmax(logits[:, :4], 1)[:, 2].view(rollout.values.shape)[favoured]
     assert chosen.mean().item() > before
 
@@ -281,10 +280,11 @@ def test_a_step_is_adam_s_on_the_clipped_gradient(net: str, small_config: Any) -
         torch.from_numpy(rollout.bootstrap).float(), 0.99, 0.95,
     )  # fmt: skip
     scaled = (gains - gains.mean()) / (gains.std(correction=0) + 1e-8)
-    everything = make_minibatch(session.actor, rollout, scaled, gains + rollout.values, torch.arange(8), 8)
-    logits, values = everything.evaluate(twin)
+    batch = Batch(rollout.actions, rollout.log_probs, rollout.values, scaled, gains + rollout.values)
+    everything = cut_out(session.actor, rollout, batch, torch.arange(8), 8)
+    ((_, logits, values),) = everything.evaluate(twin)
     loss = ppo_loss(everything.batch, logits, values, model.spec.action_sizes, config, ENTROPY)
-    loss.total.backward()  # type: ignore[no-untyped-call]
+    loss.loss.backward()  # type: ignore[no-untyped-call]
     norm = torch.nn.utils.clip_grad_norm_(twin.parameters(), config.max_grad_norm)
     optimizer.step()
     assert statistics["grad_norm"] == pytest.approx(norm.item(), rel=1e-4)
@@ -323,12 +323,12 @@ def test_a_divergence_above_the_target_ends_the_update(
 
 
 def test_threads_make_the_step_that_one_makes(small_config: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("trainer.ppo._SMALLEST_SHARE", 1)
+    monkeypatch.setattr("trainer.minibatch.SMALLEST_SHARE", 1)
     nets = []
     for threads in (1, 2):
-        session, rollout = played(small_config(minibatches=1, epochs=1))
+        session, rollout = played(small_config(minibatches=1, epochs=1, threads=threads))
         with ThreadPoolExecutor(threads) as pool:
-            update(session, rollout, pool.map, threads)
+            update(session, rollout, pool.map)
         nets.append(session.actor.net)
     for (name, one), other in zip(nets[0].named_parameters(), nets[1].parameters(), strict=True):
         assert one.grad is not None, name

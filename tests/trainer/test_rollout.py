@@ -11,10 +11,10 @@ from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.plain import encode
 from trainer.errors import ObservationError, TrainingStopped
 from trainer.features import Actor
-from trainer.nets import build_net
+from trainer.nets import NetSpec, build_net
 from trainer.nets.memory import emptied
-from trainer.rollout import Rollout, collect, ended_info, final_observation
-from trainer.session import Session, net_spec
+from trainer.rollout import Rollout, collect
+from trainer.session import Session
 
 
 class Witness(EchoEnvs):
@@ -153,7 +153,7 @@ def test_a_reward_that_is_not_finite_stops_the_run(small_config: Any) -> None:
 
 def test_ids_may_be_left_to_the_actor() -> None:
     envs = EchoEnvs(5, chatter=0.5, length=8)
-    net = build_net("fast", net_spec(envs), 0)
+    net = build_net("fast", NetSpec.of(envs), 0)
     given, own = Actor(net, 8), Actor(net, 8)
     observation, _ = envs.reset(seed=0)
     for _ in range(12):
@@ -168,18 +168,3 @@ def test_ids_may_be_left_to_the_actor() -> None:
 
 def named(observation: dict[str, np.ndarray]) -> dict[str, Any]:
     return {"images": observation["image"], "tokens": observation["tokens"]}
-
-
-def test_both_forms_of_gymnasium_s_end_information_are_understood() -> None:
-    images, tokens = np.arange(3 * 4).reshape(3, 2, 2, 1), np.arange(6).reshape(3, 2)
-    wanted = np.array([0, 2])
-    arrays = {"final_obs": {"image": images, "tokens": tokens}}
-    objects = np.array([{"image": images[e], "tokens": tokens[e]} if e != 1 else None for e in range(3)])
-    for infos in (arrays, {"final_obs": objects}):
-        final = final_observation(infos, wanted)
-        assert (final["image"] == images[wanted]).all()
-        assert (final["tokens"] == tokens[wanted]).all()
-    success, default = np.array([True, False, False]), np.zeros(3, np.bool_)
-    assert (ended_info({"success": success}, "success", default) == success).all()
-    assert (ended_info({"final_info": {"success": success}}, "success", default) == success).all()
-    assert (ended_info({}, "success", default) == default).all()

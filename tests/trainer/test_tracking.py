@@ -77,7 +77,7 @@ def test_a_resumed_run_goes_on_where_it_was(wandb: FakeWandb, tmp_path: Path, sm
     tracker = WandbTracker("project", tmp_path, {}, "a run")
 
     def stop_at_5(progress: Any) -> None:
-        if progress.update == 5:
+        if progress["update"] == 5:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

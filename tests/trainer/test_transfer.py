@@ -42,10 +42,3 @@ def test_long_lists_are_cut(small_config: Any) -> None:
     many = EchoEnvs(1, nouns=9).program
     with pytest.warns(TransferWarning, match=r'5: "old5" is now "word5" and 3 more$'):
         warn_of_differences(meta, many)
-
-
-def test_a_checkpoint_that_knows_no_words_is_named_alone(small_config: Any) -> None:
-    """Those made before checkpoints had them."""
-    meta = meta_of(small_config, program_sha256="1" * 64, scenario="", actions=[], templates=[], nouns=["x"])
-    with pytest.warns(TransferWarning, match=r"trained on \(program 11111111\) and plays echo \(00000000\)$"):
-        warn_of_differences(meta, EchoEnvs(1).program)

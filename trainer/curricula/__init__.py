@@ -28,6 +28,5 @@ def build_curriculum(name: str, leaves: Leaves, folder: Path = Path()) -> Curric
         return Phases(read_phases(Path(__file__).with_name(f"{name}.yaml")), leaves)
     if name.endswith((".yaml", ".yml")):
         return Phases(read_phases(Path(name)), leaves)
-    methods = ("observe", "weights", "state", "load_state")
-    made: Curriculum = load_class(name, "curriculum", (*SHIPPED, "a .yaml file"), methods, folder)(leaves)
+    made: Curriculum = load_class(name, "curriculum", (*SHIPPED, "a .yaml file"), Curriculum, folder)(leaves)
     return made

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
@@ -90,20 +89,8 @@ class Tutor:
             self._envs.set_member_weights(weights)
             self._weights = weights
 
-    def state(self) -> NDArray[np.uint8]:
-        """What the curriculum remembers, as the bytes of JSON text."""
-        return np.frombuffer(json.dumps(self.curriculum.state()).encode(), np.uint8).copy()
-
-    def load_state(self, state: NDArray[np.uint8]) -> None:
-        """Go on from `state()`; the environments must have been restored before.
-
-        Raises:
-            ValueError: it is not the state of such a curriculum.
-        """
-        try:
-            self.curriculum.load_state(json.loads(state.tobytes()))
-        except (KeyError, TypeError) as error:
-            raise ValueError(f"curriculum: the state is of another one ({error!r})") from error
+    def resume(self) -> None:
+        """Have the environments, which have been restored, play on as the curriculum, restored as well, chooses."""
         self._weights = []
         self._choose()
         self.begin()

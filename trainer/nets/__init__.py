@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Protocol, cast
 
 import torch
 
@@ -27,16 +26,7 @@ __all__ = [
 ]
 
 
-class NetClass(Protocol):
-    """What builds a network: a subclass of `ActorCritic` whose constructor takes the spec alone."""
-
-    reducible: bool
-
-    def __call__(self, spec: NetSpec, /) -> ActorCritic:
-        """A network with fresh weights."""
-
-
-_SHIPPED: dict[str, NetClass] = {
+_SHIPPED: dict[str, type[ActorCritic]] = {
     "fast": FastNet,
     "paper": PaperNet,
     "paper-reference": PaperReferenceNet,
@@ -44,7 +34,7 @@ _SHIPPED: dict[str, NetClass] = {
 }
 
 
-def net_class(name: str, folder: Path = Path()) -> NetClass:
+def net_class(name: str, folder: Path = Path()) -> type[ActorCritic]:
     """Find a network class: a shipped one, or `mine:Net` of the user's, looked for in `folder` first.
 
     Raises:
@@ -52,10 +42,10 @@ def net_class(name: str, folder: Path = Path()) -> NetClass:
     """
     if name in _SHIPPED:
         return _SHIPPED[name]
-    found = load_class(name, "net", tuple(_SHIPPED), ("prepare", "perceive"), folder)
+    found: type = load_class(name, "net", tuple(_SHIPPED), ActorCritic, folder)
     if not issubclass(found, ActorCritic):
         raise ValueError(f"net: got {name!r}, expected a subclass of trainer.nets.ActorCritic")
-    return cast(NetClass, found)
+    return found
 
 
 def build_net(
@@ -71,6 +61,6 @@ def build_net(
         raise ValueError(f"precision: got {precision} for the network {name}, which computes in float32 only")
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        net = found(spec)
+        net = found(spec)  # type: ignore[call-arg]
     net.precision = precision
     return net

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -43,33 +42,28 @@ class NetSpec:
         return len(self.vocabulary)
 
     @classmethod
-    def of(cls, action_space: Any, observation_space: Any, vocabulary: Sequence[str]) -> NetSpec:
-        """Read the spaces of one environment.
+    def of(cls, envs: Any) -> NetSpec:
+        """Of an environment, single or vector.
 
         Raises:
             ValueError: the spaces are not a `MultiDiscrete` of four and a `Dict` of `image` and `tokens`.
         """
-        if not isinstance(action_space, spaces.MultiDiscrete) or len(action_space.nvec) != len(HEADS):
+        actions = getattr(envs, "single_action_space", envs.action_space)
+        if not isinstance(actions, spaces.MultiDiscrete) or len(actions.nvec) != len(HEADS):
             raise ValueError(
-                f"action space: got {action_space}, expected MultiDiscrete([primitives, 2, templates, nouns])"
+                f"action space: got {actions}, expected MultiDiscrete([primitives, 2, templates, nouns])"
             )
-        image = observation_space["image"] if isinstance(observation_space, spaces.Dict) else None
-        if (
-            not isinstance(image, spaces.Box)
-            or len(image.shape) != 3
-            or "tokens" not in observation_space.spaces
-        ):
+        observations = getattr(envs, "single_observation_space", envs.observation_space)
+        image = observations["image"] if isinstance(observations, spaces.Dict) else None
+        if not isinstance(image, spaces.Box) or len(image.shape) != 3 or "tokens" not in observations.spaces:
             raise ValueError(
-                f"observation space: got {observation_space}, expected Dict(image=Box(H, W, C), tokens=Box(L))"
+                f"observation space: got {observations}, expected Dict(image=Box(H, W, C), tokens=Box(L))"
             )
-        sizes = tuple(int(n) for n in action_space.nvec)
-        high = np.asarray(image.high).reshape(-1, image.shape[-1]).max(axis=0)
-        return cls(
-            (sizes[0], sizes[1], sizes[2], sizes[3]),
-            (image.shape[0], image.shape[1], image.shape[2]),
-            tuple(int(value) for value in high),
-            tuple(vocabulary),
-        )
+        primitives, speak, templates, nouns = actions.nvec.tolist()
+        height, ahead, channels = image.shape
+        high = np.asarray(image.high).reshape(-1, channels).max(axis=0)
+        sizes, shape = (primitives, speak, templates, nouns), (height, ahead, channels)
+        return cls(sizes, shape, tuple(high.tolist()), tuple(envs.program.vocabulary))
 
 
 class Heads(nn.Module):

@@ -8,9 +8,6 @@ from torch import Tensor, nn
 from trainer.nets.base import ActorCritic, NetSpec
 from trainer.nets.dialogue import HeardWords
 
-LARGEST_TABLE = 1 << 16
-"""Possible kinds of cells up to which a table finds those that occur; beyond, sorting is faster."""
-
 
 class Cells:
     """Images as kinds of cells, of which there are far fewer than cells.
@@ -25,29 +22,8 @@ class Cells:
         code = cells[..., 0].to(torch.int64)
         for channel, size in enumerate(sizes[1:], start=1):
             code = code * size + cells[..., channel]
-        if _product(sizes) > LARGEST_TABLE:
-            codes, self.kind_of = torch.unique(code, return_inverse=True)
-            self.kinds = _unravel(codes, sizes)
-            return
-        present = torch.zeros(_product(sizes), dtype=torch.bool, device=images.device)
-        present[code.flatten()] = True
-        self.kinds = _unravel(present.nonzero().squeeze(1), sizes)
-        self.kind_of = (present.cumsum(0) - 1)[code]
-
-
-def _product(sizes: tuple[int, ...]) -> int:
-    total = 1
-    for size in sizes:
-        total *= size
-    return total
-
-
-def _unravel(codes: Tensor, sizes: tuple[int, ...]) -> Tensor:
-    channels = []
-    for size in reversed(sizes):
-        channels.append(codes % size)
-        codes = codes // size
-    return torch.stack(channels[::-1], 1)
+        codes, self.kind_of = torch.unique(code, return_inverse=True)
+        self.kinds = torch.stack(torch.unravel_index(codes, sizes), 1)
 
 
 class FastNet(ActorCritic):

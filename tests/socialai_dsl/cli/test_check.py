@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from socialai_dsl.analysis.search import Search
 from socialai_dsl.cli.main import main
-from socialai_dsl.envs.search import Search
 
 Capture = pytest.CaptureFixture[str]
 ROOT = Path(__file__).parents[3]
@@ -129,7 +129,7 @@ def test_every_member_of_a_suite_is_checked(capsys: Capture) -> None:
 def test_progress_is_told_beside_the_results(
     gate: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("socialai_dsl.envs.effort._QUIET", 0.0)
+    monkeypatch.setattr("socialai_dsl.analysis.effort._QUIET", 0.0)
     assert main(["check", claiming(gate, "{reachable: out}"), "--rooms", "2"]) == 0
     captured = capsys.readouterr()
     assert captured.err.splitlines()[:2] == [
@@ -140,7 +140,7 @@ def test_progress_is_told_beside_the_results(
 
 
 def test_quick_checks_tell_no_progress(gate: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("socialai_dsl.envs.effort._QUIET", 3600.0)
+    monkeypatch.setattr("socialai_dsl.analysis.effort._QUIET", 3600.0)
     assert main(["check", str(gate), "--rooms", "2"]) == 0
     assert capsys.readouterr().err == ""
 

@@ -11,8 +11,9 @@ from PIL import Image
 
 import socialai_dsl
 from socialai_dsl.cli.endings import Ending, endings_of
-from socialai_dsl.cli.evaluation import Evaluation, Player
+from socialai_dsl.cli.evaluation import Evaluation
 from socialai_dsl.cli.main import main, run_main
+from socialai_dsl.cli.player import Player
 from socialai_dsl.evaluation import EvalResult, wilson_interval
 
 Capture = pytest.CaptureFixture[str]
@@ -157,7 +158,7 @@ def test_recordings_show_every_way_of_failing() -> None:
     outcome = np.array([1, 1, 1, 0, 1, 1, 2, 1, 1, 0])
     result = EvalResult(outcome == 0, outcome, np.ones(10, np.int64), np.zeros(10), ("won", "late", "dead"))
     program: Any = None
-    evaluation = Evaluation("any", program, Player("random"), result, [], {})
+    evaluation = Evaluation("any", "", program, Player("random"), result, [], {})
     assert evaluation.pick(False, 3) == [0, 1, 6]
     assert evaluation.pick(False, 100) == [0, 1, 2, 4, 5, 6, 7, 8]
     assert evaluation.pick(True, 3) == [3, 9]

@@ -20,8 +20,8 @@ import socialai_dsl
 from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.cli.play_app import PlayApp
 from socialai_dsl.cli.play_game import Game
-from socialai_dsl.cli.play_words import ahead
 from socialai_dsl.engine.errors import RoomError
+from socialai_dsl.envs.view import ahead
 
 SEED = 0
 ROWS, COLUMNS = 24, 80

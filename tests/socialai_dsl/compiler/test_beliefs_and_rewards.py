@@ -9,21 +9,17 @@ import numpy as np
 import pytest
 
 from socialai_dsl.program import FrameColumn, Header, Op
+from socialai_dsl.semantics.plans import BeliefPlan, Checked, Drawn, OutcomePlan, RulePlan
 from socialai_dsl.semantics.terms import (
     CELL,
     DIRECTION,
-    BeliefPlan,
     CellBeside,
     CellOf,
-    Checked,
     Compare,
     Const,
-    Drawn,
     FieldOf,
-    OutcomePlan,
     Quantified,
     Read,
-    RulePlan,
     Sees,
     Type,
     World,

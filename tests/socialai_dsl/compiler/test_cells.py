@@ -8,6 +8,7 @@ from typing import Any, Literal
 import pytest
 
 from socialai_dsl.program import CELL
+from socialai_dsl.semantics.plans import Placing, Region, RulePlan
 from socialai_dsl.semantics.terms import (
     BOOL,
     DIRECTION,
@@ -17,20 +18,13 @@ from socialai_dsl.semantics.terms import (
     Logic,
     Measure,
     Not,
-    Placing,
     Quantified,
-    Region,
-    RulePlan,
     Term,
     Type,
     Variable,
 )
-from socialai_dsl.semantics.terms import (
-    CELL as ANY_CELL,
-)
-from socialai_dsl.semantics.terms import (
-    Test as Relation,
-)
+from socialai_dsl.semantics.terms import CELL as ANY_CELL
+from socialai_dsl.semantics.terms import Test as Relation
 from tests.socialai_dsl.compiler.workbench import (
     AGENT,
     BOX,

@@ -7,7 +7,8 @@ from dataclasses import replace
 import pytest
 
 from socialai_dsl.program import Op
-from socialai_dsl.semantics.terms import Checked, Compare, Const, FieldOf, Placing, Read, Region, Type, World
+from socialai_dsl.semantics.plans import Checked, Placing, Region
+from socialai_dsl.semantics.terms import Compare, Const, FieldOf, Read, Type, World
 from tests.socialai_dsl.compiler.workbench import (
     cell,
     code,

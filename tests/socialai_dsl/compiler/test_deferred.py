@@ -10,23 +10,19 @@ import pytest
 from socialai_dsl.compiler.verifier import InvalidProgramError
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.program import FrameColumn, Header
+from socialai_dsl.semantics.plans import Activity, Checked, Drawn, Effect, RulePlan
 from socialai_dsl.semantics.terms import (
     CELL,
     DIRECTION,
-    Activity,
     CellOf,
-    Checked,
     Compare,
     Const,
-    Drawn,
-    Effect,
     FieldOf,
     Line,
     Logic,
     Operation,
     Quantified,
     Read,
-    RulePlan,
     Type,
     Variable,
 )

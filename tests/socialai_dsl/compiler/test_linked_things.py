@@ -10,19 +10,8 @@ import pytest
 from socialai_dsl.compiler.changes import Changes, When
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.program import EntityColumn, Flag, Header, Program, TypeColumn
-from socialai_dsl.semantics.terms import (
-    BOOL,
-    DIRECTION,
-    Checked,
-    Compare,
-    Computed,
-    Const,
-    FieldOf,
-    Sees,
-    StepPlan,
-    Type,
-    World,
-)
+from socialai_dsl.semantics.plans import Checked, Computed, StepPlan
+from socialai_dsl.semantics.terms import BOOL, DIRECTION, Compare, Const, FieldOf, Sees, Type, World
 from socialai_dsl.semantics.terms import Test as Relation
 from tests.socialai_dsl.compiler.workbench import (
     activity,

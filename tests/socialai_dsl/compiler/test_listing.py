@@ -7,16 +7,8 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.program import Header
-from socialai_dsl.semantics.terms import (
-    CELL,
-    DIRECTION,
-    CellOf,
-    Const,
-    Quantified,
-    RulePlan,
-    Sees,
-    Sited,
-)
+from socialai_dsl.semantics.plans import RulePlan
+from socialai_dsl.semantics.terms import CELL, DIRECTION, CellOf, Const, Quantified, Sees, Sited
 from socialai_dsl.semantics.terms import Test as Relation
 from tests.socialai_dsl.compiler.workbench import (
     BOX,

@@ -7,19 +7,9 @@ from typing import Literal
 
 import pytest
 
-from socialai_dsl.semantics.terms import (
-    CELL,
-    Compare,
-    Computed,
-    Not,
-    Quantified,
-    RulePlan,
-    StepPlan,
-    Term,
-)
-from socialai_dsl.semantics.terms import (
-    Test as Relation,
-)
+from socialai_dsl.semantics.plans import Computed, RulePlan, StepPlan
+from socialai_dsl.semantics.terms import CELL, Compare, Not, Quantified, Term
+from socialai_dsl.semantics.terms import Test as Relation
 from tests.socialai_dsl.compiler.workbench import (
     AGENT,
     BOX,

@@ -5,20 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from socialai_dsl.program import Header, LineColumn
-from socialai_dsl.semantics.terms import (
-    ACTION,
-    Checked,
-    Compare,
-    Const,
-    Effect,
-    Pattern,
-    Read,
-    RulePlan,
-    Select,
-    StepPlan,
-    Term,
-    Type,
-)
+from socialai_dsl.semantics.plans import Checked, Effect, RulePlan, StepPlan
+from socialai_dsl.semantics.terms import ACTION, Compare, Const, Pattern, Read, Select, Term, Type
 from tests.socialai_dsl.compiler.workbench import (
     BOX,
     DIE,

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from socialai_dsl.semantics.plans import RulePlan
 from socialai_dsl.semantics.terms import (
     BOOL,
     Compare,
@@ -13,7 +14,6 @@ from socialai_dsl.semantics.terms import (
     Logic,
     Operation,
     Quantified,
-    RulePlan,
     Term,
     Type,
     Variable,

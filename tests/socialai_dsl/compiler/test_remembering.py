@@ -6,23 +6,19 @@ from dataclasses import replace
 from typing import Any
 
 from socialai_dsl.program import Header
+from socialai_dsl.semantics.plans import Checked, Drawn, Effect, MemoryPlan, RulePlan
 from socialai_dsl.semantics.terms import (
     ACTION,
     CELL,
     CellOf,
     Chance,
-    Checked,
     Compare,
     Const,
-    Drawn,
-    Effect,
     FieldOf,
     Logic,
-    MemoryPlan,
     Operation,
     Quantified,
     Read,
-    RulePlan,
     Term,
     Type,
     World,

@@ -7,23 +7,10 @@ from dataclasses import replace
 import pytest
 
 from socialai_dsl.envs import ScenarioEnv
-from socialai_dsl.program import CODES_OF_TYPES, EntityColumn, Header, TypeColumn
-from socialai_dsl.semantics.terms import (
-    COLOR,
-    DIRECTION,
-    Checked,
-    Coloring,
-    Compare,
-    Const,
-    Drawn,
-    Effect,
-    Facing,
-    Placing,
-    Read,
-    RulePlan,
-    Select,
-    Type,
-)
+from socialai_dsl.program import EntityColumn, Header, TypeColumn
+from socialai_dsl.semantics.plans import Checked, Coloring, Drawn, Effect, Facing, Placing, RulePlan
+from socialai_dsl.semantics.terms import COLOR, DIRECTION, Compare, Const, Read, Select, Type
+from socialai_dsl.vocabulary import NPC
 from tests.socialai_dsl.compiler.workbench import (
     DIE,
     DOOR,
@@ -141,7 +128,7 @@ def pictured_kind(checked: Checked, die: int) -> int:
     layout = {"let": {"die": die}, "agent": {"at": [4, 4], "facing": "down"}}
     env = ScenarioEnv(compiled(checked))
     image = env.reset(seed=0, options={"layout": layout})[0]["image"]
-    (code,) = {int(cell[2]) for row in image for cell in row if cell[0] == CODES_OF_TYPES["npc"]}
+    (code,) = {int(cell[2]) for row in image for cell in row if cell[0] == NPC}
     return code
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 import socialai_dsl
-from socialai_dsl.listing import listing
 from socialai_dsl.program import CELL
 from socialai_dsl.semantics.terms import Compare, Logic, Not, Term
 from socialai_dsl.semantics.terms import Test as Relation
@@ -50,7 +49,7 @@ def asked_one_by_one(condition: Term) -> Term:
 
 
 def loops(term: Term) -> bool:
-    return "EACH_CELL" in listing(compiled(with_let(workbench(), "let.answer", term)))
+    return "EACH_CELL" in compiled(with_let(workbench(), "let.answer", term)).listing()
 
 
 @pytest.mark.parametrize("condition", SHAPES.values(), ids=SHAPES)
@@ -104,7 +103,7 @@ def test_places_are_shapes(where: str, tmp_path: Path) -> None:
     path.write_text(SCENARIO % where)
     program = socialai_dsl.compile(socialai_dsl.load(path))
     assert isinstance(program, socialai_dsl.Program), program
-    assert "EACH_CELL" not in listing(program)
+    assert "EACH_CELL" not in program.listing()
     env = socialai_dsl.make(path)
     env.reset(seed=3)
     boxes = set()
@@ -121,7 +120,7 @@ def test_what_is_the_same_for_all_cells_is_asked_once(tmp_path: Path) -> None:
     path.write_text(SCENARIO % "number == 2")
     program = socialai_dsl.compile(socialai_dsl.load(path))
     assert isinstance(program, socialai_dsl.Program), program
-    assert "EACH_CELL" not in listing(program)
+    assert "EACH_CELL" not in program.listing()
     env = socialai_dsl.make(path)
     seen = set()
     for _ in range(30):

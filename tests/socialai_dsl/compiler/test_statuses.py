@@ -9,6 +9,7 @@ import pytest
 
 from socialai_dsl.compiler.changes import Changes, When
 from socialai_dsl.program import Flag, Header
+from socialai_dsl.semantics.plans import Checked, Computed, Effect, RulePlan
 from socialai_dsl.semantics.terms import (
     BOOL,
     CELL,
@@ -16,11 +17,8 @@ from socialai_dsl.semantics.terms import (
     DIRECTION,
     CellOf,
     Chance,
-    Checked,
     Compare,
-    Computed,
     Const,
-    Effect,
     FieldOf,
     Logic,
     Measure,
@@ -28,7 +26,6 @@ from socialai_dsl.semantics.terms import (
     PokedNow,
     Quantified,
     Read,
-    RulePlan,
     Sees,
     Select,
     Spoke,
@@ -37,9 +34,7 @@ from socialai_dsl.semantics.terms import (
     Variable,
     World,
 )
-from socialai_dsl.semantics.terms import (
-    Test as Relation,
-)
+from socialai_dsl.semantics.terms import Test as Relation
 from tests.socialai_dsl.compiler.workbench import (
     AGENT,
     BOX,

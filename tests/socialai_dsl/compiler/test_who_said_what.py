@@ -9,24 +9,20 @@ import pytest
 
 from socialai_dsl.compiler.verifier import InvalidProgramError, verify
 from socialai_dsl.program import Flag, Header, LineColumn, Op, Program
+from socialai_dsl.semantics.plans import Checked, Drawn, FramePlan, RulePlan, StatePlan
 from socialai_dsl.semantics.terms import (
     ACTION,
     BOOL,
-    Checked,
     Compare,
     Const,
-    Drawn,
     FieldOf,
-    FramePlan,
     HeardNoun,
     Line,
     Operation,
     Pattern,
     Read,
-    RulePlan,
     SaidBy,
     Speaker,
-    StatePlan,
     Term,
     Type,
     World,

@@ -19,25 +19,12 @@ import numpy as np
 from socialai_dsl.compiler import compile_scenario
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.frontend import load
-from socialai_dsl.program import BODY_WORDS, CELL, Program
-from socialai_dsl.semantics.terms import (
-    BOOL,
-    Activity,
-    Checked,
-    Const,
-    Drawn,
-    FieldOf,
-    Quantified,
-    Read,
-    RulePlan,
-    Sited,
-    StatePlan,
-    Term,
-    Type,
-    Variable,
-)
+from socialai_dsl.program import CELL, Program
+from socialai_dsl.semantics.plans import Activity, Checked, Drawn, RulePlan, StatePlan
+from socialai_dsl.semantics.terms import BOOL, Const, FieldOf, Quantified, Read, Sited, Term, Type, Variable
 from socialai_dsl.semantics.terms import CELL as ANY_CELL
 from socialai_dsl.source import Span
+from socialai_dsl.vocabulary import ACTIONS
 
 SOURCE = """
 scenario: workbench
@@ -153,7 +140,7 @@ def start(checked: Checked, layout: Mapping[str, Any] | None = None, seed: int =
 
 def step(env: ScenarioEnv, word: str = "none", pair: int | None = None) -> dict[str, Any]:
     """One step with a body action and, if given, the utterance of a pair; the info."""
-    actions = [BODY_WORDS.index(action) for action in env.program.actions]
+    actions = [ACTIONS.index(action) for action in env.program.actions]
     body = len(actions) if word == "none" else env.program.actions.index(word)
     template, noun = divmod(pair or 0, len(env.program.nouns))
     action = np.array([body, int(pair is not None), template, noun])

@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from socialai_dsl.frontend import load
-from socialai_dsl.semantics.terms import Checked, Effect, Placing, RulePlan, Term
+from socialai_dsl.semantics.plans import Checked, Effect, Placing, RulePlan
+from socialai_dsl.semantics.terms import Term
 from tests.socialai_dsl.compiler.workbench import SPAN, entity, sited
 
 SOURCE = """

@@ -259,15 +259,12 @@ def test_members_of_suites_and_acts(tiny: Folder) -> None:
         assert noun in fired[0]["words"]
 
 
-def test_a_program_from_nowhere_cannot_be_explained(tiny: Folder) -> None:
-    from dataclasses import replace
-
+def test_of_a_program_alone_nothing_is_known_that_could_explain_it(tiny: Folder) -> None:
     program = sd.compile(sd.load(str(tiny.write("tiny", GUIDE))))
-    assert isinstance(program, sd.Program)
-    env = ScenarioEnv(replace(program, origin=None))
+    env = ScenarioEnv(program)
     env.reset(seed=0)
     env.step(np.array([0, 0, 0, 0]))
-    with pytest.raises(ValueError, match="not compiled from a scenario"):
+    with pytest.raises(ValueError, match="of a program; expected make"):
         env.explain()
 
 

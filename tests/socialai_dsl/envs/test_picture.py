@@ -6,8 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from socialai_dsl.envs import ScenarioEnv, make, tiles
-from socialai_dsl.envs.tiles import draw_tile
+from socialai_dsl.envs import ScenarioEnv, make
+from socialai_dsl.library import prelude
+from socialai_dsl.render import tiles
+from socialai_dsl.render.tiles import draw_tile
+
+CODES = {name: type_.code for name, type_ in prelude().types.items()}
 
 LEAVING = """
 scenario: leaving
@@ -40,14 +44,14 @@ def test_an_npc_in_a_doorway_is_drawn_in_it(leaving: ScenarioEnv) -> None:
     leaving.step(leaving.encode_action((None, None)))
     assert leaving.describe()["ann"]["at"] == leaving.describe()["gate"]["at"] == [4, 2]
     drawn = leaving.render()[64:96, 128:160]
-    doorway, ann = (tiles.DOOR, 1, 0, 0), (tiles.NPC, 4, 0, 0)
+    doorway, ann = (CODES["door"], 1, 0, 0), (tiles.NPC, 4, 0, 0)
     assert (drawn[4:-4, 4:-4] == draw_tile(ann, None, True, 32, below=doorway)[4:-4, 4:-4]).all()
 
 
 def test_a_room_without_such_an_npc_is_drawn_as_seen(leaving: ScenarioEnv) -> None:
     drawn = leaving.render()
     assert drawn.shape == (160, 160, 3)
-    door = draw_tile((tiles.DOOR, 1, 0, 0), None, True, 32)
+    door = draw_tile((CODES["door"], 1, 0, 0), None, True, 32)
     assert np.array_equal(drawn[64:96, 128:160][4:-4, 4:-4], door[4:-4, 4:-4])
 
 

@@ -160,7 +160,19 @@ def test_differences_are_named(tmp_path, condition, settings, said):
 def test_a_changed_scenario_is_a_difference(tmp_path):
     kept = document(tmp_path, "")
     changed = kept | {"runs": [{**kept["runs"][0], "id": "0"}]}
-    assert differences(changed, kept) == ["`one`: its scenario or its checkpoint has changed since"]
+    assert differences(changed, kept) == ["`one`: its scenario, its checkpoint or its code has changed since"]
+
+
+def test_changed_code_of_ones_own_is_another_run(tmp_path):
+    (tmp_path / "room.yaml").write_text((ROOT / "scenarios" / "help.yaml").read_text())
+    (tmp_path / "e.yaml").write_text(
+        "experiment: e\nset: {frames: 9}\nconditions: [{name: one, scenario: room.yaml, net: 'mine:Net'}]\n"
+    )
+    ids = []
+    for size in (4, 8, 4):
+        (tmp_path / "mine.py").write_text(f"SIZE = {size}\n")
+        ids.append(document_of(load_experiment(tmp_path / "e.yaml"), None)["runs"][0]["id"])
+    assert ids[0] == ids[2] != ids[1]
 
 
 # -- the experiments that ship -----------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ import pytest
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.loader import library, names, resolved
 from socialai_dsl.loader.limits import MAX_CHAIN, MAX_FILES
-from socialai_dsl.loader.members import members_of
+from socialai_dsl.loader.members import check_splits, members_of
 from socialai_dsl.loader.resolved import resolve, shipped_names
 from tests.fuzzing.playground import listening
 
@@ -179,13 +179,13 @@ def test_suites_pass_variants_on() -> None:
     found = resolve("both+hidden+quiet")
     assert found.variants == ("hidden", "quiet")
     assert "observe" not in data("both+hidden+quiet")
-    assert [member.scenario.name for member in found.members()] == ["market+hidden+quiet", "garden+hidden"]
-    assert [member.name for member in found.members()] == ["market", "garden"]
-    assert [member.name for member in resolve("both?split=test").members()] == ["market", "market_swap"]
-    assert [member.name for member in resolve("both?split=train").members()] == ["market", "garden"]
+    assert [member.scenario.name for member in members_of(found)] == ["market+hidden+quiet", "garden+hidden"]
+    assert [member.name for member in members_of(found)] == ["market", "garden"]
+    assert [member.name for member in members_of(resolve("both?split=test"))] == ["market", "market_swap"]
+    assert [member.name for member in members_of(resolve("both?split=train"))] == ["market", "garden"]
     tuned = resolve("both+tuned")
     assert data("both+tuned")["draw"] == "uniform"
-    assert [member.name for member in tuned.members()] == ["market", "garden"]
+    assert [member.name for member in members_of(tuned)] == ["market", "garden"]
 
 
 def test_a_suites_own_variant_is_passed_on_however_it_is_named(write: Write) -> None:
@@ -193,7 +193,7 @@ def test_a_suites_own_variant_is_passed_on_however_it_is_named(write: Write) -> 
     for name in ("both+quiet", "both_quiet", "both_quiet+quiet"):
         found = resolve(name)
         assert data(name)["about"] == "Quiet."
-        assert [member.scenario.name for member in found.members()] == ["market+quiet", "garden"], name
+        assert [member.scenario.name for member in members_of(found)] == ["market+quiet", "garden"], name
 
 
 def test_members_with_parameters_and_whole_splits(write: Write) -> None:
@@ -201,10 +201,10 @@ def test_members_with_parameters_and_whole_splits(write: Write) -> None:
         "user/three.yaml",
         "suite: three\nmembers: [market, garden?n=1, market+quiet]\nsplits: {one: {members: [deep/inner]}}\n",
     )
-    members = resolve("three").members()
+    members = members_of(resolve("three"))
     assert [member.name for member in members] == ["market", "garden?n=1", "market+quiet"]
     assert members[1].place == ("members", 1)
-    assert [member.name for member in resolve("three?split=one").members()] == ["inner"]
+    assert [member.name for member in members_of(resolve("three?split=one"))] == ["inner"]
 
 
 def test_what_is_wrong_with_members_is_said_in_one_go(write: Write) -> None:
@@ -214,7 +214,7 @@ def test_what_is_wrong_with_members_is_said_in_one_go(write: Write) -> None:
         "splits: {a: {replace: {market: nowhere}}, b: {members: [both]}}\n",
     )
     with pytest.raises(ScenarioError) as raised:
-        resolve("bad").members()
+        members_of(resolve("bad"))
     assert [str(d).removeprefix("bad.yaml:") for d in raised.value.diagnostics] == [
         "2:11: S504 there is no file `marke` in .",
         "2:18: S108 `hidden` is a file of the kind `variant`; the members of a suite are scenarios",
@@ -222,16 +222,16 @@ def test_what_is_wrong_with_members_is_said_in_one_go(write: Write) -> None:
         "2:37: S108 `zoes/z_1` is a file of the kind `npc`; the members of a suite are scenarios",
     ]
     with pytest.raises(ScenarioError) as raised:
-        resolve("bad").check_splits()
+        check_splits(resolve("bad"))
     assert [d.code for d in raised.value.diagnostics] == ["S504", "S108"]
 
 
 def test_a_suite_none_of_whose_members_has_the_variant() -> None:
     found = resolve("both+nothing")
     with pytest.raises(ScenarioError, match="S503 no member of `both\\+nothing` has a variant `nothing`"):
-        found.members()
+        members_of(found)
     with pytest.raises(ScenarioError, match="S206 `both` has no split `tset`; did you mean `test`"):
-        resolve("both?split=tset").members()
+        members_of(resolve("both?split=tset"))
 
 
 def test_files_that_a_scenario_names() -> None:

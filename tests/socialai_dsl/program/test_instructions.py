@@ -16,7 +16,6 @@ from socialai_dsl.compiler.intervals import Known, Ranges
 from socialai_dsl.compiler.verifier import InvalidProgramError, verify
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
-from socialai_dsl.listing import instructions_page
 from socialai_dsl.program import (
     BOARDS,
     CELL,
@@ -33,6 +32,7 @@ from socialai_dsl.program import (
     Register,
 )
 from socialai_dsl.program.instructions import TABLE, Instruction, Kind, Operand
+from socialai_dsl.program.instructions_page import instructions_page
 from socialai_dsl.program.ranges import ANYTHING, Interval
 
 DOCS = Path(__file__).parents[3] / "docs"

@@ -63,7 +63,7 @@ def analysis(tmp_path_factory: pytest.TempPathFactory) -> Analysis:
 
 @pytest.fixture(scope="module")
 def document(analysis: Analysis) -> Document:
-    return compose(analysis, "1.2.3")
+    return compose(analysis, "1.2.3", Path("report"))
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +140,7 @@ def test_hostile_names_stay_text(tmp_path: Path) -> None:
     result["versions"] = {HOSTILE: HOSTILE}
     path.write_text(json.dumps(result))
     ceilings = {HOSTILE: Ceilings(random=Level(0.1, 0.0, HOSTILE))}
-    document = compose(analyse(read_experiment(tmp_path), ceilings, [HOSTILE]), "1")
+    document = compose(analyse(read_experiment(tmp_path), ceilings, [HOSTILE]), "1", tmp_path)
     page = render_page(document)
     tags = Tags(page)
     assert "<script" not in page
@@ -187,6 +187,17 @@ def test_parquet_holds_the_same(analysis: Analysis) -> None:
 
 def test_an_experiment_without_anything_is_a_report_too(tmp_path: Path) -> None:
     write_experiment(tmp_path, [condition("Help / PPO", [])])
-    document = compose(analyse(read_experiment(tmp_path), {}), "1")
+    document = compose(analyse(read_experiment(tmp_path), {}), "1", tmp_path)
     assert "0 of 0 runs done" in Tags(render_page(document)).text
     assert "no result" in render_markdown(document, "figures")
+
+
+def test_runs_link_to_their_replay(tmp_path: Path) -> None:
+    analysis = small(tmp_path / "a b")
+    (tmp_path / "a b" / "runs" / "c0-s1" / "episode.html").write_text("a page")
+    document = compose(analysis, "1", tmp_path / "a b" / "report")
+    links = [
+        attrs["href"] for tag, attrs in Tags(render_page(document)).tags if tag == "a" and "href" in attrs
+    ]
+    assert "../runs/c0-s1/episode.html" in links
+    assert "[watch](../runs/c0-s1/episode.html)" in render_markdown(document, "figures")

@@ -4,17 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from socialai_dsl.semantics.terms import (
-    Coloring,
-    Compare,
-    Const,
-    Drawn,
-    Facing,
-    Placing,
-    Quantified,
-    Read,
-    Select,
-)
+from socialai_dsl.semantics.plans import Coloring, Drawn, Facing, Placing
+from socialai_dsl.semantics.terms import Compare, Const, Quantified, Read, Select
 
 BASE = """
 npc: base

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from socialai_dsl.semantics.build import walk
-from socialai_dsl.semantics.terms import Const, Drawn, Read, Sees, Select
+from socialai_dsl.semantics.plans import Drawn
+from socialai_dsl.semantics.terms import Const, Read, Sees, Select
 
 BOXES = {
     "boxes": {"type": "box", "count": 2, "place": "anywhere"},

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from socialai_dsl.semantics.terms import Const, FieldOf, Placing
+from socialai_dsl.semantics.plans import Placing
+from socialai_dsl.semantics.terms import Const, FieldOf
 
 BOXES = {
     "boxes": {"type": "box", "count": 2, "place": "anywhere", "exclusive": True},

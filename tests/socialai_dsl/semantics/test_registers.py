@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from socialai_dsl.semantics.terms import Drawn
+from socialai_dsl.semantics.plans import Drawn
 
 
 def register(checked, path):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from socialai_dsl.semantics.plans import Drawn
 from socialai_dsl.semantics.sequences import performs
-from socialai_dsl.semantics.terms import Chance, Compare, Const, Drawn, Logic, Not, Quantified, Read, Select
+from socialai_dsl.semantics.terms import Chance, Compare, Const, Logic, Not, Quantified, Read, Select
 
 DANCE = {"dance": {"sequence": 2, "moves": ["left", "forward"], "utterance": {"chance": 0.25}}}
 LESSON = {

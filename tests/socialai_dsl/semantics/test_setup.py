@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from socialai_dsl.frontend import load
-from socialai_dsl.semantics.terms import Coloring, Drawn, Facing, Placing, Read
+from socialai_dsl.semantics.plans import Coloring, Drawn, Facing, Placing
+from socialai_dsl.semantics.terms import Read
 
 
 def places(checked):

@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from socialai_dsl.frontend import load
-from socialai_dsl.semantics.utterances import normal
-from socialai_dsl.vocabulary import words
+from socialai_dsl.vocabulary import normal, words
 
 
 @pytest.mark.parametrize("text", ["Open sesame", " open  SESAME. ", "open sesame!?"])

@@ -71,8 +71,7 @@ def test_what_is_heard_reaches_the_encoder_as_the_paper_s_agents_read_it() -> No
     """On a real scenario: lines with names, read word by word, and an embedding of a hundred rows whatever it says."""
     envs = sd.make_vec("talkitout", 4, autoreset_mode="SameStep")
     vocabulary = tuple(envs.program.vocabulary)
-    spec = NetSpec.of(envs.single_action_space, envs.single_observation_space, vocabulary)
-    net = build_net("paper-reference", spec, 0)
+    net = build_net("paper-reference", NetSpec.of(envs), 0)
     assert net.dialogue.embedding.weight.shape == (100, 128)
     line = [vocabulary.index(word) for word in ("go", "to", "the", "red", "door")]
     tokens = np.zeros((1, envs.single_observation_space["tokens"].shape[0]), np.int16)

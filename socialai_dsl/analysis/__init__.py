@@ -1,0 +1,1 @@
+"""What can happen in a scenario, tried on its rooms: searches, claims, guesses, coverage."""

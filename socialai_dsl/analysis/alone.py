@@ -1,0 +1,206 @@
+"""What an agent can get without the others: a lower bound, by twins that look alike to whoever sees no NPC.
+
+A scenario that is meant to need social skill is solved only by luck where the NPCs are neither seen nor heard. How
+good that luck is can be bounded from below by a policy that is found by search:
+
+1. A room is drawn. Its *twins* are rooms that are drawn again in everything that its looks leave open: the agent sees
+   the same walls, objects and colours in all of them, and stands in the same place. What is visible is the whole room,
+   not only what is in view, so the policy knows no less than any explorer.
+2. For some of the twins a shortest success is searched, the way an agent would go that knew all about this twin. Each
+   is a sequence of actions; the one that solves most of these twins is the policy for all rooms that look like this.
+3. It is tried on other twins, which had no part in choosing it. So its success is an unbiased estimate of what this
+   policy gets, and what the best policy gets is not less.
+
+Which draws the looks leave open is found out by trying: each site of a draw (`draws.py`) is drawn again by itself. If
+that ever changes the state of the room and not its looks, the draw is hidden. If it always shows, it is a part of the
+looks and stays as it is. Draws during the episode are made anew in every twin, since nobody could know them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.analysis.effort import Effort
+from socialai_dsl.analysis.redrawn import redrawn, sites_of
+from socialai_dsl.analysis.relevance import Relevance
+from socialai_dsl.analysis.rooms import Start, start_in
+from socialai_dsl.analysis.search import Search, Verdict
+from socialai_dsl.engine.calls import Task
+from socialai_dsl.envs.table import Table
+from socialai_dsl.program import FIRST_ENTITY, Field, Header, Program, Register
+
+LEARNT_FROM: Final = 32
+"""At most so many twins of a room choose its policy, and at most a quarter of them."""
+
+TRIED_ON: Final = 96
+"""At most so many further twins it is tried on."""
+
+_BLOCK: Final = 512
+_BLOCKS: Final = 16
+"""Twins are drawn in blocks, so many at most; those that look otherwise are left out."""
+
+_SEARCHES: Final = 8
+"""For at most so many twins of a room a success is searched."""
+
+_FEWEST: Final = 8
+"""With fewer twins nothing is known about a room, which then counts as never solved."""
+
+_ROOMS_PER_SITE: Final = 32
+
+
+@dataclass(frozen=True)
+class Alone:
+    """What a policy that neither sees nor hears an NPC gets.
+
+    Attributes:
+        success: mean over the rooms of the share of twins that the policy for their looks solves.
+        error: standard error of that mean.
+        rooms: how many rooms were tried.
+        undecided: how many of them count as never solved because too few twins were found, or a search gave up.
+    """
+
+    success: float
+    error: float
+    rooms: int
+    undecided: int
+
+
+def success_alone(hidden: Program, effort: Effort) -> Alone:
+    """Bound from below what is possible without the NPCs.
+
+    Args:
+        hidden: the program of the scenario with its NPCs neither seen nor heard.
+        effort: which rooms are drawn, and how many states of each twin may be searched.
+    """
+    twins, search = _Twins(hidden, effort.seed), Search(hidden)
+
+    def solved(room: int) -> float | None:
+        count = twins.draw(room, LEARNT_FROM + TRIED_ON)
+        plans = _plans(twins, search, count // 4, effort) if count >= _FEWEST else None
+        return None if plans is None else _share(plans, count // 4)
+
+    found = list(effort.each_room("without NPCs", solved, lambda share: share is not None))
+    values = np.array([share or 0.0 for share in found] or [0.0])
+    undecided = sum(share is None for share in found)
+    return Alone(float(values.mean()), float(values.std() / np.sqrt(len(values))), len(found), undecided)
+
+
+def _plans(twins: _Twins, search: Search, learnt: int, effort: Effort) -> list[NDArray[np.bool_]] | None:
+    """Of plans that together solve the first twins, `learnt` of them, as far as they can be: whom each solves, (K,).
+
+    None if a search gave up and nothing was found.
+    """
+    found: list[NDArray[np.bool_]] = []
+    left, gave_up = list(range(learnt)), False
+    for _ in range(_SEARCHES):
+        if not left:
+            break
+        finding = search.solve(*twins.start_of(left[0]), effort.states, effort.clock)
+        gave_up |= finding.verdict is Verdict.UNDECIDED
+        wins = np.zeros(len(twins), np.bool_) if finding.plan is None else twins.play(finding.plan)
+        if wins.any():
+            found.append(wins)
+        left = [k for k in left[1:] if not wins[k]]
+    return None if gave_up and not found else found
+
+
+def _share(found: Sequence[NDArray[np.bool_]], learnt: int) -> float:
+    """How many of the later twins that plan solves that solves most of the first ones, `learnt` of them."""
+    if not found:
+        return 0.0
+    return float(max(found, key=lambda wins: int(wins[:learnt].sum()))[learnt:].mean())
+
+
+@dataclass(frozen=True)
+class _Twin:
+    """How a twin begins, and which row of which table plays it."""
+
+    table: int
+    row: int
+    start: Start
+
+
+class _Twins:
+    """The twins of one room after the other. Each is played by a copy of the program with other draws."""
+
+    def __init__(self, program: Program, seed: int) -> None:
+        self._program, self._seed = program, seed
+        canvas = program.header(Header.CANVAS_WIDTH) * program.header(Header.CANVAS_HEIGHT)
+        self._cells = slice(0, canvas)
+        self._wins = np.array([outcome.success for outcome in program.outcome_table] + [False])
+        showing = self._showing()
+        self._hidden = {site for site, shows in zip(sites_of(program), showing, strict=True) if not shows}
+        self._tables: list[Table] = []
+        self._drawn: list[_Twin] = []
+
+    def __len__(self) -> int:
+        return len(self._drawn)
+
+    def draw(self, room: int, wanted: int) -> int:
+        """Draw twins of a room until so many look like it, itself among them; how many were found."""
+        self._drawn, looks = [], None
+        for number in range(_BLOCKS):
+            table = self._table(number)
+            table.reset(self._seed, {"index": np.full(table.rows, room)})
+            looks_here = self._looks(table)
+            looks = looks_here[0] if looks is None else looks
+            self._drawn += [
+                _Twin(number, k, start_in(table, k))
+                for k in np.flatnonzero((looks_here == looks).all(axis=1)).tolist()
+            ]
+            if len(self._drawn) >= wanted:
+                break
+        del self._drawn[wanted:]
+        return len(self._drawn)
+
+    def start_of(self, twin: int) -> Start:
+        """How a twin begins."""
+        return self._drawn[twin].start
+
+    def play(self, plan: tuple[NDArray[np.int64], ...]) -> NDArray[np.bool_]:
+        """Do the same in all twins; which of them succeed, (K,)."""
+        for twin in self._drawn:
+            state = self._tables[twin.table].state
+            state.registers[twin.row], state.boards[twin.row], state.keys[twin.row] = twin.start
+        for number in sorted({twin.table for twin in self._drawn}):
+            batch = self._tables[number].batch
+            for action in plan:
+                batch.ports.actions[:] = action
+                batch.step(Task.STEP_ONLY)
+        ends = np.stack([self._tables[twin.table].state.registers[twin.row] for twin in self._drawn])
+        solved: NDArray[np.bool_] = self._wins[ends[:, Register.OUTCOME]] & (ends[:, Register.ENDED] != 0)
+        return solved
+
+    def _table(self, number: int) -> Table:
+        """The table of a block; the first row of the first block plays the program as it is."""
+        if number == len(self._tables):
+            first = number * _BLOCK
+            copies = [redrawn(self._program, self._hidden, first + k) for k in range(_BLOCK)]
+            self._tables.append(Table(copies, _BLOCK, 1))
+        return self._tables[number]
+
+    def _looks(self, table: Table) -> NDArray[np.int64]:
+        """What a room looks like to whoever sees no NPC, (rows, cells + 3): its cells, and where the agent stands."""
+        registers = table.state.registers
+        pose = registers[:, [FIRST_ENTITY + field for field in (Field.X, Field.Y, Field.DIR)]]
+        return np.concatenate([table.state.boards[:, self._cells].astype(np.int64), pose], axis=1)
+
+    def _showing(self) -> NDArray[np.bool_]:
+        """Which sites show whenever they change anything, (sites,)."""
+        sites = self._program.header(Header.SITES)
+        copies = [self._program, *(redrawn(self._program, [one], 1) for one in sites_of(self._program))]
+        table = Table(copies, len(copies), 1)
+        relevant = Relevance.of(self._program).registers
+        shows, hides = np.zeros(sites, np.bool_), np.zeros(sites, np.bool_)
+        for room in range(_ROOMS_PER_SITE):
+            table.reset(self._seed, {"index": np.full(len(copies), room)})
+            looks, registers = self._looks(table), table.state.registers[:, relevant]
+            seen = (looks[1:] != looks[0]).any(axis=1)
+            shows |= seen
+            hides |= (registers[1:] != registers[0]).any(axis=1) & ~seen
+        return shows & ~hides

@@ -1,0 +1,174 @@
+"""What of a scenario never happens: states, rules and outcomes that nothing the agent does brings about."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.analysis.effort import Effort
+from socialai_dsl.analysis.search import Search
+from socialai_dsl.analysis.search import Verdict as Searched
+from socialai_dsl.analysis.twins import random_actions
+from socialai_dsl.checking import LoadedScenario
+from socialai_dsl.compilation import compile_loaded
+from socialai_dsl.engine.calls import Task
+from socialai_dsl.envs.table import Table
+from socialai_dsl.program import Program, Register
+from socialai_dsl.semantics.plans import Checked
+from socialai_dsl.source import Span
+
+_STEPS: Final = 200
+"""How long rooms are played with random actions."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A state, a rule or an outcome.
+
+    Attributes:
+        kind: which of them. name: its address, such as `wizard.courtesy.stranger`. span: where it is written.
+    """
+
+    kind: str
+    name: str
+    span: Span
+
+
+@dataclass
+class Coverage:
+    """What was tried, and what did not happen.
+
+    Attributes:
+        parts: how many states, rules and outcomes there are, as they are written.
+        missing: those that nothing brought about. proven: whether every room was searched to its end.
+    """
+
+    parts: int
+    missing: tuple[Part, ...]
+    proven: bool
+
+
+@dataclass
+class _Seen:
+    """What has happened so far."""
+
+    program: Program
+    names: set[str] = field(default_factory=set)
+    states: dict[str, set[int]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._frames = {
+            name.path: name.register for name in self.program.registers if name.path.endswith(".frame")
+        }
+
+    def watch(self, registers: NDArray[np.int16]) -> None:
+        """Note which states frames are in, in registers of rows, int16 (S, R)."""
+        for path, register in self._frames.items():
+            self.states.setdefault(path, set()).update(np.unique(registers[:, register]).tolist())
+
+    def count(self, counters: dict[str, Any]) -> None:
+        """Note which rules fired and how episodes ended."""
+        for kind in ("rules", "outcomes"):
+            self.names |= {f"{kind} {name}" for name, times in counters[kind].items() if times}
+
+
+def coverage(loaded: LoadedScenario, effort: Effort, scripted: LoadedScenario | None = None) -> Coverage:
+    """Play at random, let the script play, then search rooms for what has not happened yet.
+
+    Args:
+        loaded: the scenario.
+        effort: how much to try.
+        scripted: the same scenario with a frame for the agent, if there is one.
+    """
+    program = compile_loaded(loaded)
+    parts, seen = list(_parts(loaded.checked)), _Seen(program)
+    _play_at_random(program, seen, effort)
+    if scripted is not None:
+        _play_script(compile_loaded(scripted), seen, effort)
+    missing = _missing(parts, seen)
+    proven = bool(missing) and _search(program, parts, seen, effort)
+    missing = _missing(parts, seen)
+    return Coverage(len({part.span for _, part in parts}), tuple(missing), proven)
+
+
+_Key = tuple[str, int] | str
+"""What tells that a part has happened: a register of a frame with the number of the state, or a counter."""
+
+
+def _parts(checked: Checked) -> Iterator[tuple[_Key, Part]]:
+    for frame in checked.frames:
+        for number, step in enumerate(frame.steps):
+            if step.duration != 0:  # else it is left out
+                yield (f"{frame.member}.frame", number), Part("step", step.name, step.span)
+        for number, state in enumerate(frame.states):
+            name = f"{frame.member}.{frame.frame}.{state.name}"
+            yield (f"{frame.member}.frame", number), Part("state", name, state.span)
+        for plan in frame.states:
+            for rule in (*plan.first, *plan.then):
+                yield f"rules {rule.name}", Part("rule", rule.name, rule.span)
+    for rule in checked.rules:
+        yield f"rules {rule.name}", Part("rule", rule.name, rule.span)
+    for outcome in checked.outcomes:
+        yield f"outcomes {outcome.name}", Part("outcome", outcome.name, outcome.condition.span)
+
+
+def _missing(parts: list[tuple[_Key, Part]], seen: _Seen) -> list[Part]:
+    """What has not happened; what several members have in common has happened if it did with one of them."""
+    happened = {part.span for key, part in parts if _has_happened(key, part, seen)}
+    missing = {part.span: part for _, part in reversed(parts) if part.span not in happened}
+    return sorted(missing.values(), key=lambda part: (part.span.file, part.span.line, part.span.column))
+
+
+def _has_happened(key: _Key, part: Part, seen: _Seen) -> bool:
+    if isinstance(key, str):
+        return key in seen.names
+    states = seen.states.get(key[0], set())
+    # Entries of `steps` follow each other, and one that ends in the turn in which it begins is not seen in between.
+    return max(states, default=-1) >= key[1] if part.kind == "step" else key[1] in states
+
+
+def _play_at_random(program: Program, seen: _Seen, effort: Effort) -> None:
+    table = Table([program], effort.rooms, 1)
+    table.reset(effort.seed, None)
+    seen.watch(table.state.registers)
+    choose = random_actions(program, effort.rooms, effort.seed)
+    for step in range(_STEPS):
+        table.batch.ports.actions[:] = choose(step)
+        table.batch.step(Task.STEP_NEXT)
+        seen.watch(table.state.registers)
+    seen.count(table.counters())
+
+
+def _play_script(program: Program, seen: _Seen, effort: Effort) -> None:
+    """Members and their states have the same names and numbers with a frame for the agent."""
+    table, watching = Table([program], effort.rooms, 1), _Seen(program, seen.names, seen.states)
+    table.reset(effort.seed, None)
+    while not table.state.registers[:, Register.ENDED].all():
+        table.batch.ports.actions[:] = table.scripted_actions()
+        table.batch.step(Task.STEP_ONLY)
+        watching.watch(table.state.registers)
+    watching.count(table.counters())
+
+
+def _search(program: Program, parts: list[tuple[_Key, Part]], seen: _Seen, effort: Effort) -> bool:
+    """Go through all that can be done in room after room; whether nothing was left out."""
+    table = Table([program], effort.rooms, 1)
+    table.reset(effort.seed, None)
+    search, state = Search(program, (), seen.watch), table.state
+
+    def find(row: int) -> bool:
+        start = state.registers[row], state.boards[row], state.keys[row]
+        finding = search.solve(*start, effort.states, effort.clock)
+        seen.count(search.counters())
+        return finding.verdict is Searched.UNSOLVABLE and finding.exact
+
+    ends = []
+    for ended in effort.each_room("whether everything can happen", find, bool):
+        ends.append(ended)
+        if not _missing(parts, seen):
+            break
+    return len(ends) == effort.rooms and all(ends)

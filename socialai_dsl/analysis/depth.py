@@ -1,0 +1,62 @@
+"""How hard a scenario is and what it takes: shortest successes, what its script solves, what is possible alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from socialai_dsl.analysis.alone import Alone, success_alone
+from socialai_dsl.analysis.effort import Effort
+from socialai_dsl.analysis.properties import Trial
+from socialai_dsl.analysis.search import Finding, Verdict
+from socialai_dsl.checking import LoadedScenario
+from socialai_dsl.compilation import compile_loaded
+
+
+@dataclass(frozen=True)
+class Depth:
+    """What is known about success in the rooms that were tried.
+
+    Attributes:
+        rooms: how many rooms were searched.
+        steps: length of a shortest success in each room that can be solved, ascending.
+        unsolvable: rooms without any success. undecided: rooms whose search gave up.
+        unsolved: rooms that the script does not solve; None without a script.
+        alone: what is possible where no NPC is seen or heard; None if there is none.
+    """
+
+    rooms: int
+    steps: tuple[int, ...]
+    unsolvable: tuple[int, ...]
+    undecided: tuple[int, ...]
+    unsolved: tuple[int, ...] | None
+    alone: Alone | None
+
+
+def depth(trial: Trial, effort: Effort) -> Depth:
+    """Search rooms, let the script play them, and try what a policy gets that knows of no NPC."""
+    searching = replace(effort, clock=effort.clock.part(2))
+    findings = list(trial.successes(searching, "shortest successes"))
+    unsolved = None
+    if trial.scripted is not None:
+        unsolved = tuple((~trial.solved).nonzero()[0].tolist())
+    return Depth(
+        len(findings),
+        tuple(sorted(finding.steps for finding in findings if finding.steps is not None)),
+        _rooms(findings, Verdict.UNSOLVABLE),
+        _rooms(findings, Verdict.UNDECIDED),
+        unsolved,
+        without_npcs(trial.loaded, effort),
+    )
+
+
+def without_npcs(loaded: LoadedScenario, effort: Effort) -> Alone | None:
+    """What a policy gets that neither sees nor hears an NPC; None if there is none."""
+    if all(entity.role != "npc" for entity in loaded.checked.entities):
+        return None
+    hidden = replace(loaded, checked=replace(loaded.checked, npcs_hidden=True))
+    return success_alone(compile_loaded(hidden), effort)
+
+
+def _rooms(findings: Sequence[Finding], verdict: Verdict) -> tuple[int, ...]:
+    return tuple(room for room, finding in enumerate(findings) if finding.verdict is verdict)

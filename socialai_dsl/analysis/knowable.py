@@ -1,0 +1,261 @@
+"""Whether an agent that perceives all it can may know what its success depends on, and from which step on.
+
+Of each room *alternatives* are drawn that differ from it in one draw (and in what follows from it), or in what chance
+does during the episode. Where a success of the room is none in an alternative that looks the same, the agent has to
+know which of the two it is in. It can if something that it does makes the two look or sound different while both can
+still be solved, or if one sequence of actions solves both (`guessing`). All else is known to the agent then, so this is
+what the best informed agent can do; what stays hidden to it stays hidden to all.
+
+A script shows it at once: if it solves both, and acts otherwise only after they look different.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.analysis.effort import Effort
+from socialai_dsl.analysis.guessing import Answer, Guessing, Plan
+from socialai_dsl.analysis.redrawn import Site, names_of_sites, redrawn
+from socialai_dsl.analysis.relevance import Relevance
+from socialai_dsl.analysis.rooms import Rooms, Start, start_in, wins_of
+from socialai_dsl.analysis.search import Search, Verdict, marks
+from socialai_dsl.engine.calls import Task
+from socialai_dsl.engine.state import Key
+from socialai_dsl.envs.table import Table
+from socialai_dsl.program import Program, Register
+
+CHANCE: Final = "chance during the episode"
+
+_COPIES: Final = 6
+"""How many alternatives are drawn for each draw."""
+
+_TRIED: Final = 2
+"""How many of them are tried in which the success of the room is none."""
+
+
+class Known(Enum):
+    """What an agent can know in a room."""
+
+    ALL = "all"
+    NOTHING_TO_KNOW = "nothing to know"  # all alternatives are solved alike, or look different from the start
+    HIDDEN = "hidden"
+    NO_SUCCESS = "no success"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True)
+class RoomKnown:
+    """What an agent can know in one room.
+
+    Attributes:
+        known: whether it can know all that its success depends on.
+        step: after which it can know all that is asked for, in a way that was found.
+        hidden: what stays hidden, and after which step it shows when it is too late; None: never.
+    """
+
+    known: Known
+    step: int = 0
+    hidden: Mapping[str, int | None] | None = None
+
+
+@dataclass(frozen=True)
+class _Other:
+    """An alternative of a room: its number, what it differs in, and how it begins."""
+
+    row: int
+    name: str
+    start: Start
+
+
+class Knowing:
+    """Looks at rooms one after the other.
+
+    Args:
+        rooms: the rooms.
+        effort: how much is tried.
+        scripted: the program of the same scenario with a frame for the agent, if there is one.
+    """
+
+    def __init__(self, rooms: Rooms, effort: Effort, scripted: Program | None = None) -> None:
+        self._rooms, self._effort = rooms, effort
+        program = rooms.program
+        named = [(site, name) for site, name in names_of_sites(rooms.checked, program).items() if name]
+        self._drawn = [name for _, name in named for _ in range(_COPIES)]
+        copies = [redrawn(program, [site], salt) for site, _ in named for salt in range(1, _COPIES + 1)]
+        self._table = Table([program, *copies], 1 + len(copies), 1)
+        self._relevance = Relevance.of(program)
+        self._chances = marks(1 + _COPIES)[1:] if self._relevance.chance else marks(1)[1:]
+        sites = [site for site, _ in named]
+        self._script = None if scripted is None else _Script(scripted, sites, self._chances, effort)
+        self._playing = Table([program], max(1, len(copies) + len(self._chances)), 1)
+        self._playing.reset(0, None)
+        self._search = Search(program)
+        self._pair = Guessing(program, np.ones(2, np.int64))
+        self._wins = wins_of(program)
+
+    def look_at(self, room: int) -> RoomKnown:
+        """What an agent can know in a room."""
+        played = None if self._script is None else self._script.play(room)
+        plan = None if played is None else played.plan
+        if plan is None:
+            found = self._rooms.success(room, self._effort)
+            if found.verdict is Verdict.UNSOLVABLE:
+                return RoomKnown(Known.NO_SUCCESS)
+            if found.verdict is Verdict.UNDECIDED:
+                return RoomKnown(Known.UNDECIDED)
+            plan = found.plan
+        others = self._others(room)
+        if plan is not None:
+            solved = self._solved(others, plan)
+            others = [other for other, alike in zip(others, solved, strict=True) if not alike]
+        plans = [] if plan is None else [plan]
+        step, hidden, undecided = None, dict[str, int | None](), False
+        for name, tried in _by_name(others):
+            for other in tried[:_TRIED]:
+                if played is not None and (known := played.known.get(other.row)) is not None:
+                    step = max(step or 0, known) or None
+                    continue
+                guess = self._pair.solve(*self._both(room, other), self._effort, plans, surely=True)
+                if guess.answer in (Answer.KNOWS, Answer.TELLS_APART) and guess.exact:
+                    step = max(step or 0, guess.step or 0)
+                    continue
+                alone = self._alone(other)
+                if alone is Verdict.SOLVABLE and guess.answer is Answer.GUESSES:
+                    hidden[name] = guess.step
+                elif alone is not Verdict.UNSOLVABLE:
+                    undecided = True
+        if hidden:
+            return RoomKnown(Known.HIDDEN, step or 0, hidden)
+        if undecided:
+            return RoomKnown(Known.UNDECIDED)
+        return RoomKnown(Known.NOTHING_TO_KNOW if step is None else Known.ALL, step or 0)
+
+    def _alone(self, other: _Other) -> Verdict:
+        """Whether somebody who knows all of an alternative can solve it."""
+        return self._search.solve(*other.start, self._effort.states, self._effort.clock).verdict
+
+    def _others(self, room: int) -> list[_Other]:
+        """The alternatives of a room that begin otherwise and look the same."""
+        self._table.reset(self._effort.seed, {"index": np.full(self._table.rows, room)})
+        state = self._table.state
+        relevant = self._relevance.of_rows(state.registers[:, : self._rooms.start(room)[0].shape[0]])
+        same = np.ones(self._table.rows, np.bool_)
+        for array in (state.image, state.extra, state.tokens):
+            same &= (array == array[0]).reshape(len(array), -1).all(axis=1)
+        different = (relevant != relevant[0]).any(axis=1)
+        others = [
+            _Other(row, self._drawn[row - 1], start_in(self._table, row))
+            for row in np.flatnonzero(same & different).tolist()
+        ]
+        registers, board, key = self._rooms.start(room)
+        for row, mark in enumerate(self._chances.tolist(), self._table.rows):
+            other = key.copy()
+            other[Key.KEY] ^= np.uint64(mark)
+            others.append(_Other(row, CHANCE, (registers, board, other)))
+        return others
+
+    def _solved(self, others: Sequence[_Other], plan: Plan) -> NDArray[np.bool_]:
+        """In which alternatives a plan succeeds as well."""
+        state, batch, count = self._playing.state, self._playing.batch, len(others)
+        state.registers[:, Register.ENDED] = 1
+        own = state.keys[0, [Key.PROGRAM, Key.POOL]].copy()
+        for row, other in enumerate(others):
+            registers, board, key = other.start
+            state.registers[row] = registers[: state.registers.shape[1]]
+            state.boards[row] = board[: state.boards.shape[1]]
+            state.keys[row] = key
+        state.keys[:, [Key.PROGRAM, Key.POOL]] = own
+        for action in plan:
+            batch.ports.actions[:] = action
+            batch.step(Task.STEP_ONLY)
+        ends = state.registers[:count]
+        solved: NDArray[np.bool_] = self._wins[ends[:, Register.OUTCOME]] & (ends[:, Register.ENDED] != 0)
+        return solved
+
+    def _both(self, room: int, other: _Other) -> Start:
+        """The room and an alternative: registers (2, R), boards (2, C), keys (2, Key.WORDS)."""
+        registers, board, key = self._rooms.start(room)
+        its_registers, its_board, its_key = other.start
+        return (
+            np.stack([registers, its_registers[: len(registers)]]),
+            np.stack([board, its_board[: len(board)]]),
+            np.stack([key, its_key]),
+        )
+
+
+@dataclass(frozen=True)
+class Followed:
+    """What a script does in a room and its alternatives.
+
+    Attributes:
+        plan: its actions in the room; None if it does not succeed there.
+        known: rows of alternatives in which it succeeds as well, and does what it does in the room until they look
+            different; with the step after which they do, 0 where it does the same in both throughout.
+    """
+
+    plan: Plan | None
+    known: Mapping[int, int]
+
+
+def followed(table: Table, program: Program) -> Followed:
+    """Let the script of a program play a room, in row 0 of a table that was just reset, and alternatives beside it."""
+    state, step = table.state, 0
+    looks, acts = np.full(table.rows, -1), np.full(table.rows, -1)
+    plan: list[NDArray[np.int64]] = []
+    while True:
+        differs = state.registers[:, Register.ENDED] != state.registers[0, Register.ENDED]
+        for array in (state.image, state.extra, state.tokens):
+            differs |= (array != array[0]).reshape(len(array), -1).any(axis=1)
+        looks[differs & (looks < 0)] = step
+        if (state.registers[:, Register.ENDED] != 0).all():
+            break
+        actions = table.scripted_actions()
+        acts[(actions != actions[0]).any(axis=1) & (acts < 0)] = step
+        if not state.registers[0, Register.ENDED]:
+            plan.append(actions[0].copy())
+        table.batch.ports.actions[:] = actions
+        table.batch.step(Task.STEP_ONLY)
+        step += 1
+    solved = wins_of(program)[state.registers[:, Register.OUTCOME]]
+    if not solved[0]:
+        return Followed(None, {})
+    same = acts < 0
+    fair = np.flatnonzero(solved & (same | ((looks >= 0) & (looks <= acts)))).tolist()
+    return Followed(plan, {row: 0 if same[row] else int(looks[row]) for row in fair if row})
+
+
+class _Script:
+    """The agent's own frame, which knows what is drawn, in rooms and their alternatives.
+
+    Where it acts otherwise in an alternative only after that looks different, an agent that knows no more than it
+    perceives can do the same.
+    """
+
+    def __init__(
+        self, program: Program, sites: Sequence[Site], chances: NDArray[np.uint64], effort: Effort
+    ) -> None:
+        copies = [redrawn(program, [site], salt) for site in sites for salt in range(1, _COPIES + 1)]
+        playables = [program, *copies, *[program] * len(chances)]
+        self._table = Table(playables, len(playables), 1)
+        self._first_chance, self._chances = 1 + len(copies), chances
+        self._program, self._seed = program, effort.seed
+
+    def play(self, room: int) -> Followed:
+        """Play the room and all alternatives to the end."""
+        self._table.reset(self._seed, {"index": np.full(self._table.rows, room)})
+        self._table.state.keys[self._first_chance :, Key.KEY] ^= self._chances
+        return followed(self._table, self._program)
+
+
+def _by_name(others: Sequence[_Other]) -> Iterator[tuple[str, list[_Other]]]:
+    """Alternatives by what they differ in."""
+    names: dict[str, list[_Other]] = {}
+    for other in others:
+        names.setdefault(other.name, []).append(other)
+    yield from names.items()

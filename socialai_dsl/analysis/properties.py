@@ -1,0 +1,650 @@
+"""Whether what a scenario claims about itself is so: each entry of `check`, tried in rooms that are drawn.
+
+A claim rests on the rooms in which it says anything. One that rests on none fails, and says what there was nothing of.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum
+from functools import cached_property, partial
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.analysis.effort import Effort
+from socialai_dsl.analysis.guessing import Answer, Guess, Guessing, Plan
+from socialai_dsl.analysis.knowable import Knowing, Known, RoomKnown, followed
+from socialai_dsl.analysis.muting import muted
+from socialai_dsl.analysis.perceiving import perceived
+from socialai_dsl.analysis.rooms import Rooms, name_of, wins_of
+from socialai_dsl.analysis.search import Finding, Search
+from socialai_dsl.analysis.search import Verdict as Searched
+from socialai_dsl.analysis.tellers import SOMEBODY, Tellers
+from socialai_dsl.analysis.twins import Compared, Script, Twins, alike, layouts, random_actions
+from socialai_dsl.checking import LoadedScenario
+from socialai_dsl.compilation import compile_loaded
+from socialai_dsl.engine.calls import Task
+from socialai_dsl.envs.table import Table
+from socialai_dsl.program import Program, Register
+from socialai_dsl.semantics.build import walk
+from socialai_dsl.semantics.plans import OutcomePlan, PropertyPlan
+from socialai_dsl.semantics.terms import Const, InState, SaidBy
+from socialai_dsl.source import Span
+
+_HOLDS: Final = "the property holds"
+"""Name of the outcome that ends an episode of the copy in which a condition is looked for."""
+
+_AS_TRIED: Final = " (chance during the episode was tried only in part)"
+_SHOWN: Final = 5
+_OF_ITSELF: Final = "a success comes of itself, without the agent"
+_NO_TIME: Final = "there was no time to look at a room"
+
+
+class Verdict(Enum):
+    """Whether a property holds."""
+
+    HOLDS = "holds"
+    FAILS = "fails"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was found out about one property.
+
+    Attributes:
+        verdict: undecided where a search gave up, or where rooms can be told apart and more was not tried.
+        rooms: how many were tried. held: in how many it is so. undecided: in how many nothing was decided.
+        against: numbers of the first rooms that speak against it: `reset(seed=..., options={"index": number})`.
+        said: what was found, in words.
+        rests: on how many of the rooms it rests; the others say nothing about it.
+        pairs: on how many pairs of episodes, where pairs are compared.
+    """
+
+    verdict: Verdict
+    rooms: int
+    held: int
+    undecided: int
+    against: tuple[int, ...]
+    said: str
+    rests: int
+    pairs: int = 0
+
+
+class Trial:
+    """A scenario whose claims are tried.
+
+    Args:
+        loaded: the scenario.
+        effort: how much to try; each claim may have an effort of its own.
+        scripted: the same scenario with a frame for the agent, if there is one.
+    """
+
+    def __init__(
+        self, loaded: LoadedScenario, effort: Effort, scripted: LoadedScenario | None = None
+    ) -> None:
+        self.loaded, self.effort = loaded, effort
+        self.program = compile_loaded(loaded)
+        self.script = scripted
+        self.scripted = None if scripted is None else compile_loaded(scripted)
+
+    @cached_property
+    def rooms(self) -> Rooms:
+        """The rooms, with what is known of each."""
+        return Rooms(self.loaded.checked, self.program, self.effort)
+
+    @cached_property
+    def solved(self) -> NDArray[np.bool_]:
+        """In which rooms the script succeeds, (rooms,); in none if there is no script."""
+        if self.scripted is None:
+            return np.zeros(self.effort.rooms, np.bool_)
+        return solved_by_script(self.scripted, self.effort)
+
+    def successes(self, effort: Effort, what: str) -> Iterator[Finding]:
+        """A shortest success of room after room."""
+        return effort.each_room(what, lambda room: self.rooms.success(room, effort), _is_decided)
+
+    def check(self, plan: PropertyPlan, effort: Effort) -> Report:
+        """Try one property, with the same rooms, for as long as the clock of the effort says."""
+        match plan.kind:
+            case "reachable" | "never":
+                return _reaching(self, plan, effort)
+            case "within":
+                return _within(self, plan, effort)
+            case "oracle":
+                return _oracle(self, plan, effort)
+            case "script":
+                return _script(self, plan, effort)
+            case "needs":
+                return _needs(self, plan, effort)
+            case "only_through":
+                return _only_through(self, plan, effort)
+            case "knowable":
+                return _knowable(self, plan, effort)
+
+
+def check_property(
+    loaded: LoadedScenario, plan: PropertyPlan, effort: Effort, scripted: LoadedScenario | None = None
+) -> Report:
+    """Try one property of a scenario; see `Trial`."""
+    return Trial(loaded, effort, scripted).check(plan, effort)
+
+
+def by_default(loaded: LoadedScenario, span: Span) -> tuple[PropertyPlan, ...]:
+    """The properties that are tried of a scenario: what it claims, and that its success is knowable.
+
+    An agent that is not to perceive the NPCs is a control: of it nothing is tried that is not claimed.
+    """
+    plans = loaded.checked.properties
+    if loaded.checked.npcs_hidden or any(plan.kind == "knowable" for plan in plans):
+        return plans
+    return (*plans, PropertyPlan("knowable", "knowable: true", "", span))
+
+
+@dataclass
+class _Tally:
+    """What was found in room after room: the numbers of the rooms, and why some say nothing."""
+
+    held: list[int]
+    against: list[int]
+    undecided: list[int]
+    void: dict[str, list[int]]
+
+    @classmethod
+    def empty(cls) -> _Tally:
+        return cls([], [], [], {})
+
+    @property
+    def rests(self) -> int:
+        return len(self.held) + len(self.against) + len(self.undecided)
+
+    @property
+    def rooms(self) -> int:
+        return self.rests + sum(map(len, self.void.values()))
+
+    def report(self, said: str, share: float | None) -> Report:
+        """How it stands with a claim about this share of the rooms that it rests on; None: about one."""
+        if not self.rooms:
+            return Report(Verdict.UNDECIDED, 0, 0, 0, (), _NO_TIME, 0)
+        if not self.rests:
+            silent = tuple(sorted(room for rooms in self.void.values() for room in rooms))[:_SHOWN]
+            return Report(Verdict.FAILS, self.rooms, 0, 0, silent, f"it rests on nothing: {self._why()}", 0)
+        if self.void:
+            said += f"; the others say nothing: {self._why()}"
+        held, undecided = len(self.held), len(self.undecided)
+        verdict = _by_share(held, undecided, self.rests, share)
+        against = tuple(sorted((*self.against, *self.undecided)))[:_SHOWN]
+        return Report(verdict, self.rooms, held, undecided, against, said, self.rests)
+
+    def _why(self) -> str:
+        return ", ".join(f"in {_rooms(len(rooms))} {why}" for why, rooms in self.void.items())
+
+
+def _by_share(held: int, undecided: int, rooms: int, share: float | None) -> Verdict:
+    """Whether enough rooms are as they should be; one at least, and without a share one is enough."""
+    needed = 1 if share is None else max(1, share * rooms - 1e-9)
+    if held >= needed:
+        return Verdict.HOLDS
+    return Verdict.UNDECIDED if held + undecided >= needed else Verdict.FAILS
+
+
+def _rooms(count: int) -> str:
+    return f"{count} room" if count == 1 else f"{count} rooms"
+
+
+def _steps(count: int | None) -> str:
+    return f"{count} step" if count == 1 else f"{count} steps"
+
+
+def _names(tellers: Sequence[str]) -> str:
+    """Who or what tells, as `Tellers.between` says it."""
+    return ", ".join(name if name == SOMEBODY else f"`{name}`" for name in tellers) or "the walls"
+
+
+# --- by search ---
+
+
+def _reaching(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
+    """Of `reachable` and `never`: in which rooms something can be made true."""
+    program, goals = trial.program, plan.goals
+    if plan.condition is not None:
+        program, goals = _with_goal(trial.loaded, plan), (_HOLDS,)
+    findings = list(search_rooms_of(program, goals, effort, plan.text))
+    tally = _Tally.empty()
+    named = {"agent", *_named(trial, plan)}
+    for room, finding in enumerate(findings):
+        missing = trial.rooms.missing(room, named)
+        if missing and finding.verdict is not Searched.SOLVABLE:
+            tally.void.setdefault(f"`{missing[0]}` is absent", []).append(room)
+            continue
+        if plan.kind == "never" and finding.verdict is Searched.UNSOLVABLE and finding.states == 1:
+            tally.void.setdefault("every episode ends at once, or nothing in it changes", []).append(room)
+            continue
+        came = finding.verdict is Searched.SOLVABLE
+        rooms = tally.held if came is (plan.kind == "reachable") else tally.against
+        (tally.undecided if finding.verdict is Searched.UNDECIDED else rooms).append(room)
+    reached = [k for k, finding in enumerate(findings) if finding.verdict is Searched.SOLVABLE]
+    exact = all(finding.exact or finding.verdict is Searched.UNDECIDED for finding in findings)
+    said = f"it can come about in {len(reached)} of {_rooms(tally.rests)}"
+    if tally.undecided:
+        said += f", {len(tally.undecided)} undecided"
+    if plan.kind == "reachable":
+        return tally.report(said + ("" if exact else _AS_TRIED), plan.share)
+    if reached:
+        said += f"; in room {reached[0]} after {_steps(findings[reached[0]].steps)}"
+        return replace(tally.report(said, 1.0), verdict=Verdict.FAILS, against=tuple(reached[:_SHOWN]))
+    return tally.report(said + ("" if exact else _AS_TRIED), 1.0)
+
+
+def _named(trial: Trial, plan: PropertyPlan) -> Iterator[str]:
+    """The members of the cast and objects that a condition is about by name."""
+    checked = trial.loaded.checked
+    for part in walk(plan.condition) if plan.condition is not None else ():
+        match part:
+            case Const() if part.type.kind == "entity" and 0 <= part.value < len(checked.entities):
+                yield name_of(checked, part.value)
+            case InState(member=member):
+                yield member
+            case SaidBy(entity=number):
+                yield name_of(checked, number)
+
+
+def _within(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
+    findings = list(trial.successes(effort, plan.text))
+    tally = _Tally.empty()
+    for room, finding in enumerate(findings):
+        if trial.rooms.solved_by_idling[room]:
+            tally.void.setdefault(_OF_ITSELF, []).append(room)
+        elif finding.verdict is Searched.UNDECIDED:
+            tally.undecided.append(room)
+        elif finding.steps is not None and finding.steps <= plan.steps:
+            tally.held.append(room)
+        else:
+            tally.against.append(room)
+    known = [finding.steps for finding in findings if finding.steps is not None]
+    said = (
+        f"a shortest success takes at most {_steps(plan.steps)} in {len(tally.held)} of {_rooms(tally.rests)}"
+    )
+    if known:
+        said += f", {max(known)} in the longest that can be solved"
+    elif tally.rests and not tally.undecided:
+        said = f"no success can be reached in any of {_rooms(tally.rests)}"
+    return tally.report(said, 1.0 if plan.share is None else plan.share)
+
+
+def _is_decided(finding: Finding) -> bool:
+    return finding.verdict is not Searched.UNDECIDED
+
+
+def _with_goal(loaded: LoadedScenario, plan: PropertyPlan) -> Program:
+    """The scenario as it ends as soon as a condition holds."""
+    checked = loaded.checked
+    assert plan.condition is not None, "internal: there is a condition to look for"
+    goal = OutcomePlan(_HOLDS, False, 0, plan.condition)
+    remembered = tuple({drawn.path: drawn for drawn in (*checked.remembered, *plan.remembered)}.values())
+    copy = replace(checked, outcomes=(goal, *checked.outcomes), remembered=remembered)
+    return compile_loaded(replace(loaded, checked=copy))
+
+
+def search_rooms_of(
+    program: Program, goals: Sequence[str] | None, effort: Effort, what: str
+) -> Iterator[Finding]:
+    """Search each room of the effort for one of the goals, names of outcomes; None: for a success."""
+    table = Table([program], effort.rooms, 1)
+    table.reset(effort.seed, None)
+    search, state = Search(program, goals), table.state
+
+    def find(row: int) -> Finding:
+        start = state.registers[row], state.boards[row], state.keys[row]
+        return search.solve(*start, effort.states, effort.clock)
+
+    return effort.each_room(what, find, _is_decided)
+
+
+# --- by playing ---
+
+_NOBODY_PLAYS: Final = Report(
+    Verdict.FAILS, 0, 0, 0, (), "nobody plays: the agent has no frame, and there is no variant `oracle`", 0
+)
+
+
+def _oracle(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
+    assert plan.share is not None, "internal: an oracle has a share"
+    if trial.scripted is None:
+        return _NOBODY_PLAYS
+    won, idle = trial.solved, trial.rooms.solved_by_idling
+    said = f"its own script solves {won.sum()} of {_rooms(effort.rooms)}"
+    against = tuple(np.flatnonzero(~won).tolist()[:_SHOWN])
+    verdict = Verdict.HOLDS if won.mean() >= max(plan.share, 1 / len(won)) - 1e-9 else Verdict.FAILS
+    rests = int((~idle).sum())
+    if not rests:
+        said = f"it rests on nothing: in all of {_rooms(effort.rooms)} a success comes of itself, without the agent"
+        return Report(Verdict.FAILS, effort.rooms, int(won.sum()), 0, against, said, 0)
+    if idle.any():
+        said += f"; in {int(idle.sum())} of them a success comes of itself"
+    return Report(verdict, effort.rooms, int(won.sum()), 0, against, said, rests)
+
+
+def _script(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
+    """Whether the script acts on what it has perceived alone."""
+    if trial.script is None:
+        return _NOBODY_PLAYS
+    found = perceived(trial.script, effort.rooms, effort.seed)
+    against = list(dict.fromkeys(peek.index for peek in found.peeks))
+    held = effort.rooms - len(against)
+    if found.pairs == 0:
+        said = "it rests on nothing: no two rooms look alike at first"
+        return Report(Verdict.FAILS, effort.rooms, 0, 0, (), said, 0)
+    said = f"in {held} of {_rooms(effort.rooms)} the script acts on what it has perceived alone"
+    said += f" ({found.pairs} pairs of rooms that look alike at first)"
+    if found.peeks:
+        said += f"; {found.peeks[0]}"
+    share = 1.0 if plan.share is None else plan.share
+    verdict = _by_share(held, 0, effort.rooms, share)
+    return Report(verdict, effort.rooms, held, 0, tuple(against[:_SHOWN]), said, effort.rooms, found.pairs)
+
+
+def solved_by_script(program: Program, effort: Effort) -> NDArray[np.bool_]:
+    """In which rooms of the effort the agent's own frame succeeds, (rooms,)."""
+    table = Table([program], effort.rooms, 1)
+    table.reset(effort.seed, None)
+    registers = table.state.registers
+    while not registers[:, Register.ENDED].all():
+        table.batch.ports.actions[:] = table.scripted_actions()
+        table.batch.step(Task.STEP_ONLY)
+    return wins_of(program)[registers[:, Register.OUTCOME]]
+
+
+def _only_through(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
+    program = trial.program
+    ((path, weighted),) = plan.draws
+    values = _pairs_of(sorted(set(weighted)), effort)
+
+    def twins() -> Twins:
+        return Twins(program, trial.loaded.checked, path, values, plan.members, effort.seed)
+
+    compared = [twins().play(random_actions(program, effort.rooms, effort.seed))]
+    if trial.scripted is not None:
+        script = Script(trial.scripted, path, values[:, 0].tolist(), effort.seed)
+        compared.append(twins().play(script))
+    if not any(one.rooms for one in compared):
+        compared += _searched_for(twins, trial, values, effort)
+    return _told(compared, trial, plan, effort)
+
+
+def _searched_for(
+    twins: Callable[[], Twins], trial: Trial, values: NDArray[np.int64], effort: Effort
+) -> Iterator[Compared]:
+    """Pairs of episodes in which a search finds a difference that neither chance nor a script came upon."""
+    pair = Guessing(trial.program, np.ones(2, np.int64))
+
+    def find(room: int) -> Plan | None:
+        return pair.first_difference(*twins().start(room), replace(effort, states=_SEARCHED_STATES))
+
+    few = replace(effort, rooms=min(effort.rooms, _SEARCHED_ROOMS))
+    for plan in few.each_room("only_through", find, lambda plan: plan is not None):
+        if plan is not None:
+            yield twins().play(partial(_repeated, plan, len(values)))
+            return
+
+
+def _repeated(plan: Plan, pairs: int, step: int) -> NDArray[np.int64]:
+    """What a plan does in a step, in all pairs; after its end it goes on with its last action."""
+    return np.tile(plan[min(step, len(plan) - 1)], (pairs, 1))
+
+
+_SEARCHED_ROOMS: Final = 8
+_SEARCHED_STATES: Final = 5_000
+
+
+def _pairs_of(values: Sequence[int], effort: Effort) -> NDArray[np.int64]:
+    """Two different values for each room."""
+    generator = np.random.default_rng(effort.seed)
+    return np.array([generator.choice(values, 2, replace=False) for _ in range(effort.rooms)], np.int64)
+
+
+def _told(compared: Sequence[Compared], trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
+    pairs = sum(one.pairs for one in compared)
+    leaks = [leak for one in compared for leak in one.leaks]
+    cued = sum(one.cued for one in compared)
+    said = f"of {pairs} pairs of episodes {cued} differ first in a cue and {len(leaks)} in something else"
+    against = tuple(dict.fromkeys(leak.index for leak in leaks))
+    if leaks:
+        leak = min(leaks, key=lambda one: one.step)
+        said += f"; room {leak.index} differs after {_steps(leak.step)} between {leak.values[0]} and {leak.values[1]}"
+        said += f", in {_names(leak.by)}"
+    elif not cued:
+        absent = [
+            k for k in range(effort.rooms) if len(trial.rooms.missing(k, plan.members)) == len(plan.members)
+        ]
+        said = f"it rests on nothing: none of {pairs} pairs of episodes differ in anything"
+        said += f"; in {_rooms(len(absent))} none of the members is there" if absent else ""
+    verdict = Verdict.FAILS if leaks or not cued else Verdict.HOLDS
+    held = effort.rooms - len(against) if verdict is Verdict.HOLDS or leaks else 0
+    rests = len({index for one in compared for index in one.rooms})
+    return Report(verdict, effort.rooms, held, 0, against[:_SHOWN], said, rests, cued + len(leaks))
+
+
+# --- without some of the cast ---
+
+_KNOWN: Final = {
+    Answer.GUESSES: "{} {} nothing but a guess",
+    Answer.KNOWS: "in {} it can be known without",
+    Answer.TELLS_APART: "in {} something else tells, and more may be made of it",
+    Answer.UNDECIDED: "in {} it is undecided",
+}
+_NO_SUCCESS: Final = "no success is possible"
+_NEAR: Final = 8_000
+"""In so many states a success without the members is looked for before anything else."""
+
+_ALWAYS_A_GUESS: Final = "there is nothing but a guess with them, too"
+
+
+def _needs(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
+    needing = _Needing(trial, plan, effort)
+    tally, counted, exact = _Tally.empty(), Counter[Answer](), True
+    found = effort.each_room(plan.text, needing.in_room, lambda one: one[0] is not Answer.UNDECIDED)
+    for room, (answer, is_exact) in enumerate(found):
+        if isinstance(answer, str):
+            tally.void.setdefault(answer, []).append(room)
+            continue
+        counted[answer] += 1
+        exact = exact and (is_exact or answer is not Answer.GUESSES)
+        open_ = answer in (Answer.UNDECIDED, Answer.TELLS_APART)
+        (tally.held if answer is Answer.GUESSES else tally.undecided if open_ else tally.against).append(room)
+    said = ", ".join(
+        words.format(_rooms(counted[answer]), "leaves" if counted[answer] == 1 else "leave")
+        for answer, words in _KNOWN.items()
+        if counted[answer]
+    )
+    said += "" if needing.told is None else f"; {needing.told}"
+    return tally.report(said + ("" if exact else _AS_TRIED), 1.0 if plan.share is None else plan.share)
+
+
+class _Needing:
+    """What is left without some members, in room after room, and whether there is more with them."""
+
+    def __init__(self, trial: Trial, plan: PropertyPlan, effort: Effort) -> None:
+        self._trial, self._plan, self._effort = trial, plan, effort
+        silent = compile_loaded(replace(trial.loaded, checked=muted(trial.loaded.checked, plan.members)))
+        self._search = Search(silent)
+        self._alone = Table([silent], effort.rooms, 1)
+        self._alone.reset(effort.seed, None)
+        self._without = [_Draw(silent, path, weighted) for path, weighted in plan.draws]
+        self._with: dict[int, _Draw] = {}
+        self._scripted: dict[int, _Draw | None] = {}
+        self._tellers = Tellers(silent, trial.loaded.checked)
+        self.told: str | None = None
+        """Who or what else tells, in the first room of which that is known."""
+
+    def in_room(self, room: int) -> tuple[Answer | str, bool]:
+        """The best answer that any of the draws gives, and whether it is exact; in words why a room says nothing."""
+        missing = self._trial.rooms.missing(room, ("agent", *self._plan.members))
+        if missing:
+            return f"`{missing[0]}` is absent", True
+        finding = self._alone_in(room, min(_NEAR, self._effort.states))
+        if finding.verdict is Searched.UNSOLVABLE:
+            return self._with_them(room, finding)
+        found = [draw.guess(room, self._effort) for draw in self._without]
+        # Without anything to be guessed a success is known by heart.
+        best = min(found, key=lambda guess: _ORDER.index(guess.answer), default=Guess(Answer.KNOWS, 0, True))
+        if best.answer is Answer.GUESSES:
+            return self._better_than_a_guess(room, found.index(best)), best.exact
+        if finding.verdict is Searched.UNDECIDED and (best.answer is Answer.UNDECIDED or not found):
+            finding = self._alone_in(room, self._effort.states)
+            if finding.verdict is Searched.UNSOLVABLE:
+                return self._with_them(room, finding)
+            if finding.verdict is Searched.UNDECIDED:
+                return Answer.UNDECIDED, False
+        if best.answer is Answer.TELLS_APART and self.told is None:
+            told = self._without[found.index(best)].told(room, self._effort, self._tellers)
+            self.told = None if told is None else f"in room {room} {told}"
+        return best.answer, best.exact
+
+    def _alone_in(self, room: int, states: int) -> Finding:
+        """Whether a success can be reached without them."""
+        state = self._alone.state
+        start = state.registers[room], state.boards[room], state.keys[room]
+        return self._search.solve(*start, states, self._effort.clock)
+
+    def _with_them(self, room: int, alone: Finding) -> tuple[Answer | str, bool]:
+        """Nobody succeeds without them; with them?"""
+        if self._trial.solved[room]:
+            return Answer.GUESSES, alone.exact
+        verdict = self._trial.rooms.success(room, self._effort).verdict
+        if verdict is Searched.UNSOLVABLE:
+            return _NO_SUCCESS, True
+        return (Answer.GUESSES if verdict is Searched.SOLVABLE else Answer.UNDECIDED), alone.exact
+
+    def _better_than_a_guess(self, room: int, number: int) -> Answer | str:
+        """A guess without them says something only if there is more than that with them."""
+        path, weighted = self._plan.draws[number]
+        if number not in self._with:
+            self._with[number] = _Draw(self._trial.program, path, weighted)
+            scripted = self._trial.scripted
+            self._scripted[number] = None if scripted is None else _Draw(scripted, path, weighted)
+        script = self._scripted[number]
+        if script is not None and script.is_told(room, self._effort):
+            return Answer.GUESSES
+        guess = self._with[number].guess(room, self._effort)
+        if guess.answer is Answer.UNDECIDED:
+            return Answer.UNDECIDED
+        if guess.answer is not Answer.GUESSES:
+            return Answer.GUESSES
+        solvable = self._trial.rooms.success(room, self._effort).verdict is not Searched.UNSOLVABLE
+        return _ALWAYS_A_GUESS if solvable else _NO_SUCCESS
+
+
+_ORDER: Final = (Answer.GUESSES, Answer.UNDECIDED, Answer.TELLS_APART, Answer.KNOWS)
+
+
+_TURNS: Final = 4
+"""So many values of a draw are compared with the others."""
+
+
+class _Draw:
+    """A draw, with a room for each of its values."""
+
+    def __init__(self, program: Program, path: str, weighted: Sequence[int]) -> None:
+        weights = Counter(weighted)
+        self._layouts = layouts(program, path, list(weights))
+        self._table = Table([program], len(weights), 1)
+        self._program, self._weights = program, list(weights.values())
+
+    @cached_property
+    def _guessing(self) -> Guessing:
+        return Guessing(self._program, np.array(self._weights, np.int64))
+
+    def is_told(self, room: int, effort: Effort) -> bool:
+        """Whether the agent's own frame solves more than a guess, and does nothing that it could not know is right."""
+        for first in range(min(len(self._layouts), _TURNS)):
+            layouts = [*self._layouts[first:], *self._layouts[:first]]
+            weights = [*self._weights[first:], *self._weights[:first]]
+            self._table.reset(effort.seed, {"index": room, "layout": layouts})
+            known = followed(self._table, self._program).known
+            if any(weights[0] + weights[row] > max(weights) for row in known):
+                return True
+        return False
+
+    def guess(self, room: int, effort: Effort) -> Guess:
+        """How well a room can be solved, whatever its draw."""
+        self._table.reset(effort.seed, {"index": room, "layout": self._layouts})
+        state = self._table.state
+        if not alike(self._table, slice(None)):
+            return Guess(Answer.TELLS_APART, 0, True)
+        return self._guessing.solve(state.registers, state.boards, state.keys, effort)
+
+    def told(self, room: int, effort: Effort, tellers: Tellers) -> str | None:
+        """Who or what first makes the rooms of this draw differ, in words; None if that is not found."""
+        self._table.reset(effort.seed, {"index": room, "layout": self._layouts})
+        state, batch = self._table.state, self._table.batch
+        plan: Plan | None = ()
+        if alike(self._table, slice(None)):
+            few = replace(effort, states=_SEARCHED_STATES)
+            plan = self._guessing.first_difference(state.registers, state.boards, state.keys, few)
+        if plan is None:
+            return None
+        before = state.registers.copy()
+        for action in plan:
+            before = state.registers.copy()
+            batch.ports.actions[:] = action
+            batch.step(Task.STEP_ONLY)
+        for row in range(1, self._table.rows):
+            if not alike(self._table, slice(0, row + 1)):
+                names = _names(tellers.between(self._table, (0, row), before))
+                return f"it is {names}, after {_steps(len(plan))}"
+        return None
+
+
+# --- what can be known ---
+
+
+def _knowable(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
+    knowing = Knowing(trial.rooms, effort, trial.scripted)
+    found = list(effort.each_room(plan.text, knowing.look_at, lambda one: one.known is not Known.UNDECIDED))
+    tally = _Tally.empty()
+    for room, one in enumerate(found):
+        why = _NO_SUCCESS if one.known is Known.NO_SUCCESS else None
+        if trial.rooms.missing(room, ("agent",)):
+            why = "the agent is absent"
+        elif trial.rooms.solved_by_idling[room]:
+            why = _OF_ITSELF
+        if why is not None:
+            tally.void.setdefault(why, []).append(room)
+        elif one.known is Known.UNDECIDED:
+            tally.undecided.append(room)
+        else:
+            is_so = (one.known is not Known.HIDDEN) is plan.expected
+            (tally.held if is_so else tally.against).append(room)
+    return tally.report(_said_of(found), 1.0 if plan.share is None else plan.share)
+
+
+def _said_of(found: Collection[RoomKnown]) -> str:
+    """What can be known, by when, and what stays hidden."""
+    known = [one.step for one in found if one.known is Known.ALL]
+    nothing = sum(one.known is Known.NOTHING_TO_KNOW for one in found)
+    hidden: dict[str, list[int | None]] = {}
+    for one in found:
+        for name, step in (one.hidden or {}).items():
+            hidden.setdefault(name, []).append(step)
+    parts = [f"{name} stays hidden {_until(steps)} in {_rooms(len(steps))}" for name, steps in hidden.items()]
+    if known:
+        parts.append(f"in {_rooms(len(known))} all can be known, within {_steps(max(known))}")
+    if nothing:
+        parts.append(f"in {_rooms(nothing)} success depends on nothing hidden")
+    undecided = sum(one.known is Known.UNDECIDED for one in found)
+    if undecided:
+        parts.append(f"in {_rooms(undecided)} it is undecided")
+    return ", ".join(parts)
+
+
+def _until(steps: Sequence[int | None]) -> str:
+    """When something shows that was to be known before."""
+    late = [step for step in steps if step is not None]
+    return (
+        "to the end" if len(late) < len(steps) else f"until it is too late (step {min(late)} at the earliest)"
+    )

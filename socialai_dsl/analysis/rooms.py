@@ -1,0 +1,112 @@
+"""Rooms that are drawn, and what is known of each: who is missing, and whether anybody can succeed in it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.analysis.effort import Effort
+from socialai_dsl.analysis.search import Finding, Search, Verdict
+from socialai_dsl.engine.calls import Task
+from socialai_dsl.envs.table import Table
+from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Field, Header, Program, Register
+from socialai_dsl.semantics.absence import asks_about_cells
+from socialai_dsl.semantics.plans import Checked, Placing
+
+Start = tuple[NDArray[np.int16], NDArray[np.uint32], NDArray[np.uint64]]
+"""Registers, board and key of a room at its start."""
+
+
+def start_in(table: Table, row: int) -> Start:
+    """How a row of a table begins, copied while it stands there."""
+    state = table.state
+    return state.registers[row].copy(), state.boards[row].copy(), state.keys[row].copy()
+
+
+class Rooms:
+    """Rooms 0, 1, ... of a seed. What is found out about one is kept for whoever asks next.
+
+    Args:
+        checked: the scenario. program: of the same.
+        effort: which rooms, and how many states of each are searched.
+    """
+
+    def __init__(self, checked: Checked, program: Program, effort: Effort) -> None:
+        self.checked, self.program = checked, program
+        self._effort = effort
+        self._table = Table([program], effort.rooms, 1)
+        self._table.reset(effort.seed, None)
+        state = self._table.state
+        self._registers, self._boards = state.registers.copy(), state.boards.copy()
+        self._keys = state.keys.copy()
+        self._search = Search(program)
+        self._findings: dict[int, Finding] = {}
+        self._idle: NDArray[np.bool_] | None = None
+
+    def start(self, room: int) -> Start:
+        """How a room begins."""
+        return self._registers[room], self._boards[room], self._keys[room]
+
+    def success(self, room: int, effort: Effort) -> Finding:
+        """A shortest success in a room, with luck."""
+        found = self._findings.get(room)
+        if found is None or (found.verdict is Verdict.UNDECIDED and not effort.clock.is_over):
+            found = self._search.solve(*self.start(room), effort.states, effort.clock)
+            self._findings[room] = found
+        return found
+
+    def missing(self, room: int, names: Collection[str]) -> list[str]:
+        """Who of these members is not in a room, though nobody asked for that."""
+        return [name for name in self._unasked if name in names and self._gone(room, self._unasked[name])]
+
+    @property
+    def members(self) -> Sequence[str]:
+        """The members of the cast that are to be in every room, the agent among them."""
+        return [
+            name for name, number in self._unasked.items() if self.checked.entities[number].role != "object"
+        ]
+
+    @cached_property
+    def _unasked(self) -> dict[str, int]:
+        """What was not asked to be out of the room: name -> number of the entity."""
+        asked = {
+            item.entity
+            for item in self.checked.setup
+            if isinstance(item, Placing)
+            and (item.nowhere or item.inside is not None or not asks_about_cells(item))
+        }
+        numbers = range(len(self.checked.entities))
+        return {name_of(self.checked, number): number for number in numbers if number not in asked}
+
+    def _gone(self, room: int, number: int) -> bool:
+        return bool(self._registers[room, FIRST_ENTITY + ENTITY_FIELDS * number + Field.GONE])
+
+    @property
+    def solved_by_idling(self) -> NDArray[np.bool_]:
+        """In which rooms a success comes of itself, while the agent does nothing, (rooms,)."""
+        if self._idle is None:
+            registers = self._table.state.registers
+            while not registers[:, Register.ENDED].all():
+                self._table.batch.ports.actions[:] = idle(self.program)
+                self._table.batch.step(Task.STEP_ONLY)
+            self._idle = wins_of(self.program)[registers[:, Register.OUTCOME]]
+        return self._idle
+
+
+def name_of(checked: Checked, number: int) -> str:
+    """What a scenario calls an entity: `people[0]`."""
+    entity = checked.entities[number]
+    return entity.key if entity.index is None else f"{entity.key}[{entity.index}]"
+
+
+def idle(program: Program) -> NDArray[np.int64]:
+    """The action that does nothing and says nothing, int64 (4,)."""
+    return np.array([program.header(Header.PRIMITIVES), 0, 0, 0], np.int64)
+
+
+def wins_of(program: Program) -> NDArray[np.bool_]:
+    """Which outcomes are successes, (outcomes + 1,); the last stands for none so far."""
+    return np.array([outcome.success for outcome in program.outcome_table] + [False])

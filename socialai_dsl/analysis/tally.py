@@ -1,0 +1,207 @@
+"""This module counts how often each rule, state and outcome came about while environments were played.
+
+The engine counts rules and outcomes anyway. How often a state was entered follows from the rules that lead to it; which
+entries of `steps` a frame has gone through, from its register before and after each step. Training pays for none of it.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import count
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.engine.state import Key
+from socialai_dsl.envs.vector_env import Observation, ScenarioVectorEnv
+from socialai_dsl.program import FrameColumn, Header, Program
+from socialai_dsl.semantics.plans import Checked, FramePlan
+from socialai_dsl.source import Span
+
+
+@dataclass(frozen=True, order=True)
+class Part:
+    """A rule, state, step or outcome by where it is written; members that share a frame share its parts."""
+
+    span: Span
+    kind: str
+    name: str
+
+
+@dataclass
+class Tally:
+    """How often what came about.
+
+    Attributes:
+        times: how often each rule fired, each state and step was entered, and each outcome ended an episode.
+        endings: the same for every way to end, by name, deadly cells and time included.
+        episodes: how many were played.
+    """
+
+    times: Counter[Part]
+    endings: Counter[str]
+    episodes: int
+
+
+def tally(
+    envs: ScenarioVectorEnv,
+    scenarios: Sequence[Checked],
+    choose: Callable[[Observation], NDArray[np.int64]],
+    begin: Callable[[NDArray[np.bool_], NDArray[np.int64]], None],
+    episodes: int,
+    seed: int,
+) -> Tally:
+    """Play so many episodes, each to its end, and count.
+
+    Args:
+        envs: environments that do not reset themselves (autoreset_mode "Disabled"), which nobody has played yet.
+        scenarios: what the programs of the environments were compiled from.
+        choose: actions, int64 (E, 4), for an observation.
+        begin: is told in which environments an episode begins, bool (E,), and their numbers, int64 (E,), before
+            `choose` is asked.
+        episodes: how many; they are numbers 0, 1, ... of the seed (`index`).
+        seed: of the environments.
+    """
+    watch = _Watch(envs, scenarios)
+    for first in range(0, episodes, envs.num_envs):
+        playing = np.arange(envs.num_envs) < episodes - first
+        numbers = np.arange(first, first + envs.num_envs)
+        options = {"index": numbers, "reset_mask": playing}
+        observation, _ = envs.reset(seed=seed, options=options)
+        begin(playing, numbers)
+        watch.began(playing)
+        while playing.any():
+            watch.before()
+            observation, _, terminated, truncated, _ = envs.step(choose(observation))
+            watch.after(playing)
+            playing &= ~(terminated | truncated)
+    return watch.tally(episodes)
+
+
+def parts_of(checked: Checked) -> Iterator[Part]:
+    """Everything in a scenario that can come about."""
+    for frame in checked.frames:
+        for number, step in enumerate(frame.steps):
+            if step.duration != 0:  # else it is left out
+                yield _step(frame, number)
+        for number, state in enumerate(frame.states):
+            yield _state(frame, number)
+            yield from (_rule(frame, rule) for rule in (*state.first, *state.then))
+    yield from (Part(rule.span, "rule", rule.name) for rule in checked.rules)
+    yield from (Part(outcome.condition.span, "outcome", outcome.name) for outcome in checked.outcomes)
+
+
+def _step(frame: FramePlan, number: int) -> Part:
+    step = frame.steps[number]
+    return Part(step.span, "step", f"{frame.frame}.{step.state or f'steps[{number}]'}")
+
+
+def _state(frame: FramePlan, number: int) -> Part:
+    state = frame.states[number]
+    return Part(state.span, "state", f"{frame.frame}.{state.name}")
+
+
+def _rule(frame: FramePlan, rule: Any) -> Part:
+    return Part(rule.span, "rule", rule.name.removeprefix(f"{frame.member}."))
+
+
+class _Watch:
+    """Looks at the frames of environments while they are played, and at the engine's counters in the end."""
+
+    def __init__(self, envs: ScenarioVectorEnv, scenarios: Sequence[Checked]) -> None:
+        self._table = envs._table
+        self._programs = [
+            _Frames(program, checked) for program, checked in zip(envs.programs, scenarios, strict=True)
+        ]
+        self._registers = self._table.state.registers.copy()
+        self._keys = self._table.state.keys.copy()
+
+    def began(self, rows: NDArray[np.bool_]) -> None:
+        """Episodes have begun in these rows."""
+        registers, played = self._table.state.registers, self._table.batch.program_numbers()
+        for number, frames in enumerate(self._programs):
+            frames.entered(registers[rows & (played == number)])
+
+    def before(self) -> None:
+        """A step is going to be taken."""
+        self._registers[:] = self._table.state.registers
+        self._keys[:] = self._table.state.keys
+
+    def after(self, rows: NDArray[np.bool_]) -> None:
+        """A step has been taken in these rows."""
+        state, played = self._table.state, self._table.batch.program_numbers()
+        turned = rows & (state.keys[:, Key.ACT] != self._keys[:, Key.ACT])
+        if turned.any():
+            self.began(turned)
+        for number, frames in enumerate(self._programs):
+            own = rows & ~turned & (played == number)
+            frames.moved(self._registers[own], state.registers[own])
+
+    def tally(self, episodes: int) -> Tally:
+        """What has been counted."""
+        times: Counter[Part] = Counter()
+        endings: Counter[str] = Counter()
+        counters = self._table.batch.counters
+        for frames, first in zip(self._programs, self._table.batch.first_counters, strict=True):
+            own = counters[first : first + frames.program.header(Header.COUNTERS)].tolist()
+            times.update(frames.times(own))
+            names = frames.program.outcomes
+            endings.update(dict(zip(names, own[len(frames.program.rules) :], strict=False)))
+        return Tally(times, +endings, episodes)
+
+
+class _Frames:
+    """The frames of one program: which states they are in, and how often each was entered."""
+
+    def __init__(self, program: Program, checked: Checked) -> None:
+        self.program, self.checked = program, checked
+        table = program.table(Header.FRAME_AT)
+        self._states = table[:, FrameColumn.STATE]
+        self._entered = [np.zeros(count, np.int64) for count in table[:, FrameColumn.STATES].tolist()]
+
+    def entered(self, registers: NDArray[np.int16]) -> None:
+        """Count the states that frames are in, in registers of rows, int16 (S, R)."""
+        for register, entered in zip(self._states, self._entered, strict=True):
+            entered += np.bincount(registers[:, register], minlength=len(entered))
+
+    def moved(self, before: NDArray[np.int16], after: NDArray[np.int16]) -> None:
+        """Count the entries of `steps` that frames have gone to.
+
+        In one turn a frame may leave several behind: those that are fulfilled already, and one that ends at once.
+        """
+        frames = zip(self.checked.frames, self._states, self._entered, strict=True)
+        for frame, register, entered in frames:
+            if not frame.steps:
+                continue
+            old, new = before[:, register].astype(np.int64), after[:, register].astype(np.int64)
+            first = np.where(new > old, old + 1, new)
+            for k in range(len(entered)):
+                entered[k] += np.count_nonzero((old != new) & (first <= k) & (k <= new))
+
+    def times(self, counters: list[int]) -> Counter[Part]:
+        """How often each part came about, by the engine's counters."""
+        times: Counter[Part] = Counter()
+        numbers = count()
+        for frame, entered in zip(self.checked.frames, self._entered, strict=True):
+            for number in range(len(frame.steps)):
+                next(numbers)
+                times[_step(frame, number)] += int(entered[number])
+            places = {state.name: _state(frame, number) for number, state in enumerate(frame.states)}
+            for number, place in enumerate(places.values()):
+                times[place] += int(entered[number])
+            for state in frame.states:
+                for rule in (*state.first, *state.then):
+                    fired = counters[next(numbers)]
+                    times[_rule(frame, rule)] += fired
+                    if aim := rule.goto or rule.goto_now:
+                        times[places[aim]] += fired
+        for part, fired in zip(self._of_the_world(), counters[next(numbers) :], strict=False):
+            times[part] += fired
+        return times
+
+    def _of_the_world(self) -> Iterator[Part]:
+        yield from (Part(rule.span, "rule", rule.name) for rule in self.checked.rules)
+        yield from (Part(o.condition.span, "outcome", o.name) for o in self.checked.outcomes)

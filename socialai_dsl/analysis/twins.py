@@ -1,0 +1,170 @@
+"""Rooms that differ only in the value of one draw, and what is seen and heard in them under the same actions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.analysis.tellers import SOMEBODY, Tellers
+from socialai_dsl.engine.calls import Task
+from socialai_dsl.envs.table import Table
+from socialai_dsl.envs.values import shown
+from socialai_dsl.program import Header, Program, Register
+from socialai_dsl.semantics.plans import Checked
+
+Actions = Callable[[int], NDArray[np.int64]]
+"""What is done in each pair of twins in step t, int64 (pairs, 4)."""
+
+
+@dataclass(frozen=True)
+class Leak:
+    """A pair of twins that could be told apart without a cue.
+
+    Attributes:
+        index: of the room. step: after which they differ; 0: from the start.
+        values: what was drawn in either. by: who or what differs, by name; empty where only the walls do.
+    """
+
+    index: int
+    step: int
+    values: tuple[Any, Any]
+    by: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What playing pairs of twins showed.
+
+    Attributes:
+        pairs: how many were played. cued: how many differ first in a cue. leaks: the pairs that differ otherwise.
+        rooms: the rooms of the pairs that differ.
+    """
+
+    pairs: int
+    cued: int
+    leaks: tuple[Leak, ...]
+    rooms: tuple[int, ...]
+
+
+def layouts(program: Program, path: str, values: Sequence[int]) -> list[dict[str, Any]]:
+    """For each value of a draw (`let.exit`) the layout that gives it, and leaves everything else as it is drawn."""
+    name = next(register for register in program.registers if register.path == path)
+    key = path.removeprefix("let.")
+    return [{"let": {key: shown(program, name, value)}} for value in values]
+
+
+class Twins:
+    """Pairs of rooms 0, 1, ... of a seed: rows 2k and 2k + 1 are room k, with two values of a draw.
+
+    Args:
+        program: what is played. checked: of the same scenario.
+        path: of the draw. values: for each room the two values, (rooms, 2).
+        by: members of the cast whose cues may differ.
+    """
+
+    def __init__(
+        self,
+        program: Program,
+        checked: Checked,
+        path: str,
+        values: NDArray[np.int64],
+        by: Sequence[str],
+        seed: int,
+    ) -> None:
+        self._program, self._path, self._values = program, path, values
+        self._cues, self._tellers = {*by, SOMEBODY}, Tellers(program, checked)
+        self._table = Table([program], 2 * len(values), 1)
+        given = [layout for pair in values.tolist() for layout in layouts(program, path, pair)]
+        index = np.repeat(np.arange(len(values)), 2)
+        self._table.reset(seed, {"index": index, "layout": given})
+
+    def start(self, room: int) -> tuple[NDArray[np.int16], NDArray[np.uint32], NDArray[np.uint64]]:
+        """How the two of a room begin: registers (2, R), boards (2, C), keys (2, Key.WORDS)."""
+        rows, state = slice(2 * room, 2 * room + 2), self._table.state
+        return state.registers[rows].copy(), state.boards[rows].copy(), state.keys[rows].copy()
+
+    def play(self, actions: Actions) -> Compared:
+        """Do the same in both of each pair until they differ or one of them ends."""
+        pairs = len(self._values)
+        state, ports = self._table.state, self._table.batch.ports
+        running = pairs_alike(self._table)
+        leaks = [
+            self._leak(k, 0, self._between(k, state.registers)) for k in np.flatnonzero(~running).tolist()
+        ]
+        cued, step = list[int](), 0
+        while running.any():
+            before = state.registers.copy()
+            ports.actions[:] = np.repeat(actions(step), 2, axis=0)
+            self._table.batch.step(Task.STEP_ONLY)
+            step += 1
+            running &= (state.registers[:, Register.ENDED] == 0).reshape(-1, 2).all(axis=1)
+            for k in np.flatnonzero(running & ~pairs_alike(self._table)).tolist():
+                running[k] = False
+                tellers = self._between(k, before)
+                if self._cues.isdisjoint(tellers):
+                    leaks.append(self._leak(k, step, tellers))
+                else:
+                    cued.append(k)
+        return Compared(pairs, len(cued), tuple(leaks), (*cued, *(leak.index for leak in leaks)))
+
+    def _between(self, pair: int, before: NDArray[np.int16]) -> list[str]:
+        return self._tellers.between(self._table, (2 * pair, 2 * pair + 1), before)
+
+    def _leak(self, pair: int, step: int, by: Sequence[str]) -> Leak:
+        first, second = layouts(self._program, self._path, self._values[pair].tolist())
+        return Leak(pair, step, (*first["let"].values(), *second["let"].values()), tuple(by))
+
+
+def random_actions(program: Program, pairs: int, seed: int) -> Actions:
+    """Any body action, and half of the time any utterance."""
+    generator = np.random.default_rng(seed)
+    highest = np.array(
+        [
+            program.header(Header.PRIMITIVES) + 1,
+            2,
+            program.header(Header.TEMPLATES),
+            program.header(Header.NOUNS),
+        ]
+    )
+    return lambda step: generator.integers(0, highest, (pairs, 4))
+
+
+class Script:
+    """What the agent's own frame does in rooms 0, 1, ... of a seed, where it knows one of the two values.
+
+    Args:
+        program: of the scenario with a frame for the agent. path, values: of the draw, one value for each room.
+    """
+
+    def __init__(self, program: Program, path: str, values: Sequence[int], seed: int) -> None:
+        self._table = Table([program], len(values), 1)
+        given = layouts(program, path, values)
+        self._table.reset(seed, {"index": np.arange(len(values)), "layout": given})
+
+    def __call__(self, step: int) -> NDArray[np.int64]:
+        """Its actions, which are also done in its own rooms."""
+        actions = self._table.scripted_actions()
+        self._table.batch.ports.actions[:] = actions
+        self._table.batch.step(Task.STEP_ONLY)
+        return actions
+
+
+def pairs_alike(table: Table) -> NDArray[np.bool_]:
+    """Whether rows 2k and 2k + 1 show the same and sound the same, (pairs,)."""
+    state = table.state
+    same = np.ones(len(state.registers) // 2, np.bool_)
+    for array in (state.image, state.extra, state.tokens):
+        same &= (array[0::2] == array[1::2]).reshape(len(same), -1).all(axis=1)
+    return same
+
+
+def alike(table: Table, rows: slice) -> bool:
+    """Whether rooms that were just drawn show the same."""
+    state = table.state
+    return all(
+        bool((array[rows] == array[rows][0]).all()) for array in (state.image, state.extra, state.tokens)
+    )

@@ -1,0 +1,272 @@
+"""This module lets `socialai evaluate llm:MODEL` play test episodes: options, progress, and what came of it."""
+
+import argparse
+import os
+import re
+import sys
+import time
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import urlsplit
+
+from socialai_dsl.cli.arguments import positive
+from socialai_dsl.cli.endings import Ending
+from socialai_dsl.cli.errors import RunFailed, UsageError
+from socialai_dsl.cli.run_folder import scenario_folder_name
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from socialai_dsl.evaluation import EvalResult
+    from socialai_dsl.llm.players import Budget, PlayedEpisode
+    from socialai_dsl.program_suite import Playable
+
+PREFIX: Final = "llm:"
+TRANSCRIPTS: Final = "transcripts"
+_KEY: Final = "OPENAI_API_KEY"
+_LOCAL: Final = ("localhost", "127.0.0.1", "::1")
+_SECONDS_BETWEEN_LINES: Final = 5.0
+_BUDGET: Final = re.compile(r"(\d[\d_,]*(?:\.\d+)?) ?(tokens|usd)?", re.IGNORECASE)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Declare what counts for language models alone."""
+    group = parser.add_argument_group("language models", "for RUN_DIR llm:MODEL")
+    group.add_argument(
+        "--base-url",
+        metavar="URL",
+        help="of an OpenAI-compatible interface, up to /v1 (default: OpenAI's)",
+    )
+    group.add_argument(
+        "--key-from",
+        default=_KEY,
+        metavar="NAME",
+        help=f"environment variable with the key (default: {_KEY})",
+    )
+    group.add_argument("--style", choices=("prose", "grid", "json"), default="prose", help="of observations")
+    group.add_argument(
+        "--mode", choices=("text", "json", "tools"), default="text", help="how the model gives its actions"
+    )
+    group.add_argument(
+        "--history", type=positive, default=16, metavar="N", help="observations in a request (default: 16)"
+    )
+    group.add_argument("--temperature", type=float, metavar="X", help="default: the server's")
+    group.add_argument(
+        "--max-tokens", type=positive, metavar="N", help="that a reply may have (default: the server's)"
+    )
+    group.add_argument(
+        "--on-invalid",
+        choices=("noop", "retry", "fail"),
+        default="noop",
+        help="a reply without an action passes the turn (default), is asked for again, or ends the episode",
+    )
+    group.add_argument(
+        "--goal", default="", metavar="TEXT", help="what to tell the model of the aim (default: nothing)"
+    )
+    group.add_argument(
+        "--grammar", action="store_true", help="hold replies to a grammar, which llama.cpp's server can"
+    )
+    group.add_argument(
+        "--concurrency", type=positive, default=4, metavar="N", help="episodes played at once (default: 4)"
+    )
+    group.add_argument(
+        "--timeout", type=positive, default=120, metavar="SECONDS", help="for one reply (default: 120)"
+    )
+    group.add_argument(
+        "--budget", metavar="N", help="what this command may spend: 200000 tokens, or 2.50usd with --prices"
+    )
+    group.add_argument(
+        "--prices", metavar="IN,OUT", help="US dollars for a million tokens of requests and of replies"
+    )
+
+
+def default_folder(agent: str) -> Path:
+    """Where the episodes of a model go unless the user says otherwise."""
+    return Path("runs", "llm", re.sub(r"[^\w.-]+", "_", agent.removeprefix(PREFIX)).strip(".") or "model")
+
+
+def let_a_model_play(
+    agent: str,
+    scenario: str,
+    program: "Playable",
+    episodes: int,
+    out: Path,
+    options: argparse.Namespace,
+) -> "tuple[EvalResult, dict[int, list[NDArray[np.int64]]], list[Ending], dict[str, Any]]":
+    """Let a model play test episodes 0 to `episodes - 1`, those that are in transcripts already excepted.
+
+    Args:
+        agent: `llm:MODEL`.
+        scenario: as it was asked for.
+        program: its program.
+        episodes: how many.
+        out: gets `SCENARIO/transcripts`.
+        options: as `add_options` declares them.
+
+    Returns:
+        What came of it, the actions of each episode, further ways in which episodes ended, further figures.
+
+    Raises:
+        UsageError: the endpoint does not answer, or an option is not what was expected.
+        RunFailed: the budget is spent before the end.
+    """
+    if find_spec("httpx") is None:
+        raise UsageError("language models need httpx: pip install 'socialai-dsl[llm]'")
+    from socialai_dsl.llm.endpoint import Endpoint, EndpointError
+    from socialai_dsl.llm.players import LanguageModelPlayer, Manner, OtherSettings, transcripts
+
+    endpoint = _endpoint(Endpoint, agent, options)
+    manner = Manner(
+        options.style, options.mode, options.on_invalid, options.goal, options.history, options.grammar
+    )
+    budget = _budget(options.budget, endpoint.prices)
+    settings = {
+        "scenario": scenario,
+        "program_sha256": program.sha256,
+        "model": endpoint.model,
+        "address": endpoint.address,
+        **vars(manner),
+        **endpoint.options,
+    }
+    folder = out / scenario_folder_name(scenario) / TRANSCRIPTS
+    progress = _Progress(episodes)
+    try:
+        place = transcripts(folder, settings)
+        player = LanguageModelPlayer(program, endpoint, manner, place)
+        played = player.play(episodes, options.concurrency, budget, progress.note)
+    except OtherSettings as error:
+        raise UsageError(f"--out: {error}; choose another folder") from None
+    except EndpointError as error:
+        raise UsageError(f"{error}. Episodes so far are kept in {folder}; the same command goes on") from None
+    ended = sum(episode.ended for episode in played)
+    if ended < episodes:
+        raise RunFailed(
+            f"the budget is spent: {ended} of {episodes} episodes are over; the same command goes on with "
+            f"another {options.budget}"
+        )
+    return *_result(played, program), _figures(played)
+
+
+def _endpoint(kind: Any, agent: str, options: argparse.Namespace) -> Any:
+    from socialai_dsl.llm.endpoint import OPENAI
+
+    url = options.base_url or OPENAI
+    parts = urlsplit(url)
+    if parts.scheme not in ("http", "https") or not parts.hostname:
+        raise UsageError(f"--base-url: got {url!r}, expected one such as http://localhost:8080/v1")
+    if parts.username is not None or parts.password is not None:
+        raise UsageError("--base-url: expected one without a name and a password, which logs would show")
+    key = os.environ.get(options.key_from, "")
+    if not key and parts.hostname not in _LOCAL:
+        raise UsageError(
+            f"{parts.hostname} asks for a key, and the environment has none in {options.key_from}; "
+            "export it, or name another variable with --key-from"
+        )
+    model = agent.removeprefix(PREFIX)
+    if not model:
+        raise UsageError(f"got the agent {agent!r}, expected the name of a model behind {PREFIX}")
+    asked = {"temperature": options.temperature, "max_tokens": options.max_tokens}
+    return kind(model, url, key.strip(), asked, float(options.timeout), _prices(options.prices))
+
+
+def _prices(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    try:
+        prompt, completion = (float(part) for part in text.split(","))
+    except ValueError:
+        prompt = completion = -1.0
+    if not (prompt >= 0 and completion >= 0):
+        raise UsageError(f"--prices: got {text!r}, expected two amounts such as 0.15,0.60")
+    return prompt, completion
+
+
+def _budget(text: str | None, prices: tuple[float, float] | None) -> "Budget":
+    from socialai_dsl.llm.players import Budget
+
+    if text is None:
+        return Budget()
+    match = _BUDGET.fullmatch(text.strip())
+    if match is None:
+        raise UsageError(f"--budget: got {text!r}, expected an amount such as 200000 or 2.50usd")
+    amount = float(match[1].replace(",", "").replace("_", ""))
+    if (match[2] or "").lower() != "usd":
+        return Budget(tokens=int(amount))
+    if prices is None:
+        raise UsageError("--budget: an amount of money needs --prices IN,OUT to be counted")
+    return Budget(cost=amount)
+
+
+def _result(
+    played: "Sequence[PlayedEpisode]", program: "Playable"
+) -> "tuple[EvalResult, dict[int, list[NDArray[np.int64]]], list[Ending]]":
+    import numpy as np
+
+    from socialai_dsl.evaluation import EvalResult
+    from socialai_dsl.llm.episode import INVALID
+
+    results = [episode.result for episode in played]
+    invalid = any(result.ending == INVALID for result in results)
+    names = [*program.outcomes, *([INVALID] if invalid else [])]
+    rules = {
+        name: sum(episode.rules.get(name, 0) for episode in played) / len(played) for name in played[0].rules
+    }
+    result = EvalResult(
+        np.array([result.success for result in results]),
+        np.array([names.index(result.ending) for result in results]),
+        np.array([result.steps for result in results]),
+        np.array([result.total for result in results]),
+        tuple(names),
+        rules,
+    )
+    more = [Ending(INVALID, False, "a reply without an action")] if invalid else []
+    return result, {episode.number: episode.actions for episode in played}, more
+
+
+def _figures(played: "Sequence[PlayedEpisode]") -> dict[str, Any]:
+    """What counts for language models alone."""
+    from socialai_dsl.llm.endpoint import Usage
+
+    usage = sum((episode.usage for episode in played), Usage())
+    replies = sum(episode.result.replies for episode in played)
+    invalid = sum(episode.result.invalid for episode in played)
+    return {
+        "replies": replies,
+        "invalid_replies": invalid,
+        "invalid_rate": invalid / max(replies, 1),
+        "prompt_tokens": usage.prompt,
+        "completion_tokens": usage.completion,
+        "tokens_estimated": usage.estimated,
+        "cost": usage.cost,
+    }
+
+
+class _Progress:
+    """Says on standard error now and then how far it is, and what it has cost."""
+
+    def __init__(self, episodes: int) -> None:
+        self._episodes = episodes
+        self._played: list[PlayedEpisode] = []
+        self._last = self._begun = time.monotonic()
+
+    def note(self, episode: "PlayedEpisode") -> None:
+        """Note an episode that is over."""
+        self._played.append(episode)
+        now, done = time.monotonic(), len(self._played)
+        if now - self._last < _SECONDS_BETWEEN_LINES:
+            return
+        self._last = now
+        figures = _figures(self._played)
+        cost = f", ${figures['cost']:.4f}" if figures["cost"] is not None else ""
+        tokens = figures["prompt_tokens"] + figures["completion_tokens"]
+        left = (now - self._begun) / done * (self._episodes - done)
+        print(
+            f"{done} of {self._episodes} episodes, {sum(one.result.success for one in self._played)} successes, "
+            f"{figures['invalid_rate']:.1%} invalid replies, {tokens:,} tokens{cost}, {left:.0f} s left",
+            file=sys.stderr,
+            flush=True,
+        )

@@ -1,0 +1,127 @@
+"""This module is `socialai replay`: a page on which episodes of a scenario or of a run can be watched step by step."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from socialai_dsl.cli.arguments import natural, positive
+from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.run_folder import REPLAY, SETTINGS, write_text
+
+if TYPE_CHECKING:
+    from socialai_dsl.cli.evaluation import Evaluation
+    from socialai_dsl.replay import Trace
+
+SUMMARY: Final = "write a page on which episodes can be watched, step by step, with rules and reasons"
+_RECORDED: Final = 5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this command."""
+    parser.add_argument(
+        "source",
+        metavar="RUN|SCENARIO|TRACES",
+        help="a run's folder; a scenario's path or name; or traces as `-o episodes.json` writes them",
+    )
+    parser.add_argument(
+        "-o",
+        "--out",
+        type=Path,
+        default=Path(REPLAY),
+        metavar="FILE",
+        help=f"the page (default: {REPLAY}), or with the ending .json the traces alone",
+    )
+    parser.add_argument(
+        "--agent",
+        metavar="AGENT",
+        help="who plays a scenario: oracle, random, or a run's folder (default: oracle if there is one, else random)",
+    )
+    parser.add_argument(
+        "--episodes", type=positive, default=100, metavar="N", help="of the test set (default: 100)"
+    )
+    parser.add_argument(
+        "--record",
+        type=positive,
+        default=_RECORDED,
+        metavar="N",
+        help=f"so many failures and so many successes are kept (default: {_RECORDED})",
+    )
+    parser.add_argument("--test-episode", type=natural, metavar="N", help="keep test episode N alone")
+    parser.add_argument(
+        "--greedy", action="store_true", help="a trained agent takes its most probable action"
+    )
+
+
+def execute(arguments: argparse.Namespace) -> Exit:
+    """Play, trace, write."""
+    from socialai_dsl.replay.page import replay_page
+
+    if arguments.out.suffix not in (".html", ".json"):
+        raise UsageError(f"--out: got {arguments.out}, expected a name that ends in .html or .json")
+    traces = _read(Path(arguments.source)) if arguments.source.endswith(".json") else _played(arguments)
+    if arguments.out.suffix == ".json":
+        write_text(arguments.out, "[" + ",\n".join(trace.as_json() for trace in traces) + "]\n")
+    else:
+        write_text(arguments.out, replay_page(traces))
+    print(f"{_count(len(traces), 'episode')} written to {arguments.out}")
+    return Exit.GOOD
+
+
+def _read(path: Path) -> "list[Trace]":
+    """Traces from a file.
+
+    Raises:
+        OSError: it cannot be read.
+        UsageError: it holds something else.
+    """
+    from pydantic import TypeAdapter, ValidationError
+
+    from socialai_dsl.replay import Trace
+
+    try:
+        traces = TypeAdapter(list[Trace]).validate_python(json.loads(path.read_text(encoding="utf-8")))
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise UsageError(f"{path}: {place or 'the file'}: {first['msg']}") from None
+    except (ValueError, RecursionError) as error:
+        raise UsageError(f"{path}: expected a JSON list of traces, {error}") from None
+    if not all(trace.moments for trace in traces) or not traces:
+        raise UsageError(f"{path}: expected at least one trace, each with a moment")
+    return traces
+
+
+def _played(arguments: argparse.Namespace) -> "list[Trace]":
+    """Test episodes of a run or a scenario: one that was asked for, or failures and successes."""
+    number = arguments.test_episode
+    evaluation = _evaluation(arguments, arguments.episodes if number is None else number + 1)
+    for warning in evaluation.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    return evaluation.traces(arguments.record) if number is None else [evaluation.trace(number)]
+
+
+def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
+    from socialai_dsl.cli.agents import require_trainer, scripted_name
+    from socialai_dsl.cli.evaluate import own_scenario
+    from socialai_dsl.cli.evaluation import evaluate_agent
+    from socialai_dsl.cli.player import Player
+
+    source = arguments.source
+    if (Path(source) / SETTINGS).is_file():
+        if arguments.agent is not None:
+            raise UsageError(
+                "--agent: a run is replayed by its own agent; name a scenario to let another play"
+            )
+        agent, scenario = source, own_scenario(source)
+    else:
+        scenario = source
+        agent = arguments.agent or ("oracle" if scripted_name(scenario) is not None else "random")
+    if agent not in ("oracle", "random", "human"):
+        require_trainer()
+    return evaluate_agent(Player(agent, greedy=arguments.greedy), scenario, episodes)
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

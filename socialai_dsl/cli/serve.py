@@ -1,0 +1,56 @@
+"""This module is `socialai serve`: scenarios for trainers of language models."""
+
+import argparse
+import socket
+import sys
+from importlib.util import find_spec
+from typing import Final
+
+from socialai_dsl.cli.arguments import natural, positive
+from socialai_dsl.cli.errors import Exit, UsageError
+
+SUMMARY: Final = "serve a scenario to trainers of language models"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this command."""
+    parser.add_argument("interface", choices=("openenv",), help="what the trainer speaks")
+    parser.add_argument(
+        "--scenario",
+        required=True,
+        metavar="SCENARIO",
+        help="a path or a name, with +variants and ?parameters",
+    )
+    parser.add_argument(
+        "--host", default="127.0.0.1", help="address to serve on (default: this machine only)"
+    )
+    parser.add_argument(
+        "--port", type=natural, default=8000, metavar="N", help="default: 8000; 0 is any free one"
+    )
+    parser.add_argument("--style", choices=("prose", "grid", "json"), default="prose", help="of observations")
+    parser.add_argument(
+        "--sessions", type=positive, default=100, metavar="N", help="that may play at once (default: 100)"
+    )
+
+
+def execute(arguments: argparse.Namespace) -> Exit:
+    """Serve until interrupted."""
+    if find_spec("openenv") is None:
+        raise UsageError("serving OpenEnv needs openenv: pip install 'socialai-dsl[openenv]'")
+    import socialai_dsl
+
+    program = socialai_dsl.compile(socialai_dsl.load(arguments.scenario))
+    import uvicorn
+
+    from socialai_dsl.llm.openenv import application
+
+    app = application(program, arguments.style, arguments.sessions)
+    try:
+        listening = socket.create_server((arguments.host, arguments.port))
+    except (OSError, OverflowError) as error:
+        raise UsageError(f"cannot serve on {arguments.host}:{arguments.port}: {error}") from None
+    with listening:
+        address, port = listening.getsockname()[:2]
+        print(f"{program.name} at http://{address}:{port}, Ctrl-C stops it", file=sys.stderr, flush=True)
+        uvicorn.Server(uvicorn.Config(app, log_level="warning")).run(sockets=[listening])
+    return Exit.GOOD

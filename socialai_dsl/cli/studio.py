@@ -1,0 +1,108 @@
+"""This module is `socialai studio`: scenarios are written, seen and played in a browser on this machine."""
+
+import argparse
+import errno
+import secrets
+import socket
+import webbrowser
+from pathlib import Path
+from typing import Final
+
+from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.frontend import SUFFIXES
+
+SUMMARY: Final = "write, see and play scenarios in the browser"
+_PORT: Final = 8765
+_TRIED: Final = 20
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this command."""
+    parser.add_argument(
+        "path",
+        nargs="?",
+        type=Path,
+        default=Path(),
+        metavar="PATH",
+        help="a scenario's file, or a folder of scenarios (default: this folder)",
+    )
+    parser.add_argument(
+        "--host", default="127.0.0.1", metavar="ADDRESS", help="where to listen (default: this machine alone)"
+    )
+    parser.add_argument(
+        "--port", type=int, metavar="N", help=f"default: {_PORT}, or the next one that is free"
+    )
+    parser.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
+
+
+def execute(arguments: argparse.Namespace) -> Exit:
+    """Serve until Ctrl-C."""
+    try:
+        import starlette  # noqa: F401
+        import uvicorn
+        import websockets  # noqa: F401
+    except ImportError as error:
+        raise UsageError(f"the studio needs {error.name}: pip install 'socialai-dsl[studio]'") from None
+    from socialai_dsl.studio.server import LARGEST_MESSAGE, Studio
+
+    root, opened = _opened(arguments.path)
+    listening = _listen(arguments.host, arguments.port)
+    port, token = listening.getsockname()[1], secrets.token_urlsafe(24)
+    shown = "127.0.0.1" if arguments.host in ("0.0.0.0", "::") else arguments.host
+    address = f"http://{f'[{shown}]' if ':' in shown else shown}:{port}/?token={token}"
+    print(f"studio of {root}: {address}\nCtrl-C ends it", flush=True)
+    if not arguments.no_browser and not _open(address):
+        print("no browser could be opened; open the address yourself", flush=True)
+    studio = Studio(root, opened, token, arguments.host)
+    config = uvicorn.Config(
+        studio.app, log_level="error", ws="websockets-sansio", ws_max_size=LARGEST_MESSAGE, access_log=False
+    )
+    uvicorn.Server(config).run(sockets=[listening])
+    return Exit.GOOD
+
+
+def _opened(path: Path) -> tuple[Path, str]:
+    """The folder to open, and the file in it to show first.
+
+    Raises:
+        UsageError: there is nothing there, or something else.
+    """
+    try:
+        if path.is_dir():
+            list(path.iterdir())
+            return path.resolve(), ""
+        if path.is_file() and path.suffix in SUFFIXES:
+            return path.resolve().parent, path.name
+    except OSError as error:
+        raise UsageError(f"{path}: {error.strerror}") from None
+    what = f"{path} is no scenario's file" if path.exists() else f"there is no {path}"
+    raise UsageError(f"{what}; expected a folder, or a file that ends in .yaml")
+
+
+def _listen(host: str, port: int | None) -> socket.socket:
+    """A socket at the port, or where none is asked for at the next free one.
+
+    Raises:
+        UsageError: the port is in use, or the address is not this machine's.
+    """
+    if port is not None and not 0 <= port < 1 << 16:
+        raise UsageError(f"--port: got {port}, expected 0 to 65535")
+    tried = [port] if port is not None else list(range(_PORT, _PORT + _TRIED))
+    for one in tried:
+        try:
+            family = socket.AF_INET6 if ":" in host else socket.AF_INET
+            return socket.create_server((host, one), family=family)
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE:
+                raise UsageError(f"--host {host}: {error.strerror or error}") from None
+    if port is not None:
+        raise UsageError(f"--port: {port} is in use; leave it out to take a free one")
+    raise UsageError(f"--port: {tried[0]} to {tried[-1]} are in use; name another")
+
+
+def _open(address: str) -> bool:
+    """Open the address in a browser; whether there is one."""
+    try:
+        return webbrowser.open(address)
+    except webbrowser.Error:
+        return False

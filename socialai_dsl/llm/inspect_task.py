@@ -1,0 +1,117 @@
+"""Any scenario as a task of Inspect AI, which brings models, logs, limits and a viewer."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any, Final, Literal
+
+from inspect_ai import Task, task
+from inspect_ai.dataset import MemoryDataset, Sample
+from inspect_ai.model import ChatMessageSystem, ChatMessageUser, get_model
+from inspect_ai.scorer import Score, Scorer, Target, mean, scorer, stderr
+from inspect_ai.solver import Generate, Solver, TaskState, solver
+
+from socialai_dsl.envs.factory import playable_of
+from socialai_dsl.llm.episode import Episode, OnInvalid
+from socialai_dsl.llm.view import Style
+
+_RESULT: Final = "result"
+
+
+@task
+def scenario(
+    scenario: str = "talkitout",
+    episodes: int = 50,
+    style: Style = "prose",
+    mode: Literal["text", "json"] = "text",
+    history: int = 16,
+    on_invalid: OnInvalid = "noop",
+    goal: str = "",
+) -> Task:
+    """Test episodes 0 to `episodes - 1` of a scenario, a sample each.
+
+    Args:
+        scenario: a path or a name, with +variants and ?parameters.
+        episodes: how many; the common test set has 500.
+        style: how observations are written, see `TextView`.
+        mode: how actions are given, see `ActionLanguage`.
+        history: how many observations the model is shown, the present one included.
+        on_invalid: what a reply without an action does, see `Episode`.
+        goal: what the instructions say of the aim; nothing by default.
+
+    Raises:
+        ScenarioError: the scenario does not exist, or has mistakes.
+        ValueError: an argument is not what was expected.
+    """
+    if episodes < 1 or history < 1:
+        raise ValueError(f"got {episodes} episodes and a history of {history}, expected at least 1 of both")
+    program = playable_of(scenario)
+    options: dict[str, Any] = {"style": style, "mode": mode, "on_invalid": on_invalid, "goal": goal}
+    beginning = Episode(program, **options)
+    samples = [
+        Sample(
+            id=number,
+            input=beginning.reset(test_episode=number),
+            target="success",
+            metadata={"episode": number},
+        )
+        for number in range(episodes)
+    ]
+    return Task(
+        dataset=MemoryDataset(samples, name=scenario),
+        solver=player(lambda: Episode(program, **options), history),
+        scorer=outcome(),
+        metadata={"scenario": scenario, "program_sha256": program.sha256},
+    )
+
+
+@solver
+def player(episode_maker: Any, history: int = 16) -> Solver:
+    """Lets the model play the sample's episode to its end.
+
+    Args:
+        episode_maker: gives an `Episode` of its own to each sample.
+        history: how many observations a request holds.
+    """
+
+    async def solve(state: TaskState, generate: Generate) -> TaskState:
+        episode: Episode = episode_maker()
+        text = episode.reset(test_episode=state.metadata["episode"])
+        state.messages = [ChatMessageSystem(content=episode.instructions), ChatMessageUser(content=text)]
+        state.store.set(_RESULT, asdict(episode.result()))
+        done = False
+        while not done:
+            output = await get_model().generate([state.messages[0], *state.messages[1:][1 - 2 * history :]])
+            turn = episode.step(output.completion)
+            done = turn.done
+            state.output = output
+            state.messages += [output.message, ChatMessageUser(content=turn.text)]
+            state.store.set(_RESULT, asdict(episode.result()))  # also if a limit ends the sample
+        episode.close()
+        return state
+
+    return solve
+
+
+@scorer(
+    metrics={
+        "success": [mean(), stderr()],
+        "return": [mean(), stderr()],
+        "steps": [mean()],
+        "invalid_rate": [mean()],
+    }
+)
+def outcome() -> Scorer:
+    """How the episode went: success, return, steps, and the share of replies without an action."""
+
+    async def score(state: TaskState, target: Target) -> Score:
+        result = state.store.get(_RESULT)
+        value = {
+            "success": int(result["success"]),
+            "return": result["total"],
+            "steps": result["steps"],
+            "invalid_rate": result["invalid"] / max(result["replies"], 1),
+        }
+        return Score(value=value, answer=result["ending"] or "stopped", metadata=result)
+
+    return score

@@ -1,0 +1,108 @@
+"""What a cell of the picture shows, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Final
+
+from socialai_dsl.library import prelude
+from socialai_dsl.program import NO_GESTURE, EntityColumn, Header, Program
+from socialai_dsl.render.gestures import gesture_shown
+from socialai_dsl.semantics.terms import ObjectType
+from socialai_dsl.vocabulary import COLORS, NPC, UNSEEN
+
+LOOKS: Final = 4
+"""Channels that say what things look like; those behind them are gestures."""
+
+COMPASS: Final = ("east", "south", "west", "north")
+RELATIVE: Final = ("towards you", "to your left", "away from you", "to your right")
+"""Directions of others in words, absolute and as seen from the agent."""
+
+_SURFACES: Final = ("wall", "fence", "lava", "floor", "platform")
+_ACTS: Final = {
+    "forward": "just stepped forward",
+    "left": "just turned left",
+    "right": "just turned right",
+    "toggle": "just toggled what is in front of it",
+    "point": "just began to point",
+    "stop": "just stopped pointing",
+    "none": "just did nothing",
+}
+
+Cell = tuple[int, ...]
+"""The channels of a cell, as in the observation."""
+
+
+def kinds_of(programs: Sequence[Program]) -> dict[int, str]:
+    """Status code in the picture -> the kind of NPC that looks so; codes of several kinds are left out."""
+    words: dict[int, set[str]] = {}
+    for program in programs:
+        start = program.header(Header.ENTITY_AT)
+        for number, entity in enumerate(program.entities):
+            if entity.role == "npc":
+                code = program.words[start + EntityColumn.COLUMNS * number + EntityColumn.KIND]
+                words.setdefault(int(code), set()).add(entity.type)
+    # What an NPC with a drawn kind looks like is one of several codes, of which the program holds the greatest.
+    alike = {code: kinds.pop() for code, kinds in words.items() if len(kinds) == 1}
+    return {code: kind for code, kind in alike.items() if " or " not in kind}
+
+
+def is_surface(cell: Cell) -> bool:
+    """Whether a cell shows what usually covers many cells, or nothing because it is out of sight."""
+    found = _types().get(cell[0])
+    return cell[0] == UNSEEN or (found is not None and found.name in _SURFACES)
+
+
+def facts(cell: Cell, kinds: Mapping[int, str], directions: tuple[str, ...]) -> dict[str, str]:
+    """What a cell shows: `what` it is and, as far as it has one, `color`, `state`, direction and gestures.
+
+    Args:
+        cell: not an empty one.
+        kinds: see `kinds_of`.
+        directions: `COMPASS` or `RELATIVE`, for those of NPCs.
+    """
+    kind, colour, status, orientation = cell[:LOOKS]
+    if kind == UNSEEN:
+        return {"what": "cells out of sight"}
+    if kind == NPC:
+        what = kinds.get(status, f"person of look {status}")
+        return {"what": what, "color": COLORS[colour], "looking": directions[orientation]} | _gestures(
+            cell, directions
+        )
+    found = _types().get(kind)
+    if found is None:
+        return {"what": f"thing {kind}.{status}.{orientation}", "color": COLORS[colour]}
+    told = {"what": found.name.replace("_", " ")}
+    if found.name not in _SURFACES or colour != found.color:
+        told["color"] = COLORS[colour]
+    if len(found.states) > 1:
+        shown = {found.shown.get(i, (i, 0))[0]: state for i, state in enumerate(found.states)}
+        told["state"] = shown[status]
+    if status in found.rolls:
+        told["moving"] = COMPASS[orientation]
+    return told
+
+
+def phrase(told: Mapping[str, str]) -> str:
+    """Facts in a few words: `a closed red door`, `a blue guide, looking east, just turned left`."""
+    named = " ".join(told[key] for key in ("state", "color", "what") if key in told)
+    doing = [f"{key} {told[key]}" for key in ("looking", "moving", "pointing") if key in told]
+    doing += [told["last"]] if "last" in told else []
+    if told["what"].startswith("cells"):
+        return named
+    return ", ".join([f"{'an' if named[0] in 'aeiou' else 'a'} {named}", *doing])
+
+
+def _gestures(cell: Cell, directions: tuple[str, ...]) -> dict[str, str]:
+    """Where an NPC points and what it did last, where the picture shows gestures."""
+    if len(cell) == LOOKS or cell[LOOKS:] == (NO_GESTURE, NO_GESTURE):
+        return {}
+    gesture = gesture_shown(*cell[LOOKS:])
+    pointing = {} if gesture.pointing is None else {"pointing": directions[gesture.pointing]}
+    return pointing | {"last": _ACTS[gesture.act]}
+
+
+@cache
+def _types() -> dict[int, ObjectType]:
+    return {found.code: found for found in prelude().types.values()}

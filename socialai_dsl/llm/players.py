@@ -1,0 +1,328 @@
+"""Test episodes played by a model behind an endpoint: many at once, each kept on disk reply by reply."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import httpx
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.llm.actions import Mode, ToolCall
+from socialai_dsl.llm.endpoint import Answer, Endpoint, EndpointError, Usage
+from socialai_dsl.llm.episode import Episode, EpisodeResult, OnInvalid, Reply, Turn
+from socialai_dsl.llm.view import Style
+from socialai_dsl.program_suite import Playable
+
+FORMAT: Final = "socialai-transcript/1"
+_KEPT: Final = 4000
+"""So many characters of a reply are kept and shown to the model again."""
+
+
+@dataclass(frozen=True)
+class Manner:
+    """How a model plays.
+
+    Attributes:
+        style, mode, on_invalid, goal: see `Episode`.
+        history: how many observations a request holds, the present one included.
+        grammar: whether replies are held to a grammar, which llama.cpp's server understands.
+    """
+
+    style: Style = "prose"
+    mode: Mode = "text"
+    on_invalid: OnInvalid = "noop"
+    goal: str = ""
+    history: int = 16
+    grammar: bool = False
+
+    @property
+    def of_episodes(self) -> dict[str, Any]:
+        """The arguments of `Episode` among them."""
+        return {name: getattr(self, name) for name in ("style", "mode", "on_invalid", "goal")}
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What may be spent; None is no limit.
+
+    Attributes:
+        tokens: of prompts and completions. cost: in US dollars.
+    """
+
+    tokens: int | None = None
+    cost: float | None = None
+
+    def is_spent(self, usage: Usage) -> bool:
+        """Whether nothing is left."""
+        return (self.tokens is not None and usage.tokens >= self.tokens) or (
+            self.cost is not None and (usage.cost or 0.0) >= self.cost
+        )
+
+
+@dataclass(frozen=True)
+class PlayedEpisode:
+    """A test episode as far as it was played.
+
+    Attributes:
+        number: of the test episode.
+        result: how it went. actions: int64 (4,) each.
+        rules: how often each of the scenario's rules fired.
+        usage: what its replies took.
+    """
+
+    number: int
+    result: EpisodeResult
+    actions: list[NDArray[np.int64]]
+    rules: Mapping[str, int]
+    usage: Usage
+
+    @property
+    def ended(self) -> bool:
+        """Whether it was played to its end."""
+        return bool(self.result.ending)
+
+
+class OtherSettings(ValueError):  # noqa: N818 - it says what was found
+    """A folder holds episodes that were played otherwise than is asked for now."""
+
+
+def transcripts(folder: Path, settings: Mapping[str, Any]) -> Callable[[int], Path]:
+    """Where the transcript of each test episode goes; the folder is made.
+
+    Args:
+        folder: of the episodes of one scenario.
+        settings: all that decides what is played and how; the transcripts of a folder have it in common.
+
+    Raises:
+        OSError: the folder cannot be made, or read.
+        OtherSettings: it holds episodes with other settings.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "settings.json"
+    content = {"format": FORMAT, **settings}
+    if path.exists():
+        try:
+            found = json.loads(path.read_text(encoding="utf-8"))
+        except ValueError:
+            found = {}
+        other = sorted(key for key in {*content, *found} if content.get(key) != found.get(key))
+        if other:
+            raise OtherSettings(f"{folder} holds episodes that were played with another {', '.join(other)}")
+    else:
+        path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    return lambda number: folder / f"episode-{number:03d}.jsonl"
+
+
+class LanguageModelPlayer:
+    """Plays test episodes of one scenario, as many at once as asked for.
+
+    Every reply is on disk before it is played, so an episode goes on where it was stopped, and nothing is paid for
+    twice.
+
+    Args:
+        program: of a scenario or suite.
+        endpoint: which model is asked, and where.
+        manner: how it plays.
+        place: of the transcript of each episode, see `transcripts`.
+    """
+
+    def __init__(
+        self, program: Playable, endpoint: Endpoint, manner: Manner, place: Callable[[int], Path]
+    ) -> None:
+        self._program = program
+        self._endpoint = endpoint
+        self._manner = manner
+        self._place = place
+        self._spent = Usage()
+        self._answered = False
+
+    @property
+    def spent(self) -> Usage:
+        """What was spent by this player, without what earlier ones had spent."""
+        return self._spent
+
+    def play(
+        self,
+        episodes: int,
+        concurrency: int = 1,
+        budget: Budget | None = None,
+        progress: Callable[[PlayedEpisode], None] | None = None,
+    ) -> list[PlayedEpisode]:
+        """Play test episodes 0 to `episodes - 1`; those that were played already are read from their transcripts.
+
+        Args:
+            episodes: how many.
+            concurrency: how many are played at once.
+            budget: when it is spent, no further request is made; what is on the way is waited for.
+            progress: is told of each episode that is over, or was stopped because of the budget.
+
+        Raises:
+            EndpointError: the endpoint does not answer. What was played is kept.
+            OSError: a transcript cannot be read or written.
+        """
+        return asyncio.run(self._play(episodes, concurrency, budget or Budget(), progress))
+
+    async def _play(
+        self,
+        episodes: int,
+        concurrency: int,
+        budget: Budget,
+        progress: Callable[[PlayedEpisode], None] | None,
+    ) -> list[PlayedEpisode]:
+        waiting = iter(range(episodes))
+        played: list[PlayedEpisode] = []
+        failures: list[Exception] = []
+
+        async def work(client: httpx.AsyncClient) -> None:
+            episode = Episode(self._program, **self._manner.of_episodes)
+            try:
+                for number in waiting:
+                    conversation = Conversation(episode, self._manner, number, self._place(number))
+                    # After a failure the others play what they have asked for, which is paid for, and stop as well.
+                    while not (conversation.done or failures or budget.is_spent(self._spent)):
+                        conversation.add(await self._ask(client, conversation))
+                    played.append(conversation.played())
+                    if progress is not None:
+                        progress(played[-1])
+            except (EndpointError, OSError) as error:
+                failures.append(error)
+            finally:
+                episode.close()
+
+        async with self._endpoint.client() as client, asyncio.TaskGroup() as group:
+            for _ in range(min(concurrency, episodes)):
+                group.create_task(work(client))
+        if failures:
+            raise failures[0]
+        return sorted(played, key=lambda one: one.number)
+
+    async def _ask(self, client: httpx.AsyncClient, conversation: Conversation) -> Answer:
+        answer = await self._endpoint.ask(
+            client, conversation.messages(), conversation.constraints(), self._answered
+        )
+        self._answered = True
+        self._spent += answer.usage
+        return answer
+
+
+class Conversation:
+    """An episode, its transcript, and the messages that a model is sent.
+
+    Args:
+        episode: is reset, and played as far as the transcript goes.
+        manner: how the model plays.
+        number: of the test episode.
+        path: of the transcript, a line of JSON for each reply.
+
+    Raises:
+        OSError: the transcript cannot be read.
+    """
+
+    def __init__(self, episode: Episode, manner: Manner, number: int, path: Path) -> None:
+        self._episode = episode
+        self._manner = manner
+        self._number = number
+        self._path = path
+        self._usage = Usage()
+        self._before = episode.env.counters()["rules"]
+        self._text = episode.reset(test_episode=number)
+        self._exchanges: list[list[Mapping[str, Any]]] = []
+        self.done = False
+        for record in _records(path):
+            if self.done:
+                break
+            self._take(record)
+
+    def messages(self) -> list[Mapping[str, Any]]:
+        """The instructions, the last exchanges, and what is seen now."""
+        kept = self._exchanges[max(0, len(self._exchanges) - self._manner.history + 1) :]
+        return [
+            {"role": "system", "content": self._episode.instructions},
+            *(message for exchange in kept for message in exchange),
+            {"role": "user", "content": self._text},
+        ]
+
+    def constraints(self) -> dict[str, Any]:
+        """What a request says of the form of the reply."""
+        language = self._episode.language
+        if self._manner.mode == "tools":
+            return {"tools": language.tools()}
+        if self._manner.mode == "json":
+            schema = {"name": "action", "strict": True, "schema": language.json_schema()}
+            return {"response_format": {"type": "json_schema", "json_schema": schema}}
+        return {"grammar": language.gbnf()} if self._manner.grammar else {}
+
+    def add(self, answer: Answer) -> None:
+        """Write an answer down, then play it."""
+        record: dict[str, Any] = {"observation": self._text, "reply": answer.text[-_KEPT:]}
+        if self._manner.mode == "tools":
+            record["calls"] = [[call.name[:_KEPT], call.arguments[:_KEPT]] for _, call in answer.calls]
+        usage = answer.usage
+        record |= {"prompt_tokens": usage.prompt, "completion_tokens": usage.completion, "cost": usage.cost}
+        record |= {"estimated": True} if usage.estimated else {}
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        with open(self._path, "a", encoding="utf-8") as file:
+            file.write(json.dumps(record, ensure_ascii=False) + "\n")
+        self._take(record)
+
+    def played(self) -> PlayedEpisode:
+        """The episode as far as it was played."""
+        after = self._episode.env.counters()["rules"]
+        rules = {name: count - self._before.get(name, 0) for name, count in after.items()}
+        return PlayedEpisode(
+            self._number, self._episode.result(), list(self._episode.actions), rules, self._usage
+        )
+
+    def _take(self, record: Mapping[str, Any]) -> None:
+        """Play a reply, and remember what was said."""
+        calls = [ToolCall(*call) for call in record.get("calls", ())]
+        # Who answers in words where tools are asked for may name the action there.
+        reply: Reply = calls or record["reply"]
+        turn = self._episode.step(reply)
+        self._exchanges.append(_exchange(self._text, record["reply"], calls, turn))
+        self._text, self.done = turn.text, turn.done
+        self._usage += Usage(
+            record["prompt_tokens"],
+            record["completion_tokens"],
+            record["cost"],
+            record.get("estimated", False),
+        )
+
+
+def _exchange(text: str, reply: str, calls: list[ToolCall], turn: Turn) -> list[Mapping[str, Any]]:
+    """An observation and its reply as messages; a tool that was called has to be answered."""
+    asked = {"role": "user", "content": text}
+    if not calls:
+        return [asked, {"role": "assistant", "content": reply or "(nothing)"}]
+    named = [
+        {"id": f"call{n}", "type": "function", "function": {"name": call.name, "arguments": call.arguments}}
+        for n, call in enumerate(calls)
+    ]
+    told = "not understood" if turn.error else "done"
+    answers = [{"role": "tool", "tool_call_id": call["id"], "content": told} for call in named]
+    return [asked, {"role": "assistant", "content": reply or None, "tool_calls": named}, *answers]
+
+
+def _records(path: Path) -> Iterator[dict[str, Any]]:
+    """The replies of a transcript; what follows a line that was cut off is dropped from the file."""
+    try:
+        lines = path.read_bytes().split(b"\n")
+    except FileNotFoundError:
+        return
+    kept = 0
+    for line in lines[:-1]:
+        try:
+            record = json.loads(line)
+        except ValueError:
+            break
+        yield record
+        kept += len(line) + 1
+    if kept < sum(map(len, lines)) + len(lines) - 1:
+        with open(path, "r+b") as file:
+            file.truncate(kept)

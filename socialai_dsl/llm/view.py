@@ -1,0 +1,231 @@
+"""What the agent sees and hears, as text: no more and no less than its observation holds."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from typing import Any, Final, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.diagnostics import printable
+from socialai_dsl.llm.actions import ActionLanguage, Mode
+from socialai_dsl.llm.looks import (
+    COMPASS,
+    LOOKS,
+    RELATIVE,
+    Cell,
+    facts,
+    is_surface,
+    kinds_of,
+    phrase,
+)
+from socialai_dsl.program import VIEW, Flag, Header, Program
+from socialai_dsl.program_suite import Playable
+from socialai_dsl.render.grid import draw_ansi, letters
+from socialai_dsl.vocabulary import EMPTY, NPC, UNSEEN
+
+Style = Literal["prose", "grid", "json"]
+"""Sentences with places in steps, as in the SocialAI School; a picture of letters with a legend; JSON."""
+
+_OWN: Final = (VIEW // 2, VIEW - 1)
+_UP: Final = 3
+_REMEMBERED: Final = 4096
+
+Place = tuple[int, int]
+"""Steps ahead of the agent, and steps to its right; negative numbers lie to its left."""
+Area = tuple[int, int, int, int]
+"""Least and most steps ahead, least and most to the right."""
+
+
+class TextView:
+    """Puts observations into words.
+
+    The text depends on the observation and on what was heard alone, and observations that differ have texts that
+    differ; so a language model perceives what a trained agent perceives.
+
+    Args:
+        program: of a scenario or suite.
+        style: how what is seen is written.
+
+    Raises:
+        ValueError: there is no such style.
+    """
+
+    def __init__(self, program: Playable, style: Style = "prose") -> None:
+        if style not in get_args(Style):
+            raise ValueError(f"style: got {style!r}, expected one of {', '.join(get_args(Style))}")
+        self._style = style
+        self._members = _members(program)
+        self._kinds = kinds_of(list(self._members.values()))
+        self._language = ActionLanguage(program)
+        self._described = lru_cache(_REMEMBERED)(self._describe)
+
+    def instructions(self, mode: Mode = "text", goal: str = "") -> str:
+        """What there is to see, to do and to say, and how to reply; nothing of what solves the scenario.
+
+        Args:
+            mode: how actions are given, see `ActionLanguage`.
+            goal: what to say of the aim. Trained agents are told nothing of it, and nothing is the default.
+        """
+        turns = max(program.header(Header.HORIZON) for program in self._members.values())
+        aim = goal or "Find out from what you see and hear what there is to do, and do it in few turns."
+        return "\n\n".join(
+            (
+                "You are in a room of square cells, in which there may be others. Every turn you are told what you "
+                "see and hear, and you reply with what you do and say.",
+                self._explanation(),
+                self._language.instructions(mode),
+                f"An episode lasts {turns} turns at most. {aim}",
+            )
+        )
+
+    def observe(self, observation: Mapping[str, NDArray[Any]], info: Mapping[str, Any]) -> str:
+        """What the agent sees and hears now.
+
+        Args:
+            observation: of the environment; `image` is uint8 (7, 7, 4), or (7, 7, 6) with gestures.
+            info: of the same step; `utterance` holds the lines that were heard, or "NA".
+        """
+        image = observation["image"]
+        seen = self._described(image.tobytes(), image.shape[-1], self._directions(info))
+        utterance = info["utterance"]
+        heard = [] if utterance == "NA" else [printable(line) for line in utterance.split("\n")]
+        if self._style == "json":
+            return f'{seen[:-1]}, "heard": {json.dumps(heard, ensure_ascii=False)}}}'
+        return "\n".join(
+            [seen, "You hear:", *(f"- {line}" for line in heard)] if heard else [seen, "You hear nothing."]
+        )
+
+    def _explanation(self) -> str:
+        """How to read what is seen."""
+        blocked = any(program.header(Header.FLAGS) & Flag.OCCLUSION for program in self._members.values())
+        egocentric = {_is_egocentric(program) for program in self._members.values()}
+        parts = [
+            f"You see the cells up to {VIEW - 1} steps ahead of you and up to {VIEW // 2} steps to your left and "
+            f"right{', as far as nothing blocks your sight' if blocked else ''}."
+        ]
+        if True in egocentric:
+            parts.append("Directions of others are given as seen from you.")
+        if False in egocentric:
+            parts.append("Directions of others are those of a compass; your own is not given.")
+        if self._style == "grid":
+            parts.append(
+                "The picture has two characters for each cell; you are the arrow in the middle of the lowest row and "
+                "look up. ' .' is an empty cell and '  ' one out of your sight; below, the others are explained."
+            )
+        elif self._style == "json":
+            parts.append(
+                'Places are counted in steps, "ahead" of you and to your "right", negative to your left. An area is '
+                "[least ahead, most ahead, least right, most right]. All other cells are empty."
+            )
+        else:
+            parts.append("All other cells are empty.")
+        return " ".join(parts)
+
+    def _directions(self, info: Mapping[str, Any]) -> tuple[str, ...]:
+        """The words for directions of NPCs; only the members of a mixed suite differ in them."""
+        egocentric = {_is_egocentric(program) for program in self._members.values()}
+        if len(egocentric) > 1:
+            egocentric = {_is_egocentric(self._members[info["member"]])}
+        return RELATIVE if True in egocentric else COMPASS
+
+    def _describe(self, data: bytes, channels: int, directions: tuple[str, ...]) -> str:
+        """What is seen in an image, given as bytes because its text is remembered."""
+        image = np.frombuffer(data, np.uint8).reshape(VIEW, VIEW, channels)
+        seen: dict[Place, Cell] = {}
+        for across, along in np.ndindex(VIEW, VIEW):
+            cell = tuple(image[across, along].tolist())
+            if (across, along) != _OWN and cell[0] != EMPTY:
+                seen[VIEW - 1 - along, across - VIEW // 2] = cell
+        told = {cell: facts(cell, self._kinds, directions) for cell in seen.values()}
+        if self._style == "grid":
+            return _picture(image, seen, told, directions)
+        places = sorted((p for p, cell in seen.items() if not is_surface(cell)), key=_nearness)
+        surfaces = sorted({cell for cell in seen.values() if is_surface(cell)}, reverse=True)
+        areas = {cell: _areas(place for place, found in seen.items() if found == cell) for cell in surfaces}
+        if self._style == "json":
+            things = [told[seen[place]] | {"ahead": place[0], "right": place[1]} for place in places]
+            covered = [told[cell] | {"areas": areas[cell]} for cell in surfaces]
+            return json.dumps({"seen": things, "covered": covered}, ensure_ascii=False)
+        lines = [f"- {_where(place)}: {phrase(told[seen[place]])}" for place in places]
+        lines += [f"- {phrase(told[cell])}: {'; '.join(map(_extent, areas[cell]))}" for cell in surfaces]
+        return "\n".join(["You see:", *lines]) if lines else "You see nothing but empty cells."
+
+
+def _members(program: Playable) -> dict[str | None, Program]:
+    """The programs of a suite by the member's name; None is one that plays alone."""
+    if isinstance(program, Program):
+        return {None: program}
+    return dict(zip(program.members, program.programs, strict=True))
+
+
+def _is_egocentric(program: Program) -> bool:
+    return bool(program.header(Header.FLAGS) & Flag.EGOCENTRIC)
+
+
+def _picture(
+    image: NDArray[np.uint8],
+    seen: Mapping[Place, Cell],
+    told: Mapping[Cell, Mapping[str, str]],
+    directions: tuple[str, ...],
+) -> str:
+    """Letters, and below them what each stands for; of people also where they are, since their letters say less."""
+    codes = np.ascontiguousarray(image[..., :LOOKS].transpose(1, 0, 2))
+    if directions == RELATIVE:
+        people = codes[..., 0] == NPC
+        codes[people, 3] = (codes[people, 3] + 1) % 4  # arrows as they are on the page
+    legend: dict[str, None] = {}
+    for place in sorted(seen, key=_nearness):
+        cell = seen[place]
+        if cell[0] != UNSEEN:
+            look = letters(codes, VIEW - 1 - place[0], place[1] + VIEW // 2)
+            where = f", {_where(place)}" if cell[0] == NPC else ""
+            legend[f"{look} {phrase(told[cell])}{where}"] = None
+    return "\n".join(["You see:", draw_ansi(codes, (*_OWN, _UP)), *legend])
+
+
+def _nearness(place: Place) -> tuple[int, Place]:
+    return place[0] + abs(place[1]), place
+
+
+def _areas(places: Iterable[Place]) -> list[Area]:
+    """Rectangles that cover the places, each place once: as long as can be, then as deep."""
+    left, found = set(places), []
+    for ahead, right in sorted(left):
+        if (ahead, right) not in left:
+            continue
+        last = right
+        while (ahead, last + 1) in left:
+            last += 1
+        row, deep = range(right, last + 1), ahead
+        while all((deep + 1, column) in left for column in row):
+            deep += 1
+        left -= {(line, column) for line in range(ahead, deep + 1) for column in row}
+        found.append((ahead, deep, right, last))
+    return found
+
+
+def _where(place: Place) -> str:
+    ahead, right = place
+    parts = [f"{_steps(ahead)} ahead"] if ahead else []
+    if right:
+        parts.append(f"{_steps(abs(right))} to the {'right' if right > 0 else 'left'}")
+    return " and ".join(parts)
+
+
+def _extent(area: Area) -> str:
+    """`2 to 6 ahead, from 3 left to 1 right`."""
+    near, far, left, right = area
+    ahead = f"{near} ahead" if near == far else f"{near} to {far} ahead"
+    return f"{ahead}, {_side(left)}" if left == right else f"{ahead}, from {_side(left)} to {_side(right)}"
+
+
+def _side(right: int) -> str:
+    return f"{abs(right)} {'right' if right > 0 else 'left'}" if right else "straight ahead"
+
+
+def _steps(count: int) -> str:
+    return "1 step" if count == 1 else f"{count} steps"

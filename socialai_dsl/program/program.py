@@ -1,0 +1,302 @@
+"""A compiled scenario: its words, what the scenario calls them, and how it reads as text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from hashlib import sha256
+
+import numpy as np
+import numpy.typing as npt
+
+from socialai_dsl.program.format import (
+    CELL,
+    CONSTANT,
+    ENTITY_FIELDS,
+    FIRST_ENTITY,
+    TEMPORARY,
+    EntityColumn,
+    Field,
+    FrameColumn,
+    Header,
+    LineColumn,
+    Register,
+    TypeColumn,
+    room_words,
+)
+from socialai_dsl.program.instructions import TABLE, Kind, Op
+from socialai_dsl.source import Span
+from socialai_dsl.vocabulary import ACTIONS
+
+_AS_WRITTEN = frozenset((Kind.LITERAL, Kind.SITE, Kind.BOARD, Kind.FILLED, Kind.CHANGED))
+"""Operands whose word is shown as it is."""
+
+_ENTRIES = {
+    Header.RESET_PC: "reset",
+    Header.REQUIRE_PC: "require",
+    Header.BEFORE_PC: "before",
+    Header.LINKS_PC: "links",
+    Header.SETTLE_PC: "settle",
+    Header.RULES_PC: "rules",
+    Header.TICK_PC: "tick",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class EntityName:
+    """How the scenario calls an entity. `key` is the cast member's or object's name, `index` its place in a group."""
+
+    key: str
+    index: int | None
+    role: str  # agent, npc or object
+    type: str  # object type, or the NPC's kind
+    states: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return self.key if self.index is None else f"{self.key}[{self.index}]"
+
+
+@dataclass(frozen=True, slots=True)
+class RegisterName:
+    """How the scenario calls a register of its own, and what its numbers mean.
+
+    Attributes:
+        path: address in a layout: `let.exit`, `wizard.frame`, `wizard.clock`, `wizard.name`, `jill.goal`,
+            `teacher.one_of`, `switches[0].initial`; an element of a sequence or memory is `let.dance[0].move` and
+            `let.dance[0].utterance`; how many a memory holds is `memory.attempt.filled`.
+        register: its number.
+        values: word of each value from `low` on; empty for plain numbers.
+        low, high: range of its values.
+        kind: what its values are: int, bool, color, direction, action, entity (by number), text, noun, status,
+            utterance (0 silence, else 1 + template * nouns + noun), cell (CELL + 32 * y + x).
+        fleeting: whether it tells nothing between steps: it is written in every step before it is read, follows
+            from the others, or only saves work.
+    """
+
+    path: str
+    register: int
+    values: tuple[str, ...] = ()
+    low: int = 0
+    high: int = 0
+    kind: str = "int"
+    fleeting: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """One way an episode ends: `name` is the outcome's id, else `success@46` (line of the file)."""
+
+    name: str
+    success: bool
+    span: Span | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A compiled scenario: integers for the engine, names for people.
+
+    Attributes:
+        words: int32 (Header.SIZE,), see the module's docstring. Never changed.
+        name: canonical name of the scenario with its variants.
+        actions, templates, nouns: words of the agent's action, in order of index.
+        entities: by number. registers: the program's own. lines: text of each line, as heard.
+        outcomes: by index; the last two are `deadly` and `timeout`. rules: name of each counted rule.
+        vocabulary: token id -> word; 0 pads, 1 is unknown.
+        source_map: one span (or None) for each instruction. labels: pc -> what starts there.
+    """
+
+    words: npt.NDArray[np.int32]
+    name: str
+    actions: tuple[str, ...]
+    templates: tuple[str, ...]
+    nouns: tuple[str, ...]
+    entities: tuple[EntityName, ...]
+    registers: tuple[RegisterName, ...]
+    lines: tuple[str, ...]
+    outcome_table: tuple[Outcome, ...]
+    rules: tuple[str, ...]
+    vocabulary: tuple[str, ...]
+    source_map: Sequence[Span | None] = field(repr=False)
+    labels: Mapping[int, str] = field(repr=False)
+
+    def header(self, word: Header) -> int:
+        """One word of the header."""
+        return int(self.words[word])
+
+    @cached_property
+    def outcomes(self) -> list[str]:
+        """Names of the ways an episode can end, by index."""
+        return [outcome.name for outcome in self.outcome_table]
+
+    @cached_property
+    def sha256(self) -> str:
+        """Digest of everything that decides what an environment does and shows."""
+        digest = sha256(self.words.tobytes())
+        for texts in (self.actions, self.templates, self.nouns, self.lines, self.outcomes, self.vocabulary):
+            digest.update("\x1f".join(texts).encode())
+            digest.update(b"\x1e")
+        return digest.hexdigest()
+
+    @property
+    def code(self) -> npt.NDArray[np.int32]:
+        """The instructions, int32 (I, 4)."""
+        return self.table(Header.CODE_AT)
+
+    def shape(self, table: Header) -> tuple[int, int]:
+        """Rows and columns of the table that a word of the header is the offset of, such as `Header.FRAME_AT`."""
+        h = self.header
+        width, height = h(Header.CANVAS_WIDTH), h(Header.CANVAS_HEIGHT)
+        return {
+            Header.CODE_AT: (h(Header.INSTRUCTIONS), 4),
+            Header.ACTION_AT: (h(Header.PRIMITIVES) + 1, 1),
+            Header.CLASS_AT: (h(Header.TEMPLATES), h(Header.NOUNS)),
+            Header.ENTITY_AT: (h(Header.ENTITIES), int(EntityColumn.COLUMNS)),
+            Header.TYPE_AT: (h(Header.TYPE_ROWS), int(TypeColumn.COLUMNS)),
+            Header.ROOM_AT: (h(Header.HEIGHTS), room_words(width, height)),
+            Header.FRAME_AT: (h(Header.FRAMES), int(FrameColumn.COLUMNS)),
+            Header.STATE_AT: (h(Header.STATES), 1 + 2 * (h(Header.CLASSES) + 1)),
+            Header.OUTCOME_AT: (h(Header.CLASSES), len(ACTIONS)),
+            Header.LINE_AT: (h(Header.LINES), int(LineColumn.COLUMNS)),
+            Header.SITE_AT: (h(Header.SITES), 2),
+            Header.CLASS_SET_AT: (h(Header.CLASS_SETS), h(Header.CLASS_SET_WORDS)),
+        }[table]
+
+    def table(self, table: Header) -> npt.NDArray[np.int32]:
+        """A table as a view of the words, int32 (rows, columns); see `EntityColumn` and its kin for the columns."""
+        start, (rows, columns) = self.header(table), self.shape(table)
+        return self.words[start : start + rows * columns].reshape(rows, columns)
+
+    def listing(self) -> str:
+        """The program as text: sizes, one instruction a line with file:line and a heading for each block, tables."""
+        return "\n".join([*_head(self), "", *_code(self), "", *_tables(self)]) + "\n"
+
+
+# -- as text ----------------------------------------------------------------------------------------------------
+
+
+def _head(program: Program) -> list[str]:
+    h = program.header
+    return [
+        f"program {program.name}",
+        f"  {h(Header.SIZE)} words, {h(Header.REGISTERS)} registers, {h(Header.INSTRUCTIONS)} instructions, "
+        f"{h(Header.CLASSES)} utterance classes, {h(Header.LINES)} lines, history of {h(Header.TOKENS)} tokens",
+        f"  canvas {h(Header.CANVAS_WIDTH)}x{h(Header.CANVAS_HEIGHT)}, horizon {h(Header.HORIZON)}",
+        "  " + ", ".join(f"{name} at {h(word)}" for word, name in _ENTRIES.items() if h(word)),
+    ]
+
+
+def _code(program: Program) -> list[str]:
+    names = _Names(program)
+    rows = []
+    for pc, ((op, *operands), span) in enumerate(zip(program.code.tolist(), program.source_map, strict=True)):
+        if pc in program.labels:
+            rows += ["", f"{program.labels[pc]}:"]
+        text = f"{pc:5d}  {Op(op).name:<16}{names.operands(Op(op), pc, operands)}"
+        place = f"{_short(span.file)}:{span.line}" if span else ""
+        rows.append(f"{text:<66}  {place}".rstrip())
+    return rows
+
+
+def _short(file: str) -> str:
+    return file.rsplit("/", 1)[-1]
+
+
+def _tables(program: Program) -> list[str]:
+    return [
+        "frames:",
+        *_frames(program),
+        "lines:",
+        *(f"{number:5d}  {text}" for number, text in enumerate(program.lines)),
+        "outcomes:",
+        *(f"{number:5d}  {name}" for number, name in enumerate(program.outcomes)),
+        "vocabulary:",
+        "       " + " ".join(program.vocabulary),
+    ]
+
+
+def _frames(program: Program) -> list[str]:
+    """Each state with the addresses of its activity, its `first` and its `then`, by class of utterance heard."""
+    classes = program.header(Header.CLASSES) + 1
+    states = program.table(Header.STATE_AT).tolist()
+    rows = []
+    for frame in program.table(Header.FRAME_AT).tolist():
+        entity, first = frame[FrameColumn.ENTITY], frame[FrameColumn.ROWS]
+        shared = {"perceive": FrameColumn.PERCEIVE, "deferred": FrameColumn.DEFERRED}
+        rows += [
+            f"       {program.entities[entity]}: {name} {frame[column]}"
+            for name, column in shared.items()
+            if frame[column]
+        ]
+        register = next(n for n in program.registers if n.register == frame[FrameColumn.STATE])
+        for k in range(frame[FrameColumn.STATES]):
+            activity, *rest = states[first + k]
+            rows.append(
+                f"       {program.entities[entity]}.{register.values[k]}: do {activity}, "
+                f"first {rest[:classes]}, then {rest[classes:]}"
+            )
+    return rows
+
+
+class _Names:
+    """Operands in the scenario's own words."""
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self.registers = {int(register): register.name.lower() for register in Register}
+        for number, entity in enumerate(program.entities):
+            for which in Field:
+                self.registers[FIRST_ENTITY + ENTITY_FIELDS * number + which] = (
+                    f"{entity}.{which.name.lower()}"
+                )
+        self.registers |= {name.register: name.path for name in program.registers}
+
+    def operands(self, op: Op, pc: int, words: list[int]) -> str:
+        """The operands of one instruction; skips as the address they lead to."""
+        entry = TABLE[op]
+        shown = [
+            self._operand(op, position, word, words[1])
+            for position, word in enumerate(words)
+            if entry.operands[position].kind not in (Kind.UNUSED, Kind.SKIP)
+        ]
+        if entry.skips:
+            shown.append(f"-> {pc + 1 + words[2]}")
+        return ", ".join(shown)
+
+    def _operand(self, op: Op, position: int, word: int, count: int) -> str:
+        operand = TABLE[op].operands[position]
+        match operand.meaning:
+            case "rule":
+                return self.program.rules[word]
+            case "outcome":
+                return self.program.outcomes[word]
+            case "goal":
+                return _goal(word)
+            case "field":
+                return Field(word).name.lower()
+            case "first and last entity":
+                return f"{self._place(word >> 8)}..{self._place(word & 255)}"
+            case "packed":
+                return f"{word >> 16 & 255}..{(word >> 16 & 255) + (word >> 24) - 1}, {word & 65535}"
+            case "actions":
+                return "|".join(ACTIONS[word >> 4 * k & 15] for k in range(count))
+        if operand.kind in _AS_WRITTEN:
+            return str(word)
+        if word >= CONSTANT // 2:
+            value = word - CONSTANT
+            is_place = operand.kind in (Kind.ENTITY, Kind.PLACE)
+            return self._place(value) if is_place else f"#{value}"
+        if word >= TEMPORARY:
+            return f"%{word - TEMPORARY}"
+        return self.registers.get(word, f"r{word}")
+
+    def _place(self, number: int) -> str:
+        """An entity by its name, a cell by its coordinates."""
+        if number < CELL:
+            return str(self.program.entities[number])
+        return f"({(number - CELL) % 32}, {(number - CELL) // 32})"
+
+
+def _goal(word: int) -> str:
+    """Where an answer goes: frame and state, as a GOTO shows them."""
+    return f"{word >> 8}, {(word & 255) - 1}" if word else "0"

@@ -1,0 +1,6 @@
+"""Episodes for people to look at: the trace of a played episode, and the page that shows it."""
+
+from socialai_dsl.replay.document import FORMAT, Thought, Trace, trace_schema
+from socialai_dsl.replay.tracing import Tracer, trace_of
+
+__all__ = ["FORMAT", "Thought", "Trace", "Tracer", "trace_of", "trace_schema"]

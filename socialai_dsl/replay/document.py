@@ -1,0 +1,193 @@
+"""The trace format `socialai-trace/1`: everything that is shown of one episode, as JSON.
+
+A trace is small because it repeats nothing: cells, reasons and rules are numbered, and a moment says what differs
+from the moment before it. `static/trace.js` is the reader.
+"""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from socialai_dsl.replay.page import replay_page
+
+FORMAT: Final = "socialai-trace/1"
+
+_Number = Annotated[int, Field(ge=0)]
+_Code = Annotated[int, Field(ge=0, le=255)]
+Direction = Annotated[int, Field(ge=0, le=3)]
+"""0 right, 1 down, 2 left, 3 up."""
+Look = tuple[_Code, _Code, _Code, _Code]
+"""Type, colour, status and orientation of a cell, as in the observation."""
+Gesture = tuple[_Number, Annotated[int, Field(ge=-1, le=3)], str]
+"""Cell, direction in which the NPC there points (-1: none), and what it did last."""
+
+
+class _Part(BaseModel):
+    """What is left out has its default."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Line(_Part):
+    """Something that the agent heard.
+
+    Attributes:
+        text: what was said. name: who said it, as the agent hears it; empty where the scenario hides names.
+        who: the same as a member of the cast; None if that cannot be told.
+    """
+
+    text: str
+    name: str = ""
+    who: str | None = None
+
+
+class Rule(_Part):
+    """A rule of the scenario's file.
+
+    Attributes:
+        who: a member of the cast, `world` or `outcome`. kind: rule, step, world rule or outcome.
+        state, list: of a rule in a frame, where it stands.
+        name: what counts of rules call it. at: `file:line`. words: how it is written.
+    """
+
+    who: str
+    kind: str
+    state: str | None = None
+    list: str | None = None
+    name: str
+    at: str
+    words: str
+
+
+class Member(_Part):
+    """A member of the cast.
+
+    Attributes:
+        key: what the scenario's file calls it. name: what the agent hears it called. look: its face, looking down.
+    """
+
+    key: str
+    name: str
+    look: Look
+
+
+class Outcome(_Part):
+    """How an episode ended: the outcome's name, whether it is a success, and what the file says there."""
+
+    name: str
+    success: bool
+    text: str
+
+
+class Thought(_Part):
+    """What a trained agent made of a moment.
+
+    Attributes:
+        probabilities: of each choice of each head: body action, speak or not, template, noun.
+        value: the return that it expects from here on; None if it estimates none.
+    """
+
+    probabilities: list[list[float]]
+    value: float | None = None
+
+
+class Moment(_Part):
+    """The room after a step, or before the first one.
+
+    Cells are numbered row by row. `member`, `cast`, `room`, `view` and what is not in `cells` and `state` are as in the
+    moment before it where they are left out.
+
+    Attributes:
+        t: number of the step, 0 before the first one.
+        member: of a suite, what is played from here on. cast: the NPCs, where they are others.
+        room: width and height, where it is another room; then `cells` has every cell.
+        cells: pairs of a cell and the number of its look.
+        agent: x, y and direction.
+        below: pairs of a cell where an NPC stands and the number of the look of the object there.
+        gestures: what NPCs show.
+        view: the agent's own view, 7 rows of 7 numbers of looks; the agent stands in the middle of the last row and
+            looks up.
+        view_gestures: what NPCs in it show.
+        state: values that differ, by address: `wizard.state`, `doors[1].color`, `let.exit`.
+        action: body action, speak, template, noun; None before the first step. did: the body action's word.
+        said: the agent's utterance, None in silence. heard: lines.
+        reward: of the step.
+        fired: numbers of rules. others: pairs of a rule that was asked and did not fire, and the number of its reason.
+        thought: what the agent made of the moment before, from which its action was chosen.
+        ended: how the episode ended in this step.
+    """
+
+    t: _Number
+    member: str | None = None
+    cast: list[Member] | None = None
+    room: tuple[_Number, _Number] | None = None
+    cells: list[tuple[_Number, _Number]] = []
+    agent: tuple[int, int, Direction]
+    below: list[tuple[_Number, _Number]] = []
+    gestures: list[Gesture] = []
+    view: list[_Number] | None = None
+    view_gestures: list[Gesture] = []
+    state: dict[str, Any] = {}
+    action: tuple[_Number, _Number, _Number, _Number] | None = None
+    did: str | None = None
+    said: str | None = None
+    heard: list[Line] = []
+    reward: float = 0.0
+    fired: list[_Number] = []
+    others: list[tuple[_Number, _Number]] = []
+    thought: Thought | None = None
+    ended: Outcome | None = None
+
+
+class Trace(_Part):
+    """One episode.
+
+    Attributes:
+        format: the version of this format.
+        scenario: as it was asked for. about: what its file says of it.
+        agent: who played. episode: which one it was, in words.
+        actions, templates, nouns: the words of the agent's choices; one more action is no movement.
+        looks, texts, rules: what moments refer to by number.
+        moments: the room before the first step and after each step.
+    """
+
+    format: Literal["socialai-trace/1"] = FORMAT
+    scenario: str
+    about: str = ""
+    agent: str
+    episode: str
+    actions: list[str]
+    templates: list[str]
+    nouns: list[str]
+    looks: list[Look] = []
+    texts: list[str] = []
+    rules: list[Rule] = []
+    moments: list[Moment] = []
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether the episode ended in success."""
+        ended = self.moments[-1].ended
+        return ended is not None and ended.success
+
+    def as_json(self) -> str:
+        """The trace as one line of JSON, without what has its default."""
+        return self.model_dump_json(exclude_defaults=True)[:-1] + f',"format":"{FORMAT}"}}'
+
+    def _repr_html_(self) -> str:
+        """The episode as a notebook shows it: a frame that holds the page of a replay."""
+        page = escape(replay_page([self]))
+        return f'<iframe title="an episode" style="width: 100%; height: 760px; border: 0" srcdoc="{page}"></iframe>'
+
+
+def trace_schema() -> dict[str, Any]:
+    """The JSON Schema of the format."""
+    schema = Trace.model_json_schema()
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "required": [*schema.pop("required"), "format"],
+        **schema,
+    }

@@ -1,0 +1,52 @@
+"""What was done and heard in a step, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.program_suite import Playable
+from socialai_dsl.render.panel import DialogueLine
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of an episode, in words.
+
+    Attributes:
+        t: counted from 1.
+        action: the primitive's name, "none" where the agent did not move.
+        said: the agent's utterance, None if it was silent.
+        heard: lines `Name: text`, in the order spoken.
+    """
+
+    t: int
+    action: str
+    said: str | None
+    heard: tuple[str, ...]
+
+    @property
+    def dialogue(self) -> list[DialogueLine]:
+        """What was said in this step, the agent first."""
+        own = [DialogueLine(self.t, "You", self.said)] if self.said is not None else []
+        return own + [heard_line(self.t, line) for line in self.heard]
+
+
+def describe_step(
+    program: Playable, action: Sequence[int] | NDArray[np.int64], t: int, utterance: str
+) -> Step:
+    """Put an action and what was heard into words."""
+    primitive, speaks, template, noun = (int(part) for part in action)
+    words = [*program.actions, "none"]
+    said = program.templates[template].replace("<noun>", program.nouns[noun]) if speaks else None
+    heard = () if utterance == "NA" else tuple(utterance.splitlines())
+    return Step(t, words[primitive], said, heard)
+
+
+def heard_line(t: int, line: str) -> DialogueLine:
+    """A line that was heard, `Name: text`, by its parts."""
+    name, separator, text = line.partition(": ")
+    return DialogueLine(t, name, text) if separator else DialogueLine(t, "", line)

@@ -1,0 +1,262 @@
+"""From a played episode to its trace."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.envs.view import View
+from socialai_dsl.program import Flag, Header, Program
+from socialai_dsl.program_suite import outcome_name
+from socialai_dsl.render.gestures import Gesture
+from socialai_dsl.replay import document
+from socialai_dsl.replay.document import Line, Member, Moment, Outcome, Rule, Thought, Trace
+from socialai_dsl.replay.state import leaves, played
+from socialai_dsl.replay.steps import describe_step, heard_line
+from socialai_dsl.semantics.terms import Const
+from socialai_dsl.vocabulary import DIRECTIONS
+
+Action = NDArray[np.int64]
+Think = Callable[[Mapping[str, NDArray[Any]]], Thought | None]
+"""What an agent makes of an observation; asked in each moment before a step, in order."""
+
+
+def trace_of(
+    env: Any,
+    actions: Iterable[Action],
+    reset: Mapping[str, Any],
+    *,
+    scenario: str,
+    agent: str,
+    episode: str,
+    endings: Mapping[str, str] | None = None,
+    about: str = "",
+    think: Think | None = None,
+) -> Trace:
+    """Play an episode with given actions, and trace it.
+
+    Since episodes replay exactly, a seed or a test episode and the actions are a complete record of any episode.
+
+    Args:
+        env: of the scenario, as `socialai_dsl.make` returns it.
+        actions: int64 (4,) each; those after the end of the episode are left out.
+        reset: arguments of `env.reset`.
+        scenario: as it was asked for.
+        agent: who chose the actions.
+        episode: which one it is, in words.
+        endings: outcome -> what the scenario's file says there; by default its name.
+        about: what the file says of the scenario.
+        think: what the agent makes of each observation, for a trained one.
+
+    Raises:
+        ValueError: there is no such episode, or an action is not of its space.
+    """
+    observation, info = env.reset(**reset)
+    tracer = Tracer(env, scenario, agent, endings or {}, about)
+    tracer.begin(episode, observation, info)
+    for action in actions:
+        thought = think(observation) if think is not None else None
+        observation, *result = env.step(action)
+        if tracer.step(action, observation, *result, thought=thought).ended is not None:
+            break
+    return tracer.trace()
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What a moment was like, to which the next one is compared."""
+
+    member: str | None
+    cast: list[Member]
+    room: tuple[int, int]
+    cells: list[int]
+    view: list[int]
+    state: dict[str, Any]
+
+
+class Tracer:
+    """Makes the trace of an episode while it is played; a step can be taken back.
+
+    Args:
+        env: in which the episode is played.
+        scenario, agent, about: see `Trace`.
+        endings: outcome -> what the scenario's file says there.
+    """
+
+    def __init__(
+        self, env: Any, scenario: str, agent: str, endings: Mapping[str, str], about: str = ""
+    ) -> None:
+        self._env, self._program = env.unwrapped, env.unwrapped.program
+        self._scenario, self.agent, self._endings, self._about = scenario, agent, endings, about
+        self._looks: dict[tuple[int, int, int, int], int] = {}
+        self._texts: dict[str, int] = {}
+        self._rules: dict[Rule, int] = {}
+        self._seen: list[_Seen] = []
+        self.moments: list[Moment] = []
+        self._episode = ""
+
+    def begin(self, episode: str, observation: Mapping[str, NDArray[Any]], info: Mapping[str, Any]) -> Moment:
+        """The moment after `env.reset`, which returned these; `episode` says in words which one it is."""
+        self._episode, self._seen, self.moments = episode, [], []
+        return self._add(observation, info)
+
+    def step(
+        self,
+        action: Sequence[int] | Action,
+        observation: Mapping[str, NDArray[Any]],
+        reward: float,
+        terminated: bool,
+        truncated: bool,
+        info: Mapping[str, Any],
+        *,
+        thought: Thought | None = None,
+    ) -> Moment:
+        """The moment after `env.step`, which returned these."""
+        step = describe_step(self._program, action, len(self.moments), info["utterance"])
+        explained = self._env.explain()
+        called = [member.name for member in self._seen[-1].cast]
+        names = {m.name: m.key for m in self._seen[-1].cast if called.count(m.name) == 1}
+        heard = [heard_line(step.t, line) for line in step.heard]
+        return self._add(
+            observation,
+            info,
+            action=tuple(int(part) for part in action),
+            did=step.action,
+            said=step.said,
+            heard=[Line(text=line.text, name=line.speaker, who=names.get(line.speaker)) for line in heard],
+            reward=round(float(reward), 6),
+            fired=[self._rule(entry) for entry in explained["fired"]],
+            others=[(self._rule(entry), _number(self._texts, entry["why"])) for entry in explained["others"]],
+            thought=thought,
+            ended=self._outcome(info) if terminated or truncated else None,
+        )
+
+    def back(self) -> None:
+        """Take the last step back."""
+        self.moments.pop()
+        self._seen.pop()
+
+    def trace(self, since: Marks | None = None) -> Trace:
+        """The trace so far.
+
+        Args:
+            since: leave out the numbered things and moments that there were at that time; `marks` tells them.
+        """
+        looks, texts, rules, moments = since or (0, 0, 0, 0)
+        program = self._program
+        return Trace(
+            scenario=self._scenario,
+            about=self._about,
+            agent=self.agent,
+            episode=self._episode,
+            actions=list(program.actions),
+            templates=list(program.templates),
+            nouns=list(program.nouns),
+            looks=list(self._looks)[looks:],
+            texts=list(self._texts)[texts:],
+            rules=list(self._rules)[rules:],
+            moments=self.moments[moments:],
+        )
+
+    def marks(self) -> Marks:
+        """How many looks, texts, rules and moments there are."""
+        return len(self._looks), len(self._texts), len(self._rules), len(self.moments)
+
+    def _add(self, observation: Mapping[str, NDArray[Any]], info: Mapping[str, Any], **more: Any) -> Moment:
+        """Add a moment, with what differs from the one before it."""
+        scene, described = self._env.scene(), self._env.describe()
+        height, width = scene.codes.shape[:2]
+        view = self._view(observation["image"], described, info)
+        seen = _Seen(
+            info.get("member"),
+            self._cast(described),
+            (width, height),
+            self._numbers(scene.codes),
+            self._numbers(view.codes),
+            leaves(described),
+        )
+        before = self._seen[-1] if self._seen else None
+        moment = Moment(
+            t=len(self.moments),
+            agent=scene.agent,
+            below=[(y * width + x, self._look(code)) for (x, y), code in scene.below.items()],
+            gestures=_gestures(scene.gestures, width),
+            view_gestures=_gestures(view.gestures, view.codes.shape[1]),
+            **_differences(before, seen),
+            **more,
+        )
+        self._seen.append(seen)
+        self.moments.append(moment)
+        return moment
+
+    def _view(self, image: NDArray[np.uint8], described: Mapping[str, Any], info: Mapping[str, Any]) -> View:
+        egocentric = bool(self._playing(info.get("member")).header(Header.FLAGS) & Flag.EGOCENTRIC)
+        return View(image, DIRECTIONS.index(described["agent"]["facing"]), egocentric)
+
+    def _cast(self, described: Mapping[str, Any]) -> list[Member]:
+        """The NPCs, with the names by which they are heard."""
+        names = {(entity.key, entity.index): entity.name for entity in self._env.scenario.entities}
+        members = []
+        for entity, look in self._env.looks_of_npcs().items():
+            found = described[entity.key] if entity.index is None else described[entity.key][entity.index]
+            term = names[entity.key, entity.index]
+            fixed = term.type.words[term.value - term.type.low] if isinstance(term, Const) else str(entity)
+            members.append(Member(key=str(entity), name=found.get("name", fixed), look=look))
+        return members
+
+    def _playing(self, member: str | None) -> Program:
+        return played(self._program, {"member": member})
+
+    def _numbers(self, codes: NDArray[np.uint8]) -> list[int]:
+        return [self._look(tuple(code)) for row in codes.tolist() for code in row]
+
+    def _look(self, code: tuple[int, int, int, int]) -> int:
+        return _number(self._looks, code)
+
+    def _rule(self, entry: Mapping[str, Any]) -> int:
+        return _number(self._rules, Rule(**{key: entry[key] for key in Rule.model_fields if key in entry}))
+
+    def _outcome(self, info: Mapping[str, Any]) -> Outcome:
+        name = outcome_name(info)
+        return Outcome(name=name, success=bool(info["success"]), text=self._endings.get(name, name))
+
+
+Marks = tuple[int, int, int, int]
+
+
+def _number(known: dict[Any, int], one: Any) -> int:
+    return known.setdefault(one, len(known))
+
+
+def _gestures(found: Mapping[tuple[int, int], Gesture], width: int) -> list[document.Gesture]:
+    return [
+        (y * width + x, -1 if gesture.pointing is None else gesture.pointing, gesture.act)
+        for (x, y), gesture in found.items()
+        if gesture.words
+    ]
+
+
+def _differences(before: _Seen | None, now: _Seen) -> dict[str, Any]:
+    """What a moment says of what it is like, since the one before it."""
+    if before is None or (before.room, before.member) != (now.room, now.member):
+        return {
+            "member": now.member,
+            "cast": now.cast,
+            "room": now.room,
+            "cells": list(enumerate(now.cells)),
+            "view": now.view,
+            "state": now.state,
+        }
+    cells = [(cell, look) for cell, look in enumerate(now.cells) if look != before.cells[cell]]
+    gone: dict[str, Any] = {key: None for key in before.state if key not in now.state}
+    changed = {key: value for key, value in now.state.items() if before.state.get(key, ...) != value}
+    return {
+        "cast": None if now.cast == before.cast else now.cast,
+        "cells": cells,
+        "view": None if now.view == before.view else now.view,
+        "state": gone | changed,
+    }

@@ -1,0 +1,385 @@
+"""What a checked scenario says: places, activities, rules, frames and all the rest, every name resolved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from socialai_dsl.semantics.readings import Readings
+from socialai_dsl.semantics.terms import Line, ObjectType, Pattern, Read, Sited, Term, Type
+from socialai_dsl.source import Span
+
+# --- places -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """A set of cells.
+
+    `name` and `args`: anywhere; left_half, right_half, top_half, bottom_half; column(x); row(y); rect(x0, y0, x1, y1);
+    next_to(entity), in_front_of(entity); wall (side in `side`, cells at least `margin` from its corners).
+    """
+
+    name: Literal[
+        "anywhere",
+        "left_half",
+        "right_half",
+        "top_half",
+        "bottom_half",
+        "column",
+        "row",
+        "rect",
+        "next_to",
+        "in_front_of",
+        "wall",
+    ]
+    args: tuple[Term, ...] = ()
+    side: Literal["top", "bottom", "left", "right"] | None = None
+    margin: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Placing:
+    """Where an entity is put: exactly one of `at` (x, y), `regions` (their union, filtered by `where`), `inside` (in
+    another object: on its cell, but out of the room until that is opened), or nowhere. With `overlap` cells that are
+    taken count as well.
+    """
+
+    entity: int
+    site: str
+    number: int
+    span: Span
+    at: tuple[Term, Term] | None = None
+    regions: tuple[Region, ...] = ()
+    where: Term | None = None
+    where_site: str = ""
+    nowhere: bool = False
+    inside: Term | None = None
+    overlap: bool = False
+    when: Term | None = None
+    """Done only if this holds: of several for one entity (`one_of`), one does."""
+
+
+# --- what happens -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Activity:
+    """One body action a turn, by the name of its signature; `wander` is a choose, `follow` a go_next_to.
+
+    `weights` go with the args of choose. The args of perform are the elements of the sequence in turn, each as its move
+    and its utterance.
+    """
+
+    name: str
+    args: tuple[Term, ...]
+    site: str
+    span: Span
+    weights: tuple[int, ...] = ()
+    ordinal: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """An effect on an object or NPC: open, close, lock, unlock, reset (status, presence, place and content as at the
+    start of the episode), vanish, become (status in `value`), put (on the cell of `value`), move_into (the object
+    `value`), reveal (becomes opened).
+    """
+
+    name: Literal[
+        "open", "close", "lock", "unlock", "reset", "vanish", "become", "put", "move_into", "reveal"
+    ]
+    entities: tuple[Term, ...]
+    span: Span
+    value: Term | None = None
+    site: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RulePlan:
+    """A rule with everything resolved. `name` is its address: `wizard.courtesy.acquainted.then[0]` or its id."""
+
+    name: str
+    site: str
+    span: Span
+    hears: tuple[Pattern, ...] = ()
+    when: Sited | None = None
+    after: int = 0
+    chance: float | None = None
+    once: bool = False
+    do: Activity | None = None
+    sets: tuple[tuple[str, Sited], ...] = ()
+    causes: tuple[Effect, ...] = ()
+    say: Line | None = None
+    goto: str | None = None
+    goto_now: str | None = None
+    reward: int = 0
+    """Per cent of the success reward that a rule of the world adds to the reward of the step."""
+
+
+@dataclass(frozen=True, slots=True)
+class StatePlan:
+    """A state: rules before the activity, the activity, rules after it."""
+
+    name: str
+    first: tuple[RulePlan, ...]
+    activity: Activity
+    then: tuple[RulePlan, ...]
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class StepPlan:
+    """An entry of `steps`.
+
+    Attributes:
+        state: its name, if any. until: what ends it.
+        duration: for how many turns; -1: for ever.
+        lasted: whether it has lasted for as many turns as a value that is computed says.
+    """
+
+    name: str
+    state: str | None
+    activity: Activity
+    span: Span
+    until: Sited | None = None
+    duration: int | None = None
+    lasted: Sited | None = None
+    sets: tuple[tuple[str, Sited], ...] = ()
+    causes: tuple[Effect, ...] = ()
+    say: Line | None = None
+
+    @property
+    def ends_with_its_activity(self) -> bool:
+        """Whether nothing else says how long it lasts."""
+        return self.until is None and self.duration is None and self.lasted is None
+
+
+@dataclass(frozen=True, slots=True)
+class FramePlan:
+    """A frame as one member plays it; exactly one of `states` and `steps` is not empty."""
+
+    member: str
+    frame: str
+    entity: int
+    span: Span
+    start: str = ""
+    states: tuple[StatePlan, ...] = ()
+    steps: tuple[StepPlan, ...] = ()
+    written: bool = True
+    """False: nobody wrote it; it is there for who only believes something."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A register given its value at reset: names, `let`s, start values and slots of frames."""
+
+    path: str
+    type: Type
+    value: Sited
+
+
+@dataclass(frozen=True, slots=True)
+class Coloring:
+    """Colour of an entity at reset: random (value None), or a value; `distinct_from` are the members of the group drawn
+    before it, whose colours it must not have.
+    """
+
+    entity: int
+    site: str
+    number: int
+    span: Span
+    value: Sited | None = None
+    distinct_from: tuple[int, ...] = ()
+    when: Term | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Facing:
+    """Direction of a cast member at reset: random (value None), a direction, or towards an entity."""
+
+    entity: int
+    site: str
+    span: Span
+    value: Sited | None = None
+    toward: Term | None = None
+    when: Term | None = None
+
+
+Setup = Drawn | Coloring | Placing | Facing
+
+
+@dataclass(frozen=True, slots=True)
+class Entity:
+    """The agent, an NPC or an object.
+
+    Attributes:
+        number: its place in the order agent, NPCs, objects. key, index: `doors`, 2 for doors[2]; index None if single.
+        type: of an object. status: initial. kind, kind_code: of an NPC. name: type and term of its name (cast members).
+        near, far: Manhattan distances at which its voice is heard.
+        view: side of its view square. kind_drawn: the status code of an NPC whose kind is drawn; `kind_code` is then
+            the greatest it can be.
+        initial: initial status of an object where it is drawn or computed (then `status` is the type's).
+        unlocks: objects that are unlocked whenever this one is in an active status (links; a level, not an edge).
+    """
+
+    number: int
+    key: str
+    index: int | None
+    role: Literal["agent", "npc", "object"]
+    span: Span
+    type: ObjectType | None = None
+    status: int = 0
+    kind: str = ""
+    kind_code: int = 0
+    name: Term | None = None
+    near: int = 1
+    far: int = 1
+    audible: bool = False
+    view: int = 7
+    kind_drawn: Term | None = None
+    initial: Read | None = None
+    unlocks: tuple[int, ...] = ()
+    opens: tuple[int, ...] = ()
+    """Objects that are open exactly while this one, or another that opens them, is in an active status."""
+    timer: int = 0
+    """Steps after which an active status expires; 0: never."""
+    exclusive: tuple[int, ...] = ()
+    """Objects of its group: while one of them is not in its initial status, the others react to nothing."""
+    pushed_by_rolling: bool = False
+    contains: tuple[int, ...] = ()
+    """What may lie inside: when this one is opened while something does, it is replaced by that."""
+
+
+@dataclass(frozen=True, slots=True)
+class OutcomePlan:
+    """One entry of `outcome`. `name` is its id, or success@LINE; `graded` is a per cent that is computed at the end."""
+
+    name: str
+    success: bool
+    percent: int
+    condition: Sited
+    graded: Sited | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RoomPlan:
+    """Sizes (walls included) and what is built: (object type, region, span); regions read only width and height."""
+
+    width: tuple[int, int]
+    height: tuple[int, int]
+    canvas: tuple[int, int]
+    build: tuple[tuple[ObjectType, Region, Span], ...] = ()
+    occlusion: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Computed:
+    """A status that follows from a condition: `on` while it holds; `off` once it stops holding.
+
+    An object that is in `on` while the condition is false becomes `off`; in any other status it is left alone.
+    """
+
+    entity: int
+    on: int
+    off: int
+    condition: Sited
+
+
+@dataclass(frozen=True, slots=True)
+class BeliefPlan:
+    """What a member takes for true: at the start of each of its turns the register takes `value` if `when` holds.
+
+    It starts, as a `Drawn` of the setup, with what is true when the episode begins.
+    """
+
+    member: str
+    path: str
+    value: Sited
+    when: Sited | None
+
+
+@dataclass(frozen=True, slots=True)
+class MemoryPlan:
+    """The last `length` acts of the agent, oldest first, in steps that began with `open` true (None: all steps).
+
+    Registers: `memory.NAME[k].move` and `memory.NAME[k].utterance` for k < length, and `memory.NAME.filled`, how many
+    it holds, at most `length`. A new act goes to the last place and pushes the others towards 0.
+    """
+
+    path: str
+    length: int
+    utterances: Type
+    open: Sited | None
+
+
+@dataclass(frozen=True, slots=True)
+class PropertyPlan:
+    """An entry of `check`. `text` is how it was written; `site` its address, `check[0]`.
+
+    `reachable` and `never` are about `condition` or, without one, the outcomes of the names in `goals`; `condition` may
+    read `remembered`, which belongs to it alone. `share`: the least share of rooms, of `oracle` that of successes;
+    None where none is given. `steps`: of `within`. `members`: of `needs` and `only_through`, as in the cast.
+    `draws`: the registers whose values are tried (`let.exit`), of which for `needs` one is enough. `expected`: whether
+    what success depends on is to be `knowable`, or not to be.
+    """
+
+    kind: Literal["reachable", "never", "within", "oracle", "script", "needs", "only_through", "knowable"]
+    text: str
+    site: str
+    span: Span
+    condition: Sited | None = None
+    goals: tuple[str, ...] = ()
+    remembered: tuple[Drawn, ...] = ()
+    share: float | None = None
+    steps: int = 0
+    members: tuple[str, ...] = ()
+    draws: tuple[tuple[str, tuple[int, ...]], ...] = ()
+    expected: bool = True
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A scenario in which everything is resolved and nothing is wrong: the compiler's input.
+
+    Attributes:
+        setup: what is drawn at reset after the room, in the order it is done (needs first).
+        words_in_order: every word that may be heard, in order of first appearance, lower case.
+        computed: statuses that follow from conditions, each after those it reads.
+        remembered: registers that take their value at the start of every step, on the state that the last one left.
+        memories: what the agent did last. rules: rules of the world, all that hold fire, top to bottom.
+        require: a room is drawn again while one of these is false.
+        egocentric: the picture shows the directions of NPCs relative to the agent's.
+        beliefs: what members take for true. slope: thousandths of the success reward that are lost by the horizon.
+        each_step: millionths added to the reward of every step. channels: of the picture, 4 or 6.
+        properties: what the scenario claims about itself; no program contains it.
+        readings: how conditions were written; None if it was not made from a file.
+    """
+
+    name: str
+    horizon: int
+    actions: tuple[str, ...]
+    templates: tuple[str, ...]
+    nouns: tuple[str, ...]
+    room: RoomPlan
+    entities: tuple[Entity, ...]
+    setup: tuple[Setup, ...]
+    frames: tuple[FramePlan, ...]
+    outcomes: tuple[OutcomePlan, ...]
+    words_in_order: tuple[str, ...]
+    npcs_hidden: bool
+    picture_before_npcs: bool
+    names_shown: bool
+    own_voice: bool
+    computed: tuple[Computed, ...] = ()
+    remembered: tuple[Drawn, ...] = ()
+    memories: tuple[MemoryPlan, ...] = ()
+    rules: tuple[RulePlan, ...] = ()
+    require: tuple[Sited, ...] = ()
+    egocentric: bool = False
+    beliefs: tuple[BeliefPlan, ...] = ()
+    slope: int = 900
+    each_step: int = 0
+    channels: int = 4
+    properties: tuple[PropertyPlan, ...] = ()
+    readings: Readings | None = field(default=None, compare=False, repr=False)

@@ -1,0 +1,378 @@
+"""The texts of a file: which utterances they mean where something is heard, and the lines that are said."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice, product
+from typing import TypeGuard
+
+from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.grammar import ast
+from socialai_dsl.schema.positions import DataPath
+from socialai_dsl.semantics import resolve_groups
+from socialai_dsl.semantics.alternatives import by_value, drawn, select
+from socialai_dsl.semantics.build import all_of, any_of, walk
+from socialai_dsl.semantics.findings import FailedError
+from socialai_dsl.semantics.possible_values import values_of
+from socialai_dsl.semantics.resolver import Resolver
+from socialai_dsl.semantics.scope import Draws, Scope
+from socialai_dsl.semantics.terms import Compare, Const, Heard, Line, Pattern, Read, Said, Term, Type
+from socialai_dsl.semantics.utterances import MAX_TEXTS
+from socialai_dsl.semantics.wording import described, quoted, spoken
+from socialai_dsl.source import Span
+from socialai_dsl.vocabulary import normal
+
+_JOINED = re.compile(r"\s*\|\s*|\s+or\s+")
+"""What an author may put between alternatives."""
+
+_SAYABLE = ("text", "noun", "color", "int", "status", "direction", "action")
+
+
+def said(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
+    """Whether the agent said one of the texts at `node` in this step."""
+    return any_of(
+        all_of([Said(pattern), *_given(drawn), *_given(given)])
+        for text, drawn, span in texts(resolver, node, scope)
+        for pattern, given in patterns(resolver, text, scope, span, False)
+    )
+
+
+def heard(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
+    """Whether the NPC whose frame it is heard one of the texts at `node` since its last turn."""
+    return any_of(
+        all_of([Heard((pattern,)), *_given(drawn), *_given(given)])
+        for text, drawn, span in texts(resolver, node, scope)
+        for pattern, given in patterns(resolver, text, scope, span, True)
+    )
+
+
+def texts(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[tuple[ast.Text, Term | None, Span]]:
+    """The texts that an argument names, each with the condition on what `one_of` drew and where it is written."""
+    options = node.options if isinstance(node, ast.Alternatives) else (node,)
+    found: list[tuple[ast.Text, Term | None, Span]] = []
+    for option in options:
+        slot = _slot(resolver, option, scope)
+        if slot is not None:
+            found += [(one.text, one.drawn, resolver.findings.at(one.path)) for one in slot]
+        elif isinstance(option, ast.Text):
+            found.append((option, None, resolver.findings.node(scope.path, node)))
+        else:
+            message = f'`{quoted(option)}` is not a text; what is said is quoted: "Open sesame"'
+            slots = scope.frame.texts if scope.frame is not None else ()
+            near = did_you_mean(option.id, slots) if isinstance(option, ast.Name) else None
+            raise resolver.fail("S211", message, option, scope, suggestion=near)
+    return found
+
+
+def _slot(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[_Filling] | None:
+    """What fills the slot of type text or utterance that an expression names, `<formula>` of one's own frame or
+    `<teacher.formula>` of a member's: one text, or several where the files of a `one_of` differ. None if it names
+    no such slot.
+    """
+    frame, name = scope.frame, ""
+    match node:
+        case ast.Name(id=name) if name not in scope.variables:
+            pass
+        case ast.Attribute(subject=ast.Name(id=owner), name=name) if owner not in scope.variables:
+            frame = resolver.frames.get(resolver.symbols.roles.get(owner, owner))
+        case _:
+            return None
+    if frame is None or frame.model.slots.get(name) not in ("text", "utterance"):
+        return None
+    paths = frame.texts.get(name)
+    if paths is None:
+        raise FailedError  # nobody fills it, which is reported where it is left empty
+    described = resolver.symbols.alternatives[frame.member]
+    return [
+        _Filling(
+            frame.member,
+            name,
+            paths[numbers[0]],
+            resolver.findings.text(paths[numbers[0]], raw),
+            drawn(resolver.registers.drawn_file(frame.member), numbers),
+        )
+        for raw, numbers in by_value([str(one.with_[name]) for one in described]).items()
+    ]
+
+
+def patterns(
+    resolver: Resolver, text: ast.Text, scope: Scope, span: Span, from_npcs: bool
+) -> list[tuple[Pattern, Term | None]]:
+    """The utterances that a text means, each with the condition on the values in it; `<noun>` is any noun.
+
+    Reports S401 if nobody can say it and S402 if some value in it cannot be said, where a text that fills a slot
+    is written.
+    """
+    return [
+        found
+        for parts, drawn, filling in _spliced(resolver, text, scope)
+        for found in _meant(resolver, parts, drawn, scope, span if filling is None else filling, from_npcs)
+    ]
+
+
+def _meant(
+    resolver: Resolver,
+    spliced: Sequence[str | ast.Expr],
+    drawn: Sequence[Term],
+    scope: Scope,
+    span: Span,
+    from_npcs: bool,
+) -> list[tuple[Pattern, Term | None]]:
+    """The patterns of a text without slots, on the condition that what `drawn` says was drawn."""
+    parts = [_spoken_part(resolver, part, scope) for part in spliced]
+    found: list[tuple[Pattern, Term | None]] = []
+    unsayable: list[tuple[str, str]] = []
+    for choice in product(*(_choices(part) for part in parts)):
+        said = "".join(word for word, _ in choice)
+        pairs = resolver.utterances.match(said)
+        nouns = resolver.utterances.npcs_matching(said) if from_npcs else {}
+        conditions = [*drawn, *(condition for _, condition in choice if condition is not None)]
+        if pairs or nouns:
+            found_nouns = tuple((t, noun) for t, noun in nouns.items() if noun is not None)
+            pattern = Pattern(pairs, said, frozenset(nouns), found_nouns)
+            found.append((pattern, all_of(conditions) if conditions else None))
+        elif _can_be(resolver, choice):
+            unsayable.append((said, next((word for word, c in choice if c is not None), "")))
+    if unsayable:
+        values = [(node, part) for node, part in zip(spliced, parts, strict=True) if _varies(part)]
+        _report_unsayable(resolver, unsayable, values, bool(found), span, from_npcs)
+    return found
+
+
+def _spliced(
+    resolver: Resolver, text: ast.Text, scope: Scope
+) -> Iterator[tuple[list[str | ast.Expr], list[Term], Span | None]]:
+    """The parts of a text, with texts that fill slots put in their place; all ways to do so, where files that
+    `one_of` draws differ, each with its conditions, and with the place of what fills a text that is one slot.
+    """
+    choices: list[list[tuple[tuple[str | ast.Expr, ...], Term | None, Span | None]]] = []
+    findings = resolver.findings
+    for part in text.parts:
+        slot = None if isinstance(part, str) else _slot(resolver, part, scope)
+        if slot is None:
+            choices.append([((part,), None, None)])
+            continue
+        alone = len(text.parts) == 1
+        choices.append([(f.text.parts, f.drawn, findings.at(f.path) if alone else None) for f in slot])
+    for choice in product(*choices):
+        parts = [part for parts, _, _ in choice for part in parts]
+        place = next((span for _, _, span in choice if span is not None), None)
+        yield parts, [d for _, d, _ in choice if d is not None], place
+
+
+def _spoken_part(resolver: Resolver, part: str | ast.Expr, scope: Scope) -> str | Term | None:
+    """A piece of text, a value in it, or None for any noun."""
+    if isinstance(part, str):
+        return part
+    if isinstance(part, ast.Name) and part.id == "noun" and "noun" not in scope.variables:
+        return None
+    if isinstance(part, ast.Name) and part.id == "nouns":
+        message = "`nouns` are all of them; any one of them is `<noun>`"
+        raise resolver.fail("S402", message, part, scope)
+    if isinstance(part, ast.Name) and part.id == "any":
+        message = "any noun is `<noun>`; anything at all is `hears: any`"
+        raise resolver.fail("S402", message, part, scope)
+    return sayable(resolver, part, scope)
+
+
+def _can_be(resolver: Resolver, choice: Iterable[tuple[str, Term | None]]) -> bool:
+    """Whether the values of a text can be those that it is made of."""
+    return all(
+        condition.right.value in values_of(resolver, condition.left)
+        for _, condition in choice
+        if isinstance(condition, Compare) and isinstance(condition.right, Const)
+    )
+
+
+def _choices(part: str | Term | None) -> list[tuple[str, Term | None]]:
+    if isinstance(part, str):
+        return [(part, None)]
+    if part is None:
+        return [("<noun>", None)]
+    if isinstance(part, Const):
+        return [(spoken(part.type, part.value), None)]
+    values = range(part.type.low, part.type.high + 1)
+    return [(spoken(part.type, v), Compare("==", part, Const(part.type, v))) for v in values]
+
+
+def _report_unsayable(
+    resolver: Resolver,
+    unsayable: list[tuple[str, str]],
+    values: list[tuple[str | ast.Expr, Term]],
+    some: bool,
+    span: Span,
+    from_npcs: bool,
+) -> None:
+    findings = resolver.findings
+    said, word = unsayable[0]
+    if values and some:
+        node, value = values[0]
+        name = quoted(node) if not isinstance(node, str) else node
+        message = f'`{name}` can be {word}, but "{said}" cannot be said with this grammar'
+        drawn_once = isinstance(value, Read) and not resolver.registers.is_set(value.path)
+        report = findings.error if drawn_once else findings.warning
+        nouns = [str(noun) for noun in resolver.symbols.scenario.grammar.nouns]
+        missing = f"`{word}`" if word not in nouns else "what is missing"
+        report("S402", message, span, hint=f"add {missing} to the nouns, or narrow what is drawn")
+        return
+    alternatives = [part for part in _JOINED.split(said) if part]
+    if len(alternatives) > 1 and any(resolver.utterances.match(part) for part in alternatives):
+        message = f'nobody can say "{said}" with this grammar'
+        hint = f"alternatives are a list: [{', '.join(alternatives)}]"
+        raise findings.fail("S401", message, span, hint=hint)
+    near = did_you_mean(
+        said, [*resolver.utterances.all_texts(), *(resolver.utterances.npc_texts if from_npcs else ())]
+    )
+    raise findings.fail(
+        "S401",
+        f'nobody can say "{said}" with this grammar',
+        span,
+        suggestion=f'"{near}"' if near else None,
+        hint=None if near else "what can be said is a template of `grammar` with one of its nouns",
+    )
+
+
+def line(resolver: Resolver, path: DataPath, raw: str, scope: Scope) -> Line:
+    """What a `say:` says: pieces and values. The agent can only say what its grammar has."""
+    findings = resolver.findings
+    text = findings.text(path, raw)
+    span = findings.at(path)
+    only = text.parts[0] if len(text.parts) == 1 else None
+    slot = _slot(resolver, only, scope) if only is not None and not isinstance(only, str) else None
+    if slot is not None and len(slot) == 1:
+        # All of it is the slot's value, so its picks are drawn at the slot's site.
+        text, scope = slot[0].text, replace(slot[0].scope(scope), outer=None)
+    line = Line(tuple(_merged(parts(resolver, text, scope))), scope.draws.site, span)
+    if scope.member == "agent":
+        return _agents(resolver, line)
+    return line
+
+
+def parts(resolver: Resolver, text: ast.Text, scope: Scope) -> list[str | Term]:
+    """The pieces and values of a text."""
+    return list(_each_part(resolver, text, scope))
+
+
+def _each_part(resolver: Resolver, text: ast.Text, scope: Scope) -> Iterator[str | Term]:
+    for part in text.parts:
+        if isinstance(part, str):
+            yield part
+            continue
+        slot = _slot(resolver, part, scope)
+        if slot is not None:
+            yield from _filled(resolver, slot, scope)
+            continue
+        term = sayable(resolver, part, scope)
+        yield spoken(term.type, term.value) if isinstance(term, Const) else term
+
+
+def _filled(resolver: Resolver, slot: list[_Filling], scope: Scope) -> list[str | Term]:
+    """What a slot contributes to a line; where files that `one_of` draws differ, one value with their texts."""
+    if len(slot) == 1:
+        return parts(resolver, slot[0].text, slot[0].scope(scope))
+    values = next((filling for filling in slot if filling.text.plain is None), None)
+    if values is not None:
+        message = f"files of `{values.member}` say different things here, so none may have values in it"
+        raise resolver.findings.fail(
+            "S315",
+            message,
+            resolver.findings.at(values.path),
+            hint="put what differs into a slot of its own",
+        )
+    plain = [
+        Const(Type("text", 0, 0, (str(one.with_[slot[0].slot]),)), 0)
+        for one in resolver.symbols.alternatives[slot[0].member]
+    ]
+    return [select(resolver.registers.drawn_file(slot[0].member), plain)]
+
+
+def _agents(resolver: Resolver, line: Line) -> Line:
+    """The line in the grammar's own spelling."""
+    findings = resolver.findings
+    spelled: dict[str, str] = {normal(text): text for text in resolver.utterances.all_texts()}
+    texts = list(islice(_texts_said(resolver, line), MAX_TEXTS))
+    unsayable = [said for said in texts if normal(said) not in spelled]
+    if unsayable:
+        said, values = unsayable[0], [part for part in line.parts if not isinstance(part, str)]
+        message = f'the agent cannot say "{said}" with this grammar'
+        if len(unsayable) < len(texts) and any(_may_change(resolver, value) for value in values):
+            hint = "then it says nothing; give the register a range, or the grammar the noun"
+            findings.warning("S402", message, line.span, hint=hint)
+            return line
+        near = did_you_mean(said, spelled.values())
+        raise findings.fail("S401", message, line.span, suggestion=f'"{near}"' if near else None)
+    if len(line.parts) == 1 and isinstance(line.parts[0], str):
+        return Line((spelled[normal(line.parts[0])],), line.site, line.span)
+    return line
+
+
+def _texts_said(resolver: Resolver, line: Line) -> Iterator[str]:
+    """The texts that a line can be, as far as it is known what its values can be."""
+    for choice in product(*(_choices(part) for part in line.parts)):
+        if _can_be(resolver, choice):
+            yield "".join(word for word, _ in choice)
+
+
+def _may_change(resolver: Resolver, value: Term) -> bool:
+    """Whether a value is made of registers that rules set, whose range may be wider than what happens."""
+    return any(isinstance(part, Read) and resolver.registers.is_set(part.path) for part in walk(value))
+
+
+@dataclass(frozen=True)
+class _Filling:
+    """A text that fills a slot of a member's frame; `drawn` is the condition that it is this one of several."""
+
+    member: str
+    slot: str
+    path: DataPath
+    text: ast.Text
+    drawn: Term | None
+
+    def scope(self, user: Scope) -> Scope:
+        """What its names mean where it is put in."""
+        draws = Draws(f"cast.{self.member}.with.{self.slot}")
+        return Scope(self.path, draws, member=self.member, outer=user.draws)
+
+
+def _varies(part: str | Term | None) -> TypeGuard[Term]:
+    """Whether a part of a text is a value that is not known."""
+    return isinstance(part, Term) and not isinstance(part, Const)
+
+
+def _given(condition: Term | None) -> list[Term]:
+    return [] if condition is None else [condition]
+
+
+def sayable(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
+    """A value inside a text: something that words stand for."""
+    if isinstance(node, ast.Compare | ast.Logic | ast.Not | ast.Member):
+        message = f"`{quoted(node)}` is a condition; only a value can be said"
+        raise resolver.fail("S402", message, node, scope)
+    if resolve_groups.is_group(resolver, node, scope):
+        message = f"`{quoted(node)}` is a group; `pick({quoted(node)})` says one of them"
+        raise resolver.fail("S402", message, node, scope)
+    term = resolver.value(node, None, scope)
+    if term.type.kind not in _SAYABLE:
+        what = described(term.type)
+        hint = f"say its colour or name: <{quoted(node)}.color>" if term.type.kind == "entity" else None
+        raise resolver.fail(
+            "S402", f"`{quoted(node)}` is {what}, which cannot be said", node, scope, hint=hint
+        )
+    return term
+
+
+def _merged(parts: Iterable[str | Term]) -> Iterator[str | Term]:
+    """The same with neighbouring pieces of text joined."""
+    text = ""
+    for part in parts:
+        if isinstance(part, str):
+            text += part
+            continue
+        if text:
+            yield text
+        text = ""
+        yield part
+    if text:
+        yield text

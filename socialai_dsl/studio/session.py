@@ -1,0 +1,295 @@
+"""One window's scenario and game: it is drawn from the text in the editor, and played with steps back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from socialai_dsl.cli.endings import endings_of
+from socialai_dsl.cli.evaluation import about_of
+from socialai_dsl.cli.typed import Phrases, split_line
+from socialai_dsl.compilation import compile_loaded, scenarios_of
+from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity
+from socialai_dsl.engine.errors import RoomError
+from socialai_dsl.envs import ScenarioEnv
+from socialai_dsl.frontend import Loaded, check, load
+from socialai_dsl.library import prelude
+from socialai_dsl.loader.files import display_name
+from socialai_dsl.program_suite import unscripted
+from socialai_dsl.replay import Thought, Tracer
+from socialai_dsl.replay.page import replay_page
+from socialai_dsl.source import Source
+from socialai_dsl.vocabulary import EMPTY, WALL
+
+Reply = dict[str, Any]
+
+_FLOOR: Final = prelude().types["floor"].code
+
+
+class RefusalError(ValueError):
+    """Something cannot be done; the message is for the person at the screen."""
+
+
+@dataclass
+class _Before:
+    """What is put back with a step: the environment, and the chance of who plays."""
+
+    snapshot: bytes
+    observation: Mapping[str, NDArray[Any]]
+    chance: Mapping[str, Any]
+    ended: bool
+
+
+class Session:
+    """What a window shows. Each method that a window may ask for returns what it shows next."""
+
+    def __init__(self) -> None:
+        self._path = Path()
+        self._texts: dict[Path, Source] = {}
+        self._env: ScenarioEnv | None = None
+        self._phrases = Phrases((), (), ())
+        self._tracer: Tracer | None = None
+        self._moments: list[_Before] = []
+        self._player, self._seed = "me", 0
+        self._policy: Any = None
+        self._chance = np.random.default_rng(0)
+
+    def draw(self, path: str, text: str, seed: int = 0) -> Reply:
+        """Check a text that is to stand in a file, and draw its room if it is sound."""
+        self._path = Path(path)
+        self._texts = {self._path: Source(display_name(self._path), text)}
+        found = check(path, self._texts)
+        told = [_finding(one, display_name(self._path)) for one in found.diagnostics]
+        if found.has_errors:
+            return {"findings": told}
+        try:
+            self._use(load(path, self._texts))
+        except ScenarioError as error:  # it is sound, and nothing that can be played
+            return {"findings": [*told, *(_finding(one, "") for one in error.diagnostics)]}
+        try:
+            return {"findings": told, **self.begin(seed)}
+        except RefusalError as refusal:
+            return {"findings": told, "refused": str(refusal)}
+
+    def begin(self, seed: int = 0, player: str = "me", layout: Any = None) -> Reply:
+        """Begin an episode.
+
+        Args:
+            seed: of the room.
+            player: `me`, `script`, `random`, or the folder of a run.
+            layout: a known room.
+        """
+        if not self._texts:
+            raise RefusalError("there is no scenario yet")
+        if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 1 << 63:
+            raise RefusalError(f"seed: got {seed!r}, expected a whole number from 0")
+        if player != self._player:
+            self._choose(player)
+        env = self._playing()
+        try:
+            observation, info = env.reset(seed=seed, options=None if layout is None else {"layout": layout})
+        except (ValueError, RoomError) as error:
+            raise RefusalError(str(error)) from None
+        assert self._tracer is not None, "internal: a program that can be played has a tracer"
+        self._chance = np.random.default_rng(seed)
+        if self._policy is not None:
+            self._policy.reset(np.ones(1, np.bool_))
+        self._tracer.begin(f"seed {seed}" if layout is None else "a layout", observation, info)
+        self._moments = [_Before(env.snapshot(), observation, self._chance.bit_generator.state, False)]
+        return {
+            "trace": self._tracer.trace().model_dump(mode="json", exclude_defaults=True)
+            | {"format": "socialai-trace/1"},
+            "phrases": {"sentences": self._phrases.sentences()[:2000]},
+            "player": self._player,
+            "seed": seed,
+        }
+
+    def act(self, movement: str | None = None, sentence: str | None = None, line: str | None = None) -> Reply:
+        """Play a step: a movement, a sentence, both, or a line as `socialai play` takes it."""
+        env = self._playing()
+        if line is not None:
+            movement, sentence = split_line(line.strip(), self._phrases.actions)
+        try:
+            action = env.encode_action((movement, sentence))
+        except ValueError:
+            raise RefusalError(self._phrases.problem(line if line is not None else sentence or "")) from None
+        return self._step(action, None)
+
+    def auto(self) -> Reply:
+        """Let the chosen player play a step."""
+        env = self._playing()
+        if self._player == "script":
+            return self._step(env.scripted_action(), None)
+        sizes = env.action_space.nvec  # type: ignore[attr-defined]
+        if self._policy is None:
+            return self._step(self._chance.integers(0, sizes, dtype=np.int64), None)
+        probabilities, value = self._policy.think(self._moments[-1].observation)
+        shares = [np.asarray(head) / sum(head) for head in probabilities]
+        action = np.array([self._chance.choice(len(head), p=head) for head in shares])
+        rounded = [[round(share, 4) for share in head] for head in probabilities]
+        return self._step(action, Thought(probabilities=rounded, value=round(value, 4)))
+
+    def back(self, to: int) -> Reply:
+        """Take steps back until `to` of them are left, chance included."""
+        env = self._playing()
+        assert self._tracer is not None, "internal: an episode has begun"
+        if not 0 <= to < len(self._moments):
+            raise RefusalError(f"there are {len(self._moments) - 1} steps to take back")
+        while len(self._moments) > to + 1:
+            self._moments.pop()
+            self._tracer.back()
+        now = self._moments[-1]
+        env.restore(now.snapshot)
+        self._chance.bit_generator.state = dict(now.chance)
+        if self._policy is not None:  # it remembers what it has seen
+            self._policy.reset(np.ones(1, np.bool_))
+            for before in self._moments[:-1]:
+                self._policy.think(before.observation)
+        return {"length": to}
+
+    def place(self, who: str, at: list[int]) -> Reply:
+        """Begin again in the same room with one thing somewhere else; the layout is told, too."""
+        described = self._playing().describe()
+        if len(self._moments) != 1:
+            raise RefusalError("things are moved before the first step; begin the episode again first")
+        key, _, index = who.rstrip("]").partition("[")
+        found = described.get(key)
+        one = (
+            found[int(index)]
+            if isinstance(found, list) and index.isdigit() and int(index) < len(found)
+            else found
+        )
+        if not isinstance(one, dict) or "at" not in one:
+            raise RefusalError(f"there is nothing called {who!r} in the room")
+        one["at"] = at
+        layout = {
+            name: value for name, value in described.items() if name not in ("t", "last", "heard", "pending")
+        }
+        cell = self._playing().scene().codes[at[1], at[0]] if _is_cell(at, described["room"]) else None
+        if cell is None or cell[0] not in (EMPTY, _FLOOR, WALL):
+            raise RefusalError(f"{who} cannot be put there")
+        return self.begin(self._seed, self._player, layout) | {"layout": layout}
+
+    def layout(self) -> Reply:
+        """The room as it is now, as a layout that the commands take."""
+        return {"layout": self._playing().describe()}
+
+    def replay(self) -> Reply:
+        """The episode so far as a page of its own."""
+        self._playing()
+        assert self._tracer is not None, "internal: an episode has begun"
+        return {"page": replay_page([self._tracer.trace()])}
+
+    def check(self, path: str, text: str, seconds: float = 20.0) -> Reply:
+        """What `socialai check` says of a text."""
+        from socialai_dsl.analysis.effort import Clock, Effort
+        from socialai_dsl.checking import LoadedScenario
+        from socialai_dsl.cli.check import check_scenario
+
+        try:
+            loaded = load(path, {Path(path): Source(display_name(Path(path)), text)})
+        except ScenarioError as error:
+            return {"lines": [f"{one.span}: {one.text}" for one in error.diagnostics]}
+        if not isinstance(loaded, LoadedScenario):
+            raise RefusalError("a suite is checked by `socialai check`; here its members are, one by one")
+        effort = Effort(100, 0, clock=Clock(seconds, lambda said: None))
+        return {"lines": list(check_scenario(loaded, path, effort).lines())}
+
+    # -- within ----------------------------------------------------------------------------------------------
+
+    def _use(self, loaded: Loaded) -> None:
+        """Play this from now on."""
+        program = compile_loaded(loaded)
+        self._env = ScenarioEnv(program, scenarios=scenarios_of(loaded))
+        self._phrases = Phrases(program.actions, program.templates, program.nouns)
+        endings = {ending.name: ending.text for ending in endings_of(loaded, program)}
+        self._tracer = Tracer(self._env, loaded.name, "me", endings, about_of(loaded))
+        self._player, self._policy, self._moments = "me", None, []
+
+    def _choose(self, player: str) -> None:
+        """Let somebody else play."""
+        path = str(self._path)
+        loaded = load(path, self._texts)
+        if player == "script" and unscripted(compile_loaded(loaded)):
+            try:
+                loaded = load(f"{path}+oracle", self._texts)
+            except ScenarioError as error:
+                known = all(one.code == "S503" for one in error.diagnostics)
+                said = "" if known else f": {error.diagnostics[0].text}"
+                raise RefusalError(f"the agent has no script: there is no variant `oracle`{said}") from None
+            if unscripted(compile_loaded(loaded)):
+                raise RefusalError("the variant `oracle` gives the agent no frame")
+        self._use(loaded)
+        if player not in ("me", "script", "random"):
+            self._policy = _policy(player, self._env)
+        self._player = player
+        assert self._tracer is not None, "internal: there is a program"
+        self._tracer.agent = player
+
+    def _playing(self) -> ScenarioEnv:
+        if self._env is None:
+            raise RefusalError("there is no room yet; the scenario has mistakes")
+        return self._env
+
+    def _step(self, action: NDArray[np.int64], thought: Thought | None) -> Reply:
+        env, tracer = self._playing(), self._tracer
+        assert tracer is not None, "internal: an episode has begun"
+        if not self._moments or self._moments[-1].ended:
+            raise RefusalError("the episode has ended; take steps back, or begin another")
+        marks = tracer.marks()
+        observation, reward, terminated, truncated, info = env.step(action)
+        tracer.step(action, observation, reward, terminated, truncated, info, thought=thought)
+        self._moments.append(
+            _Before(env.snapshot(), observation, self._chance.bit_generator.state, terminated or truncated)
+        )
+        return {"more": tracer.trace(marks).model_dump(mode="json", exclude_defaults=True)}
+
+
+ASKED: Final[Mapping[str, Callable[..., Reply]]] = {
+    "draw": Session.draw,
+    "begin": Session.begin,
+    "act": Session.act,
+    "auto": Session.auto,
+    "back": Session.back,
+    "place": Session.place,
+    "layout": Session.layout,
+    "replay": Session.replay,
+    "check": Session.check,
+}
+"""What a window may ask a session for, by name."""
+
+
+def _is_cell(at: Any, room: Mapping[str, int]) -> bool:
+    """Whether this is x and y of a cell of the room."""
+    if not isinstance(at, list) or len(at) != 2 or not all(type(part) is int for part in at):
+        return False
+    return bool(0 <= at[0] < room["width"] and 0 <= at[1] < room["height"])
+
+
+def _policy(run: str, env: Any) -> Any:
+    from socialai_dsl.cli.agents import require_trainer
+    from socialai_dsl.cli.errors import UsageError
+    from socialai_dsl.cli.player import Player, make_policy
+
+    try:
+        require_trainer()
+        return make_policy(Player(run), env)[0]
+    except (UsageError, ValueError, OSError) as error:
+        raise RefusalError(f"{run}: {error}") from None
+
+
+def _finding(found: Diagnostic, own: str) -> Reply:
+    message = found.text if found.hint is None else f"{found.text} ({found.hint})"
+    place = "" if found.span.file == own else f"{found.span}: "
+    return {
+        "line": found.span.line if not place else 1,
+        "column": found.span.column if not place else 1,
+        "message": place + message,
+        "code": found.code,
+        "error": found.severity is Severity.ERROR,
+    }

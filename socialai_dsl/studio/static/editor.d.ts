@@ -1,0 +1,10 @@
+/** What studio.js uses of the bundle `editor.js`, which is made from editor/editor.js by `npm run bundle`. */
+export class Editor {
+  constructor(parent: HTMLElement, options: {
+    root: string; language: string; nonce: string; changed: (text: string) => void; save: () => void;
+  });
+  readonly text: string;
+  open(name: string, text: string, anew?: boolean): void;
+  replace(text: string): void;
+  goTo(line: number): void;
+}

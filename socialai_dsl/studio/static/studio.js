@@ -1,0 +1,493 @@
+// @ts-check
+/** The studio: the text of a scenario on the left, its room, its game and its reasons on the right. */
+import { make, panel } from "./dom.js";
+import { Editor } from "./editor.js";
+import { Cast, Mind, Rules, Sight, Stage, Transcript, legend } from "./panels.js";
+import { Episode } from "./trace.js";
+
+/** @typedef {Record<string, any>} Reply */
+
+const DRAW_AFTER = 60, KEEP_AFTER = 500, STEP_EVERY = 450;
+/** @type {Record<string, string>} */
+const MOVES = { ArrowLeft: "left", a: "left", ArrowRight: "right", d: "right", ArrowUp: "forward", w: "forward",
+  t: "toggle", p: "pickup", o: "drop", x: "done", ".": "none", " ": "none" };
+const token = new URLSearchParams(location.search).get("token") ?? "";
+const address = (/** @type {string} */ name) => `ws://${location.host}/${name}?token=${encodeURIComponent(token)}`;
+
+/** Questions to the server, answered in order. */
+class Line {
+  /** @param {(open: boolean) => void} changed told when the connection opens or is lost */
+  constructor(changed) {
+    this.changed = changed;
+    this.number = 0;
+    /** @type {Map<number, (reply: Reply) => void>} */ this.waiting = new Map();
+    this.connect();
+  }
+
+  connect() {
+    this.socket = new WebSocket(address("session"));
+    this.socket.onopen = () => this.changed(true);
+    this.socket.onmessage = (event) => {
+      const reply = JSON.parse(event.data);
+      this.waiting.get(reply.id)?.(reply);
+      this.waiting.delete(reply.id);
+    };
+    this.socket.onclose = () => {
+      for (const answer of this.waiting.values()) answer({ refused: "the connection was lost", lost: true });
+      this.waiting.clear();
+      this.changed(false);
+      setTimeout(() => this.connect(), 1000);
+    };
+  }
+
+  /** @param {string} name @param {Reply} more @returns {Promise<Reply>} */
+  ask(name, more = {}) {
+    if (this.socket?.readyState !== WebSocket.OPEN) return Promise.resolve({ refused: "there is no connection", lost: true });
+    const id = ++this.number;
+    this.socket.send(JSON.stringify({ id, do: name, ...more }));
+    return new Promise((resolve) => this.waiting.set(id, resolve));
+  }
+}
+
+/** All rules with how often they have fired in this episode. */
+class Counts {
+  /** @param {(at: string) => void} open */
+  constructor(open) {
+    this.open = open;
+    this.rows = make("ul", { class: "rules" });
+    this.root = panel("All rules met so far, and how often each fired", "counts", this.rows);
+  }
+
+  /** @param {Episode} episode @param {number} step */
+  show(episode, step) {
+    const counts = episode.counts(step);
+    this.rows.replaceChildren(...episode.rules.map((rule, k) => make("li", { class: counts.has(k) ? "fired" : "not" },
+      make("b", {}, `${counts.get(k) ?? 0}× ${rule.who}`), rule.state ? ` in ${rule.state} ` : " ",
+      make("small", {}, make("button", { class: "link", onclick: () => this.open(rule.at) }, rule.at)),
+      make("code", {}, rule.words))));
+  }
+}
+
+class Studio {
+  constructor() {
+    const { root = "", open = "" } = document.body.dataset;
+    this.first = open;
+    this.name = "";
+    /** @type {string | null} */ this.digest = null;
+    this.dirty = false;
+    this.seed = 0;
+    this.length = 0;
+    /** @type {Episode | null} */ this.episode = null;
+    /** @type {ReturnType<typeof setInterval> | undefined} */ this.timer = undefined;
+    /** @type {Record<string, ReturnType<typeof setTimeout>>} */ this.later = {};
+    this.drawing = false;
+    this.again = false;
+
+    const goTo = (/** @type {string} */ at) => this.editorAt(at);
+    this.stage = new Stage();
+    const parts = { why: new Rules(goTo), said: new Transcript((step) => this.back(step)), cast: new Cast(), sight: new Sight(), counts: new Counts(goTo), mind: new Mind((step) => this.back(step)) };
+    this.parts = [this.stage, ...Object.values(parts)];
+    this.files = make("select", { "aria-label": "scenario", onchange: () => this.openFile(this.files.value) });
+    this.state = make("output", { class: "quiet", "aria-live": "polite" });
+    this.findings = make("ul", { class: "findings", "aria-label": "findings" });
+    this.message = make("p", { class: "message", role: "status" });
+    this.title = make("h1", {}, "studio");
+    this.seedField = make("input", { type: "number", min: 0, value: 0, "aria-label": "seed of the room", onchange: () => this.begin(Number(this.seedField.value)) });
+    this.players = make("select", { "aria-label": "who plays", onchange: () => this.begin(this.seed) });
+    this.watch = make("button", { onclick: () => this.toggleWatch() }, "▶ watch");
+    this.count = make("output", {});
+    this.moves = make("div", { class: "moves", role: "group", "aria-label": "movements" });
+    this.template = make("select", { "aria-label": "template" });
+    this.noun = make("select", { "aria-label": "noun" });
+    this.sentences = make("datalist", { id: "sentences" });
+    this.typed = make("input", { list: "sentences", placeholder: "or type: forward, How are you …", "aria-label": "what to do or say" });
+    this.checked = make("div", { class: "checked" }, make("p", { class: "quiet" }, "`check` tries in a hundred rooms what the scenario claims; it takes up to 20 seconds."));
+    this.dialog = make("dialog");
+    this.pane = make("div", { class: "text" });
+    this.root = this.layout(parts);
+    document.body.replaceChildren(this.root);
+    const nonce = document.querySelector("meta[name=style-nonce]")?.getAttribute("content") ?? "";
+    this.editor = new Editor(this.pane, { root, language: address("language"), nonce, changed: () => this.typedText(), save: () => this.save() });
+    this.line = new Line((open) => this.connected(open));
+    addEventListener("keydown", (event) => this.key(event));
+    addEventListener("resize", () => this.show());
+    addEventListener("pagehide", () => this.keep());
+    addEventListener("beforeunload", (event) => this.dirty && event.preventDefault());
+    this.dragging();
+  }
+
+  /** @param {Record<string, {root: HTMLElement}>} parts */
+  layout(parts) {
+    const button = (/** @type {string} */ text, /** @type {() => void} */ act, title = text) => make("button", { onclick: act, title }, text);
+    const bar = make("header", {}, this.title, this.files, button("New…", () => this.offer(), "a template, or a copy of a shipped scenario"),
+      button("Save", () => this.save(), "Ctrl-S"), this.state,
+      make("span", { class: "filler" }),
+      button("Replay", () => this.export("replay"), "save this episode as a page of its own"),
+      button("Layout", () => this.export("layout"), "save the room as it is now, for --layout"),
+      button("◐", () => this.shade(), "light or dark"));
+    const game = make("div", { class: "controls" },
+      button("⟲ again", () => this.begin(this.seed), "begin the episode again (R)"),
+      button("Another room", () => this.begin(this.seed + 1), "the next seed (N)"), make("label", {}, "seed ", this.seedField),
+      button("◂ step back", () => this.back(this.length - 1), "take the last step back, chance included (U)"), this.count,
+      make("label", {}, "plays: ", this.players), this.watch,
+      button("one step", () => this.auto(), "let whoever plays do one step"));
+    const say = make("form", { class: "controls say", onsubmit: (/** @type {Event} */ event) => this.submit(event) },
+      this.template, this.noun, make("button", { type: "button", onclick: () => this.say() }, "Say"), this.typed, this.sentences, make("button", {}, "Do"));
+    const check = panel("Check", "check", button("Check the claims", () => this.check()), this.checked);
+    const help = make("details", { class: "panel" }, make("summary", {}, "Keys and colours"),
+      make("p", {}, "Outside of the text: arrows or W A D move, T toggles, P picks up, O drops, X is done, space stands still; / or Enter types a line; U or backspace takes a step back; R begins again, N draws another room, L shows letters for colours. Before the first step, drag things to other cells."), legend());
+    return make("div", { class: "studio" }, bar,
+      make("section", { class: "writing", "aria-label": "scenario" }, this.pane, this.findings),
+      make("main", {}, this.stage.root, this.message, this.moves, say, game, ...[parts.mind, parts.why].map((one) => one.root), check),
+      make("aside", {}, ...[parts.sight, parts.said, parts.cast, parts.counts].map((one) => one.root), help), this.dialog);
+  }
+
+  /** @param {boolean} open */
+  async connected(open) {
+    document.body.classList.toggle("offline", !open);
+    if (!open) {
+      this.tell("the connection to the studio was lost; what you type stays here, and is drawn again when it is back");
+      return;
+    }
+    this.tell("");
+    await this.list();
+    if (this.name) this.draw();
+    else await this.openFile(this.first || this.files.value);
+  }
+
+  async list() {
+    const found = await this.line.ask("list");
+    this.offered = found;
+    const option = (/** @type {string} */ name) => make("option", { value: name, selected: name === this.name }, name);
+    this.files.replaceChildren(...(found.files ?? []).map(option));
+    const chosen = this.players.value;
+    this.players.replaceChildren(...["me", "script", "random", ...(found.runs ?? [])].map((name) => make("option", { value: name, selected: name === chosen }, name)));
+    if (!found.files?.length) this.offer();
+  }
+
+  // -- the text --------------------------------------------------------------------------------------------------
+
+  /** @param {string} name @param {boolean} anew */
+  async openFile(name, anew = false) {
+    if (!name) return;
+    clearTimeout(this.later.keep);
+    if (this.dirty && this.name && !anew) await this.keep();
+    const found = await this.line.ask("read", { name });
+    if (found.refused) {
+      this.tell(found.refused);
+      this.files.value = this.name;
+      return;
+    }
+    const same = name === this.name;
+    Object.assign(this, { name, digest: found.digest, seed: same ? this.seed : 0 });
+    this.files.value = name;
+    document.title = this.title.textContent = name;
+    this.players.value = "me";
+    this.editor.open(name, found.text, anew);
+    if (found.draft !== null && found.draft !== this.editor.text) {
+      this.editor.replace(found.draft);
+      this.tell("what you had typed and not saved is here again; Ctrl-Z takes it back");
+    }
+    this.marked(this.editor.text !== found.text);
+    this.draw();
+  }
+
+  typedText() {
+    if (!this.name) return;
+    this.marked(true);
+    clearTimeout(this.later.draw);
+    this.later.draw = setTimeout(() => this.draw(), DRAW_AFTER);
+    clearTimeout(this.later.keep);
+    this.later.keep = setTimeout(() => this.keep(), KEEP_AFTER);
+  }
+
+  /** @param {boolean} dirty */
+  marked(dirty) {
+    this.dirty = dirty;
+    this.state.textContent = dirty ? "not saved; a draft is kept" : "saved";
+  }
+
+  async keep() {
+    if (this.dirty) await this.line.ask("draft", { name: this.name, text: this.editor.text });
+  }
+
+  async save() {
+    clearTimeout(this.later.keep);
+    const text = this.editor.text, done = await this.line.ask("save", { name: this.name, text, digest: this.digest });
+    if (done.conflict) this.conflict(done.refused);
+    else if (done.refused) this.tell(done.refused);
+    else {
+      this.digest = done.digest;
+      this.marked(this.editor.text !== text);
+    }
+  }
+
+  /** @param {string} said */
+  conflict(said) {
+    this.ask(said, [
+      ["Keep mine, and write over it", async () => {
+        this.digest = (await this.line.ask("read", { name: this.name })).digest;
+        await this.save();
+      }],
+      ["Open theirs", async () => {
+        await this.line.ask("draft", { name: this.name, text: null });
+        await this.openFile(this.name, true);
+      }],
+      ["Neither, for now", () => {}],
+    ]);
+  }
+
+  /** @param {string} text @param {[string, () => void][]} answers @param {...Node} more */
+  ask(text, answers, ...more) {
+    const close = (/** @type {() => void} */ act) => () => {
+      this.dialog.close();
+      act();
+    };
+    this.dialog.replaceChildren(make("p", {}, text), ...more, make("div", { class: "controls" }, ...answers.map(([word, act]) => make("button", { onclick: close(act) }, word))));
+    this.dialog.showModal();
+  }
+
+  /** New scenarios: templates, and copies of shipped ones. */
+  offer() {
+    const { templates = {}, shipped = [] } = this.offered ?? {};
+    const template = make("select", { "aria-label": "template" }, ...Object.entries(templates).map(([name, about]) => make("option", { value: name }, `${name}: ${about}`)));
+    const called = make("input", { value: "my_scenario", "aria-label": "name" });
+    const copy = make("select", { "aria-label": "shipped scenario" }, ...shipped.map((/** @type {string} */ name) => make("option", {}, name)));
+    const opened = async (/** @type {Reply} */ done) => {
+      if (done.refused) return this.tell(done.refused);
+      await this.list();
+      await this.openFile(done.name);
+    };
+    this.ask("Begin with a template, or with a copy of a shipped scenario. Both become files of this folder.", [
+      ["Begin with the template", async () => opened(await this.line.ask("create", { template: template.value, called: called.value.trim() }))],
+      ["Open a copy", async () => opened(await this.line.ask("copy", { shipped: copy.value }))],
+      ["Close", () => {}],
+    ], make("label", {}, "Template ", template), make("label", {}, "Name ", called), make("label", {}, "Shipped ", copy));
+  }
+
+  /** @param {string} at file:line */
+  async editorAt(at) {
+    const [, file, line] = /^(.*):(\d+)$/.exec(at) ?? ["", "", "1"];
+    const name = /** @type {string[]} */ (this.offered?.files ?? []).find((one) => one === file || file.endsWith(`/${one}`));
+    if (!name) return this.tell(`${at} is not a file of this folder`);
+    if (name !== this.name) await this.openFile(name);
+    this.editor.goTo(Number(line));
+  }
+
+  // -- the game --------------------------------------------------------------------------------------------------
+
+  /** Draw the room of what is written; of several changes while one is drawn, the last. */
+  async draw() {
+    if (this.drawing) {
+      this.again = true;
+      return;
+    }
+    this.drawing = true;
+    this.pause();
+    const text = this.editor.text, drawn = await this.line.ask("draw", { path: this.name, text, seed: this.seed });
+    this.drawing = false;
+    if (this.again) {
+      this.again = false;
+      await this.draw();
+      return;
+    }
+    const findings = drawn.findings ?? [];
+    this.findings.replaceChildren(...findings.map((/** @type {Reply} */ one) => make("li", { class: one.error ? "error" : "warning" },
+      make("button", { class: "link", onclick: () => this.editor.goTo(one.line) }, `${one.line}:${one.column}`), ` ${one.code} `, one.message)));
+    this.stage.root.classList.toggle("stale", !drawn.trace);
+    if (drawn.trace) {
+      this.players.value = drawn.player;
+      this.tell("");
+      this.take(drawn);
+    } else this.tell(drawn.refused ?? (this.episode ? "the last good room is shown until the mistakes are mended" : "the room is shown when the mistakes are mended"));
+    document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
+  }
+
+  /** @param {Reply} begun */
+  take(begun) {
+    this.episode = new Episode(begun.trace);
+    this.length = 0;
+    this.seed = begun.seed;
+    this.seedField.value = String(begun.seed);
+    const { actions, templates, nouns } = this.episode.trace;
+    const options = (/** @type {HTMLSelectElement} */ select, /** @type {string[]} */ words) => {
+      const chosen = select.value;
+      select.replaceChildren(...words.map((word) => make("option", { selected: word === chosen }, word)));
+    };
+    options(this.template, templates);
+    options(this.noun, nouns);
+    this.sentences.replaceChildren(...begun.phrases.sentences.map((/** @type {string} */ said) => make("option", { value: said })));
+    this.moves.replaceChildren(...[...actions, "none"].map((word) => make("button", { onclick: () => this.act({ movement: word === "none" ? null : word }) }, word)));
+    this.show();
+  }
+
+  /** @param {number} seed */
+  async begin(seed) {
+    this.pause();
+    const begun = await this.line.ask("begin", { seed, player: this.players.value || "me" });
+    if (begun.refused) {
+      this.tell(begun.refused);
+      if (!begun.lost) this.players.value = "me";
+      if (begun.lost) this.draw();
+      return;
+    }
+    this.tell("");
+    this.take(begun);
+  }
+
+  /** @param {Reply} what */
+  async act(what, name = "act") {
+    const done = await this.line.ask(name, what);
+    if (done.refused) {
+      this.tell(done.refused);
+      this.pause();
+      if (done.lost) this.draw();
+      return false;
+    }
+    this.tell("");
+    this.episode?.add(done.more);
+    this.length = this.episode?.length ?? 0;
+    this.show();
+    return true;
+  }
+
+  /** @param {number} step */
+  async back(step) {
+    if (step < 0 || step >= this.length) return;
+    this.pause();
+    const done = await this.line.ask("back", { to: step });
+    if (done.refused) return this.tell(done.refused);
+    this.episode?.cut(step);
+    this.length = step;
+    this.tell("");
+    this.show();
+  }
+
+  say() {
+    this.act({ sentence: this.template.value.replace("<noun>", this.noun.value) });
+  }
+
+  /** @param {Event} event */
+  async submit(event) {
+    event.preventDefault();
+    if (this.typed.value.trim() && (await this.act({ line: this.typed.value }))) this.typed.value = "";
+  }
+
+  async auto() {
+    if (this.players.value === "me") {
+      this.tell("choose who plays: the script, a random player, or a run of this folder");
+      return false;
+    }
+    return this.act({}, "auto");
+  }
+
+  toggleWatch() {
+    if (this.timer !== undefined) return this.pause();
+    this.timer = setInterval(async () => {
+      if (this.episode?.ended || !(await this.auto())) this.pause();
+    }, STEP_EVERY);
+    this.watch.textContent = "⏸ pause";
+  }
+
+  pause() {
+    clearInterval(this.timer);
+    this.timer = undefined;
+    this.watch.textContent = "▶ watch";
+  }
+
+  /** Things are dragged to other cells before the first step. */
+  dragging() {
+    const { canvas } = this.stage;
+    /** @type {string | undefined} */ let held;
+    const cell = (/** @type {PointerEvent} */ event) => {
+      const box = canvas.getBoundingClientRect(), { width, height } = this.episode?.scenes[this.length].room ?? { width: 1, height: 1 };
+      return [Math.floor(((event.clientX - box.left) / box.width) * width), Math.floor(((event.clientY - box.top) / box.height) * height)];
+    };
+    canvas.addEventListener("pointerdown", (event) => {
+      const state = this.episode?.scenes[this.length].state ?? {}, [x, y] = cell(event);
+      held = Object.keys(state).find((key) => key.endsWith(".at") && state[key]?.[0] === x && state[key]?.[1] === y)?.slice(0, -3);
+      if (held) canvas.setPointerCapture(event.pointerId);
+    });
+    canvas.addEventListener("pointerup", async (event) => {
+      const who = held, at = cell(event);
+      held = undefined;
+      const from = who ? this.episode?.scenes[this.length].state[`${who}.at`] : null;
+      if (!who || !from || (from[0] === at[0] && from[1] === at[1])) return;
+      if (this.length) await this.back(0);
+      const done = await this.line.ask("place", { who, at });
+      if (done.refused) return this.tell(done.refused);
+      this.take(done);
+      this.tell(`${who} was put at ${at.join(", ")}; “Layout” saves the room`);
+    });
+  }
+
+  async check() {
+    this.checked.replaceChildren(make("p", { class: "quiet" }, "checking …"));
+    const done = await this.line.ask("check", { path: this.name, text: this.editor.text });
+    this.checked.replaceChildren(make("pre", {}, done.refused ?? done.lines.join("\n")));
+  }
+
+  /** @param {"replay" | "layout"} what */
+  async export(what) {
+    const done = await this.line.ask(what);
+    if (done.refused) return this.tell(done.refused);
+    const stem = this.name.replace(/.*\//, "").replace(/\.ya?ml$/, "");
+    const [text, name] = what === "replay" ? [done.page, `${stem}.html`] : [JSON.stringify(done.layout, null, 2), `${stem}.layout.json`];
+    const link = make("a", { href: URL.createObjectURL(new Blob([text])), download: name });
+    link.click();
+    URL.revokeObjectURL(link.href);
+  }
+
+  shade() {
+    const root = document.documentElement, dark = matchMedia("(prefers-color-scheme: dark)").matches;
+    const now = root.style.colorScheme || (dark ? "dark" : "light");
+    root.style.colorScheme = now === "dark" ? "light" : "dark";
+    this.show();
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    const { target, key } = event;
+    if (event.ctrlKey || event.metaKey || event.altKey || this.dialog.open || !(target instanceof HTMLElement)) return;
+    if (target.closest("input, select, textarea, .text") || (target instanceof HTMLButtonElement && [" ", "Enter"].includes(key))) {
+      if (key === "Escape") target.blur();
+      return;
+    }
+    const name = key.length === 1 ? key.toLowerCase() : key;
+    const move = MOVES[name];
+    /** @type {Record<string, () => void>} */
+    const others = {
+      "/": () => this.typed.focus(),
+      Enter: () => this.typed.focus(),
+      u: () => this.back(this.length - 1),
+      Backspace: () => this.back(this.length - 1),
+      r: () => this.begin(this.seed),
+      n: () => this.begin(this.seed + 1),
+      l: () => {
+        this.stage.letters = !this.stage.letters;
+        this.show();
+      },
+    };
+    const act = move ? () => this.act({ movement: move === "none" ? null : move }) : others[name];
+    if (!act) return;
+    event.preventDefault();
+    act();
+  }
+
+  /** @param {string} text */
+  tell(text) {
+    this.message.textContent = text;
+  }
+
+  show() {
+    const { episode, length } = this;
+    if (!episode) return;
+    const { ended } = episode;
+    this.count.textContent = `step ${length} · reward ${episode.scenes[length].reward.toFixed(3)}`;
+    if (ended) this.tell(`${ended.success ? "✓ success" : "✗ no success"}: ${ended.text}`);
+    this.message.className = `message ${ended ? (ended.success ? "good" : "bad") : ""}`;
+    for (const part of this.parts) part.show(episode, length);
+  }
+}
+
+new Studio();

@@ -1,0 +1,115 @@
+"""A replay from the disk, without a network: it plays, steps, scrubs, and says why."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from socialai_dsl.cli.main import main
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> str:
+    file = tmp_path_factory.mktemp("replay") / "episode.html"
+    assert main(["replay", "talkitout", "--episodes", "40", "--record", "2", "-o", str(file)]) == 0
+    return file.as_uri()
+
+
+@pytest.fixture
+def replay(page: Page, address: str) -> Page:
+    page.context.set_offline(True)
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(address)
+    page.get_by_role("button", name="play").wait_for()
+    assert asked == [address]
+    return page
+
+
+def step(page: Page) -> str:
+    return page.locator(".controls output").inner_text().split(" ·")[0]
+
+
+def test_it_plays_steps_and_scrubs(replay: Page) -> None:
+    assert step(replay).startswith("step 0 of ")
+    last = int(step(replay).rpartition(" ")[2])
+    replay.keyboard.press("ArrowRight")
+    replay.get_by_role("button", name="a step on").click()
+    assert step(replay).startswith("step 2 of ")
+    replay.get_by_label("step", exact=True).fill("5")
+    assert step(replay).startswith("step 5 of ")
+    replay.keyboard.press("End")
+    assert step(replay).startswith(f"step {last} of ")
+    replay.keyboard.press("Home")
+    replay.get_by_label("steps a second").select_option("8")
+    replay.get_by_role("button", name="play").click()
+    replay.locator(".controls output", has_text=f"step {last} of").wait_for()
+    replay.locator(".controls .main", has_text="play").wait_for()  # it stops at the end
+    replay.get_by_label("steps a second").select_option("1")
+    replay.locator(".controls .main").click()
+    replay.locator(".controls .main", has_text="pause").wait_for()
+    replay.keyboard.press("Space")
+    assert replay.locator(".controls .main").inner_text() == "▶ play"
+
+
+def test_a_link_leads_to_a_step_and_arrows_to_other_episodes(replay: Page, address: str) -> None:
+    replay.goto(f"{address}#e2s4")
+    assert step(replay).startswith("step 4 of ")
+    assert replay.locator(".episodes [aria-current]").count() == 1
+    replay.keyboard.press("ArrowDown")
+    assert replay.evaluate("location.hash") == "#e3s0"
+    replay.goto(f"{address}#e99s999")
+    assert replay.evaluate("location.hash").startswith("#e")
+    assert step(replay).split()[1] == step(replay).split()[3]
+
+
+def test_it_says_what_was_said_and_why(replay: Page) -> None:
+    replay.locator(".episodes button", has_text="success").last.click()
+    replay.keyboard.press("End")
+    lines = replay.locator(".transcript li").all_inner_texts()
+    assert any("Gandalf" in line for line in lines)
+    assert replay.locator(".rules li.fired").count() >= 1
+    replay.keyboard.press("Home")
+    for _ in range(60):
+        if replay.locator(".bubble").count():
+            break
+        replay.keyboard.press("ArrowRight")
+    assert replay.locator(".bubble").first.is_visible()
+    replay.get_by_label("whose rules").select_option("wizard")
+    assert set(replay.locator(".rules li b").all_inner_texts()) == {"wizard"}
+    assert replay.locator(".stage canvas").get_attribute("aria-label").count("doors[") == 4  # type: ignore[union-attr]
+
+
+def test_a_phone_shows_all_of_it(browser: Browser, address: str) -> None:
+    context = browser.new_context(viewport={"width": 390, "height": 844}, device_scale_factor=2, offline=True)
+    page = context.new_page()
+    page.goto(address)
+    page.get_by_role("button", name="play").wait_for()
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    context.close()
+
+
+def test_nothing_of_a_scenario_is_read_as_html(page: Page, tmp_path: Path) -> None:
+    hostile = tmp_path / "hostile.yaml"
+    hostile.write_text(
+        """scenario: hostile
+about: "</script><img src=x onerror=document.title='broken'>"
+horizon: 5
+grammar: {templates: [Say <noun>], nouns: [hello]}
+room: {size: 6}
+cast: {agent: {place: anywhere}, other: {place: anywhere}}
+outcome: [{failure: agent.did(done)}]
+"""
+    )
+    file = tmp_path / "page.html"
+    assert main(["replay", str(hostile), "--agent", "random", "--episodes", "3", "-o", str(file)]) == 0
+    page.goto(file.as_uri())
+    page.get_by_role("button", name="play").wait_for()
+    assert "</script>" in page.locator("header").inner_text()
+    assert page.locator("img").count() == 0
+    assert "hostile" in page.title()

@@ -1,0 +1,166 @@
+"""Counting what came about: it agrees with what `explain()` tells of the same episodes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import socialai_dsl as sd
+from socialai_dsl.analysis.coverage import coverage
+from socialai_dsl.analysis.properties import Effort
+from socialai_dsl.analysis.tally import Tally, parts_of, tally
+from socialai_dsl.compilation import scenarios_of
+from socialai_dsl.envs import ScenarioVectorEnv
+from tests.tiny import Folder
+
+ROOT = Path(__file__).parents[3]
+EPISODES = 7
+
+
+def choose(row: int, step: int, sizes: Any) -> Any:
+    """What the agent does in an episode, whoever plays it beside."""
+    return np.random.default_rng([row, step]).integers(0, sizes)
+
+
+def played(name: str, together: int, scripted: bool) -> Tally:
+    """Episodes 0 to 6, so many at once."""
+    envs = sd.make_vec(name, num_envs=together, autoreset_mode="Disabled")
+    assert isinstance(envs, ScenarioVectorEnv)
+    sizes, step, first = envs.single_action_space.nvec, [0], [-together]
+
+    def begin(rows: Any, numbers: Any) -> None:
+        step[0], first[0] = 0, first[0] + together
+
+    def act(observation: Any) -> Any:
+        step[0] += 1
+        if scripted:
+            return envs.scripted_actions()
+        return np.stack([choose(first[0] + row, step[0], sizes) for row in range(together)])
+
+    return tally(envs, scenarios_of(sd.load(name)), act, begin, EPISODES, seed=3)
+
+
+def explained(name: str, scripted: bool) -> tuple[Counter[tuple[str, str]], Counter[str]]:
+    """(kind, file:line) of all that fired, and the outcomes, in the same episodes one by one."""
+    env: Any = sd.make(name).unwrapped
+    fired: Counter[tuple[str, str]] = Counter()
+    endings: Counter[str] = Counter()
+    for index in range(EPISODES):
+        env.reset(seed=3, options={"index": index})
+        ended, step = False, 0
+        while not ended:
+            step += 1
+            action = env.scripted_action() if scripted else choose(index, step, env.action_space.nvec)
+            *_, terminated, truncated, info = env.step(action)
+            ended = terminated or truncated
+            for entry in env.explain()["fired"]:
+                kind = {"world rule": "rule"}.get(entry["kind"], entry["kind"])
+                fired[kind, entry["at"]] += 1
+        endings[info["outcome"]] += 1
+    return fired, endings
+
+
+@pytest.mark.parametrize(
+    ("name", "scripted"),
+    [
+        ("talkitout", False),
+        ("talkitout+oracle", True),
+        ("help+oracle", True),
+        ("cointhief", False),
+        (str(ROOT / "scenarios/novel/shop.yaml+oracle"), True),
+        (str(ROOT / "scenarios/school/apple_stealing.yaml+oracle"), True),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("together", [1, 3, 7])
+def test_it_counts_what_happened(name: str, scripted: bool, together: int) -> None:
+    counted = played(name, together, scripted)
+    fired, endings = explained(name, scripted)
+    rules: Counter[tuple[str, str]] = Counter()
+    for part, times in counted.times.items():
+        if part.kind in ("rule", "outcome") and times:
+            rules[part.kind, f"{part.span.file}:{part.span.line}"] += times
+    assert rules == Counter({key: times for key, times in fired.items() if key[0] != "step"})
+    assert counted.endings == endings
+    assert counted.episodes == EPISODES
+
+
+def test_states_and_steps_are_counted_when_they_are_entered(tmp_path: Path) -> None:
+    """Also a state that is passed within a step, and the same state entered again."""
+    folder = Folder(tmp_path)
+    path = folder.write(
+        "tiny",
+        """
+        horizon: 10
+        frames:
+          hop:
+            start: a
+            states:
+              a: {then: [{when: t == 2 or t == 4, goto: b}]}
+              b: {then: [{goto_now: c}]}
+              c: {then: [{when: t > 50, goto: d}, {goto: a}]}
+              d: {}
+          walk: {steps: [{do: stay, for: 3}, {do: stay, until: t > 50}, {do: forward}]}
+        cast:
+          one: {at: [3, 3], frame: hop}
+          two: {at: [4, 4], frame: hop}
+          three: {at: [5, 5], frame: walk}
+          agent: {at: [1, 1]}
+        """,
+    )
+    envs = sd.make_vec(str(path), num_envs=2, autoreset_mode="Disabled")
+    assert isinstance(envs, ScenarioVectorEnv)
+    still = np.tile([envs.single_action_space.nvec[0] - 1, 0, 0, 0], (2, 1))
+    counted = tally(
+        envs,
+        scenarios_of(sd.load(str(path))),
+        lambda seen: still,
+        lambda rows, numbers: None,
+        episodes=4,
+        seed=0,
+    )
+    times = {part.name: number for part, number in counted.times.items()}
+    # Two members in four episodes: at the start, and back from c twice.
+    assert (times["hop.a"], times["hop.b"], times["hop.c"], times["hop.d"]) == (24, 16, 16, 0)
+    assert (times["walk.steps[0]"], times["walk.steps[1]"], times["walk.steps[2]"]) == (4, 4, 0)
+    assert counted.endings == {"timeout": 4}
+
+
+def test_parts_are_named_where_they_are_written() -> None:
+    loaded = sd.load("diverse_exit")
+    assert isinstance(loaded, sd.LoadedScenario)
+    files = {Path(part.span.file).name for part in parts_of(loaded.checked)}
+    assert files == {"diverse_exit.yaml", "teacher.yaml"}
+
+
+def test_entries_that_begin_and_end_in_one_turn_have_come_about(tmp_path: Path) -> None:
+    """A way that is fulfilled already is skipped, and what follows it may end in the same turn."""
+    file = Folder(tmp_path).write(
+        "skipping",
+        """\
+        objects: {ball: {type: ball, at: [3, 3]}}
+        frames:
+          work:
+            steps:
+              - {do: go_next_to(ball)}
+              - {do: left}
+              - {do: go_next_to(ball)}
+              - {do: go_next_to(ball)}
+              - {do: right}
+              - {do: stay, for: 0}
+              - {do: stay, for: ever}
+        cast:
+          ann: {frame: work, at: [4, 3]}
+          agent: {}
+        """,
+    )
+    counted = played(str(file), EPISODES, False)
+    steps = {part.name: times for part, times in counted.times.items() if part.kind == "step"}
+    assert steps == {f"work.steps[{k}]": EPISODES for k in range(7)}
+    loaded = sd.load(file)
+    assert isinstance(loaded, sd.LoadedScenario)
+    assert [part for part in coverage(loaded, Effort(2)).missing if part.kind == "step"] == []

@@ -1,0 +1,284 @@
+"""`socialai evaluate llm:MODEL`: any endpoint, its faults, its costs, and going on where it was stopped."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from socialai_dsl.cli.main import main
+from socialai_dsl.llm import Episode
+from socialai_dsl.llm.episode import scripted_reply
+from tests.socialai_dsl.llm.endpoint import completion, endpoint
+
+pytest.importorskip("httpx", reason="language models need the extra llm")
+
+Capture = pytest.CaptureFixture[str]
+SECRET = "sk-very-secret"
+
+
+@pytest.fixture(autouse=True)
+def surroundings(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A key in the environment, and no time to wait for."""
+    monkeypatch.setenv("OPENAI_API_KEY", SECRET)
+    monkeypatch.setattr("socialai_dsl.llm.endpoint._FIRST_WAIT", 0.001)
+
+
+def evaluate(url: str, out: Path, *more: str, on: str = "talkitout", episodes: int = 3) -> int:
+    arguments = [
+        "--on",
+        on,
+        "--episodes",
+        str(episodes),
+        "--base-url",
+        url,
+        "--out",
+        str(out),
+        "--record",
+        "0",
+    ]
+    return main(["evaluate", "llm:stub", *arguments, *more])
+
+
+def figures(out: Path, scenario: str = "talkitout") -> Any:
+    return json.loads((out / scenario / "result.json").read_text(encoding="utf-8"))
+
+
+def script(scenario: str) -> Any:
+    """A model that plays the scenario's script: it recognises the episode by its first observation."""
+    playing: dict[str, Episode] = {}
+    for number in range(10):
+        episode = Episode(f"{scenario}+oracle")
+        playing[episode.reset(test_episode=number)] = episode
+
+    def respond(request: dict[str, Any]) -> str:
+        episode = playing[request["messages"][1]["content"]]
+        reply = scripted_reply(episode)
+        episode.step(reply)
+        return f"Let me think.\n{reply}"
+
+    return respond
+
+
+def test_a_model_that_knows_the_script_does_what_the_script_does(tmp_path: Path, capsys: Capture) -> None:
+    assert main(["evaluate", "oracle", "--on", "talkitout", "--episodes", "8", "--json"]) == 0
+    (expected,) = json.loads(capsys.readouterr().out)
+    with endpoint(script("talkitout")) as stub:
+        assert (
+            evaluate(
+                stub.url, tmp_path, "--history", "1000", "--concurrency", "3", "--record", "1", episodes=8
+            )
+            == 0
+        )
+    printed = capsys.readouterr().out
+    result = figures(tmp_path)
+    same = ("success_rate", "mean_length", "mean_return", "outcomes")
+    assert {key: result["eval"][key] for key in same} == {key: expected["eval"][key] for key in same}
+    assert result["agent"] == "llm:stub"
+    assert result["eval"]["rules"] == pytest.approx(
+        {r: expected["eval"]["rules"][r] for r in result["eval"]["rules"]}
+    )
+    replies = len(stub.requests)
+    assert (result["eval"]["replies"], result["eval"]["invalid_replies"]) == (replies, 0)
+    assert (result["eval"]["prompt_tokens"], result["eval"]["cost"]) == (10 * replies, None)
+    assert list((tmp_path / "talkitout").glob("success-*.gif"))
+    assert f"{10 * replies:,} read and {2 * replies:,} written" in printed
+
+
+def test_a_request_holds_the_instructions_and_the_last_observations(tmp_path: Path) -> None:
+    with endpoint(lambda _: "Act: left") as stub:
+        options = ["--history", "3", "--temperature", "0.5", "--max-tokens", "50", "--goal", "Leave."]
+        assert evaluate(stub.url, tmp_path, *options, "--concurrency", "1", episodes=1) == 0
+    assert len(stub.requests) == 100
+    last = stub.requests[-1]
+    assert [message["role"] for message in last["messages"]] == ["system", *["user", "assistant"] * 2, "user"]
+    assert last["messages"][0]["content"].endswith("Leave.")
+    assert last["messages"][2]["content"] == "Act: left"
+    assert (last["model"], last["temperature"], last["max_tokens"]) == ("stub", 0.5, 50)
+    assert "temperature" in stub.requests[0]
+    lines = (tmp_path / "talkitout/transcripts/episode-000.jsonl").read_text().splitlines()
+    assert len(lines) == 100
+    assert json.loads(lines[0])["reply"] == "Act: left"
+
+
+def test_json_and_tools(tmp_path: Path) -> None:
+    with endpoint(lambda _: '{"move": "left", "say": null}') as stub:
+        assert evaluate(stub.url, tmp_path / "json", "--mode", "json", episodes=1) == 0
+    schema = stub.requests[0]["response_format"]["json_schema"]["schema"]
+    assert "Open sesame" in schema["properties"]["say"]["enum"]
+    assert figures(tmp_path / "json")["eval"]["invalid_replies"] == 0
+
+    call = {"id": "7", "type": "function", "function": {"name": "move", "arguments": '{"direction": "left"}'}}
+    with endpoint(lambda _: {"role": "assistant", "content": None, "tool_calls": [call]}) as stub:
+        assert evaluate(stub.url, tmp_path / "tools", "--mode", "tools", episodes=1) == 0
+    assert [tool["function"]["name"] for tool in stub.requests[0]["tools"]] == ["move", "say"]
+    roles = [message["role"] for message in stub.requests[1]["messages"]]
+    assert roles == ["system", "user", "assistant", "tool", "user"]
+    assert figures(tmp_path / "tools")["eval"]["invalid_replies"] == 0
+
+    with endpoint(lambda _: "Act: left") as stub:
+        assert evaluate(stub.url, tmp_path / "grammar", "--grammar", episodes=1) == 0
+    assert stub.requests[0]["grammar"].startswith('root ::= "Act: "')
+
+
+FAULTS: dict[str, Any] = {
+    "rate limit": (429, {"Retry-After": "0.01"}, b'{"error": {"message": "slow down"}}'),
+    "server error": (500, {}, b"Internal Server Error"),
+    "cut off": (200, {"Content-Length": "5000"}, completion("Act: left")),
+    "not JSON": (200, {}, b"<html>busy</html>"),
+    "no choices": (200, {}, b'{"choices": []}'),
+    "empty body": (200, {}, b""),
+    "a list": (200, {}, b"[1]"),
+    "wrong types": (200, {}, b'{"choices": [{"message": {"content": 7}}]}'),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_what_passes_is_waited_for(fault: str, tmp_path: Path) -> None:
+    count = 0
+
+    def respond(_: Any) -> Any:
+        nonlocal count
+        count += 1
+        return FAULTS[fault] if count % 3 == 2 else "Act: done"
+
+    with endpoint(respond) as stub:
+        assert evaluate(stub.url, tmp_path) == 0
+    result = figures(tmp_path)["eval"]
+    assert (result["episodes"], result["replies"], result["invalid_replies"]) == (3, 3, 0)
+    assert len(stub.requests) > 3
+
+
+def test_answers_without_an_action_count_as_invalid(tmp_path: Path) -> None:
+    replies = iter([{"content": ""}, {"content": None, "refusal": "I cannot do that."}, "x" * 100_000])
+    with endpoint(lambda _: next(replies, "Act: done")) as stub:
+        assert evaluate(stub.url, tmp_path, episodes=1) == 0
+    result = figures(tmp_path)["eval"]
+    assert (result["replies"], result["invalid_replies"]) == (4, 3)
+    assert max(len(json.dumps(request)) for request in stub.requests) < 20_000
+
+
+def test_a_reply_without_an_action_may_end_the_episode(tmp_path: Path, capsys: Capture) -> None:
+    with endpoint(lambda _: "no") as stub:
+        assert evaluate(stub.url, tmp_path, "--on-invalid", "fail", "--record", "2") == 0
+    assert figures(tmp_path)["eval"]["outcomes"]["invalid reply"] == 1
+    assert "a reply without an action" in capsys.readouterr().out
+
+
+def test_a_failure_loses_nothing_and_the_same_command_goes_on(tmp_path: Path, capsys: Capture) -> None:
+    def respond(_: Any) -> Any:
+        return (
+            "Act: left"
+            if len(stub.requests) <= 130
+            else (401, {}, f'{{"error": "{SECRET} has no money"}}'.encode())
+        )
+
+    with endpoint(respond) as stub:
+        assert evaluate(stub.url, tmp_path, "--concurrency", "1") == 2
+        first = stub.url
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "model 'stub' at http://127.0.0.1:" in error
+    assert "status 401" in error
+    assert "the same command goes on" in error
+    assert not (tmp_path / "talkitout" / "result.json").exists()
+    # A line that was being written when the power went.
+    with open(tmp_path / "talkitout/transcripts/episode-001.jsonl", "a", encoding="utf-8") as file:
+        file.write('{"reply": "Act: le')
+
+    settings = tmp_path / "talkitout/transcripts/settings.json"
+    with endpoint(lambda _: "Act: left") as stub:
+        settings.write_text(settings.read_text().replace(first, stub.url))
+        assert evaluate(stub.url, tmp_path, "--concurrency", "1") == 0
+    assert len(stub.requests) == 300 - 130
+    assert figures(tmp_path)["eval"]["replies"] == 300
+
+
+def test_a_budget_is_kept_to_and_can_be_added_to(tmp_path: Path, capsys: Capture) -> None:
+    with endpoint(lambda _: "Act: left") as stub:
+        assert evaluate(stub.url, tmp_path, "--budget", "1_800", "--concurrency", "1") == 1
+        assert len(stub.requests) == 150
+        assert "1 of 3 episodes are over" in capsys.readouterr().err
+        money = ["--budget", "0.000695 usd", "--prices", "0.5,1.0", "--concurrency", "1"]
+        assert evaluate(stub.url, tmp_path, *money) == 1
+        assert len(stub.requests) == 150 + 100
+        assert evaluate(stub.url, tmp_path) == 0
+    assert figures(tmp_path)["eval"]["replies"] == 300
+
+
+def test_other_settings_need_another_folder(tmp_path: Path, capsys: Capture) -> None:
+    with endpoint(lambda _: "Act: done") as stub:
+        assert evaluate(stub.url, tmp_path) == 0
+        assert evaluate(stub.url, tmp_path, "--style", "grid", "--history", "2") == 2
+    assert "played with another history, style; choose another folder" in capsys.readouterr().err
+
+
+def test_the_key_is_sent_and_appears_nowhere(tmp_path: Path, capsys: Capture, caplog: Any) -> None:
+    caplog.set_level("DEBUG")
+    with endpoint(lambda _: "Act: done") as stub:
+        assert evaluate(stub.url, tmp_path) == 0
+        assert evaluate(stub.url.replace("http://", f"http://user:{SECRET}@"), tmp_path) == 2
+    assert set(stub.keys) == {f"Bearer {SECRET}"}
+    printed = capsys.readouterr()
+    assert SECRET not in printed.out + printed.err + caplog.text
+    assert not [
+        path for path in tmp_path.rglob("*") if path.is_file() and SECRET.encode() in path.read_bytes()
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--base-url", "localhost:1"], "--base-url: got 'localhost:1', expected one such as http"),
+        (["--base-url", "ftp://x"], "--base-url: got 'ftp://x'"),
+        (
+            ["--base-url", "http://127.0.0.1:1/v1"],
+            "model 'm' at http://127.0.0.1:1/v1/chat/completions: no connection",
+        ),
+        (
+            ["--key-from", "NO_SUCH_KEY"],
+            "api.openai.com asks for a key, and the environment has none in NO_SUCH_KEY",
+        ),
+        (["--budget", "much"], "--budget: got 'much', expected an amount such as 200000 or 2.50usd"),
+        (["--budget", "1usd"], "--budget: an amount of money needs --prices"),
+        (["--prices", "1"], "--prices: got '1', expected two amounts such as 0.15,0.60"),
+    ],
+)
+def test_mistakes_are_told_in_one_line(
+    arguments: list[str], said: str, tmp_path: Path, capsys: Capture
+) -> None:
+    command = ["evaluate", "llm:m", "--on", "help", "--episodes", "1", "--out", str(tmp_path), *arguments]
+    assert main(command) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        ((404, {}, b'{"error": {"message": "no such model: stub"}}'), "status 404: no such model: stub"),
+        ((200, {}, b"<html>Welcome</html>"), "the answer is no completion: <html>Welcome</html>"),
+        ((400, {}, b"\x1b[2Junknown field tools\n" * 100), "status 400: \\x1b[2Junknown field tools"),
+    ],
+)
+def test_endpoints_that_are_none_are_told_of_at_once(
+    answer: Any, said: str, tmp_path: Path, capsys: Capture
+) -> None:
+    with endpoint(lambda _: answer) as stub:
+        assert evaluate(stub.url, tmp_path) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+    assert len(stub.requests) <= 2 * 4
+
+
+def test_progress_tells_of_costs(tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("socialai_dsl.cli.language_model._SECONDS_BETWEEN_LINES", 0.0)
+    with endpoint(lambda _: "Act: done") as stub:
+        assert evaluate(stub.url, tmp_path, "--prices", "1,2") == 0
+    said = capsys.readouterr().err
+    assert re.search(
+        r"3 of 3 episodes, 0 successes, 0.0% invalid replies, 36 tokens, \$0.0000, 0 s left", said
+    )

@@ -1,0 +1,118 @@
+"""`socialai replay`: the page is complete and small, and mistakes are told in words."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import socialai_dsl as sd
+from socialai_dsl.cli.main import main, run_main
+from socialai_dsl.replay import Trace, trace_of
+from socialai_dsl.replay.page import replay_page
+
+Capture = pytest.CaptureFixture[str]
+
+QUICK = ["--frames", "1500", "--envs", "32", "--eval-episodes", "30", "--device", "cpu"]
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def episodes_in(page: Path) -> list[dict[str, Any]]:
+    found = re.search(r'<script id="episodes"[^>]*>([^<]*)</script>', page.read_text(encoding="utf-8"))
+    assert found is not None
+    traces: list[dict[str, Any]] = json.loads(gzip.decompress(base64.b64decode(found.group(1))))
+    return traces
+
+
+def won(trace: dict[str, Any]) -> bool:
+    return bool(trace["moments"][-1]["ended"]["success"])
+
+
+def test_failures_come_first_and_ten_episodes_are_small(capsys: Capture) -> None:
+    assert main(["replay", "cointhief", "--agent", "random"]) == 0
+    assert "episodes written to episode.html" in capsys.readouterr().out
+    page = Path("episode.html")
+    assert page.stat().st_size <= 400_000
+    kept = [won(trace) for trace in episodes_in(page)]
+    assert kept == sorted(kept)
+    assert len(kept) <= 10
+
+
+def test_ten_episodes_that_run_out_of_time_are_small() -> None:
+    env = sd.make("social_env")
+    traces = [
+        trace_of(
+            env, [env.action_space.sample() * 0] * 300, {"seed": seed}, scenario="s", agent="a", episode="e"
+        )
+        for seed in range(10)
+    ]
+    assert len(replay_page(traces)) <= 400_000
+
+
+def test_one_test_episode_and_traces_as_a_file() -> None:
+    assert main(["replay", "talkitout", "--test-episode", "7", "-o", "seven.json"]) == 0
+    (trace,) = json.loads(Path("seven.json").read_text(encoding="utf-8"))
+    assert (trace["episode"], trace["agent"], trace["format"]) == (
+        "test episode 7",
+        "oracle",
+        "socialai-trace/1",
+    )
+    assert trace["about"].startswith("Leave by the right one")
+    assert main(["replay", "seven.json", "-o", "seven.html"]) == 0
+    assert episodes_in(Path("seven.html")) == [trace]
+
+
+def test_a_run_writes_what_its_agent_expected() -> None:
+    assert run_main(["talkitout", *QUICK, "--recipe", "plain", "--out", "run"]) == 0
+    traces = [Trace.model_validate(trace) for trace in episodes_in(Path("run", "episode.html"))]
+    assert all(moment.thought is not None for trace in traces for moment in trace.moments[1:])
+    for moment in traces[0].moments[1:]:
+        assert moment.thought is not None
+        assert [len(head) for head in moment.thought.probabilities] == [8, 2, 4, 16]
+        assert all(sum(head) == pytest.approx(1, abs=0.005) for head in moment.thought.probabilities)
+        assert moment.action is not None
+        chosen = [head[k] for head, k in zip(moment.thought.probabilities, moment.action, strict=True)]
+        assert min(chosen) > 0
+    assert main(["replay", "run", "--episodes", "30", "-o", "again.html"]) == 0
+    again = [Trace.model_validate(trace) for trace in episodes_in(Path("again.html"))]
+    assert [trace.moments for trace in again] == [trace.moments for trace in traces]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["talkitout", "-o", "page.txt"], "--out: got page.txt, expected a name that ends in .html or .json"),
+        (["none.json"], "No such file"),
+        (["list.json"], "expected at least one trace"),
+        (["text.json"], "expected a JSON list of traces"),
+        (["other.json"], "0.format"),
+        (["nowhere"], "there is no"),
+        (["talkitout", "--agent", "nowhere"], "nowhere"),
+    ],
+)
+def test_mistakes(arguments: list[str], told: str, capsys: Capture) -> None:
+    Path("list.json").write_text("[]")
+    Path("text.json").write_text("no")
+    Path("other.json").write_text('[{"format": "socialai-trace/9"}]')
+    assert main(["replay", *arguments]) in (1, 2)
+    assert told in capsys.readouterr().err
+    assert not Path("episode.html").exists()
+
+
+def test_a_notebook_shows_an_episode() -> None:
+    env = sd.make("talkitout")
+    trace = trace_of(env, [], {"seed": 0}, scenario="talkitout", agent="nobody", episode="seed 0")
+    shown = trace._repr_html_()
+    assert shown.startswith("<iframe")
+    assert "&lt;script" in shown
+    assert "<script" not in shown

@@ -1,0 +1,68 @@
+"""An OpenAI-compatible endpoint on this machine that answers as a test wants, faults included."""
+
+import json
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+Respond = Callable[[dict[str, Any]], Any]
+"""Takes a request; returns a message (or its text), or (status, headers, content)."""
+
+
+class Stub:
+    """What a stub was asked.
+
+    Attributes:
+        url: of the interface. requests: bodies, in the order in which they came. keys: of each request.
+    """
+
+    def __init__(self, url: str) -> None:
+        self.url = url
+        self.requests: list[dict[str, Any]] = []
+        self.keys: list[str] = []
+
+
+def completion(message: Any) -> bytes:
+    """The content of an answer; it takes ten tokens and two."""
+    message = {"role": "assistant", "content": message} if isinstance(message, str) else message
+    usage = {"prompt_tokens": 10, "completion_tokens": 2, "total_tokens": 12}
+    choice = {"index": 0, "message": message, "finish_reason": "stop"}
+    found = {"id": "1", "object": "chat.completion", "created": 0, "model": "stub", "choices": [choice]}
+    return json.dumps({**found, "usage": usage}).encode()
+
+
+@contextmanager
+def endpoint(respond: Respond) -> Iterator[Stub]:
+    """Serve on a free port of the loopback interface."""
+
+    class Handler(BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"
+
+        def do_POST(self) -> None:
+            body = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
+            stub.requests.append(body)
+            stub.keys.append(self.headers.get("Authorization", ""))
+            answer = respond(body)
+            status, headers, content = answer if isinstance(answer, tuple) else (200, {}, completion(answer))
+            self.send_response(status)
+            for name, value in {"Content-Length": str(len(content)), **headers}.items():
+                self.send_header(name, value)
+            self.end_headers()
+            self.wfile.write(content)
+            self.close_connection = True
+
+        def log_message(self, format: str, *arguments: Any) -> None:
+            """Say nothing."""
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    stub = Stub(f"http://127.0.0.1:{server.server_port}/v1")
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    try:
+        yield stub
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()

@@ -1,0 +1,153 @@
+"""What models really write is understood; what cannot be understood is answered with what is possible."""
+
+import json
+from itertools import product
+from typing import Any
+
+import jsonschema
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import socialai_dsl as sd
+from socialai_dsl.llm import Action, ActionLanguage
+from socialai_dsl.llm.actions import ToolCall
+from socialai_dsl.loader import shipped_names
+
+LANGUAGE = ActionLanguage(sd.compile(sd.load("talkitout")))
+EXIT = "Where is the exit"
+
+
+@pytest.mark.parametrize(
+    ("reply", "action"),
+    [
+        ("Act: forward", Action("forward")),
+        ("forward", Action("forward")),
+        ("  FORWARD.  ", Action("forward")),
+        ("Act: none", Action()),
+        ("Action: stay", Action()),
+        ("**Action:** `turn left`", Action("left")),
+        ("**Act: left**", Action("left")),
+        ("act : Left!", Action("left")),
+        ("> Act: forward", Action("forward")),
+        ("Act:\n\nforward", Action("forward")),
+        ("```\nAct: forward\n```", Action("forward")),
+        ("```\nforward\n```", Action("forward")),
+        ("Act: pick up", Action("pickup")),
+        ("Act: pick_up", Action("pickup")),
+        ("I will move forward.", Action("forward")),
+        ("I'll turn right now", Action("right")),
+        (f'Act: say "{EXIT}"', Action(None, EXIT)),
+        (f"Act: say '{EXIT}'", Action(None, EXIT)),
+        (f"Act: say “{EXIT}?”", Action(None, EXIT)),
+        (f"Act: {EXIT}?", Action(None, EXIT)),
+        ("Act: say: where is THE  exit", Action(None, EXIT)),
+        (f'"{EXIT}?"', Action(None, EXIT)),
+        (f'Act: say "{EXIT}" to the wizard.', Action(None, EXIT)),
+        (f'Act: forward, say "{EXIT}"', Action("forward", EXIT)),
+        (f'Act: move forward and say "{EXIT}"', Action("forward", EXIT)),
+        (f'Act: say "{EXIT}" and turn left', Action("left", EXIT)),
+        (f"Act: forward {EXIT}", Action("forward", EXIT)),
+        ("Act: say open sesame and then turn left", Action("left", "Open sesame")),
+        (f"Act: none, say {EXIT}", Action(None, EXIT)),
+        (
+            "I see a door ahead. Should I use it?\nNo: first I ask.\nAct: say How are you",
+            Action(None, "How are you"),
+        ),
+        ("Act: left\nThat was wrong.\nAct: right", Action("right")),
+        ("Act: left\nAct:", Action("left")),
+        ("<think>Act: left</think>\nAct: right", Action("right")),
+        ("<think>I could say Act: left</think>right", Action("right")),
+        ('{"move": "forward", "say": null}', Action("forward")),
+        ('{"move": null, "say": null}', Action()),
+        (f'```json\n{{"move": "none", "say": "{EXIT}"}}\n```', Action(None, EXIT)),
+        (f'Sure! {{"action": "Left", "say": "{EXIT}?"}} Good luck.', Action("left", EXIT)),
+        ('{"name": "move", "arguments": {"direction": "left"}}', Action("left")),
+        ('{"template": "Open <noun>", "noun": "sesame"}', Action(None, "Open sesame")),
+        ('Act: left, or rather {"move": "right", "say": ""}', Action("right")),
+    ],
+)
+def test_what_models_write_is_understood(reply: str, action: Action) -> None:
+    assert LANGUAGE.parse(reply) == (action, "")
+
+
+@pytest.mark.parametrize(
+    ("reply", "wrong"),
+    [
+        ("", "the reply was empty"),
+        (" \n", "the reply was empty"),
+        ("```\n```", "the reply held no action"),
+        ("<think>I go forward. Act: forward", "the reply held no action"),
+        ("Act: fly", '"fly" is no action'),
+        ("Act: don't go forward", '"don\'t go forward" is no action'),
+        (
+            "I am not sure whether to go forward or to ask.",
+            '"I am not sure whether to go forward or to ask." is no',
+        ),
+        (
+            'Act: say "Where is the exist"',
+            '"Where is the exist" cannot be said; did you mean "Where is the exit"?',
+        ),
+        ("Act: say please let me out", "cannot be said"),
+        (f'Act: fly, say "{EXIT}"', "cannot be said"),
+        ('{"move": "fly", "say": null}', '"fly" is no movement'),
+        ('{"move": "left", "say": "Open up"}', '"Open up" cannot be said'),
+        ('{"mood": "good"}', "the object says neither what to do nor what to say"),
+        ("x" * 1000, f'"{"x" * 80}…" is no action'),
+    ],
+)
+def test_what_is_not_understood_is_answered_with_what_is_possible(reply: str, wrong: str) -> None:
+    action, error = LANGUAGE.parse(reply)
+    assert action is None
+    assert wrong in error
+    assert "Movements are left, right, forward, pickup, drop, toggle, done, none" in error
+    assert len(error) < 500
+
+
+@pytest.mark.parametrize("name", [name for name in shipped_names() if "+" not in name])
+def test_everything_that_can_be_done_and_said_is_read_back(name: str) -> None:
+    program = sd.compile(sd.load(name))
+    language = ActionLanguage(program)
+    schema = jsonschema.Draft202012Validator(language.json_schema())
+    for template, noun in product(program.templates, program.nouns):
+        for movement in (None, "left"):
+            action = Action(movement, template.replace("<noun>", noun))
+            assert language.parse(language.write(action)) == (action, "")
+            reply = {"move": movement or "none", "say": action.sentence}
+            schema.validate(reply)
+            assert language.parse(json.dumps(reply)).action == action
+    for movement in (None, *program.actions):
+        assert language.parse(language.write(Action(movement))).action == Action(movement)
+
+
+def test_tools_of_one_reply_make_one_action() -> None:
+    def parse(*calls: tuple[str, Any]) -> Any:
+        return LANGUAGE.parse_calls([ToolCall(name, json.dumps(given)) for name, given in calls])
+
+    ask = ("say", {"template": "Where is <noun>", "noun": "the exit"})
+    assert parse(("move", {"direction": "left"})).action == Action("left")
+    assert parse(("move", {"direction": "left"}), ask).action == Action("left", EXIT)
+    assert parse(("move", {"direction": "left"}), ask, ("move", {"direction": "right"})).action == Action(
+        "right", EXIT
+    )
+    assert "no tool was called" in parse().error
+    assert '"fly" with "{}" is no call of a tool' in parse(("fly", {})).error
+    assert '"up" is no movement' in parse(("move", {"direction": "up"})).error
+    assert "is no call of a tool" in LANGUAGE.parse_calls([ToolCall("move", "{left")]).error
+    assert [tool["function"]["name"] for tool in LANGUAGE.tools()] == ["move", "say"]
+    directions = LANGUAGE.tools()[0]["function"]["parameters"]["properties"]["direction"]["enum"]
+    assert directions == ["left", "right", "forward", "pickup", "drop", "toggle", "done", "none"]
+
+
+def test_the_grammar_names_every_word() -> None:
+    grammar = LANGUAGE.gbnf()
+    assert 'root ::= "Act: " (movement | speech | movement ", " speech)' in grammar
+    assert '"Where is " noun' in grammar
+    assert '"the trash can"' in grammar
+
+
+@given(st.text())
+@settings(max_examples=100, deadline=None)
+def test_any_text_is_read_without_an_error(reply: str) -> None:
+    action, error = LANGUAGE.parse(reply)
+    assert (action is None) == bool(error)

@@ -1,0 +1,84 @@
+"""Scenarios as a task of Inspect AI, offline: a model that knows the script scores what the script scores."""
+
+import gc
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import socialai_dsl as sd
+from socialai_dsl.llm import Episode
+from socialai_dsl.llm.episode import scripted_reply
+
+pytest.importorskip("inspect_ai", reason="Inspect AI needs the extra inspect")
+
+from inspect_ai import eval as evaluate
+from inspect_ai.model import ModelOutput, ModelUsage, get_model
+
+pytestmark = pytest.mark.filterwarnings("ignore")  # of the libraries
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.chdir(tmp_path)
+    yield
+    gc.collect()  # Inspect leaves streams open; that is noticed here, where warnings of libraries are ignored
+
+
+def run(respond: Any, **arguments: Any) -> Any:
+    def output(messages: list[Any], *_: Any) -> ModelOutput:
+        found = ModelOutput.from_content("mockllm/model", respond(messages))
+        # Without it, the mock would look for a tokenizer on the network.
+        found.usage = ModelUsage(input_tokens=10, output_tokens=2, total_tokens=12)
+        return found
+
+    model = get_model("mockllm/model", custom_outputs=output)
+    (log,) = evaluate(
+        "socialai_dsl/scenario", model=model, task_args=arguments, display="none", log_format="json"
+    )
+    return log
+
+
+def test_the_task_of_the_entry_point_scores_what_the_script_reaches() -> None:
+    playing: dict[str, Episode] = {}
+    for number in range(6):
+        episode = Episode("talkitout+oracle")
+        playing[episode.reset(test_episode=number)] = episode
+
+    def script(messages: list[Any]) -> str:
+        episode = playing[messages[1].text]
+        reply = scripted_reply(episode)
+        episode.step(reply)
+        return reply
+
+    log = run(script, scenario="talkitout", episodes=6, history=1000)
+    assert log.status == "success", log.error
+    values = {score.name: {m: v.value for m, v in score.metrics.items()} for score in log.results.scores}
+    results = [episode.result() for episode in playing.values()]
+    assert values["success"]["mean"] == sum(result.success for result in results) / 6
+    assert values["steps"]["mean"] == pytest.approx(sum(result.steps for result in results) / 6)
+    assert values["return"]["mean"] == pytest.approx(sum(result.total for result in results) / 6)
+    assert values["invalid_rate"]["mean"] == 0
+    scores = [sample.scores["outcome"] for sample in log.samples]
+    assert {score.answer for score in scores} == {result.ending for result in results}
+    assert log.eval.metadata["program_sha256"] == sd.compile(sd.load("talkitout")).sha256
+
+
+def test_invalid_replies_and_a_short_history() -> None:
+    lengths = []
+
+    def respond(messages: list[Any]) -> str:
+        lengths.append(len(messages))
+        return "hm" if len(lengths) % 2 else "Act: left"
+
+    log = run(respond, scenario="talkitout", episodes=1, history=3)
+    (sample,) = log.samples
+    assert sample.scores["outcome"].value == {"success": 0, "return": 0.0, "steps": 100, "invalid_rate": 0.5}
+    assert max(lengths) == 6
+    assert "Your reply was not understood" in sample.messages[3].text
+
+
+def test_a_scenario_that_is_not_there_is_told_of() -> None:
+    with pytest.raises(Exception, match="there is no scenario `talkitour`"):
+        run(lambda _: "Act: left", scenario="talkitour")

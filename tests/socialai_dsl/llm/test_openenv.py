@@ -1,0 +1,131 @@
+"""Scenarios served to trainers: its client plays, seeds are honoured, and sessions do not mix."""
+
+import asyncio
+import socket
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import socialai_dsl as sd
+from socialai_dsl.cli.main import main
+from socialai_dsl.llm import Episode
+from socialai_dsl.llm.episode import scripted_reply
+
+pytest.importorskip("openenv", reason="serving OpenEnv needs the extra openenv")
+
+import uvicorn
+import yaml
+
+from socialai_dsl.llm.openenv import Reply, ScenarioClient, application
+
+pytestmark = pytest.mark.filterwarnings("ignore")  # of the libraries
+
+REPLIES = ("Act: forward", "Act: left", "Act: right", 'Act: say "How are you"', "hm")
+SERVED = Path(__file__).parents[3] / "docker" / "openenv"
+
+
+@pytest.fixture(scope="module")
+def url() -> Iterator[str]:
+    app = application(sd.compile(sd.load("talkitout")), sessions=100)
+    server = uvicorn.Server(uvicorn.Config(app, log_level="error"))
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        thread = threading.Thread(target=server.run, args=([listening],))
+        thread.start()
+        yield f"http://127.0.0.1:{listening.getsockname()[1]}"
+        server.should_exit = True
+        thread.join()
+
+
+def test_a_client_plays_an_episode_to_its_end(url: str) -> None:
+    beside = Episode("talkitout+oracle")
+    text = beside.reset(test_episode=3)
+    with ScenarioClient(base_url=url).sync() as client:
+        told = client.reset(test_episode=3).observation
+        assert (told.text, told.instructions) == (text, beside.instructions)
+        done = False
+        while not done:
+            reply = scripted_reply(beside)
+            turn = beside.step(reply)
+            result = client.step(Reply(message=reply))
+            assert (result.observation.text, result.reward, result.done) == (
+                turn.text,
+                turn.reward,
+                turn.done,
+            )
+            done = result.done
+        assert (result.observation.success, result.observation.ending) == (True, beside.result().ending)
+        state = client.state()
+        assert (state.step_count, state.test_episode, state.invalid_replies) == (beside.result().steps, 3, 0)
+        with pytest.raises(Exception, match="after the end of the episode"):
+            client.step(Reply(message="Act: left"))
+        with pytest.raises(Exception, match="Seed must be"):
+            client.reset(seed=-1)
+
+
+def test_an_episode_without_a_seed_can_be_played_again(url: str) -> None:
+    with ScenarioClient(base_url=url).sync() as client:
+        texts = [client.reset().observation.text for _ in range(5)]
+        assert len(set(texts)) > 1
+        again = client.state().seed
+        assert client.reset(seed=again).observation.text == texts[-1]
+
+
+def test_a_hundred_sessions_do_not_mix(url: str) -> None:
+    """All play at once, each its own room and replies; each is what one that plays alone would be told."""
+    together = asyncio.Barrier(100)
+
+    async def session(number: int) -> list[Any]:
+        replies = np.random.default_rng(number).choice(REPLIES, 20)
+        async with ScenarioClient(base_url=url) as client:
+            result = await client.reset(seed=number)
+            texts: list[Any] = [result.observation.text]
+            await together.wait()
+            for reply in replies:
+                result = await client.step(Reply(message=str(reply)))
+                texts.append((result.observation.text, result.reward, result.done))
+        return texts
+
+    async def all_sessions() -> list[list[Any]]:
+        return await asyncio.gather(*map(session, range(100)))
+
+    played = asyncio.run(all_sessions())
+    alone = Episode("talkitout")
+    for number, texts in enumerate(played):
+        assert texts[0] == alone.reset(seed=number)
+        for reply, told in zip(np.random.default_rng(number).choice(REPLIES, 20), texts[1:], strict=True):
+            turn = alone.step(str(reply))
+            assert told == (turn.text, turn.reward, turn.done)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["--scenario", "talkitour"], 2, "did you mean `talkitout`?"),
+        (
+            ["--scenario", "help", "--host", "no.such.host.invalid"],
+            2,
+            "cannot serve on no.such.host.invalid:8000",
+        ),
+        (["--scenario", "help", "--port", "99999"], 2, "cannot serve on 127.0.0.1:99999"),
+    ],
+)
+def test_mistakes_are_told(
+    arguments: list[str], code: int, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["serve", "openenv", *arguments]) == code
+    assert said in capsys.readouterr().err
+
+
+def test_the_manifest_and_the_image_name_what_there_is() -> None:
+    manifest = yaml.safe_load((SERVED / "openenv.yaml").read_text(encoding="utf-8"))
+    module, name = manifest["app"].split(":")
+    assert (module, manifest["port"]) == ("socialai_dsl.llm.openenv_app", 8000)
+    image = (SERVED / "Dockerfile").read_text(encoding="utf-8")
+    assert "socialai serve openenv" in image
+    from socialai_dsl.llm import openenv_app
+
+    assert getattr(openenv_app, name).title

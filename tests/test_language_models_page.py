@@ -1,0 +1,38 @@
+"""The five commands of docs/language_models.md lead to a table of three players on two scenarios."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from socialai_dsl.cli.main import main
+from tests.socialai_dsl.llm.endpoint import endpoint
+
+pytest.importorskip("httpx", reason="language models need the extra llm")
+
+PAGE = Path(__file__).parents[1] / "docs" / "language_models.md"
+
+
+def test_five_commands_lead_to_a_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    found = re.search(r"```console\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    assert found is not None
+    install, *commands = [line.removeprefix("$ ") for line in found[1].splitlines()]
+    assert install.startswith("pip install")
+    assert len(commands) == 4
+    with endpoint(lambda _: "Act: done") as stub:
+        for command in commands:
+            words = shlex.split(command.replace("http://localhost:8080/v1", stub.url))[1:]
+            named = [sorted(map(str, Path().glob(word))) if "*" in word else [word] for word in words]
+            assert main([word for words in named for word in words]) == 0
+    report = (tmp_path / "report" / "report.md").read_text(encoding="utf-8")
+    assert "6 of 6 runs done" in report
+    header, _, *rows = next(table for table in report.split("\n\n") if "**talkitout**" in table).splitlines()
+    players = [cell.strip() for cell in header.strip("|").split("|")][1:]
+    assert set(players) == {"llm:qwen3-8b", "oracle", "random"}
+    for row in rows:
+        cells = dict(zip(players, row.strip("|").split("|")[1:], strict=True))
+        assert cells["oracle"].strip().startswith("1.000")
+        assert cells["llm:qwen3-8b"].strip().startswith("0.000")  # it gives up at once
+    assert [row.split("|")[1].strip(" *") for row in rows] == ["help", "talkitout"]
