@@ -25,6 +25,8 @@ _FIRST_WAIT: Final = 1.0
 _LONGEST_WAIT: Final = 120.0
 _PASSING: Final = frozenset({408, 409, 425, 429, 500, 502, 503, 504, 529})
 """Statuses after which it is worth trying again."""
+_LOST: Final = (httpx.ReadError, httpx.WriteError, httpx.RemoteProtocolError)
+"""A connection that was there and broke."""
 _MOST_BYTES: Final = 4_000_000
 _CITED: Final = 200
 
@@ -136,7 +138,8 @@ class Endpoint:
             except (httpx.InvalidURL, httpx.UnsupportedProtocol) as error:
                 raise self._failure(f"that is no URL ({error})") from None
             except httpx.HTTPError as error:
-                what, strange = _said(error), strange + 1
+                # A server may close a connection just as it is used again; this says nothing about the address.
+                what, strange = _said(error), strange + (not isinstance(error, _LOST))
                 continue
             if status == httpx.codes.OK:
                 answer = self._answer(content, messages)

@@ -130,6 +130,7 @@ FAULTS: dict[str, Any] = {
     "no choices": (200, {}, b'{"choices": []}'),
     "empty body": (200, {}, b""),
     "a list": (200, {}, b"[1]"),
+    "hung up": None,
     "wrong types": (200, {}, b'{"choices": [{"message": {"content": 7}}]}'),
 }
 
@@ -148,6 +149,13 @@ def test_what_passes_is_waited_for(fault: str, tmp_path: Path) -> None:
     result = figures(tmp_path)["eval"]
     assert (result["episodes"], result["replies"], result["invalid_replies"]) == (3, 3, 0)
     assert len(stub.requests) > 3
+
+
+def test_lost_connections_do_not_make_an_address_wrong(tmp_path: Path) -> None:
+    replies = iter([None, None])
+    with endpoint(lambda _: next(replies, "Act: done")) as stub:
+        assert evaluate(stub.url, tmp_path, episodes=1) == 0
+    assert len(stub.requests) == 3
 
 
 def test_answers_without_an_action_count_as_invalid(tmp_path: Path) -> None:

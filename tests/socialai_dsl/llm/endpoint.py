@@ -8,7 +8,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 Respond = Callable[[dict[str, Any]], Any]
-"""Takes a request; returns a message (or its text), or (status, headers, content)."""
+"""Takes a request; returns a message (or its text), (status, headers, content), or None to hang up."""
 
 
 class Stub:
@@ -45,13 +45,15 @@ def endpoint(respond: Respond) -> Iterator[Stub]:
             stub.requests.append(body)
             stub.keys.append(self.headers.get("Authorization", ""))
             answer = respond(body)
+            self.close_connection = True
+            if answer is None:
+                return
             status, headers, content = answer if isinstance(answer, tuple) else (200, {}, completion(answer))
             self.send_response(status)
-            for name, value in {"Content-Length": str(len(content)), **headers}.items():
+            for name, value in {"Content-Length": str(len(content)), "Connection": "close", **headers}.items():
                 self.send_header(name, value)
             self.end_headers()
             self.wfile.write(content)
-            self.close_connection = True
 
         def log_message(self, format: str, *arguments: Any) -> None:
             """Say nothing."""
