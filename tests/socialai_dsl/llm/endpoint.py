@@ -3,7 +3,7 @@
 import json
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
@@ -52,8 +52,9 @@ def endpoint(respond: Respond) -> Iterator[Stub]:
             self.send_response(status)
             for name, value in {"Content-Length": str(len(content)), "Connection": "close", **headers}.items():
                 self.send_header(name, value)
-            self.end_headers()
-            self.wfile.write(content)
+            with suppress(ConnectionError):  # one who is answered may have left
+                self.end_headers()
+                self.wfile.write(content)
 
         def log_message(self, format: str, *arguments: Any) -> None:
             """Say nothing."""
