@@ -50,7 +50,11 @@ def endpoint(respond: Respond) -> Iterator[Stub]:
                 return
             status, headers, content = answer if isinstance(answer, tuple) else (200, {}, completion(answer))
             self.send_response(status)
-            for name, value in {"Content-Length": str(len(content)), "Connection": "close", **headers}.items():
+            for name, value in {
+                "Content-Length": str(len(content)),
+                "Connection": "close",
+                **headers,
+            }.items():
                 self.send_header(name, value)
             with suppress(ConnectionError):  # one who is answered may have left
                 self.end_headers()
