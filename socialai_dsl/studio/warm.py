@@ -1,6 +1,6 @@
 """Importing this module loads all that a window's process needs, and plays a step, which loads compiled code.
 
-The server from which these processes are forked imports it once, so that none of them waits for it or pays for its memory.
+The fork server of these processes imports it once, so that none of them waits for it or pays for its memory.
 """
 
 from pathlib import Path
