@@ -292,6 +292,10 @@ def _create(folder: Folder, template: str, called: str) -> dict[str, Any]:
     return {"name": names[0]}
 
 
+def _add(folder: Folder, name: str, text: str) -> dict[str, Any]:
+    return {"name": folder.create(name, text)}
+
+
 _FILES: Final[dict[str, Callable[..., dict[str, Any]]]] = {
     "list": _list,
     "read": _read,
@@ -299,5 +303,6 @@ _FILES: Final[dict[str, Callable[..., dict[str, Any]]]] = {
     "draft": _draft,
     "copy": _copy,
     "create": _create,
+    "add": _add,
 }
 """What a window may ask about files."""
