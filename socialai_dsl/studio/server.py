@@ -26,7 +26,9 @@ from socialai_dsl.studio.session import ASKED
 from socialai_dsl.studio.worker import answer_window, serve_language
 
 LARGEST_MESSAGE: Final = 2 << 20
-_SECONDS: Final = {"check": 90.0}
+_PLAYERS: Final = (None, "me", "script", "random")
+_CHECK_SECONDS: Final = 90.0
+_LOADING_SECONDS: Final = 60.0
 _USUAL_SECONDS: Final = 10.0
 _OWN: Final = ("studio.js", "studio.css", "editor.js")
 _SHARED: Final = ("dom.js", "panels.js", "room.js", "tiles.js", "trace.js", "pages.css")
@@ -161,7 +163,9 @@ class Studio:
         try:
             if name in ASKED:
                 self._place(asked)
-                return await engine.ask(asked, _SECONDS.get(name, _USUAL_SECONDS))
+                loads = asked.get("player") not in _PLAYERS
+                seconds = _CHECK_SECONDS if name == "check" else _LOADING_SECONDS if loads else _USUAL_SECONDS
+                return await engine.ask(asked, seconds)
             found = _FILES.get(name)
             if found is None:
                 return {"refused": f"got {name!r}, which nobody can be asked for"}
@@ -181,7 +185,7 @@ class Studio:
         if "path" in asked:
             asked["path"] = str(self._folder.path(str(asked["path"])))
         player = asked.get("player")
-        if player not in (None, "me", "script", "random"):
+        if player not in _PLAYERS:
             if player not in self._folder.runs():
                 raise FileError(f"{player}: there is no such run in the folder")
             asked["player"] = str(self._folder.root / player)

@@ -220,7 +220,7 @@ class Session:
         if not isinstance(loaded, LoadedScenario):
             raise RefusalError("a suite is checked by `socialai check`; here its members are, one by one")
         effort = Effort(100, 0, clock=Clock(seconds, lambda said: None))
-        return {"lines": list(check_scenario(loaded, path, effort).lines())}
+        return {"lines": list(check_scenario(loaded, display_name(Path(path)), effort).lines())}
 
     # -- within ----------------------------------------------------------------------------------------------
 

@@ -56,7 +56,7 @@ def all_tiles() -> list[Tile]:
         for pointing in (-1, 0, 1, 2, 3)
         for act in LAST_ACTS
     ]
-    return [*found, ((tiles.NPC, 1, 2, 3), {"below": (tiles.DOOR, 0, 0, 0)})]
+    return [*found, ((tiles.NPC, 1, 2, 3), {"below": (prelude().types["door"].code, 0, 0, 0)})]
 
 
 def as_png(look: tiles.Code, more: dict[str, Any]) -> np.ndarray:

@@ -85,9 +85,15 @@ function roomInWords(scene) {
 function momentInWords({ moment }) {
   if (!moment.t) return "Before the first step.";
   const heard = (moment.heard ?? []).map((line) => `${line.name ? `${line.name}: ` : ""}${line.text}`);
-  const ended = moment.ended ? [`The episode ended: ${moment.ended.success ? "success" : "no success"}, ${moment.ended.text}.`] : [];
+  const ended = moment.ended ? [`The episode ended: ${outcomeInWords(moment.ended)}.`] : [];
   const said = moment.said ? `, said “${moment.said}”` : "";
   return [`Step ${moment.t}: ${moment.did ?? "no action"}${said}.`, ...heard, ...ended].join(" ");
+}
+
+/** How an episode ended; what the file says there often begins with the word. @param {import("./trace.js").Outcome} outcome */
+export function outcomeInWords({ success, text }) {
+  const word = success ? "success" : "failure";
+  return text.startsWith(word) ? text : `${word}: ${text}`;
 }
 
 /** What the agent itself sees. */

@@ -1,7 +1,7 @@
 // @ts-check
 /** A page on which recorded episodes are played: forwards, backwards, step by step. */
 import { make } from "./dom.js";
-import { Cast, Mind, Replies, Rules, Sight, Stage, Transcript, legend } from "./panels.js";
+import { Cast, Mind, Replies, Rules, Sight, Stage, Transcript, legend, outcomeInWords } from "./panels.js";
 import { Episode } from "./trace.js";
 
 /** @typedef {import("./trace.js").Trace} Trace */
@@ -136,7 +136,7 @@ class Replay {
       make("p", {}, `${trace.agent}, ${trace.episode}. `, trace.about ?? ""), verdict(episode));
     this.list.replaceChildren(...this.episodes.map((one, k) => make("li", {},
       make("button", { "aria-current": k === this.number ? "true" : null, onclick: () => this.go(k, 0) },
-        verdict(one), make("span", {}, `${one.trace.episode}, ${one.length} steps`)))));
+        verdict(one), make("span", {}, `${one.trace.episode}, ${one.length} ${one.length === 1 ? "step" : "steps"}`)))));
     this.playing.textContent = this.timer === undefined ? "▶ play" : "⏸ pause";
     this.scrubber.max = String(episode.length);
     this.scrubber.value = String(step);
@@ -149,8 +149,7 @@ class Replay {
 /** How an episode ended, by sign, word and colour. @param {Episode} episode */
 function verdict({ ended }) {
   if (!ended) return make("strong", { class: "verdict open" }, "… not ended");
-  const word = ended.success ? "✓ success" : "✗ failure";
-  return make("strong", { class: `verdict ${ended.success ? "good" : "bad"}`, title: ended.text }, `${word}: ${ended.text}`);
+  return make("strong", { class: `verdict ${ended.success ? "good" : "bad"}` }, `${ended.success ? "✓" : "✗"} ${outcomeInWords(ended)}`);
 }
 
 /** Show the episodes that lie in the page, packed by gzip in base64. */

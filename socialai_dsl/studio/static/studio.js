@@ -2,7 +2,7 @@
 /** The studio: the text of a scenario on the left, its room, its game and its reasons on the right. */
 import { make, panel } from "./dom.js";
 import { Editor } from "./editor.js";
-import { Cast, Mind, Rules, Sight, Stage, Transcript, legend } from "./panels.js";
+import { Cast, Mind, Rules, Sight, Stage, Transcript, legend, outcomeInWords } from "./panels.js";
 import { Episode } from "./trace.js";
 
 /** @typedef {Record<string, any>} Reply */
@@ -84,7 +84,8 @@ class Counts {
   show(episode, step) {
     const counts = episode.counts(step), now = new Map(episode.rules.map((rule, k) => [JSON.stringify(rule), counts.get(k) ?? 0]));
     const rules = new Map([...this.met, ...episode.rules.map((rule) => /** @type {const} */ ([JSON.stringify(rule), rule]))]);
-    this.rows.replaceChildren(...[...rules].map(([key, rule]) => {
+    if (!rules.size) this.rows.replaceChildren(make("li", { class: "quiet" }, "None was asked yet."));
+    else this.rows.replaceChildren(...[...rules].map(([key, rule]) => {
       const here = now.get(key) ?? 0, all = here + (this.before.get(key) ?? 0);
       return make("li", { class: all ? "fired" : "not" },
         make("b", {}, `${here}× ${rule.who}`), rule.state ? ` in ${rule.state} ` : " ",
@@ -101,6 +102,7 @@ class Studio {
     this.first = open;
     this.name = "";
     /** @type {string | null} */ this.digest = null;
+    this.saved = "";
     this.dirty = false;
     this.seed = 0;
     this.length = 0;
@@ -213,7 +215,7 @@ class Studio {
       return;
     }
     const same = name === this.name;
-    Object.assign(this, { name, digest: found.digest, seed: same ? this.seed : 0 });
+    Object.assign(this, { name, digest: found.digest, saved: found.text, seed: same ? this.seed : 0 });
     this.files.value = name;
     document.title = this.title.textContent = name;
     this.players.value = "me";
@@ -222,27 +224,27 @@ class Studio {
       this.editor.replace(found.draft);
       this.tell("what you had typed and not saved is here again; Ctrl-Z takes it back");
     }
-    this.marked(this.editor.text !== found.text);
+    this.mark();
     this.draw();
   }
 
   typedText() {
     if (!this.name) return;
-    this.marked(true);
+    this.mark();
     clearTimeout(this.later.draw);
     this.later.draw = setTimeout(() => this.draw(), DRAW_AFTER);
     clearTimeout(this.later.keep);
     this.later.keep = setTimeout(() => this.keep(), KEEP_AFTER);
   }
 
-  /** @param {boolean} dirty */
-  marked(dirty) {
-    this.dirty = dirty;
-    this.state.textContent = dirty ? "not saved; a draft is kept" : "saved";
+  /** Say whether the file holds what is written. */
+  mark() {
+    this.dirty = this.editor.text !== this.saved;
+    this.state.textContent = this.dirty ? "not saved; a draft is kept" : "saved";
   }
 
   async keep() {
-    if (this.dirty) await this.line.ask("draft", { name: this.name, text: this.editor.text });
+    if (this.name) await this.line.ask("draft", { name: this.name, text: this.dirty ? this.editor.text : null });
   }
 
   async save() {
@@ -252,7 +254,8 @@ class Studio {
     else if (done.refused) this.tell(done.refused);
     else {
       this.digest = done.digest;
-      this.marked(this.editor.text !== text);
+      this.saved = text;
+      this.mark();
     }
   }
 
@@ -336,7 +339,6 @@ class Studio {
       this.tell("");
       this.take(drawn);
     } else this.tell(drawn.refused ?? (this.episode ? "the last good room is shown until the mistakes are mended" : "the room is shown when the mistakes are mended"));
-    document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
   }
 
   /** @param {Reply} begun */
@@ -346,6 +348,7 @@ class Studio {
     this.length = 0;
     this.seed = begun.seed;
     this.seedField.value = String(begun.seed);
+    document.body.dataset.rooms = String(Number(document.body.dataset.rooms ?? 0) + 1);
     const { actions, templates, nouns } = this.episode.trace;
     const options = (/** @type {HTMLSelectElement} */ select, /** @type {string[]} */ words) => {
       const chosen = select.value;
@@ -586,7 +589,7 @@ class Studio {
     if (!episode) return;
     const { ended } = episode;
     this.count.textContent = `step ${length} · reward ${episode.scenes[length].reward.toFixed(3)}`;
-    if (ended) this.tell(`${ended.success ? "✓ success" : "✗ no success"}: ${ended.text}`);
+    if (ended) this.tell(`${ended.success ? "✓" : "✗"} ${outcomeInWords(ended)}`);
     this.message.className = `message ${ended ? (ended.success ? "good" : "bad") : ""}`;
     for (const part of this.parts) part.show(episode, length);
   }
