@@ -421,3 +421,13 @@ def test_a_folder_without_scenarios_offers_templates(page: Page, server: Server,
     with another_room(page):
         page.get_by_role("button", name="Open a copy").click()
     assert page.locator("h1").inner_text().endswith(".yaml")
+
+
+def test_a_file_that_is_no_text_is_refused_and_the_open_one_stays(studio: Page, folder: Path) -> None:
+    (folder / "binary.yaml").write_bytes(bytes(range(256)))
+    studio.reload()
+    drawn(studio)
+    studio.get_by_label("scenario", exact=True).and_(studio.locator("select")).select_option("binary.yaml")
+    studio.locator(".message", has_text="binary.yaml").wait_for()
+    assert studio.locator("h1").inner_text() == "talkitout.yaml"
+    assert "scenario: talkitout" in studio.locator(".cm-content").inner_text()

@@ -244,7 +244,9 @@ class Studio {
   }
 
   async keep() {
-    if (this.name) await this.line.ask("draft", { name: this.name, text: this.dirty ? this.editor.text : null });
+    if (!this.name) return;
+    const done = await this.line.ask("draft", { name: this.name, text: this.dirty ? this.editor.text : null });
+    if (done.refused && this.dirty) this.state.textContent = `not saved; ${done.refused}`;
   }
 
   async save() {
