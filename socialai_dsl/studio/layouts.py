@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 import yaml
@@ -83,8 +83,9 @@ def _indent(text: str, index: int) -> int:
 
 def _end(text: str, start: int) -> int:
     """Where the value ends that starts at a place."""
+    events: Iterator[Any] = yaml.parse(text, Loader=_Parser)
     depth, end = 0, start
-    for event in yaml.parse(text, Loader=_Parser):
+    for event in events:
         if event.start_mark.index < start:
             continue
         if isinstance(event, yaml.CollectionStartEvent):

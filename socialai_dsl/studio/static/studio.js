@@ -7,7 +7,7 @@ import { Episode } from "./trace.js";
 
 /** @typedef {Record<string, any>} Reply */
 
-const DRAW_AFTER = 60, KEEP_AFTER = 500, STEP_EVERY = 450;
+const DRAW_AFTER = 30, KEEP_AFTER = 500, STEP_EVERY = 450;
 /** @type {Record<string, string>} */
 const MOVES = { ArrowLeft: "left", a: "left", ArrowRight: "right", d: "right", ArrowUp: "forward", w: "forward",
   t: "toggle", p: "pickup", o: "drop", x: "done", ".": "none", " ": "none" };
