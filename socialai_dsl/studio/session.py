@@ -108,6 +108,7 @@ class Session:
             "trace": self._tracer.trace().model_dump(mode="json", exclude_defaults=True)
             | {"format": "socialai-trace/1"},
             "phrases": {"sentences": self._phrases.sentences()[:2000]},
+            "rules": list(env.counters()["rules"]),
             "player": self._player,
             "seed": seed,
         }

@@ -311,6 +311,8 @@ def test_a_thing_is_moved_by_the_keyboard_and_its_room_becomes_a_suite(studio: P
 
 
 def test_the_script_is_watched_and_sentences_are_built(studio: Page) -> None:
+    unasked = studio.locator(".counts li", has_text="not asked yet")
+    assert "0× honest.courtesy.acquainted.then[0]" in unasked.all_inner_texts()[3]
     studio.get_by_label("template", exact=True).select_option("How are <noun>")
     studio.get_by_label("noun").select_option("you")
     studio.get_by_role("button", name="Say").click()

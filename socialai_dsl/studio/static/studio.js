@@ -55,7 +55,8 @@ class Counts {
   constructor(open) {
     this.open = open;
     this.rows = make("ul", { class: "rules" });
-    this.root = panel("All rules met so far, and how often each fired", "counts", this.rows);
+    this.root = panel("All rules, and how often each fired", "counts", this.rows);
+    /** @type {string[]} of all rules; of a suite behind their member's name and ": " */ this.names = [];
     this.episodes = 0;
     /** @type {Map<string, number>} */ this.before = new Map();
     /** @type {Map<string, import("./trace.js").Rule>} */ this.met = new Map();
@@ -84,15 +85,17 @@ class Counts {
   show(episode, step) {
     const counts = episode.counts(step), now = new Map(episode.rules.map((rule, k) => [JSON.stringify(rule), counts.get(k) ?? 0]));
     const rules = new Map([...this.met, ...episode.rules.map((rule) => /** @type {const} */ ([JSON.stringify(rule), rule]))]);
-    if (!rules.size) this.rows.replaceChildren(make("li", { class: "quiet" }, "None was asked yet."));
-    else this.rows.replaceChildren(...[...rules].map(([key, rule]) => {
+    const { member } = episode.scenes[step], prefix = member ? `${member}: ` : "", known = new Set([...rules.values()].map((rule) => rule.name));
+    const others = this.names.filter((name) => name.startsWith(prefix)).map((name) => name.slice(prefix.length)).filter((name) => !known.has(name));
+    const met = [...rules].map(([key, rule]) => {
       const here = now.get(key) ?? 0, all = here + (this.before.get(key) ?? 0);
       return make("li", { class: all ? "fired" : "not" },
         make("b", {}, `${here}× ${rule.who}`), rule.state ? ` in ${rule.state} ` : " ",
         make("small", {}, make("button", { class: "link", onclick: () => this.open(rule.at) }, rule.at),
           this.episodes ? ` · ${all}× in ${this.episodes + 1} episodes` : ""),
         make("code", {}, rule.words));
-    }));
+    });
+    this.rows.replaceChildren(...met, ...others.map((name) => make("li", { class: "not" }, make("b", {}, "0× "), name, make("small", {}, " · not asked yet"))));
   }
 }
 
@@ -347,6 +350,7 @@ class Studio {
   take(begun) {
     if (this.episode) this.counts.keep(this.episode);
     this.episode = new Episode(begun.trace);
+    this.counts.names = begun.rules;
     this.length = 0;
     this.seed = begun.seed;
     this.seedField.value = String(begun.seed);
