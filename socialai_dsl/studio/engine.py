@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import multiprocessing
+import os
 import socket
 import threading
 from collections.abc import Callable
@@ -17,6 +18,7 @@ from socialai_dsl.studio.worker import answer_window
 
 _LONGEST_ANSWER: Final = 32 << 20
 _START_SECONDS: Final = 120.0
+_SAFE_PATH: Final = "PYTHONSAFEPATH"
 
 _forking = multiprocessing.get_context("forkserver")
 _forking.set_forkserver_preload(["socialai_dsl.studio.warm"])
@@ -67,9 +69,19 @@ async def start_worker(run: Callable[[socket.socket, str], None], root: Path) ->
 
 
 def _start(process: BaseProcess) -> None:
-    """Start one process at a time, as `multiprocessing` keeps a common list of them."""
+    """Start one process at a time, as `multiprocessing` keeps a common list of them.
+
+    The fork server is a Python of its own, which is not to import modules of the folder that happens to be open.
+    """
     with _starting:
-        process.start()
+        before = os.environ.get(_SAFE_PATH)
+        os.environ[_SAFE_PATH] = "1"
+        try:
+            process.start()
+        finally:
+            del os.environ[_SAFE_PATH]
+            if before is not None:
+                os.environ[_SAFE_PATH] = before
 
 
 class Engine:

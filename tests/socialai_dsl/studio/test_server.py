@@ -177,11 +177,19 @@ def test_a_process_cannot_fill_the_machine() -> None:
     assert "MemoryError" in done.stderr
 
 
-def test_ctrl_c_ends_it_without_a_word(tmp_path: Path) -> None:
+def test_ctrl_c_ends_it_without_a_word_and_no_module_of_the_folder_was_imported(tmp_path: Path) -> None:
     shutil.copy(SCENARIOS / "talkitout.yaml", tmp_path)
-    command = [sys.executable, "-m", "socialai_dsl", "studio", str(tmp_path), "--no-browser", "--port", "0"]
+    for name in ("yaml", "multiprocessing", "socialai_dsl"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('a module of the folder was imported')\n")
+    # As the installed command starts, which does not look for modules in the present folder.
+    command = "import sys; sys.path.remove(''); from socialai_dsl.cli.main import main; sys.exit(main())"
     running = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        [sys.executable, "-c", command, "studio", "--no-browser", "--port", "0"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        cwd=tmp_path,
     )
     assert running.stdout is not None
     found = re.search(r"http://127.0.0.1:(\d+)/\?token=(\S+)", running.stdout.readline())
