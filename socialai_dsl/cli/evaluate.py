@@ -24,7 +24,9 @@ _RECORDED: Final = 3
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
     parser.add_argument(
-        "run", metavar="RUN_DIR", help="a run's folder or a checkpoint; also random, oracle or llm:MODEL"
+        "run",
+        metavar="RUN_DIR",
+        help="a run's folder or a checkpoint; also shipped:NAME, random, oracle or llm:MODEL",
     )
     parser.add_argument(
         "--on", action="append", metavar="SCENARIO", help="what to play (default: the run's own); repeatable"
@@ -110,10 +112,10 @@ def _player(arguments: argparse.Namespace) -> "Player":
         return Player(agent, out=arguments.out or default_folder(agent), options=arguments)
     if agent in ("random", "oracle", "human"):
         return Player(agent, seed=arguments.seed)
-    from socialai_dsl.cli.agents import require_trainer, resolve_device
+    from socialai_dsl.cli.agents import folder_of, require_trainer, resolve_device
 
     require_trainer()
-    has_own = arguments.on is None or (Path(agent) / SETTINGS).is_file()
+    has_own = arguments.on is None or (folder_of(agent) / SETTINGS).is_file()
     return Player(
         agent,
         resolve_device(arguments.device),
@@ -154,12 +156,14 @@ def _table(evaluation: "Evaluation", figures: dict[str, Any]) -> str:
 
 
 def own_scenario(agent: str) -> str:
-    """The scenario on which the agent of a run's folder was trained.
+    """The scenario on which the agent of a run's folder, or one that ships, was trained.
 
     Raises:
-        UsageError: it is not such a folder.
+        UsageError: it is neither.
     """
-    run = Path(agent)
+    from socialai_dsl.cli.agents import folder_of
+
+    run = folder_of(agent)
     if not (run / SETTINGS).is_file():
         raise UsageError(f"--on: {run} does not say which scenario it was trained on; name one")
     scenario = read_json(run / SETTINGS).get("scenario")
