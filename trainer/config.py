@@ -46,7 +46,8 @@ class RunConfig(BaseModel):
     scenario: str = _option("", "path or name of what is played, with +variants and ?parameters", role="kept")
     agent: str = _option(
         "ppo",
-        "ppo, random, oracle, human, or a checkpoint or run folder; only ppo is trained",
+        "ppo, random, oracle, human, shipped (the trained agent that comes with the scenario), shipped:NAME, or a "
+        "checkpoint or run folder; only ppo is trained",
         role="flag",
         min_length=1,
     )

@@ -38,5 +38,5 @@ def located(agent: str | Path) -> Path:
         return Path(agent)
     name, known = text.removeprefix(PREFIX), shipped_agents()
     if name not in known:
-        raise CheckpointError(f"{text}: no such agent ships, expected {PREFIX} and one of {', '.join(known)}")
+        raise CheckpointError(f"{text}: no agent of this name ships; these do: {', '.join(known)}")
     return agents_folder() / name

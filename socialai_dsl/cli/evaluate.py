@@ -3,6 +3,7 @@
 import argparse
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -26,7 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "run",
         metavar="RUN_DIR",
-        help="a run's folder or a checkpoint; also shipped:NAME, random, oracle or llm:MODEL",
+        help="a run's folder or a checkpoint; also shipped:NAME, shipped (the one for each scenario), random, oracle or "
+        "llm:MODEL",
     )
     parser.add_argument(
         "--on", action="append", metavar="SCENARIO", help="what to play (default: the run's own); repeatable"
@@ -71,6 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Evaluate on each scenario."""
+    from socialai_dsl.cli.agents import named_agent
     from socialai_dsl.cli.evaluation import evaluate_agent
     from socialai_dsl.cli.evaluation_report import write_episodes
 
@@ -82,7 +85,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
     out = player.out if player.options is not None else arguments.out
     results = []
     for scenario in arguments.on or [own_scenario(arguments.run)]:
-        evaluation = evaluate_agent(player, scenario, arguments.episodes)
+        playing = replace(player, agent=named_agent(player.agent, scenario))
+        evaluation = evaluate_agent(playing, scenario, arguments.episodes)
         for warning in evaluation.warnings:
             print(f"warning: {warning}", file=sys.stderr)
         results.append(_result(evaluation))

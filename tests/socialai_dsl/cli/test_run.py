@@ -226,7 +226,7 @@ def test_a_trained_agent_is_evaluated_elsewhere(capsys: Capture) -> None:
     ("arguments", "message"),
     [
         ([], "expected a scenario"),
-        (["corridor.yaml", "--agent", "nobody"], "--agent: expected ppo, random, oracle, human or"),
+        (["corridor.yaml", "--agent", "nobody"], "--agent: expected ppo, random, oracle, human, shipped or"),
         (["corridor.yaml", "--agent", "random", "--frames", "10"], "is not trained"),
         (["corridor.yaml", "--net", "huge"], "net: got 'huge'"),
         (
