@@ -77,7 +77,7 @@ def test_an_agent_that_no_longer_does_what_its_run_says_is_refused(run: Path, tm
     result = content(changed / "result.json")
     result["eval"]["success_rate"] += 0.1
     (changed / "result.json").write_text(json.dumps(result))
-    with pytest.raises(Refused, match="of 40 episodes, its run says .*: the scenario has changed"):
+    with pytest.raises(Refused, match=r"of 40 episodes, its run says .*: the scenario has changed"):
         ship(changed, tmp_path, COMMIT)
     assert {path.name for path in tmp_path.iterdir()} == {"run"}
 

@@ -72,7 +72,7 @@ def test_a_card_says_how_its_agent_was_made_and_nothing_of_a_machine(name: str) 
     (command,) = re.findall(rf"Trained again by `socialai-run {name} ([^`]+)`", card(name))
     assert f"--recipe {settings['recipe']} --frames {settings['frames']}" in command
     assert re.search(r"\| trained \| \d{4}-\d\d-\d\d, with commit `[0-9a-f]{40}` \|", card(name))
-    assert f"CheckpointPolicy.load('{PREFIX}{name}', env)" in card(name)
+    assert f'CheckpointPolicy.load("{PREFIX}{name}", env)' in card(name)
     for file in (agents_folder() / name).iterdir():
         content = file.read_bytes()
         assert not re.search(rb"/(tmp|home|root|work|Users)/", content), file.name

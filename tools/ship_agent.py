@@ -95,7 +95,12 @@ def compare(single: np.ndarray, half: np.ndarray) -> dict[str, Any]:
             f"half precision plays differently: it loses {only_single} and wins {only_half} of {len(single)} episodes "
             f"(McNemar's exact test: p = {chance:.3g}, expected at least {LEVEL})"
         )
-    return {"episodes": len(single), "only_single": only_single, "only_half": only_half, "p": round(chance, 4)}
+    return {
+        "episodes": len(single),
+        "only_single": only_single,
+        "only_half": only_half,
+        "p": round(chance, 4),
+    }
 
 
 def shipped_name(loaded: Any, scenario: str) -> str:
@@ -182,9 +187,10 @@ def ship(run: Path, folder: Path, commit: str | None = None) -> str:
         target.parent.mkdir(parents=True, exist_ok=True)
         place.rename(target)
     write_text(folder / INDEX, index(folder))
+    now, before = half.result.success_rate, single.result.success_rate
     return (
-        f"{target}: {half.result.success_rate:.1%} of {EPISODES} test episodes ({single.result.success_rate:.1%} before "
-        f"rounding; {compared['only_single']} lost, {compared['only_half']} won, p = {compared['p']}), {size:,} bytes"
+        f"{target}: {now:.1%} of {EPISODES} test episodes, {before:.1%} before rounding "
+        f"({compared['only_single']} lost, {compared['only_half']} won, p = {compared['p']}); {size:,} bytes"
     )
 
 
@@ -221,9 +227,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("run", type=Path, metavar="RUN", help="folder of a finished run, or of a shipped agent")
     parser.add_argument(
-        "--commit", help="whose code trained the agent (default: the newest on this branch when the run began)"
+        "run", type=Path, metavar="RUN", help="folder of a finished run, or of a shipped agent"
+    )
+    parser.add_argument(
+        "--commit",
+        help="whose code trained the agent (default: the newest on this branch when the run began)",
     )
     arguments = parser.parse_args()
     folder = agents_folder()

@@ -27,8 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "run",
         metavar="RUN_DIR",
-        help="a run's folder or a checkpoint; also shipped:NAME, shipped (the one for each scenario), random, oracle or "
-        "llm:MODEL",
+        help="a run's folder or a checkpoint; also shipped:NAME, shipped (the agent of each scenario), random, oracle "
+        "or llm:MODEL",
     )
     parser.add_argument(
         "--on", action="append", metavar="SCENARIO", help="what to play (default: the run's own); repeatable"

@@ -106,7 +106,9 @@ def write_agent(
 
     Args:
         out: the folder, which is there.
-        config, loaded, checkpoint: what `finished_agent` found.
+        config: of the run.
+        loaded: its scenario.
+        checkpoint: its network.
         result: content of the run's `result.json`.
         agent: by which name `CheckpointPolicy.load` finds the agent, for its card.
     """

@@ -1,5 +1,6 @@
 """Model cards: what an agent is, how well it does, and how to load it, beside its weights."""
 
+import json
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
@@ -31,7 +32,7 @@ def model_card(
         config: of the run.
         result: content of the run's `result.json`.
         about: what the scenario says about itself.
-        agent: by which name `CheckpointPolicy.load` finds it: a run's folder, `.` for the card's own, or `shipped:NAME`.
+        agent: what `CheckpointPolicy.load` finds it by: a run's folder, `.` for the card's own, or `shipped:NAME`.
         weights: the checkpoint, as seen from its folder.
     """
     name = f"{scenario_folder_name(config.scenario)}-{config.net}-s{config.seed}"
@@ -132,7 +133,9 @@ def _precision(compared: Mapping[str, Any] | None) -> str:
     if compared is None:
         return ""
     lost, won = compared["only_single"], compared["only_half"]
-    return f", in half precision, which loses {lost} and wins {won} of the {compared['episodes']} test episodes"
+    return (
+        f", in half precision, which loses {lost} and wins {won} of the {compared['episodes']} test episodes"
+    )
 
 
 def _place(agent: str) -> str:
@@ -144,13 +147,13 @@ def _place(agent: str) -> str:
 def _snippet(config: RunConfig, agent: str) -> str:
     """Code that plays one episode; a test runs it."""
     own = ":" in config.net
-    net = f", net={config.net!r}, folder=Path({config.code_folder.as_posix()!r})" if own else ""
+    net = f", net={_quoted(config.net)}, folder=Path({_quoted(config.code_folder.as_posix())})" if own else ""
     return f"""\
 {"from pathlib import Path" + chr(10) * 2 if own else ""}import socialai_dsl as sd
 from trainer.play import CheckpointPolicy
 
-env = sd.make({config.scenario!r})
-agent = CheckpointPolicy.load({agent!r}, env{net})
+env = sd.make({_quoted(config.scenario)})
+agent = CheckpointPolicy.load({_quoted(agent)}, env{net})
 observation, info = env.reset(seed=0)
 agent.reset()
 ended = False
@@ -159,6 +162,11 @@ while not ended:
     ended = terminated or truncated
 print(info["outcome"])
 """
+
+
+def _quoted(text: str) -> str:
+    """A text in Python, between double quotes."""
+    return json.dumps(text)
 
 
 def _command(config: RunConfig) -> str:

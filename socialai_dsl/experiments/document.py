@@ -41,7 +41,9 @@ def document_of(loaded: LoadedExperiment, profile: str | None) -> dict[str, Any]
         name: compile_loaded(loaded.played[name]).sha256 for name in {cell.scenario for cell in cells}
     }
     weights = {
-        cell.agent: _weights_digest(loaded.folder / located(cell.agent)) for cell in cells if cell.agent not in AGENTS
+        cell.agent: _weights_digest(loaded.folder / located(cell.agent))
+        for cell in cells
+        if cell.agent not in AGENTS
     }
     return {
         "format": FORMAT,
