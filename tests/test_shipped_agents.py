@@ -11,6 +11,7 @@ from safetensors import safe_open
 
 import socialai_dsl
 from socialai_dsl import frontend
+from socialai_dsl.cli import agents
 from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.evaluation import evaluate
 from socialai_dsl.loader import shipped_folder
@@ -114,16 +115,37 @@ def test_a_name_that_does_not_ship_is_refused_with_those_that_do() -> None:
 
 
 @pytest.mark.parametrize(
-    "scenario", [QUICK, str(shipped_folder() / f"{QUICK}.yaml"), f"{QUICK}+unsocial"], ids=lambda s: s[-12:]
+    ("scenario", "agent"),
+    [
+        ("help", "help"),
+        ("SHIPPED/help.yaml", "help"),
+        ("help+unsocial", "help"),
+        ("SHIPPED/help.yaml+oracle+unsocial", "help"),
+        ("help_as_helper", "help_as_helper"),
+        ("help+as_helper", "help_as_helper"),
+        ("help+as_helper+unsocial", "help_as_helper"),
+        ("social_env?split=test", "social_env"),
+        ("novel/shop+unsocial", "novel/shop"),
+    ],
 )
-def test_a_run_with_a_shipped_agent_trains_nothing_and_leaves_what_a_run_leaves(
-    scenario: str, tmp_path: Path, capsys: Capture
+def test_a_scenario_has_the_agent_of_its_name_however_it_is_called(
+    scenario: str, agent: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    command = [scenario, "--agent", "shipped", "--eval-episodes", "25", "--device", "cpu"]
-    assert run_main([*command, "--out", str(tmp_path / "run")]) == 0
+    known = ["help", "help_as_helper", "novel/shop", "social_env"]
+    monkeypatch.setattr(agents, "shipped_agents", lambda: known)
+    spec = scenario.replace("SHIPPED", str(shipped_folder()))
+    assert agents.named_agent("shipped", spec) == PREFIX + agent
+    assert agents.named_agent("oracle", spec) == "oracle"
+
+
+def test_a_run_with_a_shipped_agent_trains_nothing_and_leaves_what_a_run_leaves(
+    tmp_path: Path, capsys: Capture
+) -> None:
+    command = [str(shipped_folder() / f"{QUICK}.yaml"), "--agent", "shipped", "--eval-episodes", "25"]
+    assert run_main([*command, "--device", "cpu", "--out", str(tmp_path / "run")]) == 0
     shown = capsys.readouterr()
     assert "how the episodes ended" in shown.out
-    assert ("was trained on" in shown.err) == ("+" in scenario), "a variant is another program"
+    assert shown.err == "", "it plays the program that it was trained on"
     files = {file.name for file in (tmp_path / "run").iterdir()}
     assert {"result.json", "config.json", "episode.gif", "transcript.txt", "episode.html"} <= files
     assert not {"metrics.jsonl", "checkpoints"} & files
@@ -159,7 +181,9 @@ def test_every_command_that_takes_a_trained_agent_takes_it(tmp_path: Path, capsy
     assert own == there
     assert [result["scenario"] for result in own] == [QUICK]
     elsewhere = ["--on", f"{QUICK}+unsocial", "--on", QUICK]
-    assert len(json.loads(printed("evaluate", agent, *elsewhere, *few, "--json"))) == 2
+    hidden, plain = json.loads(printed("evaluate", agent, *elsewhere, *few, "--json"))
+    assert plain["warnings"] == []
+    assert "was trained on talkitout" in hidden["warnings"][0], "a variant is another program"
 
     for words in ([agent], [QUICK, "--agent", "shipped"]):
         traces = tmp_path / "traces.json"

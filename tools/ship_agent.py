@@ -103,6 +103,11 @@ def compare(single: np.ndarray, half: np.ndarray) -> dict[str, Any]:
     }
 
 
+def identical(one: Evaluation, other: Evaluation) -> int:
+    """How many episodes have the same actions in both."""
+    return sum(np.array_equal(one.actions[number], other.actions[number]) for number in one.actions)
+
+
 def shipped_name(loaded: Any, scenario: str) -> str:
     """The name under which the agent ships: that of its scenario.
 
@@ -170,7 +175,10 @@ def ship(run: Path, folder: Path, commit: str | None = None) -> str:
         single = evaluate_agent(Player(str(run)), name, EPISODES)
         require_same(single, result["eval"])
         half = evaluate_agent(Player(str(place)), name, EPISODES)
-        compared = result.get("half_precision") or compare(single.result.success, half.result.success)
+        compared = result.get("half_precision") or {
+            **compare(single.result.success, half.result.success),
+            "identical": identical(single, half),
+        }
         kept = {key: value for key, value in result.items() if key not in _OF_ONE_MACHINE}
         told = kept | {
             "eval": half.figures(),
@@ -190,7 +198,8 @@ def ship(run: Path, folder: Path, commit: str | None = None) -> str:
     now, before = half.result.success_rate, single.result.success_rate
     return (
         f"{target}: {now:.1%} of {EPISODES} test episodes, {before:.1%} before rounding "
-        f"({compared['only_single']} lost, {compared['only_half']} won, p = {compared['p']}); {size:,} bytes"
+        f"({compared['identical']} played alike, {compared['only_single']} lost, {compared['only_half']} won, "
+        f"p = {compared['p']}); {size:,} bytes"
     )
 
 

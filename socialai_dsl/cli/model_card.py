@@ -132,9 +132,9 @@ def _precision(compared: Mapping[str, Any] | None) -> str:
     """What half precision changed, where the weights were reduced to it."""
     if compared is None:
         return ""
-    lost, won = compared["only_single"], compared["only_half"]
     return (
-        f", in half precision, which loses {lost} and wins {won} of the {compared['episodes']} test episodes"
+        ", in half precision: of the {episodes} test episodes {identical} are played with the same actions as in "
+        "single precision, {only_single} are lost and {only_half} won".format(**compared)
     )
 
 
