@@ -150,8 +150,8 @@ def test_the_trainer_sees_only_the_facade(path: Path) -> None:
     for name, line in imported(ast.parse(path.read_text(encoding="utf-8"))):
         root = name.split(".")[0]
         assert root not in {"numba", "llvmlite", "ctypes"}, f"{path.relative_to(ROOT)}:{line}: imports {name}"
-        if path.name in ("config.py", "shipped.py", "errors.py"):
-            allowed = root == "pydantic" or root in sys.stdlib_module_names or name == "trainer.errors"
+        if path.name in ("config.py", "shipped.py"):
+            allowed = root == "pydantic" or root in sys.stdlib_module_names
             assert allowed, f"{path.relative_to(ROOT)}:{line}: imports {name}"
         if root == "socialai_dsl":
             assert name in FACADE, f"{path.relative_to(ROOT)}:{line}: the trainer must not import {name}"

@@ -17,7 +17,6 @@ from socialai_dsl.evaluation import evaluate
 from socialai_dsl.loader import shipped_folder
 from tools.ship_agent import EPISODES, INDEX, LARGEST, ROUNDING, index
 from trainer import checkpoint as checkpoints
-from trainer.errors import CheckpointError
 from trainer.play import CheckpointPolicy
 from trainer.shipped import PREFIX, WEIGHTS, agents_folder, located, shipped_agents
 
@@ -107,9 +106,9 @@ def test_an_agent_is_loaded_without_saying_what_it_plays() -> None:
 
 
 def test_a_name_that_does_not_ship_is_refused_with_those_that_do() -> None:
-    with pytest.raises(CheckpointError, match=f"shipped:nobody: no agent of this name ships; .*{QUICK}"):
+    with pytest.raises(ValueError, match=f"shipped:nobody: no agent of this name ships; .*{QUICK}"):
         located("shipped:nobody")
-    with pytest.raises(CheckpointError, match="no agent of this name"):
+    with pytest.raises(ValueError, match="no agent of this name"):
         CheckpointPolicy.load("shipped:../scenarios")
     assert located("runs/mine") == Path("runs/mine")
 

@@ -163,7 +163,8 @@ def read_agent(agent: Path | str) -> Checkpoint:
     """Read the newest checkpoint of an agent: `shipped:NAME`, a run's folder, or what `read` takes.
 
     Raises:
-        CheckpointError: see `located` and `read`.
+        CheckpointError: see `read`.
+        ValueError: no agent of this name ships.
     """
     path = located(agent)
     saved = path / FOLDER

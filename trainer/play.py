@@ -70,6 +70,7 @@ class CheckpointPolicy:
         Raises:
             CheckpointError: see `checkpoint.read_agent` and `checkpoint.restore_net`; or `envs` is None and the
                 checkpoint does not say which scenario it is for.
+            ValueError: no agent of this name ships.
         """
         checkpoint = checkpoints.read_agent(path)
         if envs is None:

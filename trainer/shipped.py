@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from trainer.errors import CheckpointError
-
 PREFIX: Final = "shipped:"
 """What the name of a shipped agent begins with wherever a path of an agent can stand."""
 
@@ -31,12 +29,12 @@ def located(agent: str | Path) -> Path:
     """Where an agent is kept: for `shipped:NAME` the folder of that agent, for a path the path itself.
 
     Raises:
-        CheckpointError: no agent of that name ships.
+        ValueError: no agent of that name ships.
     """
     text = str(agent)
     if not text.startswith(PREFIX):
         return Path(agent)
     name, known = text.removeprefix(PREFIX), shipped_agents()
     if name not in known:
-        raise CheckpointError(f"{text}: no agent of this name ships; these do: {', '.join(known)}")
+        raise ValueError(f"{text}: no agent of this name ships; these do: {', '.join(known)}")
     return agents_folder() / name

@@ -16,7 +16,6 @@ from socialai_dsl.cli.run_folder import SETTINGS, read_json
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.experiments.settings import resolved_config
 from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, RunConfig
-from trainer.errors import CheckpointError
 from trainer.shipped import PREFIX, located, shipped_agents
 
 if TYPE_CHECKING:
@@ -286,7 +285,7 @@ def folder_of(agent: str) -> Path:
     """
     try:
         return located(agent)
-    except CheckpointError as error:
+    except ValueError as error:
         raise UsageError(str(error)) from None
 
 
