@@ -246,7 +246,7 @@ def test_a_trained_agent_is_evaluated_elsewhere(capsys: Capture) -> None:
         (["corridor.yaml", "--hyper", "entropy_coeff=1"], "'entropy_coeff'; did you mean entropy_coef?"),
         (
             ["corridor.yaml", "--hyper", "banana=1"],
-            "'banana'; expected one of guide_share, imitation_coef, imitation_floor,",
+            "'banana'; expected one of guide_share, imitation_coef, horizon,",
         ),
         (["corridor.yaml", "--hyper", "envs=3"], "envs has an option of its own, --envs"),
         (["corridor.yaml", "--hyper", "lr=1", "--hyper", "lr=2"], "--hyper: lr is given twice"),
