@@ -14,7 +14,7 @@ from socialai_dsl.llm.view import Style
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 ROOMS = 3
-MANY_ROOMS = 25
+MANY_ROOMS = 100
 
 
 def scripted(path: Path) -> str:
