@@ -40,8 +40,8 @@ def test_five_commands_lead_to_a_table(tmp_path: Path, monkeypatch: pytest.Monke
     with open("report/rooms.csv", newline="", encoding="utf-8") as file:
         pairs = {(row["first"], row["second"]): row for row in csv.DictReader(file)}
     assert len(pairs) == 6
-    pair = pairs["help / llm:qwen3-8b", "help / oracle"]
-    assert (pair["rooms"], pair["first_better"], pair["second_better"]) == ("20", "0", "20")
-    assert float(pair["difference"]) == -1.0
-    assert "| help / llm:qwen3-8b | help / oracle | 20 | 0 | 20 | −1.000 [" in report
+    pair = pairs["help / oracle", "help / llm:qwen3-8b"]
+    assert (pair["rooms"], pair["first_better"], pair["second_better"]) == ("20", "20", "0")
+    assert float(pair["difference"]) == 1.0
+    assert "| help / oracle | help / llm:qwen3-8b | 20 | 20 | 0 | +1.000 [" in report
     assert "| **help / llm:qwen3-8b** | 20 | 20 | 0.0% | 200 | 40 | – |" in report

@@ -169,9 +169,9 @@ def _pairings(section: Section, prefix: str) -> Iterator[Block]:
             ]
             for pairing in section.pairings
         ],
-        "Conditions that played the same test episodes: in how many one did better than the other, and the difference of "
-        "their success, first minus second, in brackets with its 95 % interval for paired proportions (Bonett and Price "
-        "2012). It is about these players in further rooms; of trained agents it takes the seeds as they are.",
+        "Conditions that played the same test episodes: in how many one did better than the other, and the difference "
+        "of their success, first minus second, in brackets with its 95 % interval for paired proportions (Bonett and "
+        "Price 2012). It is about these players in further rooms; of trained agents it takes the seeds as they are.",
     )
 
 
@@ -201,7 +201,7 @@ def _language_models(section: Section, prefix: str) -> Iterator[Block]:
         yield Table(
             ["condition", ">episodes", ">replies", ">invalid", ">tokens read", ">tokens written", ">cost"],
             rows,
-            "Invalid: share of the replies that held no action. Cost: in US dollars; a dash where prices are not known.",
+            "Invalid: share of the replies that held no action. Cost: in US dollars, a dash where prices are unknown.",
         )
 
 

@@ -178,7 +178,8 @@ def paired_difference(first: Sequence[float], second: Sequence[float]) -> Estima
     the second alone solves. So it is of use for few rooms, too, and where all differences are alike.
 
     Args:
-        first: success in each room, 0 to 1. second: in the same rooms.
+        first: success in each room, 0 to 1.
+        second: in the same rooms.
 
     Raises:
         ValueError: there is no room, or not as many on both sides.
