@@ -43,5 +43,5 @@ def test_five_commands_lead_to_a_table(tmp_path: Path, monkeypatch: pytest.Monke
     pair = pairs["help / oracle", "help / llm:qwen3-8b"]
     assert (pair["rooms"], pair["first_better"], pair["second_better"]) == ("20", "20", "0")
     assert float(pair["difference"]) == 1.0
-    assert "| help / oracle | help / llm:qwen3-8b | 20 | 20 | 0 | +1.000 [" in report
+    assert r"| help / oracle | help / llm:qwen3-8b | 20 | 20 | 0 | +1.000 \[" in report
     assert "| **help / llm:qwen3-8b** | 20 | 20 | 0.0% | 200 | 40 | – |" in report

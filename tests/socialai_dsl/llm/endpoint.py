@@ -44,6 +44,18 @@ def slowly(pieces: Iterable[bytes], seconds: float) -> Iterator[bytes]:
         yield piece
 
 
+def stream(text: str) -> tuple[int, dict[str, str], bytes]:
+    """The same as events, for requests with `stream`."""
+    head = {"id": "1", "object": "chat.completion.chunk", "created": 0, "model": "stub"}
+    delta = {"index": 0, "delta": {"role": "assistant", "content": text}, "finish_reason": None}
+    end = {"index": 0, "delta": {}, "finish_reason": "stop"}
+    usage = {"prompt_tokens": 10, "completion_tokens": 2, "total_tokens": 12}
+    chunks = [{"choices": [delta]}, {"choices": [end]}, {"choices": [], "usage": usage}]
+    events = [*(json.dumps({**head, **chunk}) for chunk in chunks), "[DONE]"]
+    content = "".join(f"data: {event}\n\n" for event in events)
+    return 200, {"Content-Type": "text/event-stream"}, content.encode()
+
+
 @contextmanager
 def endpoint(respond: Respond) -> Iterator[Stub]:
     """Serve on a free port of the loopback interface."""
