@@ -334,7 +334,7 @@ def _section(group: str | None, summaries: Sequence[Summary]) -> Section:
     ]
     adjusted = bonferroni([test.p for *_, test in found])
     comparisons = tuple(Comparison(*one, p) for one, p in zip(found, adjusted, strict=True))
-    pairings = tuple(found for pair in bare.pairs() if (found := pair_by_room(*pair)) is not None)
+    pairings = tuple(pairing for pair in bare.pairs() if (pairing := pair_by_room(*pair)) is not None)
     if not bare.is_table:
         return Section(group, bare.summaries, comparisons, pairings)
     aggregates, common = _aggregates(bare)
