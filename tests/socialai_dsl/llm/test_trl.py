@@ -197,6 +197,7 @@ def test_a_step_of_grpo_changes_a_small_model(
         loaded.config
     )  # the weights are floats now, but a model made of a GGUF file counts as quantised
     model.load_state_dict(loaded.state_dict())
+    del loaded
     before = {name: tensor.detach().clone() for name, tensor in model.named_parameters()}
     trainer = GRPOTrainer(
         model=model,
