@@ -24,7 +24,7 @@ def locked() -> dict[str, str]:
 
 
 UNLOCKED = {"inspect", "openenv", "trl"}
-"""Extras that ask for other versions than the lock has; `make test-models` installs them apart, and they are bounded."""
+"""Extras that ask for other versions than the lock has: `make test-models` installs them apart, they are bounded."""
 
 
 def test_every_dependency_is_locked() -> None:
