@@ -71,7 +71,7 @@ def social_env(scenario: Scenario, style: Style = "prose", goal: str = "") -> ty
     tools = [tool["function"] for tool in ActionLanguage(program).tools()]
     content = {"_program": program, "_style": style, "_goal": goal}
     # Rewards are logged under the name of the class.
-    return type("SocialEnv", (SocialEnv,), {**content, **{tool["name"]: _method(tool) for tool in tools}})
+    return type(program.name, (SocialEnv,), {**content, **{tool["name"]: _method(tool) for tool in tools}})
 
 
 def _method(tool: Mapping[str, Any]) -> Callable[..., str]:

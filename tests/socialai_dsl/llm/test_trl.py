@@ -161,7 +161,7 @@ def test_a_step_of_grpo_changes_a_small_model(
 ) -> None:
     """SmolLM2-135M, its weights dequantised, plays episodes through tools and is trained on what they paid.
 
-    So small a model hardly ever calls a tool of itself, so its replies are held to calls.
+    Its replies are held to calls of tools, so that every rollout plays.
     """
     monkeypatch.setenv("HF_HUB_OFFLINE", "1")
     import torch
@@ -226,7 +226,7 @@ def test_a_step_of_grpo_changes_a_small_model(
     logged = next(record for record in trainer.state.log_history if "reward" in record)
     assert logged["tools/call_frequency"] >= 1
     assert logged["tools/failure_frequency"] == 0
-    assert logged["reward"] > 0
+    assert logged["reward"] == logged["rewards/signal/mean"] > 0
     assert logged["reward_std"] > 0
     assert logged["grad_norm"] > 0
     assert any(not torch.equal(tensor, before[name]) for name, tensor in model.named_parameters())
