@@ -59,24 +59,21 @@ class DialogueEncoder(nn.Module):
         return torch.cat(levels)
 
     @torch.no_grad()
-    def extend(self, states: Tensor, tokens: Tensor, lengths: Sequence[int], inputs: Tensor) -> Tensor:
+    def extend(self, states: Tensor, tokens: Tensor, inputs: Tensor) -> Tensor:
         """Continue encodings by the words heard since, without gradients.
 
         Args:
             states: (K, size) encodings so far.
-            tokens: int64 (K, S), row k's first `lengths[k]` are its new words.
-            lengths: new words per row, in descending order.
+            tokens: int64 (K, S), the new words of each, 0-padded.
             inputs: result of `word_inputs` under the current weights.
 
         Returns:
             (K, size) encodings after the new words.
         """
         states = states.clone()
-        active = len(lengths)
-        for position in range(lengths[0] if lengths else 0):
-            while lengths[active - 1] <= position:
-                active -= 1
-            states[:active] = self._advance(inputs[tokens[:active, position]], states[:active])
+        for words in tokens.unbind(1):
+            longer = words.nonzero().squeeze(1)
+            states[longer] = self._advance(inputs[words[longer]], states[longer])
         return states
 
 
@@ -106,11 +103,9 @@ class HeardWords(DialogueEncoder):
         return torch.cat((states, heard), 1)
 
     @torch.no_grad()
-    def extend(self, states: Tensor, tokens: Tensor, lengths: Sequence[int], inputs: Tensor) -> Tensor:
+    def extend(self, states: Tensor, tokens: Tensor, inputs: Tensor) -> Tensor:
         """See `DialogueEncoder.extend`."""
         recurrent, heard = self.split(states)
-        heard = heard.clone()
-        behind = torch.tensor(lengths, device=tokens.device)
-        new = torch.arange(tokens.shape[1], device=tokens.device) < behind[:, None]
-        heard[new.nonzero()[:, 0], tokens[new]] = 1
-        return torch.cat((super().extend(recurrent, tokens, lengths, inputs), heard), 1)
+        heard = heard.scatter(1, tokens, 1)
+        heard[:, 0] = 0  # the padding is no word
+        return torch.cat((super().extend(recurrent, tokens, inputs), heard), 1)
