@@ -10,13 +10,15 @@ import time
 import uuid
 import warnings
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
 import torch
 
 from trainer.config import RunConfig
-from trainer.rollout import EpisodeTally
+from trainer.rollout import Tally
+from trainer.session import Session
 
 FILE_NAME = "metrics.jsonl"
 STARTS = "starts.jsonl"
@@ -24,20 +26,39 @@ SURROUNDINGS = ("torch", "cpu", "device", "threads")
 _ID_FILE = "wandb_id.txt"
 
 
-def episode_metrics(
-    tally: EpisodeTally, before: Mapping[str, Any], after: Mapping[str, Any]
-) -> dict[str, Any]:
-    """What the episodes that ended in one rollout were like.
+class Metrics:
+    """Makes the row of each update, as `docs/metrics.md` describes it."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._counted, self._time = session.envs.counters(), time.perf_counter()
+
+    def row(self, tally: Tally, losses: Mapping[str, float]) -> dict[str, Any]:
+        """The row of the update just made, which took from the last call until now."""
+        session, config, before, began = self._session, self._session.config, self._counted, self._time
+        self._counted, self._time = session.envs.counters(), time.perf_counter()
+        row = {
+            "update": session.update,
+            "frames": session.frames,
+            "frames_per_second": round(config.frames_per_update / (self._time - began), 1),
+            **losses,
+            "bonus": tally.bonus,
+            **episode_metrics(tally, before, self._counted),
+        }
+        if config.guide == "none":
+            del row["imitation_loss"]
+            return row
+        agreement = tally.agreed_steps / tally.led_steps if tally.led_steps else None
+        return row | {"led": tally.led_steps / config.frames_per_update, "agreement": agreement}
+
+
+def episode_metrics(tally: Tally, before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+    """What the episodes that ended in one rollout were like; rates are None where none ended.
 
     Args:
-        tally: the trainer's sums.
-        before: the environments' `counters()` before the rollout.
+        tally: the trainer's sums, of the agent's own episodes.
+        before: the environments' `counters()` before the rollout, of own and led episodes.
         after: the same after it.
-
-    Returns:
-        episodes, success, mean_return, mean_length, timeouts of the agent's own episodes; then per episode, own and
-        led ones, the rate of each outcome and of each rule (rules may fire several times an episode). None where no
-        episode ended.
     """
 
     def rate(total: float, episodes: int = tally.episodes) -> float | None:
@@ -58,17 +79,11 @@ def episode_metrics(
     }
 
 
-def guide_metrics(tally: EpisodeTally, frames: int) -> dict[str, float | None]:
-    """Share of a rollout's frames that a guide made, and of those in which the policy would have done the same."""
-    agreement = tally.agreed_steps / tally.led_steps if tally.led_steps else None
-    return {"led": tally.led_steps / frames, "agreement": agreement}
-
-
 class MetricsLog:
-    """`metrics.jsonl`, and, if wanted, TensorBoard events in a run directory and W&B.
+    """`starts.jsonl`, `metrics.jsonl`, and, if wanted, TensorBoard events in a run directory and W&B.
 
-    Opening it cuts file and events back to `update`, so that a resumed run's log equals that of one that never
-    stopped. TensorBoard's steps and the tracker's are frames.
+    Opening it records the start, and cuts rows and events back to `update`, so that a resumed run's log equals that
+    of one that never stopped. TensorBoard's steps and the tracker's are frames.
 
     Raises:
         OSError: the files cannot be written.
@@ -78,11 +93,12 @@ class MetricsLog:
     def __init__(
         self,
         run_dir: Path,
-        update: int,
-        tensorboard: bool,
+        config: RunConfig,
+        update: int = 0,
         frames: int = 0,
         tracker: WandbTracker | None = None,
     ) -> None:
+        run_dir.mkdir(parents=True, exist_ok=True)
         path = run_dir / FILE_NAME
         _cut_back(path, update)
         self._tracker = tracker
@@ -90,11 +106,12 @@ class MetricsLog:
             tracker.open()
         self._file = path.open("a", encoding="utf-8")
         self._events: Any = None
-        if tensorboard:
+        if config.tensorboard:
             from torch.utils.tensorboard import SummaryWriter
 
             # A reader drops what an earlier part of the run wrote from this step on.
             self._events = SummaryWriter(str(run_dir), purge_step=frames + 1)
+        record_start(run_dir, update, frames, config)
 
     def write(self, row: Mapping[str, Any]) -> None:
         """Append the row of one update."""
@@ -195,53 +212,51 @@ class TrackingWarning(UserWarning):
     """Figures are not sent any more; the run goes on."""
 
 
+@dataclass
 class WandbTracker:
     """Sends figures to a project of Weights & Biases, where they are drawn over frames.
 
     A resumed run goes on where it was: what it does again is not sent twice. Once begun, nothing that goes wrong
     stops the training; it is said once, and the figures stay in `metrics.jsonl`.
+
+    Attributes:
+        project: its name.
+        run_dir: folder of the run, where W&B keeps its own files as well.
+        config: what the run was asked for, shown beside its curves.
+        name: what the run is called there.
     """
 
-    def __init__(self, project: str, run_dir: Path, config: Mapping[str, Any], name: str) -> None:
-        """Send to `project`.
-
-        Args:
-            project: its name.
-            run_dir: folder of the run, where W&B keeps its own files as well.
-            config: what the run was asked for, shown beside its curves.
-            name: what the run is called there.
-
-        Raises:
-            ValueError: the package is not installed.
-        """
-        try:
-            self._wandb = importlib.import_module("wandb")
-        except ImportError:
-            raise ValueError(
-                "W&B is not installed: pip install 'socialai-dsl[wandb]', or leave out --wandb"
-            ) from None
-        self._shown = {"project": project, "config": dict(config), "name": name}
-        self._run_dir = run_dir
-        self._run: Any = None
+    project: str
+    run_dir: Path
+    config: Mapping[str, Any]
+    name: str
+    _run: Any = field(default=None, init=False)
 
     def open(self) -> None:
         """Begin, or go on where the run was.
 
         Raises:
-            ValueError: it cannot begin; the message says what to do.
+            ValueError: the package is not installed, or it cannot begin; the message says what to do.
         """
-        path = self._run_dir / _ID_FILE
+        path = self.run_dir / _ID_FILE
         if not path.exists():
             path.write_text(uuid.uuid4().hex[:12] + "\n", encoding="utf-8")
         try:
-            self._run = self._wandb.init(
-                **self._shown,
+            wandb = importlib.import_module("wandb")
+            self._run = wandb.init(
+                project=self.project,
+                name=self.name,
+                config=dict(self.config),
                 id=path.read_text(encoding="utf-8").strip(),
-                dir=str(self._run_dir),
+                dir=str(self.run_dir),
                 resume="allow",
                 # The terminal shows the progress; W&B is not to copy what is printed.
-                settings=self._wandb.Settings(console="off"),
+                settings=wandb.Settings(console="off"),
             )
+        except ImportError:
+            raise ValueError(
+                "W&B is not installed: pip install 'socialai-dsl[wandb]', or leave out --wandb"
+            ) from None
         except Exception as error:
             raise ValueError(f"W&B cannot begin: {type(error).__name__}: {error}") from error
 
@@ -268,7 +283,7 @@ class WandbTracker:
             self._run = None
             warnings.warn(
                 f"W&B gets no more figures ({type(error).__name__}: {error}); training goes on, and they are all in "
-                f"{self._run_dir / FILE_NAME}",
+                f"{self.run_dir / FILE_NAME}",
                 TrackingWarning,
                 stacklevel=2,
             )

@@ -113,7 +113,7 @@ class CheckpointPolicy:
         self, images: NDArray[np.uint8], tokens: NDArray[np.int16]
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """Logits of all heads side by side, and values; the memory goes on."""
-        if self._actor is None or self._actor.pairs.size > _REMEMBERED_FRAMES:
+        if self._actor is None or len(self._actor.pairs.data) > _REMEMBERED_FRAMES:
             self._actor = Actor(self.net, tokens.shape[1])
         self._require(len(tokens))
         _, features = self._actor.see(images, tokens)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,14 +15,18 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from trainer import checkpoint as checkpoints
 from trainer.bonus import Bonus, build_bonus
 from trainer.checkpoint import Checkpoint, CheckpointMeta, restore_net
 from trainer.config import WITHOUT_EFFECT, RunConfig
 from trainer.curricula import Curriculum, Leaves, Tutor, build_curriculum
-from trainer.errors import CheckpointError
+from trainer.errors import CheckpointError, ObservationError, TrainingStopped
 from trainer.features import Actor, Int64
 from trainer.guides import Guide, build_guide
 from trainer.nets import NetSpec, build_net
+
+Mapper = Callable[..., Iterable[Any]]
+"""`map`, or that of a pool of threads."""
 
 _ADAM = ("step", "exp_avg", "exp_avg_sq")
 
@@ -173,6 +181,19 @@ class Session:
         parts = (("curriculum", getattr(self.tutor, "curriculum", None)), ("guide", self.guide))
         return [(name, part) for name, part in parts if part is not None]
 
+    def save(self, run_dir: Path) -> Path:
+        """Write a checkpoint into a run's folder and return its path."""
+        return checkpoints.write(
+            run_dir / checkpoints.FOLDER, self.checkpoint(), self.config.keep_checkpoints
+        )
+
+    def resume(self, run_dir: Path) -> None:
+        """Continue from the newest intact checkpoint in a run's folder; see `load`."""
+        folder = run_dir / checkpoints.FOLDER
+        if not folder.is_dir():
+            raise CheckpointError(f"{run_dir}: nothing to resume, there are no checkpoints")
+        self.load(checkpoints.read(folder))
+
     def load(self, checkpoint: Checkpoint) -> None:
         """Continue from a checkpoint of this very run, in a session begun with the same configuration.
 
@@ -184,7 +205,7 @@ class Session:
         net = restore_net(checkpoint, spec, config.net, config.code_folder)
         try:
             self.actor.net.load_state_dict(net.state_dict())
-            self._load_adam(checkpoint)
+            self._load_adam(checkpoint.part("adam"))
             self._load_state(checkpoint.part("state"))
             self.generator.set_state(checkpoint.tensors["rng"])
             if self.bonus is not None:
@@ -213,24 +234,16 @@ class Session:
                 detail += " (guide and schedules reach from the first frame to the last)"
             raise CheckpointError(f"a run resumes only with the same settings; changed: {detail}")
 
-    @torch.no_grad()
-    def _load_adam(self, checkpoint: Checkpoint) -> None:
-        stored = checkpoint.part("adam")
-        state: dict[int, dict[str, Tensor]] = {}
-        for index, (name, parameter) in enumerate(self.actor.net.named_parameters()):
+    def _load_adam(self, stored: dict[str, Tensor]) -> None:
+        for name, parameter in self.actor.net.named_parameters():
             if not any(f"{key}.{name}" in stored for key in _ADAM):
                 continue  # it had no gradient yet, as an encoder of words before the first word
-            values = {key: stored[f"{key}.{name}"] for key in _ADAM}
-            if values["step"].ndim or any(values[key].shape != parameter.shape for key in _ADAM[1:]):
+            step, *averages = (stored[f"{key}.{name}"] for key in _ADAM)
+            if step.ndim or any(average.shape != parameter.shape for average in averages):
                 raise ValueError(f"optimiser state of {name} has another shape")
             # Fused Adam walks all of them in the order they lie in memory, so they must lie like the parameter.
-            state[index] = {
-                key: value if key == "step" else torch.empty_like(parameter).copy_(value)
-                for key, value in values.items()
-            }
-        self.optimizer.load_state_dict(
-            {"state": state, "param_groups": self.optimizer.state_dict()["param_groups"]}
-        )
+            like = [torch.empty_like(parameter.detach()).copy_(average) for average in averages]
+            self.optimizer.state[parameter] = dict(zip(_ADAM, (step.to(parameter), *like), strict=True))
 
     def _load_state(self, stored: dict[str, Tensor]) -> None:
         for name, present in vars(self.state).items():
@@ -242,6 +255,42 @@ class Session:
                 )
             is_tensor = isinstance(present, Tensor)
             setattr(self.state, name, value.to(present) if is_tensor else value.numpy().copy())
+
+
+@contextlib.contextmanager
+def threads_of(session: Session) -> Iterator[Mapper]:
+    """Threads that each differentiate a share of a minibatch.
+
+    A recurrent network is thousands of small operations. Split inside each operation, as PyTorch does, threads spend
+    their time meeting at barriers; whole shares meet once a step. So each thread runs PyTorch on one core. Networks
+    whose frames depend on the rest of their batch, and GPUs, are left to PyTorch.
+    """
+    threads, before = session.config.threads, torch.get_num_threads()
+    shared = session.actor.net.distinct and session.actor.device.type == "cpu"
+    torch.set_num_threads(1 if shared else threads)
+    try:
+        if not shared or threads == 1:
+            yield map
+            return
+        with ThreadPoolExecutor(threads, initializer=torch.set_num_threads, initargs=(1,)) as pool:
+            yield pool.map
+    finally:
+        torch.set_num_threads(before)
+
+
+@contextlib.contextmanager
+def explained_stops(session: Session, run_dir: Path) -> Iterator[None]:
+    """Say where a run stopped, why, and what is left of it."""
+    try:
+        yield
+    except BrokenPipeError:  # of the terminal that progress is shown on, not of a file
+        raise
+    except (TrainingStopped, ObservationError, OSError) as error:
+        saved = max((run_dir / checkpoints.FOLDER).glob("*.safetensors"), default=None)
+        kept = f"the last good checkpoint is {saved}" if saved else "there is no checkpoint yet"
+        reason = f"cannot write: {error}" if isinstance(error, OSError) else str(error)
+        where = f"training stopped after {session.frames} frames (update {session.update})"
+        raise TrainingStopped(f"{where}: {reason}; {kept}") from error
 
 
 def _check_alike(program: Any, played: Any) -> None:
