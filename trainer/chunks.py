@@ -10,9 +10,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from trainer.features import prefix_tree
 from trainer.minibatch import Batch
 from trainer.nets import ActorCritic
+from trainer.nets.dialogue import PrefixTree, prefix_tree
 from trainer.nets.memory import emptied
 from trainer.rollout import Rollout
 from trainer.session import Session
@@ -30,7 +30,7 @@ class Chunks:
         resets: bool (T, E), where an episode starts, into which no memory reaches.
         pairs: int64 (T, E, 2), row of the image in `images` and state of the history in the tree.
         images: uint8 (I, H, W, C).
-        tree: tokens, parents and offsets of the histories' prefix tree.
+        tree: of the histories.
         memories: float32 (T, E, *shape), the last computed before each step; not numbers where none was yet.
         length: steps of each chunk.
         starts: int64 (C, 2), environment and first step of each.
@@ -41,7 +41,7 @@ class Chunks:
     resets: Tensor
     pairs: Tensor
     images: Tensor
-    tree: tuple[Tensor, Tensor, list[int]]
+    tree: PrefixTree
     memories: Tensor
     length: int
     starts: Tensor
@@ -52,7 +52,7 @@ class Chunks:
 
         Replaces the memories it passes through.
         """
-        texts = net.dialogue(*self.tree)
+        texts = net.dialogue(self.tree)
         env, first = self.starts.unbind(1)
         each = torch.arange(len(env), device=env.device)
         memory = self.memories[first, env]  # (C, *shape)
@@ -74,7 +74,7 @@ def chunks(session: Session, rollout: Rollout, batch: Batch) -> Iterator[list[Ch
     through, one of an earlier epoch afterwards.
     """
     config, actor = session.config, session.actor
-    tree = prefix_tree(actor.histories.data)
+    tree = prefix_tree(actor.histories.data, actor.device)
     images, histories = np.moveaxis(actor.pairs.data[rollout.pair_rows.numpy()], 2, 0)  # (T, E) each
     shape = (config.horizon, config.envs, *rollout.memories.shape[2:])
     memories = rollout.memories.new_full(shape, float("nan"))  # so that none can be used by mistake
@@ -82,9 +82,9 @@ def chunks(session: Session, rollout: Rollout, batch: Batch) -> Iterator[list[Ch
     every = Chunks(
         batch,
         rollout.starts,
-        actor.move(np.stack((images, tree.leaves[histories]), 2)),
+        torch.stack((actor.move(images), tree.leaves[actor.move(histories)]), 2),
         actor.move(actor.images.data),
-        actor.move_tree(tree),
+        tree,
         memories,
         config.bptt,
         rollout.actions.new_empty(0, 2),

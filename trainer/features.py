@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import torch
@@ -17,6 +17,7 @@ from torch import Tensor
 
 from trainer.errors import ObservationError
 from trainer.nets import ActorCritic
+from trainer.nets.dialogue import prefix_tree
 
 Int64 = NDArray[np.int64]
 
@@ -54,41 +55,6 @@ class DistinctRows:
         if len(fresh):
             self.data = np.concatenate((self.data, read(values[fresh])))
         return rows[inverse], fresh
-
-
-class PrefixTree(NamedTuple):
-    """Distinct histories as paths from a root, so that a shared beginning is encoded once.
-
-    State 0 is the empty history; state k >= 1 is the history of state `parents[k - 1]` plus `tokens[k - 1]`.
-    States are sorted by length: those of length d are `offsets[d - 1] + 1` to `offsets[d]`.
-
-    Attributes:
-        tokens: int64 (K,) last word of each state.
-        parents: int64 (K,) state it continues.
-        offsets: K's running total by length, starting at 0.
-        leaves: int64 (D,) state of each history given to `prefix_tree`.
-    """
-
-    tokens: Int64
-    parents: Int64
-    offsets: list[int]
-    leaves: Int64
-
-
-def prefix_tree(histories: NDArray[np.generic]) -> PrefixTree:
-    """Build the tree of 0-padded histories, integer (D, L), duplicates allowed, one word of all of them at a time."""
-    words = histories.astype(np.int64)
-    lengths = np.count_nonzero(words, axis=1)  # (D,)
-    state = np.zeros(len(words), np.int64)  # (D,), of each history's beginning so far
-    offsets, levels = [0], [state[:0]]
-    for depth in range(lengths.max(initial=0)):
-        longer = lengths > depth
-        edges, which = np.unique(state[longer] << 32 | words[longer, depth], return_inverse=True)
-        state[longer] = offsets[-1] + 1 + which
-        offsets.append(offsets[-1] + len(edges))
-        levels.append(edges)
-    edges = np.concatenate(levels)
-    return PrefixTree(edges & 0xFFFFFFFF, edges >> 32, offsets, state)
 
 
 class Actor:
@@ -186,9 +152,9 @@ class Actor:
         """Encode histories (K, L) that continue those of the rows `parents`, int64 (K,); (K, size)."""
         known = np.count_nonzero(self.histories.data[parents], axis=1)  # (K,)
         if not known.any():
-            tree = prefix_tree(words)
-            states: Tensor = self.net.dialogue(*self.move_tree(tree))
-            return states[self.move(tree.leaves)]
+            tree = prefix_tree(words, self.device)
+            states: Tensor = self.net.dialogue(tree)
+            return states[tree.leaves]
         new = np.count_nonzero(words, axis=1) - known  # (K,)
         columns = known[:, None] + np.arange(new.max())  # (K, S)
         padded = np.pad(words, ((0, 0), (0, new.max())))
@@ -198,7 +164,3 @@ class Actor:
     def move(self, array: NDArray[Any]) -> Tensor:
         """The array as a tensor on the network's device."""
         return torch.from_numpy(np.ascontiguousarray(array)).to(self.device)
-
-    def move_tree(self, tree: PrefixTree) -> tuple[Tensor, Tensor, list[int]]:
-        """Tokens, parents and offsets of a tree, as an encoder of dialogues takes them."""
-        return self.move(tree.tokens), self.move(tree.parents), tree.offsets

@@ -10,9 +10,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from trainer.features import prefix_tree
 from trainer.guides import Lead
 from trainer.nets import ActorCritic
+from trainer.nets.dialogue import PrefixTree, prefix_tree
 from trainer.rollout import Rollout
 from trainer.session import Session
 
@@ -52,7 +52,7 @@ class Environments:
         weight: share of its minibatch's frames that these are.
         starts: bool (T, B). memory: (B, *shape) before the first step.
         prepared: the net's view of the distinct images.
-        tree: tokens, parents and offsets of the distinct histories' prefix tree.
+        tree: of the distinct histories.
         image_index, text_index: int64 (P,), image and tree state of each distinct pair.
         frame_index: int64 (N,), pair of each frame.
     """
@@ -62,14 +62,14 @@ class Environments:
     starts: Tensor
     memory: Tensor
     prepared: Any
-    tree: tuple[Tensor, Tensor, list[int]]
+    tree: PrefixTree
     image_index: Tensor
     text_index: Tensor
     frame_index: Tensor
 
     def evaluate(self, net: ActorCritic) -> Iterator[tuple[Batch, Tensor, Tensor]]:
         """Frames, logits (N, sum of sizes) and values (N,) under the present weights, in one part."""
-        text = net.dialogue(*self.tree)
+        text = net.dialogue(self.tree)
         features = net.perceive(self.prepared, text, self.image_index, self.text_index)
         frames = features.index_select(0, self.frame_index).view(*self.starts.shape, -1)
         yield self.batch, *net.heads(net.memory(frames, self.starts, self.memory).flatten(0, 1))
@@ -110,15 +110,15 @@ def cut_out(
     pairs = actor.pairs.data[pair_rows]
     image_rows, image_index = np.unique(pairs[:, 0], return_inverse=True)
     history_rows, history_index = np.unique(pairs[:, 1], return_inverse=True)
-    tree = prefix_tree(actor.histories.data[history_rows])
+    tree = prefix_tree(actor.histories.data[history_rows], actor.device)
     return Environments(
         batch.pick(lambda array: cut(array).flatten(0, 1)),
         weight,
         cut(rollout.starts),
         rollout.memories.index_select(1, envs.to(actor.device)).flatten(0, 1),
         actor.net.prepare(actor.move(actor.images.data[image_rows])),
-        actor.move_tree(tree),
+        tree,
         actor.move(image_index),
-        actor.move(tree.leaves[history_index]),
+        tree.leaves[actor.move(history_index)],
         actor.move(frame_index.reshape(-1)),
     )
