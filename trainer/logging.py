@@ -14,16 +14,53 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from trainer.config import RunConfig
-from trainer.rollout import Tally
-from trainer.session import Session
+from trainer.session import Session, State
 
 FILE_NAME = "metrics.jsonl"
 STARTS = "starts.jsonl"
 SURROUNDINGS = ("torch", "cpu", "device", "threads")
 _ID_FILE = "wandb_id.txt"
+
+
+@dataclass
+class Tally:
+    """Sums over a rollout; episodes are the agent's own that ended in it, without those that a guide took part in.
+
+    Attributes:
+        episodes, successes, timeouts: counts.
+        total_return, total_length: sums of undiscounted returns (without bonus) and of lengths in steps.
+        all_episodes: own and led ones.
+        led_steps, agreed_steps: steps that a guide made, and those of them in which the policy's own sample was the
+            same.
+        bonus: mean exploration bonus per frame.
+    """
+
+    episodes: int = 0
+    successes: int = 0
+    timeouts: int = 0
+    total_return: float = 0.0
+    total_length: int = 0
+    all_episodes: int = 0
+    led_steps: int = 0
+    agreed_steps: int = 0
+    bonus: float = 0.0
+
+    def count(
+        self, state: State, ended: NDArray[np.bool_], cut: NDArray[np.bool_], success: NDArray[np.bool_]
+    ) -> None:
+        """Add the episodes that ended in a step, those that were cut off and those that succeeded, bool (E,) each."""
+        own = ended & ~state.led
+        self.all_episodes += int(ended.sum())
+        self.episodes += int(own.sum())
+        self.successes += int(success[own].sum())
+        self.timeouts += int(cut[own].sum())
+        self.total_return += float(state.returns[own].sum())
+        self.total_length += int(state.lengths[own].sum())
 
 
 class Metrics:

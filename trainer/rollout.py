@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -12,61 +11,39 @@ from torch import Tensor
 
 from trainer import actions as heads
 from trainer.errors import require_finite
+from trainer.extensions import require_shape
 from trainer.features import Actor, Int64
 from trainer.guides import Guide, Lead
+from trainer.logging import Tally
 from trainer.nets.memory import emptied
 from trainer.session import Session
 
 
-@dataclass
-class Tally:
-    """Sums over a rollout; episodes are the agent's own that ended in it, without those that a guide took part in.
-
-    Attributes:
-        episodes, successes, timeouts: counts.
-        total_return, total_length: sums of undiscounted returns (without bonus) and of lengths in steps.
-        all_episodes: own and led ones.
-        led_steps, agreed_steps: steps that a guide made, and those of them in which the policy's own sample was the
-            same.
-        bonus: mean exploration bonus per frame.
-    """
-
-    episodes: int = 0
-    successes: int = 0
-    timeouts: int = 0
-    total_return: float = 0.0
-    total_length: int = 0
-    all_episodes: int = 0
-    led_steps: int = 0
-    agreed_steps: int = 0
-    bonus: float = 0.0
-
-
-@dataclass(frozen=True)
-class Rollout:
+class Rollout(NamedTuple):
     """T steps of E environments, time first, on the network's device.
 
     Attributes:
-        actions: int64 (T, E, 4), as played. log_probs: float32 (T, E, 4) of the policy, before masking.
+        actions: int64 (T, E, 4), as played.
         values, rewards: float32 (T, E); rewards with the bonus.
         starts, ended: bool (T, E), whether the episode began, and whether it ended, with this step.
         bootstrap: float32 (T, E), value of the state a time-out cut an episode off in; 0 elsewhere.
-        next_value: float32 (E,), value of the state after the last step.
         pair_rows: int64 (T, E), row of the actor's `pairs`; on the CPU.
+        log_probs: float32 (T, E, 4) of the policy, before masking.
+        next_value: float32 (E,), value of the state after the last step.
         memories: float32 (T / bptt, E, *shape), memory before each stretch of back-propagation.
         lead: what a guide did, (T, E, ...); None where none took part.
         tally: counts and sums for the log.
     """
 
     actions: Tensor
-    log_probs: Tensor
     values: Tensor
     rewards: Tensor
     starts: Tensor
     ended: Tensor
     bootstrap: Tensor
-    next_value: Tensor
     pair_rows: Tensor
+    log_probs: Tensor
+    next_value: Tensor
     memories: Tensor
     lead: Lead | None
     tally: Tally
@@ -99,30 +76,18 @@ def collect(session: Session) -> Rollout:
             actions, given = _follow(session, session.guide, actions, tally)
             leads.append(given)
         reward, ended, bootstrap = map(actor.move, _step(session, actions, tally))  # (E,) each
-        steps.append((actions, logits, values, reward, starts, ended, bootstrap, torch.from_numpy(rows)))
-    next_value = _value(actor, state.image, state.tokens, emptied(state.memory, ended), _ids(envs))
-    columns = [torch.stack(column) for column in zip(*steps, strict=True)]
-    actions, logits, values, rewards, starts, ended, bootstrap, pair_rows = columns
-    log_probs = heads.log_probs(logits, actions, sizes)  # (T, E, 4)
-    require_finite("a reward", rewards)
-    require_finite("the network's output", torch.cat((log_probs, values[..., None]), -1))
+        steps.append((actions, values, reward, starts, ended, bootstrap, torch.from_numpy(rows), logits))
+    next_value = _value(actor, emptied(state.memory, ended), state.image, state.tokens, _ids(envs))
+    *columns, logits = (torch.stack(column) for column in zip(*steps, strict=True))
+    log_probs = heads.log_probs(logits, columns[0], sizes)
     lead = None
     if any(given.led.any() or given.weights.any() for given in leads):
         lead = Lead(*map(torch.stack, zip(*leads, strict=True)))
-    return Rollout(
-        actions,
-        log_probs,
-        values,
-        rewards,
-        starts,
-        ended,
-        bootstrap,
-        next_value,
-        pair_rows,
-        torch.stack(memories),
-        lead,
-        tally,
-    )
+    rollout = Rollout._make((*columns, log_probs, next_value, torch.stack(memories), lead, tally))
+    require_finite("a reward", rollout.rewards)
+    require_finite("the network's output", rollout.log_probs)
+    require_finite("the network's output", rollout.values)
+    return rollout
 
 
 def _ids(envs: Any) -> tuple[Int64, Int64]:
@@ -134,7 +99,7 @@ def _follow(session: Session, guide: Guide, own: Tensor, tally: Tally) -> tuple[
     state, move = session.state, session.actor.move
     given = guide.lead(session.envs, state.starts, min(session.frames / session.config.frames, 1.0))
     for name, part, axes in zip(Lead._fields, given, ((4,), (), ()), strict=True):
-        _require_shape(f"guide: {name} of lead", part, (len(own), *axes))
+        require_shape(f"guide: {name} of lead", part, (len(own), *axes))
     state.led |= given.led
     lead = Lead(*(move(part.copy()) for part in given))
     agrees = ((own == lead.actions) | (heads.spoken_mask(lead.actions) == 0)).all(1)  # (E,)
@@ -154,51 +119,33 @@ def _step(
     bootstrap = np.zeros(len(ended), np.float32)
     if config.bootstrap_timeouts and cut.any():
         final, probe = infos["final_obs"], Actor(session.actor.net, state.tokens.shape[1])
-        values = _value(probe, final["image"][cut], final["tokens"][cut], state.memory[probe.move(cut)])
+        values = _value(probe, state.memory[probe.move(cut)], final["image"][cut], final["tokens"][cut])
         bootstrap[cut] = values.cpu().numpy()
     state.image, state.tokens, state.starts = observation["image"].copy(), observation["tokens"].copy(), ended
     state.returns += reward
     state.lengths += 1
     if ended.any():
-        own = ended & ~state.led
-        tally.all_episodes += int(ended.sum())
-        tally.episodes += int(own.sum())
-        tally.successes += int(success[own].sum())
-        tally.timeouts += int(cut[own].sum())
-        tally.total_return += float(state.returns[own].sum())
-        tally.total_length += int(state.lengths[own].sum())
+        tally.count(state, ended, cut, success)
         state.returns[ended], state.lengths[ended], state.led[ended] = 0, 0, False
     if session.tutor is not None:
         session.tutor.step(ended, success)
     if session.bonus is not None:
         paid = session.bonus.step(envs, observation["image"], ended)
-        _require_shape("bonus: the result of step", paid, ended.shape)
+        require_shape("bonus: the result of step", paid, ended.shape)
         tally.bonus += float(paid.sum()) / config.frames_per_update
         reward = reward + paid
     return reward.astype(np.float32), ended, bootstrap
 
 
-def _require_shape(what: str, array: Any, shape: tuple[int, ...]) -> None:
-    """Refuse an array of the user's code that NumPy would stretch or stumble over."""
-    if np.shape(array) != shape:
-        raise ValueError(f"{what}: got the shape {np.shape(array)}, expected {shape}")
-
-
-def _value(
-    actor: Actor,
-    images: NDArray[np.uint8],
-    tokens: NDArray[np.int16],
-    memory: Tensor,
-    ids: tuple[Int64, Int64] | None = None,
-) -> Tensor:
-    """Value of an observation, (K,), given the memory before it.
+def _value(actor: Actor, memory: Tensor, *observation: Any) -> Tensor:
+    """Value, (K,), of an observation, as `Actor.see` takes it, given the memory before it.
 
     Running statistics of the network stay as they are: it meets the observation in the next rollout, or never acts on
     it, and each counts once.
     """
     net = actor.net
     statistics = [buffer.clone() for buffer in net.buffers()]
-    _, features = actor.see(images, tokens, ids)
+    _, features = actor.see(*observation)
     value: Tensor = net.heads(net.memory.step(features, memory)[0])[1]
     for buffer, before in zip(net.buffers(), statistics, strict=True):
         buffer.copy_(before)
