@@ -219,7 +219,7 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str
         ):
             break
     for name, value in net.state_dict().items():  # also of its buffers
-        require_finite(f"the network's {name}", value)
+        require_finite(f"an entry of the network's {name}", value)
     unexplained = (batch.returns - batch.values).var(correction=0) / (batch.returns.var(correction=0) + 1e-8)
     figures = dict(zip(STATISTICS, torch.stack(steps).mean(0).tolist(), strict=True))
     figures["explained_variance"] = 1 - float(unexplained)

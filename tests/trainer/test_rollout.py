@@ -116,6 +116,18 @@ def test_time_outs_are_bootstrapped_with_the_value_of_their_last_observation(sma
     assert (terminal.bootstrap == 0).all()
 
 
+def test_an_end_in_the_last_moment_beats_the_time_out(small_config: Any) -> None:
+    class Both(EchoEnvs):
+        def step(self, actions: np.ndarray) -> Any:
+            observation, reward, terminated, truncated, infos = super().step(actions)
+            return observation, reward, terminated | truncated, terminated | truncated, infos
+
+    _, rollout = play(small_config(), Both(8, limit=4))
+    assert rollout.ended.any()
+    assert (rollout.bootstrap == 0).all()
+    assert rollout.tally.timeouts == 0
+
+
 def test_batch_normalisation_counts_each_observation_once(small_config: Any) -> None:
     """Neither the value after a rollout's last step nor that of a time-out's last observation counts again."""
     session, rollout = play(small_config(net="paper-reference"), EchoEnvs(8, limit=4), rollouts=2)

@@ -249,7 +249,7 @@ def test_weights_that_a_step_spoils_are_not_saved(
     monkeypatch.setattr(torch.optim.Adam, "step", spoiling)
     with pytest.raises(TrainingStopped) as caught:
         train(config, EchoEnvs(8), tmp_path)
-    check_stopped(tmp_path, f"the network's {name} is not a finite number", caught)
+    check_stopped(tmp_path, f"an entry of the network's {name} is not a finite number", caught)
 
 
 def test_figures_that_are_not_finite_stop_the_run(
