@@ -23,7 +23,6 @@ from trainer.session import Session, State
 
 FILE_NAME = "metrics.jsonl"
 STARTS = "starts.jsonl"
-SURROUNDINGS = ("torch", "cpu", "device", "threads")
 _ID_FILE = "wandb_id.txt"
 
 
@@ -194,18 +193,17 @@ def scalars(row: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
 def _cut_back(path: Path, update: int) -> None:
     """Drop the rows after `update`."""
     if path.exists():
-        rows = [
-            row for row in _rows(path) if isinstance(row.get("update"), int) and 0 < row["update"] <= update
-        ]
+        known = _rows(path.read_text(encoding="utf-8", errors="replace"))
+        rows = [row for row in known if isinstance(row.get("update"), int) and 0 < row["update"] <= update]
         temporary = path.with_suffix(".tmp")
         temporary.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
         temporary.replace(path)
 
 
-def _rows(path: Path) -> list[dict[str, Any]]:
-    """The rows of a file, but for what a killed or failing machine left unfinished."""
+def _rows(text: str) -> list[dict[str, Any]]:
+    """The rows of a file's text, but for what a killed or failing machine left unfinished."""
     rows = []
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+    for line in text.splitlines():
         with contextlib.suppress(ValueError):
             rows.append(json.loads(line))
     return [row for row in rows if isinstance(row, dict)]
@@ -222,25 +220,22 @@ def record_start(run_dir: Path, update: int, frames: int, config: RunConfig) -> 
     """
     # The instructions that torch uses here; other processors may round sums differently.
     cpu = torch.backends.cpu.get_cpu_capability()
-    values = (str(torch.__version__), cpu, config.device, config.threads)
-    around = dict(zip(SURROUNDINGS, values, strict=True))
+    now = {"torch": str(torch.__version__), "cpu": cpu, "device": config.device, "threads": config.threads}
     path = run_dir / STARTS
-    if update and path.exists() and (known := _rows(path)):
-        last = known[-1]
-        changed = [
-            f"{name} {last.get(name)} -> {now}" for name, now in around.items() if last.get(name) != now
-        ]
+    known = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+    if update and (starts := _rows(known)):
+        last = starts[-1]
+        changed = [f"{name} {last.get(name)} -> {one}" for name, one in now.items() if last.get(name) != one]
         if changed:
             warnings.warn(
                 f"the run goes on under other conditions ({', '.join(changed)}), so it need not equal, to the last "
                 "bit, one that never stopped",
-                stacklevel=3,
+                stacklevel=4,
             )
     row = {"time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), "update": update, "frames": frames}
-    with path.open("a+b") as file:
-        file.seek(max(file.seek(0, os.SEEK_END) - 1, 0))
-        unfinished = "" if file.read() in (b"", b"\n") else "\n"  # by a process killed while writing
-        file.write((unfinished + json.dumps(row | around) + "\n").encode())
+    with path.open("a", encoding="utf-8") as file:
+        unfinished = "" if known.endswith("\n") or not known else "\n"  # by a process killed while writing
+        file.write(unfinished + json.dumps(row | now) + "\n")
         file.flush()
         os.fsync(file.fileno())
 
