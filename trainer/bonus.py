@@ -133,7 +133,8 @@ def build_bonus(config: RunConfig, num_envs: int) -> Bonus | None:
     """
     if config.bonus == "none":
         return None
-    if config.bonus in SHIPPED:
-        return EpisodicBonus(config, num_envs)
-    bonus: Bonus = load_class(config.bonus, "bonus", SHIPPED, Bonus, config.code_folder)(config, num_envs)
-    return bonus
+    shipped = config.bonus in SHIPPED
+    found = (
+        EpisodicBonus if shipped else load_class(config.bonus, "bonus", SHIPPED, Bonus, config.code_folder)
+    )
+    return found(config, num_envs)

@@ -74,7 +74,6 @@ class Actor:
         self.device = next(net.parameters()).device
         self._length = net.reader.length(tokens_length)
         self._image_high = np.array(net.spec.image_high)  # (C,)
-        self._frames = 0
         self.begin()
 
     @torch.no_grad()
@@ -107,8 +106,7 @@ class Actor:
         """
         image_ids, history_ids = ids or (content_ids(images), content_ids(tokens))
         if not self.net.distinct:
-            image_ids = np.arange(self._frames, self._frames + len(images))
-            self._frames += len(images)
+            image_ids = np.arange(len(images)) + len(self.images.data)  # each image is new
         image_rows, fresh = self.images.add(image_ids, images)
         if (images[fresh] > self._image_high).any():
             high = tuple(self.net.spec.image_high)

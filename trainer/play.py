@@ -155,11 +155,8 @@ def warn_of_differences(meta: CheckpointMeta, program: Any) -> None:
 
 def _changes(old: Sequence[str], new: Sequence[str]) -> str:
     """`2: "Hello" is now "Good day", ...`, the first few."""
-    changed = [
-        f'{i}: "{before}" is now "{after}"'
-        for i, (before, after) in enumerate(zip(old, new, strict=False))
-        if before != after
-    ]
+    both = enumerate(zip(old, new, strict=False))
+    changed = [f'{i}: "{was}" is now "{now}"' for i, (was, now) in both if was != now]
     if len(old) != len(new):
         changed.append(f"{len(old)} are now {len(new)}")
     more = len(changed) - _WORDS_SHOWN

@@ -29,6 +29,7 @@ Mapper = Callable[..., Iterable[Any]]
 """`map`, or that of a pool of threads."""
 
 _ADAM = ("step", "exp_avg", "exp_avg_sq")
+_WORDS = ("actions", "templates", "nouns", "vocabulary")
 
 
 @dataclass
@@ -50,20 +51,6 @@ class State:
     returns: NDArray[np.float64]
     lengths: Int64
     led: NDArray[np.bool_]
-
-    @classmethod
-    def initial(cls, observation: dict[str, NDArray[Any]], memory: Tensor) -> State:
-        """The state after a reset that returned `observation`, with an empty memory."""
-        count = len(observation["tokens"])
-        return cls(
-            observation["image"].copy(),
-            observation["tokens"].copy(),
-            np.ones(count, np.bool_),
-            memory,
-            np.zeros(count),
-            np.zeros(count, np.int64),
-            np.zeros(count, np.bool_),
-        )
 
 
 @dataclass
@@ -129,20 +116,22 @@ class Session:
         guide = build_guide(config, envs)
         if tutor is not None:
             tutor.begin()
-        return cls(
-            config,
-            envs,
-            envs.program if program is None else program,
-            Actor(net, observation["tokens"].shape[1]),
-            torch.optim.Adam(
-                net.parameters(), config.lr, (0.9, config.adam_beta2), config.adam_eps, fused=True
-            ),
-            State.initial(observation, net.memory.initial(config.envs)),
-            torch.Generator().manual_seed(config.seed),
-            bonus,
-            tutor,
-            guide,
+        state = State(
+            image=observation["image"].copy(),
+            tokens=observation["tokens"].copy(),
+            starts=np.ones(config.envs, np.bool_),
+            memory=net.memory.initial(config.envs),
+            returns=np.zeros(config.envs),
+            lengths=np.zeros(config.envs, np.int64),
+            led=np.zeros(config.envs, np.bool_),
         )
+        optimizer = torch.optim.Adam(
+            net.parameters(), config.lr, (0.9, config.adam_beta2), config.adam_eps, fused=True
+        )
+        generator = torch.Generator().manual_seed(config.seed)
+        actor = Actor(net, state.tokens.shape[1])
+        program = envs.program if program is None else program
+        return cls(config, envs, program, actor, optimizer, state, generator, bonus, tutor, guide)
 
     def checkpoint(self) -> Checkpoint:
         """Everything needed to continue exactly."""
@@ -164,12 +153,9 @@ class Session:
             config=self.config,
             action_sizes=net.spec.action_sizes,
             image_shape=net.spec.image_shape,
-            vocabulary=list(program.vocabulary),
             program_sha256=program.sha256,
             scenario=program.name,
-            actions=list(program.actions),
-            templates=list(program.templates),
-            nouns=list(program.nouns),
+            **{name: list(getattr(program, name)) for name in _WORDS},
             frames=self.frames,
             update=self.update,
             torch_version=str(torch.__version__),
@@ -214,7 +200,7 @@ class Session:
             for name, part in self._parts_in_json():
                 part.load_state(json.loads(checkpoint.tensors[name].numpy().tobytes()))
             if self.tutor is not None:
-                self.tutor.resume()
+                self.tutor.begin()
         except (KeyError, ValueError, RuntimeError, TypeError) as error:
             raise CheckpointError(f"checkpoint cannot continue this run: {error}") from error
         self.update = checkpoint.meta.update
@@ -238,23 +224,27 @@ class Session:
         for name, parameter in self.actor.net.named_parameters():
             if not any(f"{key}.{name}" in stored for key in _ADAM):
                 continue  # it had no gradient yet, as an encoder of words before the first word
-            step, *averages = (stored[f"{key}.{name}"] for key in _ADAM)
-            if step.ndim or any(average.shape != parameter.shape for average in averages):
-                raise ValueError(f"optimiser state of {name} has another shape")
             # Fused Adam walks all of them in the order they lie in memory, so they must lie like the parameter.
+            step = _fitting(stored, f"step.{name}", torch.zeros(())).to(parameter.device)
+            averages = [_fitting(stored, f"{key}.{name}", parameter) for key in _ADAM[1:]]
             like = [torch.empty_like(parameter.detach()).copy_(average) for average in averages]
-            self.optimizer.state[parameter] = dict(zip(_ADAM, (step.to(parameter), *like), strict=True))
+            self.optimizer.state[parameter] = dict(zip(_ADAM, (step, *like), strict=True))
 
     def _load_state(self, stored: dict[str, Tensor]) -> None:
         for name, present in vars(self.state).items():
-            value, wanted = stored[name], torch.as_tensor(present)
-            if value.shape != wanted.shape or value.dtype != wanted.dtype:
-                raise ValueError(
-                    f"state.{name}: got {tuple(value.shape)} {value.dtype}, "
-                    f"expected {tuple(wanted.shape)} {wanted.dtype}"
-                )
+            value = _fitting(stored, name, torch.as_tensor(present))
             is_tensor = isinstance(present, Tensor)
             setattr(self.state, name, value.to(present) if is_tensor else value.numpy().copy())
+
+
+def _fitting(stored: dict[str, Tensor], name: str, wanted: Tensor) -> Tensor:
+    """The stored tensor of this name. Raises ValueError unless it has the shape and type of the one wanted."""
+    value = stored[name]
+    if (value.shape, value.dtype) != (wanted.shape, wanted.dtype):
+        raise ValueError(
+            f"{name}: got {tuple(value.shape)} {value.dtype}, expected {tuple(wanted.shape)} {wanted.dtype}"
+        )
+    return value
 
 
 @contextlib.contextmanager
@@ -295,7 +285,7 @@ def explained_stops(session: Session, run_dir: Path) -> Iterator[None]:
 
 def _check_alike(program: Any, played: Any) -> None:
     """Refuse a variant, played for its script, that says or does other things than the scenario itself."""
-    for name in ("actions", "templates", "nouns", "vocabulary"):
+    for name in _WORDS:
         own, others = list(getattr(program, name)), list(getattr(played, name))
         if own != others:
             strange = ", ".join(sorted(set(own) ^ set(others))) or "the same in another order"
