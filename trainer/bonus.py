@@ -102,11 +102,7 @@ class EpisodicBonus:
         return {"counts": self.counts.copy(), "keys": np.array(list(self.keys), np.int64)}
 
     def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """See `Bonus.load_state`.
-
-        Raises:
-            ValueError: the counts are of another number of environments.
-        """
+        """See `Bonus.load_state`; a ValueError if the counts are of another number of environments."""
         counts, keys = state["counts"], state["keys"]
         if counts.ndim != 2 or len(counts) != len(self.counts) or len(keys) > counts.shape[1]:
             raise ValueError(

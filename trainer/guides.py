@@ -60,11 +60,7 @@ class ScriptGuide:
     """
 
     def __init__(self, config: RunConfig, envs: Any) -> None:
-        """Begin with nobody led.
-
-        Raises:
-            ValueError: the environments have no script for the agent.
-        """
+        """Begin with nobody led. Raises ValueError if the environments have no script for the agent."""
         try:
             envs.scripted_actions()
         except ValueError as error:
@@ -98,7 +94,6 @@ def build_guide(config: RunConfig, envs: Any) -> Guide | None:
     """
     if config.guide == "none":
         return None
-    if config.guide == "script":
-        return ScriptGuide(config, envs)
-    guide: Guide = load_class(config.guide, "guide", SHIPPED, Guide, config.code_folder)(config, envs)
-    return guide
+    script = config.guide == "script"
+    found = ScriptGuide if script else load_class(config.guide, "guide", SHIPPED, Guide, config.code_folder)
+    return found(config, envs)

@@ -84,12 +84,8 @@ def environments(session: Session, rollout: Rollout, batch: Batch) -> Iterator[l
     groups = []
     for group in torch.randperm(config.envs, generator=generator).tensor_split(config.minibatches):
         shares = max(1, min(config.threads, len(group) * config.horizon // SMALLEST_SHARE))
-        groups.append(
-            [
-                cut_out(session, rollout, batch, share, len(share) / len(group))
-                for share in group.tensor_split(shares)
-            ]
-        )
+        parts = group.tensor_split(shares)
+        groups.append([cut_out(session, rollout, batch, part, len(part) / len(group)) for part in parts])
     for _ in range(config.epochs):
         for index in torch.randperm(len(groups), generator=generator).tolist():
             yield groups[index]

@@ -117,6 +117,7 @@ def ppo_loss(
     entropy and value term, masked, and the four are averaged, as in the released SocialAI code.
 
     Frames that a guide led have no policy and no entropy term: PPO's ratio means nothing where another policy acted.
+    What a guide does or advises is imitated by a weighted cross-entropy: behaviour cloning (Pomerleau 1991).
 
     Args:
         batch: the frames and what the acting policy thought of them.
@@ -149,26 +150,15 @@ def ppo_loss(
     total = policy_term + config.value_coef * value_term - entropy_coef * entropy_term
     imitation = torch.zeros((), device=logits.device)
     if batch.lead is not None:
-        imitation = imitation_loss(logits, batch.lead.actions, batch.lead.weights, sizes)
+        shown = batch.lead.actions  # (N, 4)
+        shown_log_probs = heads.log_probs(logits, shown, sizes) * heads.spoken_mask(shown)  # (N, 4)
+        imitation = -(shown_log_probs.sum(-1) * batch.lead.weights).mean()
         total = total + config.imitation_coef * imitation
     with torch.no_grad():
         kl = (ratio - 1 - log_ratio).mean()
         clip_fraction = ((ratio - 1).abs() > config.clip).float().mean()
         known = (policy_term, value_term, entropy.mean(), kl, clip_fraction, imitation)
         return LossParts(total, *(part.detach() for part in known))
-
-
-def imitation_loss(logits: Tensor, actions: Tensor, weights: Tensor, sizes: tuple[int, ...]) -> Tensor:
-    """Weighted mean cross-entropy between the policy and given actions: behaviour cloning (Pomerleau 1991).
-
-    Args:
-        logits: (N, A) of the policy.
-        actions: int64 (N, 4); template and noun count only where they speak.
-        weights: (N,) of the frames.
-        sizes: choices of each head.
-    """
-    log_probs = heads.log_probs(logits, actions, sizes) * heads.spoken_mask(actions)  # (N, 4)
-    return -(log_probs.sum(-1) * weights).mean()
 
 
 # -- update -------------------------------------------------------------------------------------------------------

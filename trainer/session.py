@@ -17,7 +17,7 @@ from torch import Tensor
 
 from trainer import checkpoint as checkpoints
 from trainer.bonus import Bonus, build_bonus
-from trainer.checkpoint import Checkpoint, CheckpointMeta, restore_net
+from trainer.checkpoint import Checkpoint, CheckpointMeta, fitting, restore_net
 from trainer.config import WITHOUT_EFFECT, RunConfig
 from trainer.curricula import Curriculum, Leaves, Tutor, build_curriculum
 from trainer.errors import CheckpointError, ObservationError, TrainingStopped
@@ -225,26 +225,16 @@ class Session:
             if not any(f"{key}.{name}" in stored for key in _ADAM):
                 continue  # it had no gradient yet, as an encoder of words before the first word
             # Fused Adam walks all of them in the order they lie in memory, so they must lie like the parameter.
-            step = _fitting(stored, f"step.{name}", torch.zeros(())).to(parameter.device)
-            averages = [_fitting(stored, f"{key}.{name}", parameter) for key in _ADAM[1:]]
+            step = fitting(stored, f"step.{name}", torch.zeros(())).to(parameter.device)
+            averages = [fitting(stored, f"{key}.{name}", parameter) for key in _ADAM[1:]]
             like = [torch.empty_like(parameter.detach()).copy_(average) for average in averages]
             self.optimizer.state[parameter] = dict(zip(_ADAM, (step, *like), strict=True))
 
     def _load_state(self, stored: dict[str, Tensor]) -> None:
         for name, present in vars(self.state).items():
-            value = _fitting(stored, name, torch.as_tensor(present))
+            value = fitting(stored, name, torch.as_tensor(present))
             is_tensor = isinstance(present, Tensor)
             setattr(self.state, name, value.to(present) if is_tensor else value.numpy().copy())
-
-
-def _fitting(stored: dict[str, Tensor], name: str, wanted: Tensor) -> Tensor:
-    """The stored tensor of this name. Raises ValueError unless it has the shape and type of the one wanted."""
-    value = stored[name]
-    if (value.shape, value.dtype) != (wanted.shape, wanted.dtype):
-        raise ValueError(
-            f"{name}: got {tuple(value.shape)} {value.dtype}, expected {tuple(wanted.shape)} {wanted.dtype}"
-        )
-    return value
 
 
 @contextlib.contextmanager

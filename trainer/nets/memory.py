@@ -59,11 +59,8 @@ class _ResettableLstm(torch.autograd.Function):
         # What each gate's input does to the cell (output gate: to h), for all steps at once.
         slopes = torch.empty_like(gates)
         aten = torch.ops.aten
-        for part, (reach, gate) in zip(
-            torch.split(slopes, size, 2),
-            ((entry, candidate), (candidate, entry), (c_in, forget), (squashed, exit_)),
-            strict=True,
-        ):
+        reaches = ((entry, candidate), (candidate, entry), (c_in, forget), (squashed, exit_))
+        for part, (reach, gate) in zip(slopes.split(size, 2), reaches, strict=True):
             rule = aten.tanh_backward if gate is candidate else aten.sigmoid_backward
             rule.grad_input(reach, gate, grad_input=part)
         to_cell = aten.tanh_backward(exit_, squashed)
