@@ -122,11 +122,7 @@ def cell_codes(image: NDArray[np.uint8]) -> Int64:
 
 
 def build_bonus(config: RunConfig, num_envs: int) -> Bonus | None:
-    """The bonus that a configuration names, None for `none`.
-
-    Raises:
-        ValueError: there is no such bonus, or it lacks a method.
-    """
+    """The bonus that a configuration names, None for `none`. Raises ValueError if it is not there or lacks a method."""
     if config.bonus == "none":
         return None
     shipped = config.bonus in SHIPPED

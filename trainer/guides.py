@@ -87,11 +87,7 @@ class ScriptGuide:
 
 
 def build_guide(config: RunConfig, envs: Any) -> Guide | None:
-    """The guide that a configuration names, None for `none`.
-
-    Raises:
-        ValueError: there is no such guide, it lacks a method, or it does not fit the scenario.
-    """
+    """The guide that a configuration names, None for `none`. Raises ValueError if it is not there or does not fit."""
     if config.guide == "none":
         return None
     script = config.guide == "script"

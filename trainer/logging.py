@@ -131,7 +131,6 @@ class MetricsLog:
         run_dir: Path,
         config: RunConfig,
         update: int = 0,
-        frames: int = 0,
         tracker: WandbTracker | None = None,
     ) -> None:
         run_dir.mkdir(parents=True, exist_ok=True)
@@ -146,8 +145,8 @@ class MetricsLog:
             from torch.utils.tensorboard import SummaryWriter
 
             # A reader drops what an earlier part of the run wrote from this step on.
-            self._events = SummaryWriter(str(run_dir), purge_step=frames + 1)
-        record_start(run_dir, update, frames, config)
+            self._events = SummaryWriter(str(run_dir), purge_step=update * config.frames_per_update + 1)
+        record_start(run_dir, update, config)
 
     def write(self, row: Mapping[str, Any]) -> None:
         """Append the row of one update."""
@@ -209,7 +208,7 @@ def _rows(text: str) -> list[dict[str, Any]]:
     return [row for row in rows if isinstance(row, dict)]
 
 
-def record_start(run_dir: Path, update: int, frames: int, config: RunConfig) -> None:
+def record_start(run_dir: Path, update: int, config: RunConfig) -> None:
     """Append a line to `starts.jsonl`: when, from where on, and what must be equal for two runs to be equal to the bit.
 
     Warns if the last start was under other conditions. The file is never cut back: it tells how often a run was
@@ -232,10 +231,10 @@ def record_start(run_dir: Path, update: int, frames: int, config: RunConfig) -> 
                 "bit, one that never stopped",
                 stacklevel=4,
             )
-    row = {"time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), "update": update, "frames": frames}
+    began, frames = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), update * config.frames_per_update
     with path.open("a", encoding="utf-8") as file:
         unfinished = "" if known.endswith("\n") or not known else "\n"  # by a process killed while writing
-        file.write(unfinished + json.dumps(row | now) + "\n")
+        file.write(unfinished + json.dumps({"time": began, "update": update, "frames": frames} | now) + "\n")
         file.flush()
         os.fsync(file.fileno())
 

@@ -261,7 +261,7 @@ def train(
         session.resume(run_dir)
     with (
         explained_stops(session, run_dir),
-        MetricsLog(run_dir, config, session.update, session.frames, tracker) as log,
+        MetricsLog(run_dir, config, session.update, tracker) as log,
         threads_of(session) as mapper,
     ):
         if not resume:

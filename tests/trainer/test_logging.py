@@ -10,7 +10,7 @@ import pytest
 from trainer.config import RunConfig
 from trainer.logging import MetricsLog, Tally, episode_metrics, record_start
 
-ALONE, BOTH = RunConfig(tensorboard=False), RunConfig()
+ALONE, BOTH = (RunConfig(envs=8, horizon=8, tensorboard=board) for board in (False, True))
 
 
 def test_rates_are_per_episode_that_ended() -> None:
@@ -85,7 +85,7 @@ def test_tensorboard_counts_frames_and_forgets_what_is_made_again(tmp_path: Path
     assert points(tmp_path, "loss") == [(64 * update, 0.5) for update in range(1, 6)]
     # TensorBoard reads files in order of their names: second, process, and then a number of which 10 is before 9.
     time.sleep(1)
-    with MetricsLog(tmp_path, BOTH, 2, 128) as log:
+    with MetricsLog(tmp_path, BOTH, 2) as log:
         for update in range(3, 7):
             log.write({"update": update, "frames": 64 * update, "loss": 0.25, "outcomes": {"won": 0.25}})
     expected = [(64, 0.5), (128, 0.5), (192, 0.25), (256, 0.25), (320, 0.25), (384, 0.25)]
@@ -110,13 +110,13 @@ def test_success_is_of_the_agent_s_own_episodes_and_rates_are_of_all() -> None:
 
 
 def test_starts_are_appended_and_never_cut_back(tmp_path: Path) -> None:
-    config = RunConfig(threads=2)
-    record_start(tmp_path, 0, 0, config)
+    config = RunConfig(envs=8, threads=2)
+    record_start(tmp_path, 0, config)
     with (tmp_path / "starts.jsonl").open("a") as file:
         file.write('{"time": "20')  # killed while writing
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        record_start(tmp_path, 4, 1024, config)
+        record_start(tmp_path, 4, config)
     first, torn, second = (tmp_path / "starts.jsonl").read_text().splitlines()
     assert torn == '{"time": "20'
     assert json.loads(first).items() >= {"update": 0, "frames": 0, "device": "cpu", "threads": 2}.items()
@@ -125,6 +125,6 @@ def test_starts_are_appended_and_never_cut_back(tmp_path: Path) -> None:
 
 
 def test_other_surroundings_are_worth_a_warning(tmp_path: Path) -> None:
-    record_start(tmp_path, 0, 0, RunConfig(threads=2))
+    record_start(tmp_path, 0, RunConfig(threads=2))
     with pytest.warns(UserWarning, match=r"other conditions \(threads 2 -> 4\)"):
-        record_start(tmp_path, 4, 1024, RunConfig(threads=4))
+        record_start(tmp_path, 4, RunConfig(threads=4))

@@ -56,17 +56,17 @@ class Group(_Model):
     members: tuple[str, ...] | None = None
     weight: float | Ramp = Field(1.0)
 
-    def find(self, leaves: Leaves) -> list[int]:
-        """Numbers of the leaves that it holds. Raises ValueError if there is none, or it names what is not there."""
+    def find(self, leaves: Leaves, place: str) -> list[int]:
+        """Numbers of its leaves. Raises ValueError, with the place, if there is none, or it names what is not there."""
         for name in self.members or ():
             if name not in leaves.names:
-                raise ValueError(f"the suite has no member {name!r}")
+                raise ValueError(f"{place}: the suite has no member {name!r}")
         for parameter, values in self.only.items():
             known = {labels[parameter] for labels in leaves.labels if parameter in labels}
             for value in values:
                 if value not in known:
                     listed = ", ".join(sorted(known)) or "no values: the suite has no such parameter"
-                    raise ValueError(f"got {parameter}: {value}; the suite has {listed}")
+                    raise ValueError(f"{place}: got {parameter}: {value}; the suite has {listed}")
         found = [
             number
             for number, (name, labels) in enumerate(zip(leaves.names, leaves.labels, strict=True))
@@ -75,7 +75,7 @@ class Group(_Model):
             and not (self.without and _has(labels, self.without))
         ]
         if not found:
-            raise ValueError("no member of the suite is in this group")
+            raise ValueError(f"{place}: no member of the suite is in this group")
         return found
 
 
@@ -134,13 +134,10 @@ class Phases:
         """Look up who is in which group. Raises ValueError for a group without leaves."""
         self._plan = plan
         self._natural = leaves.weights
-        self._groups: list[list[list[int]]] = [[] for _ in plan.phases]
-        for p, phase in enumerate(plan.phases):
-            for g, group in enumerate(phase.play):
-                try:
-                    self._groups[p].append(group.find(leaves))
-                except ValueError as error:
-                    raise ValueError(f"curriculum: phases.{p}.play.{g}: {error}") from None
+        self._groups = [
+            [group.find(leaves, f"curriculum: phases.{p}.play.{g}") for g, group in enumerate(phase.play)]
+            for p, phase in enumerate(plan.phases)
+        ]
         self._digest = hashlib.sha256(plan.model_dump_json().encode()).hexdigest()
         self.phase = 0
         self._episodes = 0

@@ -38,7 +38,7 @@ class _ResettableLstm(torch.autograd.Function):
             if resets[t]:
                 h, c = h * keep[t], c * keep[t]
             gate.addmm_(h, w_t)
-            candidate, entry, forget, exit_ = gate.split(size, 1)
+            candidate, entry, forget, exit_ = torch.split(gate, size, 1)
             candidate.tanh_()
             gate[:, size:].sigmoid_()
             torch.mul(entry, candidate, out=cell).addcmul_(forget, c)
@@ -60,7 +60,7 @@ class _ResettableLstm(torch.autograd.Function):
         slopes = torch.empty_like(gates)
         aten = torch.ops.aten
         reaches = ((entry, candidate), (candidate, entry), (c_in, forget), (squashed, exit_))
-        for part, (reach, gate) in zip(slopes.split(size, 2), reaches, strict=True):
+        for part, (reach, gate) in zip(torch.split(slopes, size, 2), reaches, strict=True):
             rule = aten.tanh_backward if gate is candidate else aten.sigmoid_backward
             rule.grad_input(reach, gate, grad_input=part)
         to_cell = aten.tanh_backward(exit_, squashed)
