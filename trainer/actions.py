@@ -28,11 +28,7 @@ def spoken_mask(actions: Tensor) -> Tensor:
 
 def log_probs(logits: Tensor, actions: Tensor, sizes: tuple[int, ...]) -> Tensor:
     """Log-probability of each head's choice, (..., 4), before masking."""
-    parts = [
-        torch.log_softmax(part, -1).gather(-1, actions[..., head : head + 1])
-        for head, part in enumerate(torch.split(logits, list(sizes), -1))
-    ]
-    return torch.cat(parts, -1)
+    return log_probs_and_entropies(logits, actions, sizes)[0]
 
 
 def log_probs_and_entropies(logits: Tensor, actions: Tensor, sizes: tuple[int, ...]) -> tuple[Tensor, Tensor]:

@@ -102,11 +102,7 @@ class EpisodicBonus:
         return {"counts": self.counts.copy(), "keys": np.array(list(self.keys), np.int64)}
 
     def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """See `Bonus.load_state`.
-
-        Raises:
-            ValueError: the counts are of another number of environments.
-        """
+        """See `Bonus.load_state`; a ValueError if the counts are of another number of environments."""
         counts, keys = state["counts"], state["keys"]
         if counts.ndim != 2 or len(counts) != len(self.counts) or len(keys) > counts.shape[1]:
             raise ValueError(
@@ -126,14 +122,11 @@ def cell_codes(image: NDArray[np.uint8]) -> Int64:
 
 
 def build_bonus(config: RunConfig, num_envs: int) -> Bonus | None:
-    """The bonus that a configuration names, None for `none`.
-
-    Raises:
-        ValueError: there is no such bonus, or it lacks a method.
-    """
+    """The bonus that a configuration names, None for `none`. Raises ValueError if it is not there or lacks a method."""
     if config.bonus == "none":
         return None
-    if config.bonus in SHIPPED:
-        return EpisodicBonus(config, num_envs)
-    bonus: Bonus = load_class(config.bonus, "bonus", SHIPPED, Bonus, config.code_folder)(config, num_envs)
-    return bonus
+    shipped = config.bonus in SHIPPED
+    found = (
+        EpisodicBonus if shipped else load_class(config.bonus, "bonus", SHIPPED, Bonus, config.code_folder)
+    )
+    return found(config, num_envs)

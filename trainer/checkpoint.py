@@ -107,21 +107,14 @@ def write_file(path: Path, checkpoint: Checkpoint) -> None:
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(path)
-    except OSError:
+    finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
-        raise
     descriptor = os.open(path.parent, os.O_RDONLY)
     try:
         os.fsync(descriptor)  # of the new name
     finally:
         os.close(descriptor)
-
-
-def weights_only(checkpoint: Checkpoint) -> Checkpoint:
-    """What playing needs of a checkpoint: the network, without what only training remembers."""
-    net = {name: value for name, value in checkpoint.tensors.items() if name.startswith("net.")}
-    return Checkpoint(checkpoint.meta, net)
 
 
 def _encode(checkpoint: Checkpoint) -> bytes:
@@ -285,9 +278,15 @@ def _check_weights(weights: dict[str, Tensor], expected: dict[str, Tensor]) -> N
         raise CheckpointError(
             f"checkpoint's weights are not those of its network (first difference: {unlike[0]})"
         )
-    for name, value in weights.items():
-        got, wanted = [(tuple(one.shape), one.dtype) for one in (value, expected[name])]
-        if got != wanted:
-            raise CheckpointError(f"checkpoint's {name}: got {got}, expected {wanted}")
-        if not bool(torch.isfinite(value).all()):
+    for name, wanted in expected.items():
+        if not bool(torch.isfinite(fitting(weights, name, wanted)).all()):
             raise CheckpointError(f"checkpoint's {name} holds numbers that are not finite")
+
+
+def fitting(tensors: dict[str, Tensor], name: str, wanted: Tensor) -> Tensor:
+    """The tensor of this name. Raises CheckpointError unless it has the shape and type of the one wanted."""
+    value = tensors[name]
+    got, needed = ((tuple(one.shape), one.dtype) for one in (value, wanted))
+    if got != needed:
+        raise CheckpointError(f"checkpoint's {name}: got {got}, expected {needed}")
+    return value

@@ -7,9 +7,9 @@ This module imports neither PyTorch nor Gymnasium, so that checking an experimen
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -25,10 +25,14 @@ def _option(default: Any, about: str, *, role: Role = "hyper", result: bool = Tr
         about: its help text.
         role: see `Role`.
         result: whether it decides what a run computes; False for options that say where, how long or how it is kept.
-        bounds: pydantic's (`ge`, `gt`, `le`, `lt`, `min_length`).
+        bounds: pydantic's (`ge`, `gt`, `le`, `lt`).
     """
     extra: dict[str, Any] = {"role": role, "result": result}
     return Field(default, description=about, json_schema_extra=extra, **bounds)
+
+
+_flag = partial(_option, role="flag")
+Name = Annotated[str, Field(min_length=1)]
 
 
 class RunConfig(BaseModel):
@@ -44,55 +48,39 @@ class RunConfig(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
     scenario: str = _option("", "path or name of what is played, with +variants and ?parameters", role="kept")
-    agent: str = _option(
+    agent: Name = _flag(
         "ppo",
         "ppo, random, oracle, human, shipped (the trained agent that comes with the scenario), shipped:NAME, or a "
         "checkpoint or run folder; only ppo is trained",
-        role="flag",
-        min_length=1,
     )
-    frames: int = _option(
-        600_000, "frames (steps of all environments together) to train for", role="flag", result=False, ge=0
+    frames: int = _flag(
+        600_000, "frames to train for: steps of all environments together", result=False, ge=0
     )
-    seed: int = _option(0, "seeds weights, sampling, shuffling and episodes", role="flag", ge=0, lt=2**63)
-    envs: int = _option(256, "environments stepped together (measured)", role="flag", ge=1)
-    net: str = _option(
+    seed: int = _flag(0, "seeds weights, sampling, shuffling and episodes", ge=0, lt=2**63)
+    envs: int = _flag(256, "environments stepped together (measured)", ge=1)
+    net: Name = _flag(
         "fast",
         "fast, paper or mine:Net; paper-reference and paper-reference-tuned are presets: the paper's network, update "
         "and numbers",
-        role="flag",
-        min_length=1,
     )
-    precision: Literal["float32", "bfloat16"] = _option(
-        "float32", "numbers that the convolutions of `paper` compute with", role="flag"
-    )
-    bonus: str = _option(
+    precision: Literal["float32", "bfloat16"] = _flag("float32", "numbers of the convolutions of `paper`")
+    bonus: Name = _flag(
         "none",
         "exploration bonus: none, lang (new utterances), cell (new kinds of cells) or mine:Bonus; the command line "
         "takes auto as well, the paper's choice for the scenario",
-        role="flag",
-        min_length=1,
     )
-    curriculum: str = _option(
+    curriculum: Name = _flag(
         "none",
         "which members of a suite are played: none, expert, progress, reverse, a .yaml file of phases or "
         "mine:Curriculum",
-        role="flag",
-        min_length=1,
     )
-    guide: str = _option(
+    guide: Name = _flag(
         "none",
         "who shows the agent what to do: none, script (the scenario's own script plays, the agent imitates it) or "
         "mine:Guide",
-        role="flag",
-        min_length=1,
     )
-    guide_share: float = _option(
-        0.6, "share of the frames, from the first on, in which the guide leads (measured)", ge=0, le=1
-    )
-    imitation_coef: float = _option(
-        1.0, "weight of the cross-entropy to the guide's actions (measured)", ge=0
-    )
+    guide_share: float = _option(0.6, "first share of the frames, led by the guide (measured)", ge=0, le=1)
+    imitation_coef: float = _option(1.0, "weight of the cross-entropy to a guide's actions (measured)", ge=0)
 
     horizon: int = _option(32, "steps of each environment in one rollout (measured)", ge=1)
     bptt: int = _option(0, "steps that back-propagation through time goes back; 0: the whole rollout", ge=0)
@@ -104,41 +92,27 @@ class RunConfig(BaseModel):
     epochs: int = _option(4, "passes over each rollout (paper)", ge=1)
     minibatches: int = _option(4, "parts a rollout is cut into (measured)", ge=1)
     lr: float = _option(7e-4, "Adam's learning rate at the start (measured; paper 1e-4)", gt=0)
-    lr_end: float | None = _option(
-        None, "learning rate at the end, reached linearly; null: it stays as it is", gt=0
-    )
+    lr_end: float | None = _option(None, "learning rate at the end, reached linearly; null: unchanged", gt=0)
     adam_eps: float = _option(1e-5, "Adam's epsilon (paper)", gt=0)
-    adam_beta2: float = _option(
-        0.999, "how much of Adam's mean of squared gradients is kept from step to step", ge=0, lt=1
-    )
+    adam_beta2: float = _option(0.999, "Adam's beta2, the decay of its mean of squared gradients", ge=0, lt=1)
     gamma: float = _option(0.99, "discount per step (paper)", ge=0, le=1)
-    gae_lambda: float = _option(
-        0.95, "lambda of generalised advantage estimation (measured; paper .99)", ge=0, le=1
-    )
+    gae_lambda: float = _option(0.95, "lambda of the advantage estimates (measured; paper .99)", ge=0, le=1)
     clip: float = _option(0.2, "PPO's clipping range of the probability ratio (paper)", gt=0)
     clip_value: bool = _option(False, "clip the value's change by `clip` as well (paper: yes; measured: no)")
     value_coef: float = _option(0.5, "weight of the squared value error (paper)", ge=0)
-    entropy_coef: float = _option(
-        0.01, "weight of the entropy, nats, at the start (paper; .03 was worse)", ge=0
-    )
+    entropy_coef: float = _option(0.01, "weight of the entropy, nats, at the start (paper)", ge=0)
     entropy_coef_end: float | None = _option(
-        None, "weight of the entropy at the end, reached linearly; null: it stays as it is", ge=0
+        None, "weight of the entropy at the end, reached linearly; null: unchanged", ge=0
     )
     max_grad_norm: float = _option(0.5, "global L2 norm that gradients are clipped to (paper)", gt=0)
-    target_kl: float | None = _option(
-        None, "divergence from the acting policy that ends an update; null: none does", gt=0
-    )
-    normalize_advantages: bool = _option(
-        True, "scale a rollout's advantages to mean 0, deviation 1 (paper: no)"
-    )
+    target_kl: float | None = _option(None, "divergence that ends an update; null: none does", gt=0)
+    normalize_advantages: bool = _option(True, "scale advantages to mean 0, deviation 1 (paper: no)")
     loss: Literal["joint", "per_head"] = _option(
         "joint",
         "joint: one ratio of the whole action; per_head: a ratio, clip, entropy and value term for each head, "
         "averaged over the four (paper)",
     )
-    bootstrap_timeouts: bool = _option(
-        True, "continue the value through a time-out; false: a time-out is terminal (paper)"
-    )
+    bootstrap_timeouts: bool = _option(True, "go on with the value after a time-out (paper: terminal)")
     bonus_c: float = _option(
         7.0, "C of the bonus (default: the paper's for the scenario, else 7 for lang and 3 for cell)", ge=0
     )
@@ -154,22 +128,19 @@ class RunConfig(BaseModel):
         role="kept",
     )
 
-    device: str = _option("cpu", "where the network runs: cpu or cuda", role="flag", min_length=1)
-    threads: int = _option(
-        1,
-        "CPU threads that share each minibatch; runs equal to the bit need equally many",
-        role="flag",
-        ge=1,
-        le=64,
+    device: Name = _flag("cpu", "where the network runs: cpu or cuda")
+    threads: int = _flag(
+        1, "CPU threads of each minibatch; runs equal to the bit need equally many", ge=1, le=64
     )
-    checkpoint_every: int = _option(50, "updates between checkpoints", role="flag", result=False, ge=1)
-    keep_checkpoints: int = _option(2, "checkpoints kept, the newest ones", role="flag", result=False, ge=1)
-    eval_episodes: int = _option(500, "episodes of the test set", role="flag", ge=1)
+    checkpoint_every: int = _flag(50, "updates between checkpoints", result=False, ge=1)
+    keep_checkpoints: int = _flag(2, "checkpoints kept, the newest ones", result=False, ge=1)
+    eval_episodes: int = _flag(500, "episodes of the test set", ge=1)
     tensorboard: bool = _option(True, "also write TensorBoard events", result=False)
-    wandb: str | None = _option(
-        None, "also send the figures to this project of Weights & Biases (needs the extra `wandb`)",
-        role="flag", result=False, min_length=1,
-    )  # fmt: skip
+    wandb: Name | None = _flag(
+        None,
+        "also send the figures to this project of Weights & Biases (needs the extra `wandb`)",
+        result=False,
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -248,14 +219,8 @@ WITHOUT_EFFECT: Final = frozenset(_options("result", False))
 """Options that do not change what is computed in an update; a resumed run may have others."""
 
 
-@dataclass(frozen=True)
-class Preset:
-    """Values of several options under one name.
-
-    Attributes:
-        values: option -> value.
-        source: where they come from.
-    """
+class Preset(NamedTuple):
+    """Values of several options under one name, and where they come from."""
 
     values: Mapping[str, Any]
     source: str

@@ -1,4 +1,6 @@
-"""This module names the ways in which training can be refused or stopped."""
+"""The ways in which training can be refused or stopped."""
+
+import torch
 
 
 class CheckpointError(ValueError):
@@ -11,3 +13,9 @@ class ObservationError(ValueError):
 
 class TrainingStopped(RuntimeError):  # noqa: N818 - it reports an event, as StopIteration does
     """A run ended early with its last good checkpoint intact; the message says why and where that is."""
+
+
+def require_finite(what: str, numbers: torch.Tensor | float) -> None:
+    """Raise TrainingStopped unless all numbers are finite."""
+    if not bool(torch.isfinite(torch.as_tensor(numbers)).all()):
+        raise TrainingStopped(f"{what} is not a finite number")

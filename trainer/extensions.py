@@ -12,6 +12,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
+
 from trainer.config import code_file
 
 
@@ -46,6 +48,12 @@ def load_class(name: str, option: str, shipped: Sequence[str], needed: type, fol
     if lacking:
         raise ValueError(f"{option}: {file}: {class_name} lacks the method {lacking[0]!r}")
     return found
+
+
+def require_shape(what: str, array: Any, shape: tuple[int, ...]) -> None:
+    """Refuse, with a ValueError, an array of the user's code that NumPy would stretch or stumble over."""
+    if np.shape(array) != shape:
+        raise ValueError(f"{what}: got the shape {np.shape(array)}, expected {shape}")
 
 
 def _load_module(name: str, option: str, folder: Path) -> ModuleType:

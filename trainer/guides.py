@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,9 @@ from trainer.extensions import load_class
 
 SHIPPED = ("none", "script")
 
-Array = TypeVar("Array")
 
-
-class Lead(NamedTuple, Generic[Array]):
-    """What a guide does in one step of E environments: arrays; of a rollout, tensors (T, E, ...).
+class Lead(NamedTuple):
+    """What a guide does in one step of E environments: NumPy arrays; of a rollout, tensors (T, E, ...).
 
     Attributes:
         actions: int64 (E, 4), what the guide would do now.
@@ -28,12 +26,9 @@ class Lead(NamedTuple, Generic[Array]):
             imitation, of others advice. 0: nothing is imitated.
     """
 
-    actions: Array
-    led: Array
-    weights: Array
-
-
-StepLead = Lead[NDArray[Any]]
+    actions: Any
+    led: Any
+    weights: Any
 
 
 class Guide(Protocol):
@@ -42,7 +37,7 @@ class Guide(Protocol):
     A guide of the user's own, `--guide mine:Guide`, is built as `Guide(config, envs)`.
     """
 
-    def lead(self, envs: Any, starts: NDArray[np.bool_], progress: float) -> StepLead:
+    def lead(self, envs: Any, starts: NDArray[np.bool_], progress: float) -> Lead:
         """What happens in the coming step.
 
         Args:
@@ -65,11 +60,7 @@ class ScriptGuide:
     """
 
     def __init__(self, config: RunConfig, envs: Any) -> None:
-        """Begin with nobody led.
-
-        Raises:
-            ValueError: the environments have no script for the agent.
-        """
+        """Begin with nobody led. Raises ValueError if the environments have no script for the agent."""
         try:
             envs.scripted_actions()
         except ValueError as error:
@@ -77,7 +68,7 @@ class ScriptGuide:
         self._share = config.guide_share
         self._led = np.zeros(envs.num_envs, np.bool_)
 
-    def lead(self, envs: Any, starts: NDArray[np.bool_], progress: float) -> StepLead:
+    def lead(self, envs: Any, starts: NDArray[np.bool_], progress: float) -> Lead:
         """See `Guide.lead`; an episode that began with the script is played by it to its end."""
         self._led = np.where(starts, progress < self._share, self._led)
         if self._led.any():
@@ -96,14 +87,9 @@ class ScriptGuide:
 
 
 def build_guide(config: RunConfig, envs: Any) -> Guide | None:
-    """The guide that a configuration names, None for `none`.
-
-    Raises:
-        ValueError: there is no such guide, it lacks a method, or it does not fit the scenario.
-    """
+    """The guide that a configuration names, None for `none`. Raises ValueError if it is not there or does not fit."""
     if config.guide == "none":
         return None
-    if config.guide == "script":
-        return ScriptGuide(config, envs)
-    guide: Guide = load_class(config.guide, "guide", SHIPPED, Guide, config.code_folder)(config, envs)
-    return guide
+    script = config.guide == "script"
+    found = ScriptGuide if script else load_class(config.guide, "guide", SHIPPED, Guide, config.code_folder)
+    return found(config, envs)

@@ -10,34 +10,91 @@ import time
 import uuid
 import warnings
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from trainer.config import RunConfig
-from trainer.rollout import EpisodeTally
+from trainer.session import Session, State
 
 FILE_NAME = "metrics.jsonl"
 STARTS = "starts.jsonl"
-SURROUNDINGS = ("torch", "cpu", "device", "threads")
 _ID_FILE = "wandb_id.txt"
 
 
-def episode_metrics(
-    tally: EpisodeTally, before: Mapping[str, Any], after: Mapping[str, Any]
-) -> dict[str, Any]:
-    """What the episodes that ended in one rollout were like.
+@dataclass
+class Tally:
+    """Sums over a rollout; episodes are the agent's own that ended in it, without those that a guide took part in.
+
+    Attributes:
+        episodes, successes, timeouts: counts.
+        total_return, total_length: sums of undiscounted returns (without bonus) and of lengths in steps.
+        all_episodes: own and led ones.
+        led_steps, agreed_steps: steps that a guide made, and those of them in which the policy's own sample was the
+            same.
+        bonus: mean exploration bonus per frame.
+    """
+
+    episodes: int = 0
+    successes: int = 0
+    timeouts: int = 0
+    total_return: float = 0.0
+    total_length: int = 0
+    all_episodes: int = 0
+    led_steps: int = 0
+    agreed_steps: int = 0
+    bonus: float = 0.0
+
+    def count(
+        self, state: State, ended: NDArray[np.bool_], cut: NDArray[np.bool_], success: NDArray[np.bool_]
+    ) -> None:
+        """Add the episodes that ended in a step, those that were cut off and those that succeeded, bool (E,) each."""
+        own = ended & ~state.led
+        self.all_episodes += int(ended.sum())
+        self.episodes += int(own.sum())
+        self.successes += int(success[own].sum())
+        self.timeouts += int(cut[own].sum())
+        self.total_return += float(state.returns[own].sum())
+        self.total_length += int(state.lengths[own].sum())
+
+
+class Metrics:
+    """Makes the row of each update, as `docs/metrics.md` describes it."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._counted, self._time = session.envs.counters(), time.perf_counter()
+
+    def row(self, tally: Tally, losses: Mapping[str, float]) -> dict[str, Any]:
+        """The row of the update just made, which took from the last call until now."""
+        session, config, before, began = self._session, self._session.config, self._counted, self._time
+        self._counted, self._time = session.envs.counters(), time.perf_counter()
+        row = {
+            "update": session.update,
+            "frames": session.frames,
+            "frames_per_second": round(config.frames_per_update / (self._time - began), 1),
+            **losses,
+            "bonus": tally.bonus,
+            **episode_metrics(tally, before, self._counted),
+        }
+        if config.guide == "none":
+            del row["imitation_loss"]
+            return row
+        agreement = tally.agreed_steps / tally.led_steps if tally.led_steps else None
+        return row | {"led": tally.led_steps / config.frames_per_update, "agreement": agreement}
+
+
+def episode_metrics(tally: Tally, before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+    """What the episodes that ended in one rollout were like; rates are None where none ended.
 
     Args:
-        tally: the trainer's sums.
-        before: the environments' `counters()` before the rollout.
+        tally: the trainer's sums, of the agent's own episodes.
+        before: the environments' `counters()` before the rollout, of own and led episodes.
         after: the same after it.
-
-    Returns:
-        episodes, success, mean_return, mean_length, timeouts of the agent's own episodes; then per episode, own and
-        led ones, the rate of each outcome and of each rule (rules may fire several times an episode). None where no
-        episode ended.
     """
 
     def rate(total: float, episodes: int = tally.episodes) -> float | None:
@@ -58,17 +115,11 @@ def episode_metrics(
     }
 
 
-def guide_metrics(tally: EpisodeTally, frames: int) -> dict[str, float | None]:
-    """Share of a rollout's frames that a guide made, and of those in which the policy would have done the same."""
-    agreement = tally.agreed_steps / tally.led_steps if tally.led_steps else None
-    return {"led": tally.led_steps / frames, "agreement": agreement}
-
-
 class MetricsLog:
-    """`metrics.jsonl`, and, if wanted, TensorBoard events in a run directory and W&B.
+    """`starts.jsonl`, `metrics.jsonl`, and, if wanted, TensorBoard events in a run directory and W&B.
 
-    Opening it cuts file and events back to `update`, so that a resumed run's log equals that of one that never
-    stopped. TensorBoard's steps and the tracker's are frames.
+    Opening it records the start, and cuts rows and events back to `update`, so that a resumed run's log equals that
+    of one that never stopped. TensorBoard's steps and the tracker's are frames.
 
     Raises:
         OSError: the files cannot be written.
@@ -78,11 +129,11 @@ class MetricsLog:
     def __init__(
         self,
         run_dir: Path,
-        update: int,
-        tensorboard: bool,
-        frames: int = 0,
+        config: RunConfig,
+        update: int = 0,
         tracker: WandbTracker | None = None,
     ) -> None:
+        run_dir.mkdir(parents=True, exist_ok=True)
         path = run_dir / FILE_NAME
         _cut_back(path, update)
         self._tracker = tracker
@@ -90,11 +141,12 @@ class MetricsLog:
             tracker.open()
         self._file = path.open("a", encoding="utf-8")
         self._events: Any = None
-        if tensorboard:
+        if config.tensorboard:
             from torch.utils.tensorboard import SummaryWriter
 
             # A reader drops what an earlier part of the run wrote from this step on.
-            self._events = SummaryWriter(str(run_dir), purge_step=frames + 1)
+            self._events = SummaryWriter(str(run_dir), purge_step=update * config.frames_per_update + 1)
+        record_start(run_dir, update, config)
 
     def write(self, row: Mapping[str, Any]) -> None:
         """Append the row of one update."""
@@ -140,24 +192,23 @@ def scalars(row: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
 def _cut_back(path: Path, update: int) -> None:
     """Drop the rows after `update`."""
     if path.exists():
-        rows = [
-            row for row in _rows(path) if isinstance(row.get("update"), int) and 0 < row["update"] <= update
-        ]
+        known = _rows(path.read_text(encoding="utf-8", errors="replace"))
+        rows = [row for row in known if isinstance(row.get("update"), int) and 0 < row["update"] <= update]
         temporary = path.with_suffix(".tmp")
         temporary.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
         temporary.replace(path)
 
 
-def _rows(path: Path) -> list[dict[str, Any]]:
-    """The rows of a file, but for what a killed or failing machine left unfinished."""
+def _rows(text: str) -> list[dict[str, Any]]:
+    """The rows of a file's text, but for what a killed or failing machine left unfinished."""
     rows = []
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+    for line in text.splitlines():
         with contextlib.suppress(ValueError):
             rows.append(json.loads(line))
     return [row for row in rows if isinstance(row, dict)]
 
 
-def record_start(run_dir: Path, update: int, frames: int, config: RunConfig) -> None:
+def record_start(run_dir: Path, update: int, config: RunConfig) -> None:
     """Append a line to `starts.jsonl`: when, from where on, and what must be equal for two runs to be equal to the bit.
 
     Warns if the last start was under other conditions. The file is never cut back: it tells how often a run was
@@ -168,25 +219,22 @@ def record_start(run_dir: Path, update: int, frames: int, config: RunConfig) -> 
     """
     # The instructions that torch uses here; other processors may round sums differently.
     cpu = torch.backends.cpu.get_cpu_capability()
-    values = (str(torch.__version__), cpu, config.device, config.threads)
-    around = dict(zip(SURROUNDINGS, values, strict=True))
+    now = {"torch": str(torch.__version__), "cpu": cpu, "device": config.device, "threads": config.threads}
     path = run_dir / STARTS
-    if update and path.exists() and (known := _rows(path)):
-        last = known[-1]
-        changed = [
-            f"{name} {last.get(name)} -> {now}" for name, now in around.items() if last.get(name) != now
-        ]
+    known = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+    if update and (starts := _rows(known)):
+        last = starts[-1]
+        changed = [f"{name} {last.get(name)} -> {one}" for name, one in now.items() if last.get(name) != one]
         if changed:
             warnings.warn(
                 f"the run goes on under other conditions ({', '.join(changed)}), so it need not equal, to the last "
                 "bit, one that never stopped",
-                stacklevel=3,
+                stacklevel=4,
             )
-    row = {"time": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), "update": update, "frames": frames}
-    with path.open("a+b") as file:
-        file.seek(max(file.seek(0, os.SEEK_END) - 1, 0))
-        unfinished = "" if file.read() in (b"", b"\n") else "\n"  # by a process killed while writing
-        file.write((unfinished + json.dumps(row | around) + "\n").encode())
+    began, frames = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()), update * config.frames_per_update
+    with path.open("a", encoding="utf-8") as file:
+        unfinished = "" if known.endswith("\n") or not known else "\n"  # by a process killed while writing
+        file.write(unfinished + json.dumps({"time": began, "update": update, "frames": frames} | now) + "\n")
         file.flush()
         os.fsync(file.fileno())
 
@@ -195,53 +243,51 @@ class TrackingWarning(UserWarning):
     """Figures are not sent any more; the run goes on."""
 
 
+@dataclass
 class WandbTracker:
     """Sends figures to a project of Weights & Biases, where they are drawn over frames.
 
     A resumed run goes on where it was: what it does again is not sent twice. Once begun, nothing that goes wrong
     stops the training; it is said once, and the figures stay in `metrics.jsonl`.
+
+    Attributes:
+        project: its name.
+        run_dir: folder of the run, where W&B keeps its own files as well.
+        config: what the run was asked for, shown beside its curves.
+        name: what the run is called there.
     """
 
-    def __init__(self, project: str, run_dir: Path, config: Mapping[str, Any], name: str) -> None:
-        """Send to `project`.
-
-        Args:
-            project: its name.
-            run_dir: folder of the run, where W&B keeps its own files as well.
-            config: what the run was asked for, shown beside its curves.
-            name: what the run is called there.
-
-        Raises:
-            ValueError: the package is not installed.
-        """
-        try:
-            self._wandb = importlib.import_module("wandb")
-        except ImportError:
-            raise ValueError(
-                "W&B is not installed: pip install 'socialai-dsl[wandb]', or leave out --wandb"
-            ) from None
-        self._shown = {"project": project, "config": dict(config), "name": name}
-        self._run_dir = run_dir
-        self._run: Any = None
+    project: str
+    run_dir: Path
+    config: Mapping[str, Any]
+    name: str
+    _run: Any = field(default=None, init=False)
 
     def open(self) -> None:
         """Begin, or go on where the run was.
 
         Raises:
-            ValueError: it cannot begin; the message says what to do.
+            ValueError: the package is not installed, or it cannot begin; the message says what to do.
         """
-        path = self._run_dir / _ID_FILE
+        path = self.run_dir / _ID_FILE
         if not path.exists():
             path.write_text(uuid.uuid4().hex[:12] + "\n", encoding="utf-8")
         try:
-            self._run = self._wandb.init(
-                **self._shown,
+            wandb = importlib.import_module("wandb")
+            self._run = wandb.init(
+                project=self.project,
+                name=self.name,
+                config=dict(self.config),
                 id=path.read_text(encoding="utf-8").strip(),
-                dir=str(self._run_dir),
+                dir=str(self.run_dir),
                 resume="allow",
                 # The terminal shows the progress; W&B is not to copy what is printed.
-                settings=self._wandb.Settings(console="off"),
+                settings=wandb.Settings(console="off"),
             )
+        except ImportError:
+            raise ValueError(
+                "W&B is not installed: pip install 'socialai-dsl[wandb]', or leave out --wandb"
+            ) from None
         except Exception as error:
             raise ValueError(f"W&B cannot begin: {type(error).__name__}: {error}") from error
 
@@ -268,7 +314,7 @@ class WandbTracker:
             self._run = None
             warnings.warn(
                 f"W&B gets no more figures ({type(error).__name__}: {error}); training goes on, and they are all in "
-                f"{self._run_dir / FILE_NAME}",
+                f"{self.run_dir / FILE_NAME}",
                 TrackingWarning,
                 stacklevel=2,
             )

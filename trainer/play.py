@@ -93,11 +93,13 @@ class CheckpointPolicy:
     @torch.no_grad()
     def act(self, observation: Observation) -> Int64:
         """Actions, int64 (E, 4), for `image` (E, H, W, C) and `tokens` (E, L), or (4,) for a single observation."""
-        images, tokens = observation["image"], observation["tokens"]
-        if tokens.ndim == 1:
-            alone: Int64 = self._act(images[None], tokens[None])[0]
-            return alone
-        return self._act(images, tokens)
+        alone = observation["tokens"].ndim == 1
+        logits, _ = self._look(observation, alone)
+        if not self._greedy:
+            noise = torch.from_numpy(self._streams.gumbel(*logits.shape))
+            logits = logits + noise.to(logits.device)
+        chosen: Int64 = heads.choose(logits, self.net.spec.action_sizes).cpu().numpy()
+        return chosen[0] if alone else chosen
 
     @torch.no_grad()
     def think(self, observation: Observation) -> tuple[list[list[float]], float]:
@@ -106,25 +108,18 @@ class CheckpointPolicy:
         Returns:
             The probabilities of each head's choices, and the return that it expects.
         """
-        logits, values = self._look(observation["image"][None], observation["tokens"][None])
-        heads_of = torch.split(logits[0], list(self.net.spec.action_sizes))
-        return [torch.softmax(head, -1).tolist() for head in heads_of], float(values[0])
+        logits, values = self._look(observation, alone=True)
+        parts = torch.split(logits[0], list(self.net.spec.action_sizes))
+        return [torch.softmax(part, -1).tolist() for part in parts], float(values[0])
 
-    def _act(self, images: NDArray[np.uint8], tokens: NDArray[np.int16]) -> Int64:
-        logits, _ = self._look(images, tokens)
-        if not self._greedy:
-            noise = torch.from_numpy(self._streams.gumbel(len(tokens), logits.shape[1]))
-            logits = logits + noise.to(logits.device)
-        chosen: Int64 = heads.choose(logits, self.net.spec.action_sizes).cpu().numpy()
-        return chosen
-
-    def _look(
-        self, images: NDArray[np.uint8], tokens: NDArray[np.int16]
-    ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Logits of all heads side by side, and values; the memory goes on."""
-        if self._actor is None or self._actor.pairs.size > _REMEMBERED_FRAMES:
-            self._actor = Actor(self.net, tokens.shape[1])
+    def _look(self, observation: Observation, alone: bool) -> tuple[torch.Tensor, torch.Tensor]:
+        """Logits of all heads side by side (E, A), and values (E,); the memory goes on."""
+        images, tokens = observation["image"], observation["tokens"]
+        if alone:
+            images, tokens = images[None], tokens[None]
         self._require(len(tokens))
+        if self._actor is None or len(self._actor.pairs.data) > _REMEMBERED_FRAMES:
+            self._actor = Actor(self.net, tokens.shape[1])
         _, features = self._actor.see(images, tokens)
         output, self._memory = self.net.memory.step(features, self._memory)
         found: tuple[torch.Tensor, torch.Tensor] = self.net.heads(output)
@@ -133,7 +128,7 @@ class CheckpointPolicy:
     def _require(self, count: int) -> None:
         """Begin with an empty memory if another number of environments is played now."""
         if len(self._memory) != count:
-            self._memory = self.net.memory.initial(count)
+            self._memory, self._actor = self.net.memory.initial(count), None
 
 
 class TransferWarning(UserWarning):
@@ -160,11 +155,8 @@ def warn_of_differences(meta: CheckpointMeta, program: Any) -> None:
 
 def _changes(old: Sequence[str], new: Sequence[str]) -> str:
     """`2: "Hello" is now "Good day", ...`, the first few."""
-    changed = [
-        f'{i}: "{before}" is now "{after}"'
-        for i, (before, after) in enumerate(zip(old, new, strict=False))
-        if before != after
-    ]
+    both = enumerate(zip(old, new, strict=False))
+    changed = [f'{i}: "{was}" is now "{now}"' for i, (was, now) in both if was != now]
     if len(old) != len(new):
         changed.append(f"{len(old)} are now {len(new)}")
     more = len(changed) - _WORDS_SHOWN

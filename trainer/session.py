@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,16 +15,21 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from trainer import checkpoint as checkpoints
 from trainer.bonus import Bonus, build_bonus
-from trainer.checkpoint import Checkpoint, CheckpointMeta, restore_net
+from trainer.checkpoint import Checkpoint, CheckpointMeta, fitting, restore_net
 from trainer.config import WITHOUT_EFFECT, RunConfig
 from trainer.curricula import Curriculum, Leaves, Tutor, build_curriculum
-from trainer.errors import CheckpointError
+from trainer.errors import CheckpointError, ObservationError, TrainingStopped
 from trainer.features import Actor, Int64
 from trainer.guides import Guide, build_guide
 from trainer.nets import NetSpec, build_net
 
+Mapper = Callable[..., Iterable[Any]]
+"""`map`, or that of a pool of threads."""
+
 _ADAM = ("step", "exp_avg", "exp_avg_sq")
+_WORDS = ("actions", "templates", "nouns", "vocabulary")
 
 
 @dataclass
@@ -42,20 +51,6 @@ class State:
     returns: NDArray[np.float64]
     lengths: Int64
     led: NDArray[np.bool_]
-
-    @classmethod
-    def initial(cls, observation: dict[str, NDArray[Any]], memory: Tensor) -> State:
-        """The state after a reset that returned `observation`, with an empty memory."""
-        count = len(observation["tokens"])
-        return cls(
-            observation["image"].copy(),
-            observation["tokens"].copy(),
-            np.ones(count, np.bool_),
-            memory,
-            np.zeros(count),
-            np.zeros(count, np.int64),
-            np.zeros(count, np.bool_),
-        )
 
 
 @dataclass
@@ -121,20 +116,22 @@ class Session:
         guide = build_guide(config, envs)
         if tutor is not None:
             tutor.begin()
-        return cls(
-            config,
-            envs,
-            envs.program if program is None else program,
-            Actor(net, observation["tokens"].shape[1]),
-            torch.optim.Adam(
-                net.parameters(), config.lr, (0.9, config.adam_beta2), config.adam_eps, fused=True
-            ),
-            State.initial(observation, net.memory.initial(config.envs)),
-            torch.Generator().manual_seed(config.seed),
-            bonus,
-            tutor,
-            guide,
+        state = State(
+            image=observation["image"].copy(),
+            tokens=observation["tokens"].copy(),
+            starts=np.ones(config.envs, np.bool_),
+            memory=net.memory.initial(config.envs),
+            returns=np.zeros(config.envs),
+            lengths=np.zeros(config.envs, np.int64),
+            led=np.zeros(config.envs, np.bool_),
         )
+        optimizer = torch.optim.Adam(
+            net.parameters(), config.lr, (0.9, config.adam_beta2), config.adam_eps, fused=True
+        )
+        generator = torch.Generator().manual_seed(config.seed)
+        actor = Actor(net, state.tokens.shape[1])
+        program = envs.program if program is None else program
+        return cls(config, envs, program, actor, optimizer, state, generator, bonus, tutor, guide)
 
     def checkpoint(self) -> Checkpoint:
         """Everything needed to continue exactly."""
@@ -156,12 +153,9 @@ class Session:
             config=self.config,
             action_sizes=net.spec.action_sizes,
             image_shape=net.spec.image_shape,
-            vocabulary=list(program.vocabulary),
             program_sha256=program.sha256,
             scenario=program.name,
-            actions=list(program.actions),
-            templates=list(program.templates),
-            nouns=list(program.nouns),
+            **{name: list(getattr(program, name)) for name in _WORDS},
             frames=self.frames,
             update=self.update,
             torch_version=str(torch.__version__),
@@ -172,6 +166,19 @@ class Session:
         """Curriculum and guide, if there are any, by the names that their states have in a checkpoint."""
         parts = (("curriculum", getattr(self.tutor, "curriculum", None)), ("guide", self.guide))
         return [(name, part) for name, part in parts if part is not None]
+
+    def save(self, run_dir: Path) -> Path:
+        """Write a checkpoint into a run's folder and return its path."""
+        return checkpoints.write(
+            run_dir / checkpoints.FOLDER, self.checkpoint(), self.config.keep_checkpoints
+        )
+
+    def resume(self, run_dir: Path) -> None:
+        """Continue from the newest intact checkpoint in a run's folder; see `load`."""
+        folder = run_dir / checkpoints.FOLDER
+        if not folder.is_dir():
+            raise CheckpointError(f"{run_dir}: nothing to resume, there are no checkpoints")
+        self.load(checkpoints.read(folder))
 
     def load(self, checkpoint: Checkpoint) -> None:
         """Continue from a checkpoint of this very run, in a session begun with the same configuration.
@@ -184,7 +191,7 @@ class Session:
         net = restore_net(checkpoint, spec, config.net, config.code_folder)
         try:
             self.actor.net.load_state_dict(net.state_dict())
-            self._load_adam(checkpoint)
+            self._load_adam(checkpoint.part("adam"))
             self._load_state(checkpoint.part("state"))
             self.generator.set_state(checkpoint.tensors["rng"])
             if self.bonus is not None:
@@ -193,7 +200,7 @@ class Session:
             for name, part in self._parts_in_json():
                 part.load_state(json.loads(checkpoint.tensors[name].numpy().tobytes()))
             if self.tutor is not None:
-                self.tutor.resume()
+                self.tutor.begin()
         except (KeyError, ValueError, RuntimeError, TypeError) as error:
             raise CheckpointError(f"checkpoint cannot continue this run: {error}") from error
         self.update = checkpoint.meta.update
@@ -213,40 +220,62 @@ class Session:
                 detail += " (guide and schedules reach from the first frame to the last)"
             raise CheckpointError(f"a run resumes only with the same settings; changed: {detail}")
 
-    @torch.no_grad()
-    def _load_adam(self, checkpoint: Checkpoint) -> None:
-        stored = checkpoint.part("adam")
-        state: dict[int, dict[str, Tensor]] = {}
-        for index, (name, parameter) in enumerate(self.actor.net.named_parameters()):
+    def _load_adam(self, stored: dict[str, Tensor]) -> None:
+        for name, parameter in self.actor.net.named_parameters():
             if not any(f"{key}.{name}" in stored for key in _ADAM):
                 continue  # it had no gradient yet, as an encoder of words before the first word
-            values = {key: stored[f"{key}.{name}"] for key in _ADAM}
-            if values["step"].ndim or any(values[key].shape != parameter.shape for key in _ADAM[1:]):
-                raise ValueError(f"optimiser state of {name} has another shape")
             # Fused Adam walks all of them in the order they lie in memory, so they must lie like the parameter.
-            state[index] = {
-                key: value if key == "step" else torch.empty_like(parameter).copy_(value)
-                for key, value in values.items()
-            }
-        self.optimizer.load_state_dict(
-            {"state": state, "param_groups": self.optimizer.state_dict()["param_groups"]}
-        )
+            step = fitting(stored, f"step.{name}", torch.zeros(())).to(parameter.device)
+            averages = [fitting(stored, f"{key}.{name}", parameter) for key in _ADAM[1:]]
+            like = [torch.empty_like(parameter.detach()).copy_(average) for average in averages]
+            self.optimizer.state[parameter] = dict(zip(_ADAM, (step, *like), strict=True))
 
     def _load_state(self, stored: dict[str, Tensor]) -> None:
         for name, present in vars(self.state).items():
-            value, wanted = stored[name], torch.as_tensor(present)
-            if value.shape != wanted.shape or value.dtype != wanted.dtype:
-                raise ValueError(
-                    f"state.{name}: got {tuple(value.shape)} {value.dtype}, "
-                    f"expected {tuple(wanted.shape)} {wanted.dtype}"
-                )
+            value = fitting(stored, name, torch.as_tensor(present))
             is_tensor = isinstance(present, Tensor)
             setattr(self.state, name, value.to(present) if is_tensor else value.numpy().copy())
 
 
+@contextlib.contextmanager
+def threads_of(session: Session) -> Iterator[Mapper]:
+    """Threads that each differentiate a share of a minibatch.
+
+    A recurrent network is thousands of small operations. Split inside each operation, as PyTorch does, threads spend
+    their time meeting at barriers; whole shares meet once a step. So each thread runs PyTorch on one core. Networks
+    whose frames depend on the rest of their batch, and GPUs, are left to PyTorch.
+    """
+    threads, before = session.config.threads, torch.get_num_threads()
+    shared = session.actor.net.distinct and session.actor.device.type == "cpu"
+    torch.set_num_threads(1 if shared else threads)
+    try:
+        if not shared or threads == 1:
+            yield map
+            return
+        with ThreadPoolExecutor(threads, initializer=torch.set_num_threads, initargs=(1,)) as pool:
+            yield pool.map
+    finally:
+        torch.set_num_threads(before)
+
+
+@contextlib.contextmanager
+def explained_stops(session: Session, run_dir: Path) -> Iterator[None]:
+    """Say where a run stopped, why, and what is left of it."""
+    try:
+        yield
+    except BrokenPipeError:  # of the terminal that progress is shown on, not of a file
+        raise
+    except (TrainingStopped, ObservationError, OSError) as error:
+        saved = max((run_dir / checkpoints.FOLDER).glob("*.safetensors"), default=None)
+        kept = f"the last good checkpoint is {saved}" if saved else "there is no checkpoint yet"
+        reason = f"cannot write: {error}" if isinstance(error, OSError) else str(error)
+        where = f"training stopped after {session.frames} frames (update {session.update})"
+        raise TrainingStopped(f"{where}: {reason}; {kept}") from error
+
+
 def _check_alike(program: Any, played: Any) -> None:
     """Refuse a variant, played for its script, that says or does other things than the scenario itself."""
-    for name in ("actions", "templates", "nouns", "vocabulary"):
+    for name in _WORDS:
         own, others = list(getattr(program, name)), list(getattr(played, name))
         if own != others:
             strange = ", ".join(sorted(set(own) ^ set(others))) or "the same in another order"

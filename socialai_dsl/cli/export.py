@@ -77,7 +77,9 @@ def finished_agent(run: Path) -> "tuple[RunConfig, Loaded, Checkpoint]":
         raise UsageError(f"{run}: expected a finished run, it has no {RESULT}")
     loaded = socialai_dsl.load(config.scenario)
     try:
-        return config, loaded, checkpoints.weights_only(checkpoints.read_agent(run))
+        whole = checkpoints.read_agent(run)
+        weights = {name: value for name, value in whole.tensors.items() if name.startswith("net.")}
+        return config, loaded, checkpoints.Checkpoint(whole.meta, weights)
     except CheckpointError as error:
         raise UsageError(str(error)) from error
 

@@ -11,9 +11,9 @@ import torch
 
 import socialai_dsl
 from trainer.config import RunConfig, configure
-from trainer.ppo import threads_of, update
+from trainer.ppo import update
 from trainer.rollout import collect
-from trainer.session import Session
+from trainer.session import Session, threads_of
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,6 @@ def own_updates(config: RunConfig, envs: Any, every_frame: bool) -> Iterator[Upd
     net = session.actor.net
     with threads_of(session) as mapper:
         net.distinct = net.distinct and not every_frame
-        net.train()
         count = _Count(net.perceive)
         net.perceive = count  # type: ignore[method-assign]
         while True:

@@ -15,8 +15,8 @@ from torch import Tensor, nn
 from benchmarks.training import LongDialogue, clean_loop, plain_loop
 from benchmarks.training.networks import SIZE, Agent, CellTrunk, PaperTrunk
 from benchmarks.training.settings import Settings, advantages, observe, padded
-from trainer.features import prefix_tree
 from trainer.nets import ActorCritic, NetSpec, build_net
+from trainer.nets.dialogue import prefix_tree
 from trainer.ppo import compute_gae
 
 SPEC = NetSpec((8, 2, 4, 16), (7, 7, 4), (12, 5, 3, 3), tuple(map(str, range(40))))
@@ -148,8 +148,7 @@ def frames(count: int) -> tuple[Tensor, np.ndarray]:
 
 def ours(net: ActorCritic, images: Tensor, tokens: np.ndarray) -> Tensor:
     tree = prefix_tree(tokens)
-    text = net.dialogue(torch.from_numpy(tree.tokens), torch.from_numpy(tree.parents), tree.offsets)
-    return net.perceive(net.prepare(images), text, torch.arange(len(images)), torch.from_numpy(tree.leaves))
+    return net.perceive(net.prepare(images), net.dialogue(tree), torch.arange(len(images)), tree.leaves)
 
 
 def copy(targets: dict[str, Tensor], sources: list[Tensor]) -> None:
@@ -194,8 +193,7 @@ def test_the_newest_words_are_kept() -> None:
 def test_advantages_are_those_of_the_trainer() -> None:
     rewards, values, last = torch.rand(5, 3), torch.rand(5, 3), torch.rand(3)
     ends = torch.rand(5, 3) < 0.3
-    never = torch.zeros(5, 3)
-    expected = compute_gae(rewards, values, last, ends, never.bool(), never, 0.99, 0.9)
+    expected = compute_gae(rewards, values, last, ends, torch.zeros(5, 3), 0.99, 0.9)
     assert torch.allclose(advantages(rewards, values, ends.float(), last, 0.9), expected, atol=1e-6)
 
 

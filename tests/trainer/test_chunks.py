@@ -1,7 +1,6 @@
 """The update of the paper's code: chunks and their shifts, memories, batch statistics, and the step that results."""
 
 import copy
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,10 +10,10 @@ from torch import Tensor, nn
 
 from tests.trainer.fake_envs import EchoEnvs
 from tests.trainer.plain import encode
+from trainer.chunks import chunk_starts, chunks
 from trainer.config import RunConfig, configure
-from trainer.minibatch import acting_memories, chunk_starts
 from trainer.play import CheckpointPolicy
-from trainer.ppo import compute_gae, update
+from trainer.ppo import compute_gae, estimate_advantages, update
 from trainer.rollout import Rollout, collect
 from trainer.session import Session
 
@@ -90,12 +89,11 @@ def test_a_chunk_begins_with_the_memory_that_was_last_computed_for_its_first_ste
 ) -> None:
     config = small(epochs=3)
     session, rollout = played(config)
-    rollout = replace(rollout, starts=np.zeros_like(rollout.starts))  # memories go on for ever
+    rollout = rollout._replace(starts=torch.zeros_like(rollout.starts))  # memories go on for ever
     steps = Steps(session, monkeypatch)
     update(session, rollout)
     first, second, third = (steps.calls[epoch * 4 : epoch * 4 + 4] for epoch in range(3))
-    acting = acting_memories(rollout, 4)
-    assert rows(first[0][0]) == rows(acting[[0, 4]].flatten(0, 1)), "those of the acting network"
+    assert rows(first[0][0]) == rows(rollout.memories.flatten(0, 1)), "those of the acting network"
     # Unshifted chunks hold steps 0-3 and 4-7, shifted ones 2-5. What step 1 returned is the memory before step 2.
     before_2_or_6 = rows(first[1][1])
     assert rows(second[0][0]) < before_2_or_6, "shifted chunks begin with memories of the epoch before"
@@ -103,15 +101,17 @@ def test_a_chunk_begins_with_the_memory_that_was_last_computed_for_its_first_ste
     before_4 = rows(second[1][1])
     assert len(before_4) == 6
     began = rows(third[0][0])
-    assert began == rows(acting[0]) | before_4, "step 0 is in no chunk but its own; 4 was met shifted"
+    assert began == rows(rollout.memories[0]) | before_4, (
+        "step 0 is in no chunk but its own; 4 was met shifted"
+    )
 
 
 def test_memories_do_not_reach_into_an_episode(monkeypatch: pytest.MonkeyPatch) -> None:
     config = small(epochs=1)
     session, rollout = played(config)
-    marks = np.zeros_like(rollout.starts)
+    marks = torch.zeros_like(rollout.starts)
     marks[6] = True  # the third step of each chunk that begins at 4
-    rollout = replace(rollout, starts=marks)
+    rollout = rollout._replace(starts=marks)
     steps = Steps(session, monkeypatch)
     update(session, rollout)
     empty = [(given == 0).flatten(1).all(1).sum().item() for given, _ in steps.calls]
@@ -119,8 +119,8 @@ def test_memories_do_not_reach_into_an_episode(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_memories_not_yet_known_are_not_numbers() -> None:
-    _, rollout = played(small())
-    memories = acting_memories(rollout, 4)
+    session, rollout = played(small())
+    memories = next(chunks(session, rollout, estimate_advantages(session.config, rollout)))[0].memories
     assert memories.shape == (8, 6, 2, 128)
     assert torch.equal(memories[4, 3], rollout.memories[1][3])
     assert memories[[1, 2, 3, 5, 6, 7]].isnan().all()
@@ -197,8 +197,7 @@ def test_the_update_is_that_of_a_plain_loop_over_frames(net: str) -> None:
     config = small(net=net, epochs=3, max_grad_norm=0.05)
     session, rollout = played(config)
     session.actor.net.double()
-    rollout = replace(
-        rollout,
+    rollout = rollout._replace(
         values=rollout.values.double(),
         log_probs=rollout.log_probs.double(),
         next_value=rollout.next_value.double(),
@@ -219,9 +218,8 @@ def plain_update(net: Any, session: Session, rollout: Rollout, config: RunConfig
     actor = session.actor
     pairs = actor.pairs.data[rollout.pair_rows]
     advantages = compute_gae(
-        torch.from_numpy(rollout.rewards).float(), rollout.values, rollout.next_value,
-        torch.from_numpy(rollout.terminated), torch.from_numpy(rollout.truncated),
-        torch.zeros(rollout.values.shape), config.gamma, config.gae_lambda,
+        rollout.rewards, rollout.values, rollout.next_value, rollout.ended, torch.zeros(rollout.values.shape),
+        config.gamma, config.gae_lambda,
     )  # fmt: skip
     returns = advantages + rollout.values
     memory_of = {
@@ -305,11 +303,8 @@ def test_minibatches_are_of_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_time_outs_are_terminal() -> None:
     assert not configure(net="paper-reference").bootstrap_timeouts
-    values, none = torch.tensor([[0.5], [0.25]]), torch.zeros(2, 1, dtype=torch.bool)
-    cut = torch.tensor([[True], [False]])
-    got = compute_gae(
-        torch.zeros(2, 1), values, torch.tensor([1.0]), none, cut, torch.zeros(2, 1), 0.99, 0.99
-    )
+    values, cut = torch.tensor([[0.5], [0.25]]), torch.tensor([[True], [False]])
+    got = compute_gae(torch.zeros(2, 1), values, torch.tensor([1.0]), cut, torch.zeros(2, 1), 0.99, 0.99)
     assert got.flatten().tolist() == pytest.approx([-0.5, 0.99 - 0.25]), (
         "0 + .99 * 0 - .5, then 0 + .99 * 1 - .25"
     )
@@ -317,9 +312,9 @@ def test_time_outs_are_terminal() -> None:
 
 def test_gae_of_the_paper_s_numbers() -> None:
     """Gamma and lambda .99: deltas .99 * .3 - .5 = -.203 and 1 - .3 = .7; the first gets .99 * .99 of the second."""
-    none, end = torch.zeros(2, 1, dtype=torch.bool), torch.tensor([[False], [True]])
+    end = torch.tensor([[False], [True]])
     got = compute_gae(
-        torch.tensor([[0.0], [1.0]]), torch.tensor([[0.5], [0.3]]), torch.tensor([9.0]), end, none,
+        torch.tensor([[0.0], [1.0]]), torch.tensor([[0.5], [0.3]]), torch.tensor([9.0]), end,
         torch.zeros(2, 1), 0.99, 0.99,
     )  # fmt: skip
     assert got.flatten().tolist() == pytest.approx([-0.203 + 0.9801 * 0.7, 0.7])

@@ -5,7 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from trainer.features import DistinctRows, PrefixTree, content_ids, prefix_tree
+from trainer.features import DistinctRows, content_ids
+from trainer.nets.dialogue import PrefixTree, prefix_tree
 
 HISTORIES = st.lists(st.lists(st.integers(1, 3), max_size=6), min_size=1, max_size=12)
 
@@ -51,13 +52,13 @@ def test_content_ids_are_equal_exactly_for_equal_rows(rows: np.ndarray) -> None:
 
 
 def test_rows_are_stored_once_and_found_again() -> None:
-    table = DistinctRows((2,), np.int16, unnamed=1, capacity=2)
+    table = DistinctRows((2,), np.int16)
     values = np.array([[1, 1], [2, 2], [1, 1], [3, 3]], np.int16)
     rows, fresh = table.add(np.array([70, -5, 70, 9]), values)
-    assert table.size == 4
+    assert len(table.data) == 4
     assert len(fresh) == 3
     assert (table.data[rows] == values).all()
-    assert (table.data[table.size - 3 :] == values[fresh]).all(), "fresh rows are the last ones, in order"
+    assert (table.data[1:] == values[fresh]).all(), "fresh rows are the last ones, in order"
     again, fresh = table.add(np.array([9, 9, 70, -5]), values[[3, 3, 0, 1]])
     assert len(fresh) == 0
     assert again.tolist() == [rows[3], rows[3], rows[0], rows[1]]

@@ -80,7 +80,7 @@ def test_advantages_are_normalised_over_the_agent_s_own_steps(small_config: Any)
     assert rollout.lead is not None
     led = rollout.lead.led
     assert 0 < led.sum() < led.numel()
-    advantages = estimate_advantages(session, rollout).advantages
+    advantages = estimate_advantages(session.config, rollout).advantages
     own = advantages[~led]
     assert own.mean().item() == pytest.approx(0, abs=1e-6)
     assert own.std(correction=0).item() == pytest.approx(1, abs=1e-3)

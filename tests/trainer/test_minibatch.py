@@ -53,7 +53,7 @@ def reference(net: ActorCritic, rollout: Rollout, seen: list[dict[str, np.ndarra
     for t, observation in enumerate(seen):
         if t % STRETCH == 0:
             memory = rollout.memories[t // STRETCH]
-        memory = emptied(memory, torch.from_numpy(rollout.starts[t]))
+        memory = emptied(memory, rollout.starts[t])
         features = [
             net.perceive(
                 net.prepare(torch.from_numpy(image[None])), encode(net.dialogue, tokens)[None], only, only
@@ -85,7 +85,7 @@ def test_agrees_with_reencoding_every_frame(net_name: str, distinct: bool) -> No
     assert max(np.count_nonzero(o["tokens"], axis=1).max() for o in seen) > 8, "histories must be long"
     zeros = torch.zeros(STEPS, ENVS)
     batch = Batch(rollout.actions, rollout.log_probs, rollout.values, zeros, zeros)
-    minibatch = cut_out(session.actor, rollout, batch, torch.arange(ENVS), STRETCH)
+    minibatch = cut_out(session, rollout, batch, torch.arange(ENVS))
     shared = len(minibatch.image_index) < STEPS * ENVS
     assert shared == distinct, "duplicates must be removed exactly where that was asked for"
 

@@ -2,7 +2,6 @@
 
 import copy
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from math import exp, log
 from typing import Any
 
@@ -30,43 +29,27 @@ def flags(*marks: int) -> Tensor:
     return torch.tensor(marks, dtype=torch.bool)[:, None]
 
 
-def gae(
-    rewards: Tensor, values: Tensor, terminated: Tensor, truncated: Tensor, bootstrap: Tensor
-) -> list[float]:
+def gae(rewards: Tensor, values: Tensor, ended: Tensor, bootstrap: Tensor) -> list[float]:
     next_value = torch.tensor([8.0], dtype=torch.float64)
-    return (
-        compute_gae(rewards, values, next_value, terminated, truncated, bootstrap, 0.5, 0.5)
-        .flatten()
-        .tolist()
-    )
+    return compute_gae(rewards, values, next_value, ended, bootstrap, 0.5, 0.5).flatten().tolist()
 
 
 def test_gae_without_an_end() -> None:
     # deltas: 1 + .5*2 - 4 = -2; 0 + .5*6 - 2 = 1; 2 + .5*8 - 6 = 0; weight of the next one .25
-    got = gae(column(1, 0, 2), column(4, 2, 6), flags(0, 0, 0), flags(0, 0, 0), column(0, 0, 0))
+    got = gae(column(1, 0, 2), column(4, 2, 6), flags(0, 0, 0), column(0, 0, 0))
     assert got == [-2 + 0.25 * 1, 1.0, 0.0]
 
 
-def test_gae_stops_at_a_termination() -> None:
+def test_gae_stops_at_an_end() -> None:
     # deltas: -2; 0 + 0 - 2 = -2 (the episode is over); 0
-    got = gae(column(1, 0, 2), column(4, 2, 6), flags(0, 1, 0), flags(0, 0, 0), column(0, 0, 0))
+    got = gae(column(1, 0, 2), column(4, 2, 6), flags(0, 1, 0), column(0, 0, 0))
     assert got == [-2 + 0.25 * -2, -2.0, 0.0]
-
-
-def test_a_time_out_without_bootstrap_is_terminal() -> None:
-    got = gae(column(1, 0, 2), column(4, 2, 6), flags(0, 0, 0), flags(0, 1, 0), column(0, 0, 0))
-    assert got == [-2.5, -2.0, 0.0]
 
 
 def test_a_bootstrapped_time_out_continues_the_value_but_not_the_sum() -> None:
     # delta of the cut step: 0 + .5*10 - 2 = 3; nothing of the next episode flows back
-    got = gae(column(1, 0, 2), column(4, 2, 6), flags(0, 0, 0), flags(0, 1, 0), column(0, 10, 0))
+    got = gae(column(1, 0, 2), column(4, 2, 6), flags(0, 1, 0), column(0, 10, 0))
     assert got == [-2 + 0.25 * 3, 3.0, 0.0]
-
-
-def test_a_termination_in_the_last_moment_beats_the_time_out() -> None:
-    got = gae(column(1, 0, 2), column(4, 2, 6), flags(0, 1, 0), flags(0, 1, 0), column(0, 10, 0))
-    assert got == [-2.5, -2.0, 0.0]
 
 
 def one_frame(speaks: bool, advantage: float, acting: float, now: float) -> tuple[Batch, Tensor]:
@@ -156,7 +139,7 @@ def test_per_head_loss_masks_and_averages_each_head() -> None:
     logits = torch.tensor(
         [[log(0.4), log(0.6), log(0.45), log(0.55), log(0.2), log(0.8), log(0.9), log(0.1)]]
     )
-    batch = replace(batch, log_probs=torch.tensor([[log(0.5), log(0.5), log(0.5), log(0.5)]]))
+    batch = batch._replace(log_probs=torch.tensor([[log(0.5), log(0.5), log(0.5), log(0.5)]]))
     parts = ppo_loss(batch, logits, torch.tensor([1.5]), SIZES, config(loss="per_head"), ENTROPY)
     primitive, speak = -2 * min(1.2, 1.2), -2 * (0.45 / 0.5)
     entropies = entropy_of(0.6) + entropy_of(0.55)
@@ -221,9 +204,9 @@ def test_the_update_sees_the_policy_that_acted(net: str, bptt: int, small_config
     """Before the first step the minibatch gives the log-probabilities and values recorded while acting."""
     config = small_config(net=net, bptt=bptt)
     session, rollout = played(config)
-    batch = estimate_advantages(session, rollout)
+    batch = estimate_advantages(config, rollout)
     for envs in (torch.tensor([0, 3, 5]), torch.tensor([1, 2, 4, 6, 7])):
-        minibatch = cut_out(session.actor, rollout, batch, envs, bptt or config.horizon)
+        minibatch = cut_out(session, rollout, batch, envs)
         ((_, logits, values),) = minibatch.evaluate(session.actor.net)
         assert torch.allclose(values, minibatch.batch.values, atol=1e-5)
         parts = ppo_loss(
@@ -237,8 +220,8 @@ def test_minibatches_hold_whole_environments_in_time_order(small_config: Any) ->
     config = small_config(bptt=4)
     session, rollout = played(config)
     marks = torch.arange(config.horizon)[:, None] * 100.0 + torch.arange(config.envs)
-    batch = replace(estimate_advantages(session, rollout), advantages=marks)
-    minibatch = cut_out(session.actor, rollout, batch, torch.tensor([5, 2]), 4)
+    batch = estimate_advantages(config, rollout)._replace(advantages=marks)
+    minibatch = cut_out(session, rollout, batch, torch.tensor([5, 2]))
     got = minibatch.batch.advantages.view(4, 4)
     assert got.tolist() == [
         [t * 100.0 + 5, t * 100.0 + 2, (t + 4) * 100.0 + 5, (t + 4) * 100.0 + 2] for t in range(4)
@@ -251,14 +234,14 @@ def test_an_update_makes_the_better_action_likelier(small_config: Any) -> None:
     config = small_config(normalize_advantages=False, entropy_coef=0.0, value_coef=0.0, epochs=3)
     session, rollout = played(config)
     favoured = rollout.actions[..., 0] == 2
-    rollout.rewards[:] = favoured.numpy()
+    rollout.rewards[:] = favoured.float()
     rollout.values.zero_()
     rollout.next_value.zero_()
-    rollout.terminated[:], rollout.truncated[:] = True, False
+    rollout.ended[:] = True
     before = rollout.log_probs[..., 0][favoured].mean().item()
     update(session, rollout)
     group = torch.arange(config.envs)
-    minibatch = cut_out(session.actor, rollout, estimate_advantages(session, rollout), group, config.horizon)
+    minibatch = cut_out(session, rollout, estimate_advantages(config, rollout), group)
     ((_, logits, _),) = minibatch.evaluate(session.actor.net)
     chosen = torch.log_softmax(logits[:, :4], 1)[:, 2].view(rollout.values.shape)[favoured]
     assert chosen.mean().item() > before
@@ -275,13 +258,11 @@ def test_a_step_is_adam_s_on_the_clipped_gradient(net: str, small_config: Any) -
     statistics = update(session, rollout)
 
     gains = compute_gae(
-        torch.from_numpy(rollout.rewards).float(), rollout.values, rollout.next_value,
-        torch.from_numpy(rollout.terminated), torch.from_numpy(rollout.truncated),
-        torch.from_numpy(rollout.bootstrap).float(), 0.99, 0.95,
+        rollout.rewards, rollout.values, rollout.next_value, rollout.ended, rollout.bootstrap, 0.99, 0.95,
     )  # fmt: skip
     scaled = (gains - gains.mean()) / (gains.std(correction=0) + 1e-8)
     batch = Batch(rollout.actions, rollout.log_probs, rollout.values, scaled, gains + rollout.values)
-    everything = cut_out(session.actor, rollout, batch, torch.arange(8), 8)
+    everything = cut_out(session, rollout, batch, torch.arange(8))
     ((_, logits, values),) = everything.evaluate(twin)
     loss = ppo_loss(everything.batch, logits, values, model.spec.action_sizes, config, ENTROPY)
     loss.loss.backward()  # type: ignore[no-untyped-call]

@@ -49,21 +49,22 @@ def test_what_is_recorded_is_what_happened(small_config: Any) -> None:
     session, rollout = play(small_config(), envs)
     for t, (actions, reward, terminated, truncated, _) in enumerate(envs.steps):
         assert (rollout.actions[t].numpy() == actions).all()
-        assert (rollout.rewards[t] == reward).all()
-        assert (rollout.terminated[t] == terminated).all()
-        assert (rollout.truncated[t] == truncated).all()
-        following = session.state.starts if t + 1 == len(envs.steps) else rollout.starts[t + 1]
-        assert (following == (terminated | truncated)).all()
+        assert (rollout.rewards[t].numpy() == reward.astype(np.float32)).all()
+        assert (rollout.ended[t].numpy() == (terminated | truncated)).all()
+        if t + 1 < len(envs.steps):
+            assert torch.equal(rollout.starts[t + 1], rollout.ended[t])
         pairs = session.actor.pairs.data[rollout.pair_rows[t]]
         assert (session.actor.images.data[pairs[:, 0]] == envs.seen[t]["image"]).all()
         assert (session.actor.histories.data[pairs[:, 1]] == envs.seen[t]["tokens"]).all()
     assert rollout.starts[0].all()
-    ended = rollout.terminated | rollout.truncated
-    assert rollout.tally.episodes == ended.sum() == envs.counters()["episodes"]
-    assert rollout.tally.timeouts == rollout.truncated.sum()
+    assert (session.state.starts == rollout.ended[-1].numpy()).all()
+    assert rollout.tally.episodes == rollout.ended.sum() == envs.counters()["episodes"]
+    assert rollout.tally.timeouts == sum(step[3].sum() for step in envs.steps)
     assert rollout.tally.successes == envs.counters()["outcomes"]["right"]
-    assert rollout.tally.total_length + session.state.lengths.sum() == ended.size
-    assert rollout.tally.total_return + session.state.returns.sum() == pytest.approx(rollout.rewards.sum())
+    assert rollout.tally.total_length + session.state.lengths.sum() == rollout.ended.numel()
+    assert rollout.tally.total_return + session.state.returns.sum() == pytest.approx(
+        rollout.rewards.sum().item()
+    )
 
 
 @pytest.mark.parametrize("net", ["fast", "paper"])
@@ -77,7 +78,7 @@ def test_values_equal_those_of_a_plain_recurrent_loop(net: str, length: int, sma
     with torch.no_grad():
         for t in range(24):
             features = torch.stack([plain_features(model, envs.seen[t], e) for e in range(8)])
-            memory = emptied(memory, torch.from_numpy(rollout.starts[t]))
+            memory = emptied(memory, rollout.starts[t])
             output, memory = model.memory.step(features, memory)
             logits, values = model.heads(output)
             assert torch.allclose(values, rollout.values[t], atol=1e-5), f"step {t}"
@@ -100,19 +101,31 @@ def test_time_outs_are_bootstrapped_with_the_value_of_their_last_observation(sma
     checked = 0
     with torch.no_grad():
         for t in range(config.horizon):
-            memory = emptied(memory, torch.from_numpy(rollout.starts[t]))
+            memory = emptied(memory, rollout.starts[t])
             features = torch.stack([plain_features(model, envs.seen[t], e) for e in range(8)])
             _, memory = model.memory.step(features, memory)
-            for e in np.flatnonzero(rollout.truncated[t]):
+            for e in np.flatnonzero(envs.steps[t][3]):
                 final = plain_features(model, envs.steps[t][4]["final_obs"], int(e))
                 _, value = model.heads(model.memory.step(final[None], memory[e : e + 1])[0])
-                assert rollout.bootstrap[t, e] == pytest.approx(value.item(), abs=1e-5)
+                assert rollout.bootstrap[t, e].item() == pytest.approx(value.item(), abs=1e-5)
                 checked += 1
     assert checked > 0
-    assert (rollout.bootstrap[~rollout.truncated] == 0).all()
+    assert (rollout.bootstrap != 0).sum() == checked
     _, terminal = play(small_config(bootstrap_timeouts=False), EchoEnvs(8, limit=4))
-    assert terminal.truncated.any()
+    assert terminal.tally.timeouts > 0
     assert (terminal.bootstrap == 0).all()
+
+
+def test_an_end_in_the_last_moment_beats_the_time_out(small_config: Any) -> None:
+    class Both(EchoEnvs):
+        def step(self, actions: np.ndarray) -> Any:
+            observation, reward, terminated, truncated, infos = super().step(actions)
+            return observation, reward, terminated | truncated, terminated | truncated, infos
+
+    _, rollout = play(small_config(), Both(8, limit=4))
+    assert rollout.ended.any()
+    assert (rollout.bootstrap == 0).all()
+    assert rollout.tally.timeouts == 0
 
 
 def test_batch_normalisation_counts_each_observation_once(small_config: Any) -> None:
@@ -127,9 +140,9 @@ def test_the_bonus_is_paid_on_top_and_does_not_count_as_return(small_config: Any
     config = small_config(bonus="lang")
     envs = Witness(8)
     session, rollout = play(config, envs)
-    paid = rollout.rewards - np.array([step[1] for step in envs.steps])
+    paid = rollout.rewards.numpy() - np.array([step[1] for step in envs.steps])
     assert paid.max() == pytest.approx(0.6 * tanh(7 / 40)), "the paper's bonus for a first visit"
-    assert rollout.bonus == pytest.approx(paid.mean())
+    assert rollout.tally.bonus == pytest.approx(paid.mean())
     returns = rollout.tally.total_return + session.state.returns.sum()
     assert returns == pytest.approx(sum(step[1].sum() for step in envs.steps))
 

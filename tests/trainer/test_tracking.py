@@ -109,10 +109,11 @@ def test_a_failure_at_the_start_is_explained(wandb: FakeWandb, tmp_path: Path, s
         train(small_config(), EchoEnvs(8), tmp_path, tracker=tracker)
 
 
-def test_it_has_to_be_installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_it_has_to_be_installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, small_config: Any) -> None:
     monkeypatch.setitem(sys.modules, "wandb", None)
+    tracker = WandbTracker("project", tmp_path, {}, "a run")
     with pytest.raises(ValueError, match=r"pip install 'socialai-dsl\[wandb\]'"):
-        WandbTracker("project", tmp_path, {}, "a run")
+        train(small_config(), EchoEnvs(8), tmp_path, tracker=tracker)
 
 
 def test_the_package_itself_offline(

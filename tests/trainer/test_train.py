@@ -234,31 +234,36 @@ def test_weights_that_a_step_spoils_are_not_saved(
     config = small_config(
         net="fast" if name == "film.bias" else "paper-reference", epochs=1, checkpoint_every=1
     )
-    real = training.update
+    start, step, steps = training.Session.start, torch.optim.Adam.step, []
 
-    def spoiling(session: Any, *rest: Any) -> Any:
-        losses = real(session, *rest)
-        if session.update == 2:
-            session.actor.net.state_dict()[name][0] = torch.inf
-        return losses
+    def spoiling(optimizer: Any) -> None:
+        step(optimizer)
+        steps.append(optimizer)
+        if len(steps) == 6:
+            sessions[0].actor.net.state_dict()[name][0] = torch.inf
 
-    monkeypatch.setattr(training, "update", spoiling)
+    sessions: list[Any] = []
+    monkeypatch.setattr(
+        training.Session, "start", lambda *rest: sessions.append(start(*rest)) or sessions[-1]
+    )
+    monkeypatch.setattr(torch.optim.Adam, "step", spoiling)
     with pytest.raises(TrainingStopped) as caught:
         train(config, EchoEnvs(8), tmp_path)
-    check_stopped(tmp_path, f"the network's {name} holds numbers that are not finite", caught)
+    check_stopped(tmp_path, f"an entry of the network's {name} is not a finite number", caught)
 
 
 def test_figures_that_are_not_finite_stop_the_run(
     tmp_path: Path, small_config: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real, calls = training.update, 0
+    real, calls = training.ppo_loss, 0
 
     def diverging(*everything: Any) -> Any:
         nonlocal calls
         calls += 1
-        return real(*everything) | ({"approx_kl": float("inf")} if calls == 3 else {})
+        parts = real(*everything)
+        return parts._replace(approx_kl=parts.loss / 0) if calls == 12 else parts
 
-    monkeypatch.setattr(training, "update", diverging)
+    monkeypatch.setattr(training, "ppo_loss", diverging)
     with pytest.raises(TrainingStopped) as caught:
         train(small_config(), EchoEnvs(8), tmp_path)
     check_stopped(tmp_path, "approx_kl of the update is not a finite number", caught)

@@ -67,12 +67,13 @@ class Tutor:
         """
         self.curriculum, self._envs = curriculum, envs
         self._weights: list[int] = []
-        self._playing: NDArray[np.int64] = np.zeros(0, np.int64)
         self._choose()
 
     def begin(self) -> None:
-        """Note what is played; after a reset, or after a snapshot was put back."""
-        self._playing = self._envs.member_ids()
+        """Choose, and note what is played; after a reset, or after environments and curriculum have been restored."""
+        self._weights = []
+        self._choose()
+        self._playing: NDArray[np.int64] = self._envs.member_ids()
 
     def step(self, ended: NDArray[np.bool_], success: NDArray[np.bool_]) -> None:
         """Take in the episodes that ended in a step, bool (E,) each, in the order of the environments."""
@@ -88,9 +89,3 @@ class Tutor:
         if weights != self._weights:
             self._envs.set_member_weights(weights)
             self._weights = weights
-
-    def resume(self) -> None:
-        """Have the environments, which have been restored, play on as the curriculum, restored as well, chooses."""
-        self._weights = []
-        self._choose()
-        self.begin()

@@ -17,8 +17,6 @@ _ONE = 1 << 20
 
 def _labels(value: Any) -> Any:
     """A value, or a list of them, as the labels of a tree."""
-    if isinstance(value, bool):
-        value = str(value).lower()
     listed = value if isinstance(value, list | tuple) else [value]
     return tuple(str(one).lower() if isinstance(one, bool) else str(one) for one in listed)
 
@@ -37,6 +35,10 @@ class Ramp(_Model):
     to: float = Field(ge=0, le=1e6)
     over: int = Field(ge=1, description="episodes")
 
+    def after(self, episodes: int) -> float:
+        """The weight after so many episodes of the phase."""
+        return self.start + (self.to - self.start) * min(episodes / self.over, 1.0)
+
 
 class Group(_Model):
     """Some leaves of a suite, and how likely one of them is played.
@@ -54,18 +56,27 @@ class Group(_Model):
     members: tuple[str, ...] | None = None
     weight: float | Ramp = Field(1.0)
 
-    def holds(self, name: str, labels: Mapping[str, str]) -> bool:
-        """Whether a leaf is one of them."""
-        if self.members is not None and name not in self.members:
-            return False
-        return _has(labels, self.only) and not (self.without and _has(labels, self.without))
-
-    def weight_after(self, episodes: int) -> float:
-        """The weight after so many episodes of the phase."""
-        if not isinstance(self.weight, Ramp):
-            return self.weight
-        ramp = self.weight
-        return ramp.start + (ramp.to - ramp.start) * min(episodes / ramp.over, 1.0)
+    def find(self, leaves: Leaves, place: str) -> list[int]:
+        """Numbers of its leaves. Raises ValueError, with the place, if there is none, or it names what is not there."""
+        for name in self.members or ():
+            if name not in leaves.names:
+                raise ValueError(f"{place}: the suite has no member {name!r}")
+        for parameter, values in self.only.items():
+            known = {labels[parameter] for labels in leaves.labels if parameter in labels}
+            for value in values:
+                if value not in known:
+                    listed = ", ".join(sorted(known)) or "no values: the suite has no such parameter"
+                    raise ValueError(f"{place}: got {parameter}: {value}; the suite has {listed}")
+        found = [
+            number
+            for number, (name, labels) in enumerate(zip(leaves.names, leaves.labels, strict=True))
+            if (self.members is None or name in self.members)
+            and _has(labels, self.only)
+            and not (self.without and _has(labels, self.without))
+        ]
+        if not found:
+            raise ValueError(f"{place}: no member of the suite is in this group")
+        return found
 
 
 class Until(_Model):
@@ -124,7 +135,7 @@ class Phases:
         self._plan = plan
         self._natural = leaves.weights
         self._groups = [
-            [_members(group, leaves, f"phases.{p}.play.{g}") for g, group in enumerate(phase.play)]
+            [group.find(leaves, f"curriculum: phases.{p}.play.{g}") for g, group in enumerate(phase.play)]
             for p, phase in enumerate(plan.phases)
         ]
         self._digest = hashlib.sha256(plan.model_dump_json().encode()).hexdigest()
@@ -149,7 +160,8 @@ class Phases:
     def weights(self) -> list[int]:
         """See `Curriculum.weights`."""
         phase = self._plan.phases[self.phase]
-        shares = [group.weight_after(self._episodes) for group in phase.play]
+        given = [group.weight for group in phase.play]
+        shares = [one.after(self._episodes) if isinstance(one, Ramp) else one for one in given]
         if sum(shares) <= 0:
             shares = [1.0] * len(shares)
         weights = [0] * len(self._natural)
@@ -177,23 +189,6 @@ class Phases:
         if not 0 <= phase < len(self._plan.phases) or episodes < 0 or set(last) - {0, 1}:
             raise ValueError("curriculum: the state is damaged")
         self.phase, self._episodes, self._last = phase, episodes, last
-
-
-def _members(group: Group, leaves: Leaves, place: str) -> list[int]:
-    for name in group.members or ():
-        if name not in leaves.names:
-            raise ValueError(f"curriculum: {place}: the suite has no member {name!r}")
-    for parameter, values in group.only.items():
-        known = {labels[parameter] for labels in leaves.labels if parameter in labels}
-        for value in values:
-            if value not in known:
-                listed = ", ".join(sorted(known)) if known else "no values: the suite has no such parameter"
-                raise ValueError(f"curriculum: {place}: got {parameter}: {value}; the suite has {listed}")
-    both = zip(leaves.names, leaves.labels, strict=True)
-    members = [number for number, (name, labels) in enumerate(both) if group.holds(name, labels)]
-    if not members:
-        raise ValueError(f"curriculum: {place}: no member of the suite is in this group")
-    return members
 
 
 def _has(labels: Mapping[str, str], wanted: Values) -> bool:

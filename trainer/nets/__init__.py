@@ -7,24 +7,12 @@ from pathlib import Path
 import torch
 
 from trainer.extensions import load_class
-from trainer.nets.base import HEADS, ActorCritic, NetSpec, Precision
+from trainer.nets.base import ActorCritic, NetSpec, Precision
 from trainer.nets.fast import FastNet
-from trainer.nets.memory import LstmMemory, Memory
+from trainer.nets.memory import Memory
 from trainer.nets.paper import PaperNet, PaperReferenceNet
 
-__all__ = [
-    "HEADS",
-    "ActorCritic",
-    "FastNet",
-    "LstmMemory",
-    "Memory",
-    "NetSpec",
-    "PaperNet",
-    "Precision",
-    "build_net",
-    "net_class",
-]
-
+__all__ = ["ActorCritic", "FastNet", "Memory", "NetSpec", "build_net", "net_class"]
 
 _SHIPPED: dict[str, type[ActorCritic]] = {
     "fast": FastNet,

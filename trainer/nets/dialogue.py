@@ -2,12 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any, NamedTuple
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
+
+
+class PrefixTree(NamedTuple):
+    """Distinct histories as paths from a root, so that a shared beginning is encoded once.
+
+    State 0 is the empty history; state k >= 1 is the history of state `parents[k - 1]` plus `tokens[k - 1]`.
+    States are sorted by length: those of length d are `offsets[d - 1] + 1` to `offsets[d]`.
+
+    Attributes:
+        tokens: int64 (K,) last word of each state.
+        parents: int64 (K,) state it continues.
+        offsets: K's running total by length, starting at 0.
+        leaves: int64 (D,) state of each history given to `prefix_tree`.
+    """
+
+    tokens: Tensor
+    parents: Tensor
+    offsets: list[int]
+    leaves: Tensor
+
+
+def prefix_tree(histories: NDArray[Any], device: torch.device | str = "cpu") -> PrefixTree:
+    """Build the tree of 0-padded histories, integer (D, L), duplicates allowed, one word of all of them at a time."""
+    words = histories.astype(np.int64)
+    lengths = np.count_nonzero(words, axis=1)  # (D,)
+    state = np.zeros(len(words), np.int64)  # (D,), of each history's beginning so far
+    offsets, levels = [0], [state[:0]]
+    for depth in range(lengths.max(initial=0)):
+        longer = lengths > depth
+        edges, which = np.unique(state[longer] << 32 | words[longer, depth], return_inverse=True)
+        state[longer] = offsets[-1] + 1 + which
+        offsets.append(offsets[-1] + len(edges))
+        levels.append(edges)
+    edges = np.concatenate(levels)
+    tokens, parents, leaves = (
+        torch.from_numpy(part).to(device) for part in (edges & 0xFFFFFFFF, edges >> 32, state)
+    )
+    return PrefixTree(tokens, parents, offsets, leaves)
 
 
 class DialogueEncoder(nn.Module):
@@ -43,40 +83,33 @@ class DialogueEncoder(nn.Module):
         new = torch.tanh(torch.addcmul(inputs[:, 2 * size :], gates[:, :size], recurrent[:, 2 * size :]))
         return torch.lerp(new, states, gates[:, size:])
 
-    def forward(self, tokens: Tensor, parents: Tensor, offsets: Sequence[int]) -> Tensor:
-        """Encode the states of a `features.PrefixTree` (its fields as int64 tensors), level by level.
-
-        Returns:
-            Encodings (K + 1, size); row 0, the empty history, is zero.
-        """
-        inputs = functional.embedding(tokens, self.word_inputs())
+    def forward(self, tree: PrefixTree) -> Tensor:
+        """Encode the states of a tree, level by level; (K + 1, size), the empty history's row 0 being zero."""
+        inputs = functional.embedding(tree.tokens, self.word_inputs())
         levels = [inputs.new_zeros(1, self.hidden)]
         first_of_parents = 0
-        for first, behind in pairwise(offsets):
-            before = levels[-1].index_select(0, parents[first:behind] - first_of_parents)
+        for first, behind in pairwise(tree.offsets):
+            before = levels[-1].index_select(0, tree.parents[first:behind] - first_of_parents)
             levels.append(self._advance(inputs[first:behind], before))
             first_of_parents = first + 1
         return torch.cat(levels)
 
     @torch.no_grad()
-    def extend(self, states: Tensor, tokens: Tensor, lengths: Sequence[int], inputs: Tensor) -> Tensor:
+    def extend(self, states: Tensor, tokens: Tensor, inputs: Tensor) -> Tensor:
         """Continue encodings by the words heard since, without gradients.
 
         Args:
             states: (K, size) encodings so far.
-            tokens: int64 (K, S), row k's first `lengths[k]` are its new words.
-            lengths: new words per row, in descending order.
+            tokens: int64 (K, S), the new words of each, 0-padded.
             inputs: result of `word_inputs` under the current weights.
 
         Returns:
             (K, size) encodings after the new words.
         """
         states = states.clone()
-        active = len(lengths)
-        for position in range(lengths[0] if lengths else 0):
-            while lengths[active - 1] <= position:
-                active -= 1
-            states[:active] = self._advance(inputs[tokens[:active, position]], states[:active])
+        for words in tokens.unbind(1):
+            longer = words.nonzero().squeeze(1)
+            states[longer] = self._advance(inputs[words[longer]], states[longer])
         return states
 
 
@@ -95,22 +128,20 @@ class HeardWords(DialogueEncoder):
         """Encodings (D, size) as recurrent states (D, hidden) and the words heard (D, V)."""
         return encodings[:, : self.hidden], encodings[:, self.hidden :]
 
-    def forward(self, tokens: Tensor, parents: Tensor, offsets: Sequence[int]) -> Tensor:
+    def forward(self, tree: PrefixTree) -> Tensor:
         """See `DialogueEncoder.forward`."""
-        states = super().forward(tokens, parents, offsets)
+        states = super().forward(tree)
         heard = states.new_zeros(len(states), self.size - self.hidden)
         # Level by level: a history has the words of its parent, and one more.
-        for first, behind in pairwise(offsets):
-            words = heard.index_select(0, parents[first:behind])
-            heard[1 + first : 1 + behind] = words.scatter_(1, tokens[first:behind, None], 1)
+        for first, behind in pairwise(tree.offsets):
+            words = heard.index_select(0, tree.parents[first:behind])
+            heard[1 + first : 1 + behind] = words.scatter_(1, tree.tokens[first:behind, None], 1)
         return torch.cat((states, heard), 1)
 
     @torch.no_grad()
-    def extend(self, states: Tensor, tokens: Tensor, lengths: Sequence[int], inputs: Tensor) -> Tensor:
+    def extend(self, states: Tensor, tokens: Tensor, inputs: Tensor) -> Tensor:
         """See `DialogueEncoder.extend`."""
         recurrent, heard = self.split(states)
-        heard = heard.clone()
-        behind = torch.tensor(lengths, device=tokens.device)
-        new = torch.arange(tokens.shape[1], device=tokens.device) < behind[:, None]
-        heard[new.nonzero()[:, 0], tokens[new]] = 1
-        return torch.cat((super().extend(recurrent, tokens, lengths, inputs), heard), 1)
+        heard = heard.scatter(1, tokens, 1)
+        heard[:, 0] = 0  # the padding is no word
+        return torch.cat((super().extend(recurrent, tokens, inputs), heard), 1)

@@ -32,23 +32,15 @@ class _ResettableLstm(torch.autograd.Function):
         steps, batch, size = inputs.shape[0], inputs.shape[1], w_hh.shape[1]
         gates = functional.linear(inputs.flatten(0, 1), w_ih, bias).view(steps, batch, 4 * size)
         cells, squashed, outputs = (inputs.new_empty(steps, batch, size) for _ in range(3))
-        rows = zip(
-            gates.unbind(),
-            gates[..., size:].unbind(),
-            *(gate.unbind() for gate in torch.split(gates, size, 2)),
-            cells.unbind(),
-            squashed.unbind(),
-            outputs.unbind(),
-            strict=True,
-        )
         w_t = w_hh.t()
         h, c = memory.unbind()
-        for t, (gate, sigmoids, candidate, entry, forget, exit_, cell, squash, output) in enumerate(rows):
+        for t, (gate, cell, squash, output) in enumerate(zip(gates, cells, squashed, outputs, strict=True)):
             if resets[t]:
                 h, c = h * keep[t], c * keep[t]
             gate.addmm_(h, w_t)
-            sigmoids.sigmoid_()
+            candidate, entry, forget, exit_ = torch.split(gate, size, 1)
             candidate.tanh_()
+            gate[:, size:].sigmoid_()
             torch.mul(entry, candidate, out=cell).addcmul_(forget, c)
             torch.tanh(cell, out=squash)
             torch.mul(exit_, squash, out=output)
@@ -67,45 +59,25 @@ class _ResettableLstm(torch.autograd.Function):
         # What each gate's input does to the cell (output gate: to h), for all steps at once.
         slopes = torch.empty_like(gates)
         aten = torch.ops.aten
-        for part, (reach, gate) in zip(
-            torch.split(slopes, size, 2),
-            ((entry, candidate), (candidate, entry), (c_in, forget), (squashed, exit_)),
-            strict=True,
-        ):
+        reaches = ((entry, candidate), (candidate, entry), (c_in, forget), (squashed, exit_))
+        for part, (reach, gate) in zip(torch.split(slopes, size, 2), reaches, strict=True):
             rule = aten.tanh_backward if gate is candidate else aten.sigmoid_backward
             rule.grad_input(reach, gate, grad_input=part)
         to_cell = aten.tanh_backward(exit_, squashed)
 
         d_gates = slopes  # each step's slopes are replaced by its gradients
-        rows = list(
-            zip(
-                d_gates.unbind(),
-                d_gates.view(steps, batch, 4, size)[:, :, :3].unbind(),
-                d_gates[..., 3 * size :].unbind(),
-                forget.unbind(),
-                to_cell.unbind(),
-                grad.unbind(),
-                strict=True,
-            )
-        )
-        d_c, d_h = torch.zeros_like(cells[0]), rows[-1][-1]
-        d_c_row = d_c.unsqueeze(1)
+        d_c, d_h, nothing = torch.zeros_like(cells[0]), grad[-1], torch.zeros_like(grad[0])
         for t in range(steps - 1, -1, -1):
-            d_gate, reached, last, forgotten, slope, _ = rows[t]
-            d_c.addcmul_(d_h, slope)
-            reached.mul_(d_c_row)
-            last.mul_(d_h)
-            d_c.mul_(forgotten)
-            before = rows[t - 1][-1] if t else None
-            if before is not None and not ctx.resets[t]:
-                d_h = torch.addmm(before, d_gate, w_hh)
-                continue
-            d_h = torch.mm(d_gate, w_hh)
+            d_gate, before = d_gates[t], grad[t - 1] if t else nothing
+            d_c.addcmul_(d_h, to_cell[t])
+            d_gate.view(batch, 4, size)[:, :3].mul_(d_c[:, None])
+            d_gate[:, 3 * size :].mul_(d_h)
+            d_c.mul_(forget[t])
             if ctx.resets[t]:
                 d_c.mul_(keep[t])
-                d_h.mul_(keep[t])
-            if before is not None:
-                d_h.add_(before)
+                d_h = torch.mm(d_gate, w_hh).mul_(keep[t]).add_(before)
+            else:
+                d_h = torch.addmm(before, d_gate, w_hh)
         flat = d_gates.view(-1, 4 * size)
         flat_t = flat.t()
         d_inputs = (flat @ w_ih).view_as(inputs)

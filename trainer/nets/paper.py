@@ -80,9 +80,7 @@ class PaperNet(ActorCritic):
         )
         self.blocks = nn.ModuleList(_FilmBlock(width, self.dialogue.size, self.batch_norm) for _ in range(2))
         self.apply(unit_row_linear)
-        for convolution in self.modules():
-            if isinstance(convolution, nn.Conv2d):
-                convolution.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+        self.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
     def prepare(self, images: Tensor) -> Tensor:
         """Images (I, C, H, W) as floats; the bytes lie channels-last in memory, as convolutions like them."""

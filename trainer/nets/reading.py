@@ -35,13 +35,10 @@ class LetterReader(Reader):
     """Reads histories as the agents of the SocialAI 1.0 paper do.
 
     A word is a maximal run of the letters a to z: digits and apostrophes vanish and may part or delete a word. Before
-    the first line every history has the sentence that the paper's environments begin each episode with. It is the
-    same in all of them, so it belongs to how these agents read and not to a scenario. Ids are given in the order of
-    first appearance, from 1 on: first that sentence, then the vocabulary. The released code gives them in the order
-    in which words are heard in training; since the rows of an embedding start out alike, this changes nothing but
-    which row a word has.
+    the first line every history has the sentence that the paper's environments begin each episode with. Ids are given
+    in the order of first appearance, from 1 on: first that sentence, then the vocabulary.
 
-    Source: SocialAI 1.0, released code of the agents.
+    Source: SocialAI 1.0, released code of the agents; `docs/agents.md` says what is different.
 
     Raises:
         ValueError: there are more words than the paper's agents have room for.

@@ -16,7 +16,6 @@ from socialai_dsl.cli import run as run_command
 from socialai_dsl.cli.errors import UsageError
 from socialai_dsl.cli.main import run_main
 from trainer import checkpoint as checkpoints
-from trainer import ppo as training
 from trainer.checkpoint import read
 
 Capture = pytest.CaptureFixture[str]
@@ -131,23 +130,21 @@ def test_a_disk_that_fails_while_training(
 def test_numbers_that_are_not_finite(
     tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run, real, calls = tmp_path / "run", training.update, 0
+    run, step, steps = tmp_path / "run", torch.optim.Adam.step, 0
 
-    def spoiling(session: Any, *rest: Any) -> Any:
-        nonlocal calls
-        calls += 1
-        losses = real(session, *rest)
-        if calls == 4:
-            with torch.no_grad():
-                session.actor.net.heads.hidden.bias[0] = torch.nan
-        return losses
+    def spoiling(optimizer: torch.optim.Adam) -> None:
+        nonlocal steps
+        steps += 1
+        step(optimizer)
+        if steps == 64:  # the last of the fourth update
+            optimizer.param_groups[0]["params"][0].data.fill_(torch.nan)
 
-    monkeypatch.setattr(training, "update", spoiling)
+    monkeypatch.setattr(torch.optim.Adam, "step", spoiling)
     assert run_main([*RUN, "--out", str(run)]) == 1
     check_clear(
         capsys.readouterr().err,
         "training stopped after 768 frames (update 3)",
-        "heads.hidden.bias holds numbers that are not finite",
+        "an entry of the network's channels is not a finite number",
         "the last good checkpoint is ",
     )
     assert read(run / "checkpoints").meta.update == 2

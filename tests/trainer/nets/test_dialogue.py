@@ -6,8 +6,7 @@ import torch
 from torch import Tensor
 
 from tests.trainer.plain import encode
-from trainer.features import prefix_tree
-from trainer.nets.dialogue import DialogueEncoder, HeardWords
+from trainer.nets.dialogue import DialogueEncoder, HeardWords, prefix_tree
 
 
 @pytest.fixture
@@ -37,8 +36,8 @@ def encode_one_by_one(encoder: DialogueEncoder, rows: np.ndarray) -> Tensor:
 
 def encode_tree(encoder: DialogueEncoder, rows: np.ndarray) -> Tensor:
     tree = prefix_tree(rows)
-    states = encoder(torch.from_numpy(tree.tokens), torch.from_numpy(tree.parents), tree.offsets)
-    return states[torch.from_numpy(tree.leaves)]
+    states: Tensor = encoder(tree)
+    return states[tree.leaves]
 
 
 def test_tree_agrees_with_reencoding_in_values_and_gradients(encoder: DialogueEncoder) -> None:
@@ -60,14 +59,10 @@ def test_extending_agrees_with_reencoding(encoder: DialogueEncoder) -> None:
     lengths = (rows > 0).sum(1)
     known = np.maximum(lengths - np.array([5, 4, 3, 2, 1, 0] * 5), 0)
     starts = np.where(np.arange(40) < known[:, None], rows, 0)
-    order = np.argsort(-(lengths - known), kind="stable")
-    new = (lengths - known)[order]
-    suffix = np.array([np.roll(rows[i], -known[i])[:6] for i in order])
-    states = encode_one_by_one(encoder, starts[order]).detach()
-    extended = encoder.extend(
-        states, torch.tensor(suffix.astype(np.int64)), new.tolist(), encoder.word_inputs()
-    )
-    assert torch.allclose(extended, full[torch.from_numpy(order)], rtol=0, atol=1e-12)
+    suffix = np.array([[*row[begun:], *[0] * begun][:6] for row, begun in zip(rows, known, strict=True)])
+    states = encode_one_by_one(encoder, starts).detach()
+    extended = encoder.extend(states, torch.tensor(suffix.astype(np.int64)), encoder.word_inputs())
+    assert torch.allclose(extended, full, rtol=0, atol=1e-12)
 
 
 def test_the_empty_history_is_zero(encoder: DialogueEncoder) -> None:
@@ -93,6 +88,6 @@ def test_extending_adds_the_words_heard_since() -> None:
     known = np.array([[3, 0, 0, 0], [5, 0, 0, 0], [7, 0, 0, 0]], np.int16)
     before = encode_tree(both, known).detach()
     suffix = torch.tensor([[1, 2, 4], [5, 6, 0], [0, 0, 0]])
-    after = both.extend(before, suffix, [3, 2, 0], both.word_inputs())
+    after = both.extend(before, suffix, both.word_inputs())
     assert torch.allclose(after, encode_tree(both, rows), rtol=0, atol=1e-12)
     assert torch.equal(both.split(before)[1], heard_by(known, 20)), "what was known stays as it is"
