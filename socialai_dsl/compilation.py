@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import overload
 
-from socialai_dsl.checking import Loaded, LoadedScenario, LoadedSuite
+from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
 from socialai_dsl.compiler import compile_probed, compile_scenario
 from socialai_dsl.compiler.probes import Part, Probe, Probed, Value
 from socialai_dsl.program import Program

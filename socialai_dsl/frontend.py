@@ -7,22 +7,15 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from socialai_dsl.checking import (
-    Loaded,
-    LoadedExperiment,
-    LoadedScenario,
-    LoadedSuite,
-    check_experiment,
-    check_library,
-    check_npc,
-    check_scenario,
-    check_suite,
-    naming_the_patch,
-    of_other_values,
-    said_once,
-    sift,
-    swallowed,
-)
+from socialai_dsl.checking.choices import of_other_values
+from socialai_dsl.checking.experiments import LoadedExperiment, check_experiment
+from socialai_dsl.checking.ignored import sift
+from socialai_dsl.checking.libraries import check_library, check_npc
+from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
+from socialai_dsl.checking.repetitions import said_once
+from socialai_dsl.checking.scenarios import check_scenario, naming_the_patch
+from socialai_dsl.checking.suites import check_suite
+from socialai_dsl.checking.swallowed import swallowed
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity, bounded_suggestions
 from socialai_dsl.loader import Resolved, resolve
 from socialai_dsl.loader.files import display_name

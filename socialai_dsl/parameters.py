@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
-from socialai_dsl.loader import Data, DataPath, Resolved
+from socialai_dsl.loader import Data, Resolved
 from socialai_dsl.loader.scalars import read_plain
+from socialai_dsl.source import DataPath
 
 Value = int | bool | float | str
 

@@ -13,7 +13,7 @@ from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.search import Search
 from socialai_dsl.analysis.search import Verdict as Searched
 from socialai_dsl.analysis.twins import random_actions
-from socialai_dsl.checking import LoadedScenario
+from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table

@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.analysis.twins import pairs_alike
-from socialai_dsl.checking import LoadedScenario
+from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Program, Register
-from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.plans import Checked, Placing
-from socialai_dsl.semantics.terms import Quantified
+from socialai_dsl.semantics.terms import Quantified, walk
 
 _HAPPENING: Final = ("t", "memory", "last", "heard", "pending")
 _ATTEMPTS: Final = 4

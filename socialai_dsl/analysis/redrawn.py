@@ -10,9 +10,8 @@ from typing import Final
 from socialai_dsl.draws import GOLDEN, mix
 from socialai_dsl.draws import site as number_of
 from socialai_dsl.program import Header, Program
-from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.plans import Checked, Coloring, Drawn, Facing, Placing
-from socialai_dsl.semantics.terms import Chance, Quantified, Sited
+from socialai_dsl.semantics.terms import Chance, Quantified, Sited, walk
 
 _SITE_MASK: Final = (1 << 31) - 1
 

@@ -13,7 +13,7 @@ from socialai_dsl.analysis.search import Finding, Search, Verdict
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Field, Header, Program, Register
-from socialai_dsl.semantics.absence import asks_about_cells
+from socialai_dsl.semantics.free_cells import asks_about_cells
 from socialai_dsl.semantics.plans import Checked, Placing
 
 Start = tuple[NDArray[np.int16], NDArray[np.uint32], NDArray[np.uint64]]

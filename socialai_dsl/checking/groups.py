@@ -8,9 +8,8 @@ from typing import Any, Final
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.schema import CastMember
-from socialai_dsl.schema.positions import DataPath, Positions
 from socialai_dsl.schema.shape import PARAMETER
-from socialai_dsl.source import Span
+from socialai_dsl.source import DataPath, Positions, Span
 
 MOST: Final = 16
 _AGENT: Final = "agent"

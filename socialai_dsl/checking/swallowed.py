@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from typing import Final
 
 from socialai_dsl.diagnostics import Diagnostic, Severity
-from socialai_dsl.loader import Data, DataPath, Resolved
+from socialai_dsl.loader import Data, Resolved
 from socialai_dsl.loader.offsets import Style
-from socialai_dsl.source import Span
+from socialai_dsl.source import DataPath, Span
 
 _SPOKEN: Final = frozenset({"say", "hears", "templates", "nouns", "name"})
 _GLUED: Final = re.compile(r"[ \t]+(#\w\S*)")

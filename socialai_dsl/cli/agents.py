@@ -18,7 +18,7 @@ from socialai_dsl.experiments.settings import resolved_config
 from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, RunConfig
 
 if TYPE_CHECKING:
-    from socialai_dsl.checking import Loaded
+    from socialai_dsl.checking.loaded import Loaded
     from socialai_dsl.program_suite import Playable
     from trainer.logging import WandbTracker
 

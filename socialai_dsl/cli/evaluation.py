@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from socialai_dsl.checking import Loaded
+    from socialai_dsl.checking.loaded import Loaded
     from socialai_dsl.cli.episode import Episode
     from socialai_dsl.evaluation import EvalResult, Policy
     from socialai_dsl.program_suite import Playable

@@ -19,7 +19,7 @@ from socialai_dsl.cli.run_folder import (
 )
 
 if TYPE_CHECKING:
-    from socialai_dsl.checking import Loaded
+    from socialai_dsl.checking.loaded import Loaded
     from trainer.checkpoint import Checkpoint
     from trainer.config import RunConfig
 

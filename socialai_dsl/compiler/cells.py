@@ -12,8 +12,7 @@ from socialai_dsl.compiler.folding import TRUE, mentions
 from socialai_dsl.compiler.registers import NOWHERE
 from socialai_dsl.program import BOARDS, CELL, Counting, Field, Op
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.build import may_find_nothing
-from socialai_dsl.semantics.terms import Const, Term
+from socialai_dsl.semantics.terms import Const, Term, may_find_nothing
 
 ROW = 32
 

@@ -9,8 +9,7 @@ from typing import Any
 from socialai_dsl.compiler.classes import SILENCE, Classes
 from socialai_dsl.program import Body
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.build import may_find_nothing
-from socialai_dsl.semantics.terms import BOOL, Const, Term
+from socialai_dsl.semantics.terms import BOOL, Const, Term, may_find_nothing
 from socialai_dsl.trees import every, rebuilt
 
 TRUE = Const(BOOL, 1)

@@ -15,7 +15,7 @@ from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import mentions
 from socialai_dsl.program import Counting, Field, Op, Register, Side
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.geometry import EXACT
+from socialai_dsl.semantics.free_cells import EXACT
 from socialai_dsl.semantics.plans import Placing, Region
 from socialai_dsl.semantics.terms import Term
 

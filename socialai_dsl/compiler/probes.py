@@ -18,10 +18,8 @@ from socialai_dsl.compiler.registers import Registers, label, state_names
 from socialai_dsl.grammar import unparse
 from socialai_dsl.program import Op, Program, RegisterName
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.build import all_of
 from socialai_dsl.semantics.plans import Checked, OutcomePlan, RulePlan, StepPlan
-from socialai_dsl.semantics.readings import Reading, Readings
-from socialai_dsl.semantics.terms import BOOL, Const, Term, Type
+from socialai_dsl.semantics.terms import BOOL, Const, Reading, Readings, Term, Type, all_of
 
 _LEAST, _GREATEST = -32768, 32767
 _MOST_VALUES = 6

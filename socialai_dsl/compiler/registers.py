@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from socialai_dsl.program import CELL, ENTITY_FIELDS, FIRST_ENTITY, Field, RegisterName
-from socialai_dsl.semantics.build import may_find_nothing
 from socialai_dsl.semantics.plans import Checked, Drawn, Entity, FramePlan, MemoryPlan
-from socialai_dsl.semantics.terms import ACTION, BOOL, Type
+from socialai_dsl.semantics.terms import ACTION, BOOL, Type, may_find_nothing
 from socialai_dsl.vocabulary import FINISHED
 
 NOWHERE = CELL - 1

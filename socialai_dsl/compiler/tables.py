@@ -22,7 +22,7 @@ from socialai_dsl.program import (
     TypeColumn,
     pack_cell,
 )
-from socialai_dsl.semantics.geometry import interior_cells
+from socialai_dsl.semantics.free_cells import interior_cells
 from socialai_dsl.semantics.plans import Checked, Entity, RoomPlan
 from socialai_dsl.semantics.terms import ObjectType
 from socialai_dsl.vocabulary import ACTIONS, COLORS, EMPTY, NPC, WALL

@@ -24,8 +24,7 @@ from socialai_dsl.program import EntityColumn, Header, LineColumn, Program, Regi
 from socialai_dsl.program_suite import ProgramSuite
 from socialai_dsl.schema.base import Model
 from socialai_dsl.semantics.plans import Checked, FramePlan, OutcomePlan, RulePlan, StepPlan
-from socialai_dsl.semantics.readings import Readings
-from socialai_dsl.semantics.terms import Const, Read, Term
+from socialai_dsl.semantics.terms import Const, Read, Readings, Term
 from socialai_dsl.source import Span
 
 _TO_IT: Final = ("go_to", "enter")

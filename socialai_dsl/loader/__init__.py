@@ -1,7 +1,7 @@
 """From a scenario's name to plain data with positions: reading YAML, `extends` and variants."""
 
 from socialai_dsl.loader.build import KINDS
-from socialai_dsl.loader.document import Data, DataPath, Document, NodeSpan, Positions
+from socialai_dsl.loader.document import Data, Document, NodeSpan, PositionedData
 from socialai_dsl.loader.members import Member
 from socialai_dsl.loader.names import shipped_folder
 from socialai_dsl.loader.offsets import Style
@@ -12,12 +12,11 @@ from socialai_dsl.loader.resolved import Resolved, resolve, shipped_names
 __all__ = [
     "KINDS",
     "Data",
-    "DataPath",
     "Document",
     "Edit",
     "Member",
     "NodeSpan",
-    "Positions",
+    "PositionedData",
     "Resolved",
     "Style",
     "read_document",

@@ -8,11 +8,9 @@ from pathlib import Path
 from typing import TypeAlias
 
 from socialai_dsl.loader.offsets import Style, source_indices
-from socialai_dsl.source import Source, Span
+from socialai_dsl.source import DataPath, Source, Span
 
 Data: TypeAlias = "str | int | float | bool | list[Data] | dict[str, Data] | None"
-DataPath: TypeAlias = tuple[str | int, ...]
-"""Keys and list indices from the root of a document to one of its parts; () is the root."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +34,7 @@ class NodeSpan:
     end: int
 
 
-class Positions(ABC):
+class PositionedData(ABC):
     """Data whose parts know where they come from; what does not exist is where its nearest ancestor is."""
 
     data: Data
@@ -79,7 +77,7 @@ class Positions(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class Document(Positions):
+class Document(PositionedData):
     """One YAML file as plain data.
 
     Attributes:

@@ -8,7 +8,8 @@ from fractions import Fraction
 from typing import Final
 
 from socialai_dsl.diagnostics import DiagnosticBag
-from socialai_dsl.loader.document import Data, DataPath, Positions
+from socialai_dsl.loader.document import Data, PositionedData
+from socialai_dsl.source import DataPath
 
 NODE_KEYS: Final = ("about", "scenario", "set", "remove", "add", "layout")
 """Keys of a value in a tree; every other key is a parameter below it."""
@@ -45,7 +46,7 @@ def label_of(value: Data) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def leaves_of(tree: Data, places: Positions, found: DiagnosticBag) -> tuple[Leaf, ...]:
+def leaves_of(tree: Data, places: PositionedData, found: DiagnosticBag) -> tuple[Leaf, ...]:
     """The leaves of a tree of the right shape, in reading order; reports S004, S107 and S213.
 
     Args:
@@ -84,7 +85,7 @@ def _listed(values: Data) -> list[Data]:
     return values if isinstance(values, list) else []
 
 
-def _below(node: Data, path: DataPath, places: Positions, found: DiagnosticBag) -> list[Leaf]:
+def _below(node: Data, path: DataPath, places: PositionedData, found: DiagnosticBag) -> list[Leaf]:
     """The leaves at and below a value."""
     assert isinstance(node, dict), "internal: a value of a tree that is no mapping has no keys"
     own = Leaf(
@@ -101,7 +102,7 @@ def _below(node: Data, path: DataPath, places: Positions, found: DiagnosticBag) 
 
 
 def _values(
-    parameter: str, values: Data, path: DataPath, places: Positions, found: DiagnosticBag
+    parameter: str, values: Data, path: DataPath, places: PositionedData, found: DiagnosticBag
 ) -> list[Leaf]:
     """The leaves of one parameter: of each of its values."""
     made: list[Leaf] = []
@@ -132,7 +133,7 @@ def _values(
     return made
 
 
-def _joined(own: Leaf, one: Leaf, other: Leaf, places: Positions, found: DiagnosticBag) -> Leaf:
+def _joined(own: Leaf, one: Leaf, other: Leaf, places: PositionedData, found: DiagnosticBag) -> Leaf:
     """Two values that are drawn together below `own`; what is said deeper replaces what `own` says."""
     for word in ("scenario", "layout"):
         before, after = getattr(one, word), getattr(other, word)

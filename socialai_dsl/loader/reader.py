@@ -11,14 +11,14 @@ from typing import Any
 import yaml
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag
-from socialai_dsl.loader.document import Data, DataPath, Document, NodeSpan
+from socialai_dsl.loader.document import Data, Document, NodeSpan
 from socialai_dsl.loader.files import FORBIDDEN, checked, display_name, forbidden_character, read_source
 from socialai_dsl.loader.limits import MAX_DEPTH, MAX_EVENTS, MAX_SCALAR
 from socialai_dsl.loader.offsets import Style
 from socialai_dsl.loader.scalars import read_plain
 from socialai_dsl.loader.texts import value_at
 from socialai_dsl.loader.yaml_errors import explain
-from socialai_dsl.source import Source, Span
+from socialai_dsl.source import DataPath, Source, Span
 
 # Only the event stream of libyaml is used: its composer and PyYAML's are recursive and can be made to crash.
 _EventParser: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
 from socialai_dsl.loader.build import Build, Builder
-from socialai_dsl.loader.document import DataPath, Document, Positions
+from socialai_dsl.loader.document import Document, PositionedData
 from socialai_dsl.loader.files import is_file
 from socialai_dsl.loader.library import Library, yaml_files
 from socialai_dsl.loader.limits import MAX_CHAIN
@@ -23,10 +23,10 @@ from socialai_dsl.loader.names import (
 from socialai_dsl.loader.patches import PATCH_VERBS
 from socialai_dsl.loader.tree import Node
 from socialai_dsl.loader.variants import names_in, vary
-from socialai_dsl.source import Source, Span
+from socialai_dsl.source import DataPath, Source, Span
 
 
-class Resolved(Positions):
+class Resolved(PositionedData):
     """A scenario (or suite, npc, library) with `extends` and variants applied.
 
     Behaves like a document; its parts know in which file they were written, patches included.
@@ -51,7 +51,7 @@ class Resolved(Positions):
         self._parts = dict(build.tree.walk())
 
     @property
-    def document(self) -> Positions:
+    def document(self) -> PositionedData:
         """The data with its positions, which is this object itself."""
         return self
 
@@ -216,7 +216,7 @@ class Resolved(Positions):
             return None
         return Resolved(self._builder, build, self._given)
 
-    def patched(self, holder: Positions, path: DataPath) -> Resolved:
+    def patched(self, holder: PositionedData, path: DataPath) -> Resolved:
         """This scenario changed by the mapping (`remove`, `set`, `add`) at `path` of another file.
 
         Raises:
@@ -230,7 +230,7 @@ class Resolved(Positions):
         self._builder.patch(build, patch)
         return Resolved(self._builder, build, self._given)
 
-    def with_value(self, path: str, holder: Positions, place: DataPath) -> Resolved:
+    def with_value(self, path: str, holder: PositionedData, place: DataPath) -> Resolved:
         """This scenario with the value at `place` of another file set at a path of it.
 
         Raises:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from socialai_dsl.loader.document import Data, DataPath
+from socialai_dsl.loader.document import Data
 from socialai_dsl.loader.scalars import read_plain
+from socialai_dsl.source import DataPath
 
 _TEXTS: Final = frozenset("say hears templates about notes note skills name state goto goto_now".split())
 """Keys of the language whose values are texts or names of states."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TypeAlias
 
-from socialai_dsl.loader.document import Data, DataPath, Document
-from socialai_dsl.source import Span
+from socialai_dsl.loader.document import Data, Document
+from socialai_dsl.source import DataPath, Span
 
 Children: TypeAlias = "dict[str, Node] | list[Node] | None"
 

@@ -32,11 +32,11 @@ from socialai_dsl.schema.experiment import (
     Settings,
     Tested,
 )
-from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.schema.properties import OnlyThrough, Property
 from socialai_dsl.schema.scenario import Memory, Outcome, Parameter, Reward, Scenario, Sequence, SungWith
 from socialai_dsl.schema.suite import Entry, Split, Suite, Value, Values
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
+from socialai_dsl.source import DataPath
 
 CALLED: Final[dict[type, str]] = {
     Scenario: "a scenario",

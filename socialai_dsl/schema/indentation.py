@@ -8,8 +8,8 @@ from pydantic import BaseModel
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.schema.annotations import CALLED, annotation_at, branches, keys_of, model_at
-from socialai_dsl.schema.positions import DataPath, Positions
 from socialai_dsl.schema.repair import MovedPlaces, Repaired, part_at
+from socialai_dsl.source import DataPath, Positions
 
 _BUILDING = "extends"
 """A key that is gone when the models see a file."""

@@ -8,8 +8,7 @@ from typing import Any
 
 from socialai_dsl.diagnostics import DiagnosticBag
 from socialai_dsl.schema.behaviour import FirstRule, Step, ThenRule, WorldRule
-from socialai_dsl.schema.positions import DataPath, Positions
-from socialai_dsl.source import Span
+from socialai_dsl.source import DataPath, Positions, Span
 
 _KEYS = {key for model in (FirstRule, ThenRule, Step, WorldRule) for key in model.model_fields}
 """Keys of rules, which are mostly written inside { }."""

@@ -22,10 +22,9 @@ from socialai_dsl.schema.annotations import (
 )
 from socialai_dsl.schema.behaviour import Npc, Ranged, State, ThenRule
 from socialai_dsl.schema.indentation import mend_indentation
-from socialai_dsl.schema.positions import DataPath, Positions
 from socialai_dsl.schema.repair import MovedPlaces, Repaired, copied, fill_gaps, part_at
 from socialai_dsl.schema.scenario import Scenario
-from socialai_dsl.source import Span
+from socialai_dsl.source import DataPath, Positions, Span
 
 M = TypeVar("M", bound=BaseModel)
 

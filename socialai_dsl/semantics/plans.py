@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from socialai_dsl.semantics.readings import Readings
-from socialai_dsl.semantics.terms import Line, ObjectType, Pattern, Read, Sited, Term, Type
+from socialai_dsl.semantics.terms import Line, ObjectType, Pattern, Read, Readings, Sited, Term, Type
 from socialai_dsl.source import Span
 
 # --- places -----------------------------------------------------------------------------------------------------

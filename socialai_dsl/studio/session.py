@@ -188,7 +188,7 @@ class Session:
     def check(self, path: str, text: str, seconds: float = 20.0) -> Reply:
         """What `socialai check` says of a text."""
         from socialai_dsl.analysis.effort import Clock, Effort
-        from socialai_dsl.checking import LoadedScenario
+        from socialai_dsl.checking.loaded import LoadedScenario
         from socialai_dsl.cli.check import check_scenario
 
         try:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from socialai_dsl.checking import LoadedSuite
+from socialai_dsl.checking.loaded import LoadedSuite
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import check, load
 from socialai_dsl.loader import read_document

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import socialai_dsl as sd
-from socialai_dsl.checking import LoadedSuite
+from socialai_dsl.checking.loaded import LoadedSuite
 from socialai_dsl.grammar import ast, parse_expression, unparse
 
 ROOT = Path(__file__).parents[3]

@@ -1,4 +1,4 @@
-"""Positions: of keys, of values, and of single characters inside every kind of scalar."""
+"""PositionedData: of keys, of values, and of single characters inside every kind of scalar."""
 
 from __future__ import annotations
 
