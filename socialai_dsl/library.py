@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field
 
 from socialai_dsl.loader import read_document
 from socialai_dsl.schema import UtteranceGrammar
-from socialai_dsl.schema.base import Model, Word
+from socialai_dsl.schema.scenario import Model, Word
 from socialai_dsl.semantics.entities import Prelude
 from socialai_dsl.semantics.terms import COLOR, ObjectType
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from socialai_dsl.compiler import compile_scenario
+from socialai_dsl.compilation import compile_scenario
 from socialai_dsl.frontend import load
 from socialai_dsl.program import FrameColumn, Header, Program
 from socialai_dsl.semantics import plans, terms

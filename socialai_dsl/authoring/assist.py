@@ -15,8 +15,8 @@ from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_
 from socialai_dsl.loader import Data, Document
 from socialai_dsl.loader.library import yaml_files
 from socialai_dsl.schema.annotations import annotation_at, literals, model_at
-from socialai_dsl.schema.behaviour import CastGroup
 from socialai_dsl.schema.files import ExperimentFile, NpcFile, ScenarioFile, SuiteFile, VariantFile
+from socialai_dsl.schema.scenario import CastGroup
 from socialai_dsl.semantics.signatures import (
     ACTIVITIES,
     EFFECTS,

@@ -8,7 +8,7 @@ from socialai_dsl.cli.sheets_text import code, entries, flow, frame, items, rule
 
 if TYPE_CHECKING:
     from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
-    from socialai_dsl.schema.behaviour import CastMember
+    from socialai_dsl.schema.scenario import CastMember
 
 _GENERATED: Final = "<!-- Written by `socialai sheets`; change the scenario's file and run it again. -->"
 _FILES: Final = "../../scenarios"

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from socialai_dsl.compiler.assembler import Label, constant
-from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.compiler.lines import Lines
-from socialai_dsl.compiler.registers import NOWHERE, entity_register, label
+from socialai_dsl.compiler.assembler import NOWHERE, Label, constant, entity_register, label
+from socialai_dsl.compiler.expressions import Expressions, Lines
 from socialai_dsl.program import MOST_CHOICES, Body, Field, Op
 from socialai_dsl.semantics.plans import Activity, Checked
 from socialai_dsl.semantics.terms import BOOL, CellOf, Const, FieldOf, Measure, ObjectType, Read, Term

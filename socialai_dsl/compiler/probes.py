@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from socialai_dsl.compiler.assembler import Label, constant
+from socialai_dsl.compiler.assembler import Label, Registers, constant, label, state_names
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import fold, mentions
-from socialai_dsl.compiler.registers import Registers, label, state_names
-from socialai_dsl.grammar import unparse
+from socialai_dsl.compiler.lowering import Asked, Probes
+from socialai_dsl.grammar.parser import unparse
 from socialai_dsl.program import Op, Program, RegisterName
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import Checked, OutcomePlan, RulePlan, StepPlan
@@ -79,44 +79,6 @@ class Probed:
     first: int
     rules: dict[int, Probe]
     outcomes: dict[int, Probe]
-
-
-class Asked:
-    """What a rule asks, while its code is emitted. This one notes nothing."""
-
-    def unless(self, key: str, otherwise: Label) -> Label:
-        """Where to skip to if what is written under a key does not hold; `otherwise` is where the rule ends."""
-        return otherwise
-
-    def nothing(self, key: str, otherwise: Label) -> Label:
-        """Where to skip to if a value finds nothing."""
-        return otherwise
-
-    def condition(self, to: Expressions, key: str, sited: terms.Sited, otherwise: Label) -> None:
-        """Emit a condition."""
-        to.sited_condition(sited, otherwise)
-
-    def report(self, to: Expressions, otherwise: Label) -> None:
-        """Emit what notes the parts that are false, right before `otherwise`."""
-
-
-class Probes:
-    """Gives out what notes the rules. This one notes nothing, so that a program is what it would be without."""
-
-    recording = False
-    """Whether every rule is asked, also one that cannot hold."""
-
-    def rule(self, to: Expressions, counter: int, plan: RulePlan | StepPlan, entity: int | None) -> Asked:
-        """For the code of a rule or an entry of `steps` of a member of the cast; None: of the world."""
-        return _NOTHING_NOTED
-
-    def outcome(self, to: Expressions, number: int, plan: OutcomePlan) -> Asked:
-        """For the code of an outcome."""
-        return _NOTHING_NOTED
-
-
-_NOTHING_NOTED = Asked()
-NO_PROBES = Probes()
 
 
 class Recorder(Probes):

@@ -6,10 +6,8 @@ from itertools import product
 
 import numpy as np
 
-from socialai_dsl.compiler.allocation import Allocation
-from socialai_dsl.compiler.behaviour import FrameCode
-from socialai_dsl.compiler.lowering import Lowered
-from socialai_dsl.compiler.registers import state_names
+from socialai_dsl.compiler.assembler import state_names
+from socialai_dsl.compiler.lowering import Allocation, FrameCode, Lowered
 from socialai_dsl.program import (
     EntityColumn,
     EntityName,

@@ -22,7 +22,7 @@ from socialai_dsl.envs.values import shown, utterance_text
 from socialai_dsl.envs.ways import Moment
 from socialai_dsl.program import EntityColumn, Header, LineColumn, Program, Register
 from socialai_dsl.program_suite import ProgramSuite
-from socialai_dsl.schema.base import Model
+from socialai_dsl.schema.scenario import Model
 from socialai_dsl.semantics.plans import Checked, FramePlan, OutcomePlan, RulePlan, StepPlan
 from socialai_dsl.semantics.terms import Const, Read, Readings, Term
 from socialai_dsl.source import Span

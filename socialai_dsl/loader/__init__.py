@@ -1,13 +1,11 @@
 """From a scenario's name to plain data with positions: reading YAML, `extends` and variants."""
 
-from socialai_dsl.loader.build import KINDS
-from socialai_dsl.loader.document import Data, Document, NodeSpan, PositionedData
+from socialai_dsl.loader.library import shipped_folder
 from socialai_dsl.loader.members import Member
-from socialai_dsl.loader.names import shipped_folder
 from socialai_dsl.loader.offsets import Style
 from socialai_dsl.loader.patches import Edit
-from socialai_dsl.loader.reader import read_document
-from socialai_dsl.loader.resolved import Resolved, resolve, shipped_names
+from socialai_dsl.loader.reader import Data, Document, NodeSpan, PositionedData, read_document
+from socialai_dsl.loader.resolved import KINDS, Resolved, resolve, shipped_names
 
 __all__ = [
     "KINDS",

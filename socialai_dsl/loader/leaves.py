@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Final
 
 from socialai_dsl.diagnostics import DiagnosticBag
-from socialai_dsl.loader.document import Data, PositionedData
+from socialai_dsl.loader.reader import Data, PositionedData
 from socialai_dsl.source import DataPath
 
 NODE_KEYS: Final = ("about", "scenario", "set", "remove", "add", "layout")

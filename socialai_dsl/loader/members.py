@@ -8,8 +8,8 @@ from fractions import Fraction
 from itertools import product
 
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
-from socialai_dsl.loader.document import Data
 from socialai_dsl.loader.leaves import MAX_LEAVES, Leaf, label_of, leaves_of, parameters_of
+from socialai_dsl.loader.reader import Data
 from socialai_dsl.loader.resolved import Resolved
 from socialai_dsl.source import DataPath
 

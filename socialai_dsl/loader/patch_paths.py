@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from socialai_dsl.diagnostics import did_you_mean
-from socialai_dsl.loader.tree import Node
+from socialai_dsl.loader.library import Node
 
 _INDEX: Final = re.compile(r"\[([^\[\]]*)\]")
 _KEY: Final = re.compile(r"[^.\[\]()]+(?:\([^()]*\))?")

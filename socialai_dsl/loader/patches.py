@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, did_you_mean
-from socialai_dsl.loader.limits import MAX_PATCH_PATH
+from socialai_dsl.loader.library import Node
 from socialai_dsl.loader.patch_paths import Miss, Place, follow, missing
-from socialai_dsl.loader.tree import Node
+from socialai_dsl.loader.reader import MAX_PATCH_PATH
 from socialai_dsl.source import Span
 
 VARIANT_KEYS: Final = ("variant", "of", "about", "notes", "skills", "remove", "set", "add")

@@ -9,7 +9,7 @@ from typing import Any, cast
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema import FirstRule, Rule, State, Step, ThenRule, WorldRule
-from socialai_dsl.schema.behaviour import Effects
+from socialai_dsl.schema.scenario import Effects
 from socialai_dsl.semantics import groups, object_facts, texts
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.findings import (
@@ -22,7 +22,7 @@ from socialai_dsl.semantics.findings import (
     wrong_count,
 )
 from socialai_dsl.semantics.groups import performed
-from socialai_dsl.semantics.plans import Activity, Effect, FramePlan, RulePlan, StatePlan, StepPlan
+from socialai_dsl.semantics.plans import FOR_EVER, Activity, Effect, FramePlan, RulePlan, StatePlan, StepPlan
 from socialai_dsl.semantics.resolve_names import status_of
 from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
 from socialai_dsl.semantics.scope import Draws, PlayedFrame, Scope, at_every_step, reset_scope
@@ -295,8 +295,6 @@ def _new_status(
 
 # -- frames --------------------------------------------------------------------------------------------------
 
-
-_FOR_EVER = -1
 
 ANYTHING = "any"
 """`hears: any` is whatever anybody says."""
@@ -573,7 +571,7 @@ class _Planner:
         if raw is None:
             return None, None
         if raw == "ever":
-            return _FOR_EVER, None
+            return FOR_EVER, None
         findings, horizon = self.resolver.findings, self.resolver.symbols.scenario.horizon
         try:
             term = self.resolver.written(path, raw, INT, self._scope(path, site))  # type: ignore[arg-type]

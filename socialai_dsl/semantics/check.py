@@ -10,8 +10,7 @@ from typing import Final, Literal, get_args
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, did_you_mean
 from socialai_dsl.schema import Property, Scenario, Sequence
-from socialai_dsl.schema.base import Expression
-from socialai_dsl.schema.world import CHANNELS
+from socialai_dsl.schema.scenario import CHANNELS, Expression
 from socialai_dsl.semantics import behaviour, entities, groups, object_facts, possible, setup
 from socialai_dsl.semantics.entities import AGENT, Prelude, entities_of
 from socialai_dsl.semantics.findings import FailedError, Findings, Scalar, dotted, surviving

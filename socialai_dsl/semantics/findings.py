@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
-from socialai_dsl.grammar import ParseProblem, ast, parse_expression, parse_text
-from socialai_dsl.grammar.unparse import unparse
+from socialai_dsl.grammar import ast
+from socialai_dsl.grammar.ast import rebuilt
+from socialai_dsl.grammar.parser import ParseProblem, parse_expression, parse_text, unparse
 from socialai_dsl.semantics.signatures import Signature
 from socialai_dsl.semantics.terms import SIDE, TURN, Type
 from socialai_dsl.source import DataPath, Positions, Span
-from socialai_dsl.trees import rebuilt
 
 Scalar = int | bool | float | str
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from socialai_dsl.diagnostics import did_you_mean
-from socialai_dsl.grammar import ParseProblem, ast, parse_expression
+from socialai_dsl.grammar import ast
+from socialai_dsl.grammar.parser import ParseProblem, parse_expression
 from socialai_dsl.schema import Frame, Scenario
-from socialai_dsl.schema.behaviour import Effects, Ranged
+from socialai_dsl.schema.scenario import Effects, Ranged
 from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.findings import FailedError, quoted, surviving, with_article
 from socialai_dsl.semantics.plans import Activity, BeliefPlan, Computed, FramePlan, StatePlan

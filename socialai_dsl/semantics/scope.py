@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema import CastMember, Frame, Scenario
-from socialai_dsl.schema.base import Expression
+from socialai_dsl.schema.scenario import Expression
 from socialai_dsl.semantics.findings import dotted, spoken
 from socialai_dsl.semantics.terms import Compare, Const, ObjectType, Select, Term, Type, all_of, one_of
 from socialai_dsl.source import DataPath

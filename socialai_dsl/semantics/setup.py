@@ -10,7 +10,7 @@ from typing import Literal
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema import CastMember, ObjectGroup, Scenario
-from socialai_dsl.schema.base import Expression
+from socialai_dsl.schema.scenario import Expression
 from socialai_dsl.semantics import groups, object_facts
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.findings import FailedError, Findings, quoted, surviving

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from itertools import product
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
+from socialai_dsl.grammar.ast import every
 from socialai_dsl.schema import Scenario
 from socialai_dsl.schema.suite import Suite
 from socialai_dsl.semantics.plans import Checked, FramePlan
 from socialai_dsl.semantics.resolver import texts_of
 from socialai_dsl.semantics.terms import Line, Pattern
 from socialai_dsl.source import Positions
-from socialai_dsl.trees import every
 from socialai_dsl.vocabulary import PRIMITIVES, normal
 
 

@@ -6,11 +6,10 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from socialai_dsl import trees
 from socialai_dsl.grammar import ast
+from socialai_dsl.grammar.ast import Leaf
 from socialai_dsl.schema import Outcome, Rule, Step, WorldRule
 from socialai_dsl.source import Span
-from socialai_dsl.trees import Leaf
 from socialai_dsl.vocabulary import ACTIONS, COLORS, DIRECTIONS, SIDES, TURNS
 
 Kind = Literal[
@@ -519,12 +518,12 @@ def changed(value: Any, change: Callable[[Term], Term | None]) -> Any:
     if isinstance(value, tuple):
         return tuple(changed(part, change) for part in value)
     other = change(value) if isinstance(value, Term) else None
-    return other if other is not None else trees.rebuilt(value, lambda part: changed(part, change))
+    return other if other is not None else ast.rebuilt(value, lambda part: changed(part, change))
 
 
 def walk(tree: Any) -> Iterator[Term]:
     """All terms in a term, a plan or a tuple of them, depth first."""
-    return (node for node in trees.walk(tree) if isinstance(node, Term))
+    return (node for node in ast.walk(tree) if isinstance(node, Term))
 
 
 def draws(term: Term) -> bool:

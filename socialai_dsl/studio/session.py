@@ -19,7 +19,7 @@ from socialai_dsl.engine.errors import RoomError
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.frontend import Loaded, check, load
 from socialai_dsl.library import prelude
-from socialai_dsl.loader.files import display_name
+from socialai_dsl.loader.reader import display_name
 from socialai_dsl.program_suite import unscripted
 from socialai_dsl.replay import Thought, Tracer
 from socialai_dsl.replay.page import replay_page

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from socialai_dsl.compiler.changes import Changes, When
+from socialai_dsl.compiler.folding import Changes, When
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.program import EntityColumn, Flag, Header, Program, TypeColumn
 from socialai_dsl.semantics.plans import Checked, Computed, StepPlan
