@@ -15,7 +15,7 @@ from socialai_dsl.compiler.assembler import Label, Registers, constant, label, s
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import fold, mentions
 from socialai_dsl.compiler.lowering import Asked, Probes
-from socialai_dsl.grammar.parser import unparse
+from socialai_dsl.grammar.ast import unparse
 from socialai_dsl.program import Op, Program, RegisterName
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import Checked, OutcomePlan, RulePlan, StepPlan

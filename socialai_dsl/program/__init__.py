@@ -56,7 +56,6 @@ from socialai_dsl.program.format import (
     Side,
     TypeColumn,
     pack_cell,
-    room_words,
 )
 from socialai_dsl.program.instructions import (
     CLASS_BITS,
@@ -68,6 +67,7 @@ from socialai_dsl.program.program import (
     Outcome,
     Program,
     RegisterName,
+    room_words,
 )
 
 __all__ = [

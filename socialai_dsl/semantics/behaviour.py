@@ -12,20 +12,24 @@ from socialai_dsl.schema import FirstRule, Rule, State, Step, ThenRule, WorldRul
 from socialai_dsl.schema.scenario import Effects
 from socialai_dsl.semantics import groups, object_facts, texts
 from socialai_dsl.semantics.entities import AGENT
-from socialai_dsl.semantics.findings import (
-    FailedError,
-    described,
-    dotted,
-    quoted,
-    surviving,
-    with_article,
-    wrong_count,
-)
 from socialai_dsl.semantics.groups import performed
 from socialai_dsl.semantics.plans import FOR_EVER, Activity, Effect, FramePlan, RulePlan, StatePlan, StepPlan
 from socialai_dsl.semantics.resolve_names import status_of
 from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
-from socialai_dsl.semantics.scope import Draws, PlayedFrame, Scope, at_every_step, reset_scope
+from socialai_dsl.semantics.scope import (
+    Draws,
+    FailedError,
+    PlayedFrame,
+    Scope,
+    at_every_step,
+    described,
+    dotted,
+    quoted,
+    reset_scope,
+    surviving,
+    with_article,
+    wrong_count,
+)
 from socialai_dsl.semantics.signatures import ACTIVITIES, EFFECTS, SYNONYMS
 from socialai_dsl.semantics.terms import (
     ACTION,

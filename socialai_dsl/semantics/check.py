@@ -13,7 +13,6 @@ from socialai_dsl.schema import Property, Scenario, Sequence
 from socialai_dsl.schema.scenario import CHANNELS, Expression
 from socialai_dsl.semantics import behaviour, entities, groups, object_facts, possible, setup
 from socialai_dsl.semantics.entities import AGENT, Prelude, entities_of
-from socialai_dsl.semantics.findings import FailedError, Findings, Scalar, dotted, surviving
 from socialai_dsl.semantics.free_cells import check_absences, check_placements
 from socialai_dsl.semantics.groups import performs
 from socialai_dsl.semantics.plans import Checked, Drawn, FramePlan, OutcomePlan, PropertyPlan
@@ -28,7 +27,17 @@ from socialai_dsl.semantics.resolver import (
     texts_of,
     words_in_order,
 )
-from socialai_dsl.semantics.scope import PlayedFrame, at_every_step, frames_of, reset_scope
+from socialai_dsl.semantics.scope import (
+    FailedError,
+    Findings,
+    PlayedFrame,
+    Scalar,
+    at_every_step,
+    dotted,
+    frames_of,
+    reset_scope,
+    surviving,
+)
 from socialai_dsl.semantics.setup import room_plan, room_sizes
 from socialai_dsl.semantics.terms import (
     BOOL,

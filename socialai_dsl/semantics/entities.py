@@ -12,7 +12,6 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.schema import CastMember, Frame, ObjectGroup, Ranged, Scenario, Sequence
 from socialai_dsl.schema.scenario import Expression
 from socialai_dsl.semantics import groups, object_facts, texts
-from socialai_dsl.semantics.findings import Findings, dotted, surviving, with_article
 from socialai_dsl.semantics.object_facts import initial
 from socialai_dsl.semantics.plans import Entity
 from socialai_dsl.semantics.resolve_names import slot_truth
@@ -20,15 +19,19 @@ from socialai_dsl.semantics.resolver import ANY_TEXT, ENTITY, INT, Declaration, 
 from socialai_dsl.semantics.scope import (
     Define,
     Draws,
+    Findings,
     Objects,
     PlayedFrame,
     Scope,
     Symbols,
     at_every_step,
+    dotted,
     frames_of,
     parse_define,
     reset_scope,
     select,
+    surviving,
+    with_article,
 )
 from socialai_dsl.semantics.signatures import WORDS
 from socialai_dsl.semantics.terms import (

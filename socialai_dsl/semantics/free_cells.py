@@ -11,8 +11,8 @@ from random import Random
 from typing import Final
 
 from socialai_dsl.semantics import plans, terms
-from socialai_dsl.semantics.findings import Findings
 from socialai_dsl.semantics.plans import Checked, Placing, Region
+from socialai_dsl.semantics.scope import Findings
 from socialai_dsl.semantics.terms import Const, Term, compute, walk
 
 EXACT: Final = frozenset({"column", "row", "rect"})

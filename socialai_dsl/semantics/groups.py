@@ -9,10 +9,21 @@ from typing import Literal, cast
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema import Frame, Sequence
-from socialai_dsl.semantics.findings import FailedError, described, quoted, spoken, surviving, usage
 from socialai_dsl.semantics.plans import MemoryPlan
 from socialai_dsl.semantics.resolver import ANY_TEXT, ENTITY, INT, Resolver
-from socialai_dsl.semantics.scope import Draws, Macro, Scope, at_every_step, reset_scope
+from socialai_dsl.semantics.scope import (
+    Draws,
+    FailedError,
+    Macro,
+    Scope,
+    at_every_step,
+    described,
+    quoted,
+    reset_scope,
+    spoken,
+    surviving,
+    usage,
+)
 from socialai_dsl.semantics.signatures import QUANTIFIERS, WORDS, Signature
 from socialai_dsl.semantics.terms import (
     ACTION,

@@ -10,8 +10,13 @@ from typing import Any, cast
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups, object_facts, resolve_names, texts
-from socialai_dsl.semantics.findings import (
+from socialai_dsl.semantics.groups import check_moment, check_points, check_toggled, must_be_agent, subject_of
+from socialai_dsl.semantics.resolve_names import toggled_by, without_arguments
+from socialai_dsl.semantics.resolver import ENTITY, INT, WORDED, Resolver, same_kind, text_value
+from socialai_dsl.semantics.scope import (
+    Draws,
     FailedError,
+    Scope,
     described,
     quoted,
     spoken,
@@ -19,10 +24,6 @@ from socialai_dsl.semantics.findings import (
     usage,
     wrong_count,
 )
-from socialai_dsl.semantics.groups import check_moment, check_points, check_toggled, must_be_agent, subject_of
-from socialai_dsl.semantics.resolve_names import toggled_by, without_arguments
-from socialai_dsl.semantics.resolver import ENTITY, INT, WORDED, Resolver, same_kind, text_value
-from socialai_dsl.semantics.scope import Draws, Scope
 from socialai_dsl.semantics.signatures import (
     ACTIVITIES,
     EFFECTS,

@@ -10,18 +10,25 @@ from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema import Sequence
 from socialai_dsl.semantics import object_facts, texts
-from socialai_dsl.semantics.findings import (
+from socialai_dsl.semantics.groups import check_moment, check_points, check_toggled, must_be_agent, subject_of
+from socialai_dsl.semantics.resolver import VOCABULARIES, Resolver
+from socialai_dsl.semantics.scope import (
+    Define,
+    Draws,
     FailedError,
+    Macro,
+    PlayedFrame,
+    Scope,
     as_text,
+    by_value,
     described,
+    drawn,
+    of_each,
     quoted,
     usage,
     with_article,
     words_of,
 )
-from socialai_dsl.semantics.groups import check_moment, check_points, check_toggled, must_be_agent, subject_of
-from socialai_dsl.semantics.resolver import VOCABULARIES, Resolver
-from socialai_dsl.semantics.scope import Define, Draws, Macro, PlayedFrame, Scope, by_value, drawn, of_each
 from socialai_dsl.semantics.signatures import (
     ACTIVITIES,
     EFFECTS,

@@ -11,9 +11,20 @@ from typing import Final, Protocol
 
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema import Scenario, UtteranceGrammar
-from socialai_dsl.semantics.findings import FailedError, Findings, Scalar, described, quoted, spoken, words_of
 from socialai_dsl.semantics.plans import Drawn
-from socialai_dsl.semantics.scope import PlayedFrame, Scope, Symbols, select
+from socialai_dsl.semantics.scope import (
+    FailedError,
+    Findings,
+    PlayedFrame,
+    Scalar,
+    Scope,
+    Symbols,
+    described,
+    quoted,
+    select,
+    spoken,
+    words_of,
+)
 from socialai_dsl.semantics.signatures import VALUES, WORDS
 from socialai_dsl.semantics.terms import (
     ACTION,

@@ -13,10 +13,20 @@ from socialai_dsl.schema import CastMember, ObjectGroup, Scenario
 from socialai_dsl.schema.scenario import Expression
 from socialai_dsl.semantics import groups, object_facts
 from socialai_dsl.semantics.entities import AGENT
-from socialai_dsl.semantics.findings import FailedError, Findings, quoted, surviving
 from socialai_dsl.semantics.plans import Coloring, Drawn, Facing, Placing, Region, RoomPlan, Setup
 from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
-from socialai_dsl.semantics.scope import Objects, Scope, by_value, drawn, object_scope, reset_scope
+from socialai_dsl.semantics.scope import (
+    FailedError,
+    Findings,
+    Objects,
+    Scope,
+    by_value,
+    drawn,
+    object_scope,
+    quoted,
+    reset_scope,
+    surviving,
+)
 from socialai_dsl.semantics.signatures import PLACES
 from socialai_dsl.semantics.terms import (
     BOOL,

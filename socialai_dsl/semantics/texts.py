@@ -11,11 +11,20 @@ from typing import TypeGuard
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups
-from socialai_dsl.semantics.findings import FailedError, described, quoted, spoken
 from socialai_dsl.semantics.groups import must_be_agent, subject_of, values_of
 from socialai_dsl.semantics.plans import RulePlan
 from socialai_dsl.semantics.resolver import MAX_TEXTS, Resolver
-from socialai_dsl.semantics.scope import Draws, Scope, by_value, drawn, select
+from socialai_dsl.semantics.scope import (
+    Draws,
+    FailedError,
+    Scope,
+    by_value,
+    described,
+    drawn,
+    quoted,
+    select,
+    spoken,
+)
 from socialai_dsl.semantics.signatures import VALUES
 from socialai_dsl.semantics.terms import (
     Compare,

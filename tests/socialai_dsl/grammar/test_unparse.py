@@ -10,7 +10,7 @@ import pytest
 import socialai_dsl as sd
 from socialai_dsl.checking.loaded import LoadedSuite
 from socialai_dsl.grammar import ast
-from socialai_dsl.grammar.parser import parse_expression, unparse
+from socialai_dsl.grammar.ast import parse_expression, unparse
 
 ROOT = Path(__file__).parents[3]
 
