@@ -28,11 +28,11 @@ from socialai_dsl.diagnostics import (
     bounded_suggestions,
     did_you_mean,
 )
-from socialai_dsl.loader import Data, Resolved, read_document, resolve
 from socialai_dsl.loader.comments import comments_of
 from socialai_dsl.loader.offsets import Style
-from socialai_dsl.loader.reader import display_name
-from socialai_dsl.schema import Scenario
+from socialai_dsl.loader.reader import Data, display_name, read_document
+from socialai_dsl.loader.resolved import Resolved, resolve
+from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.semantics.plans import Checked
 from socialai_dsl.source import DataPath, Source, Span
 

@@ -16,8 +16,8 @@ from socialai_dsl import frontend
 from socialai_dsl.authoring import assist
 from socialai_dsl.authoring.formatting import formatted
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity
-from socialai_dsl.loader import Document, Resolved, read_document
-from socialai_dsl.loader.reader import display_name
+from socialai_dsl.loader.reader import Document, display_name, read_document
+from socialai_dsl.loader.resolved import Resolved
 from socialai_dsl.source import Source, Span
 
 _SEVERITIES: Final = {

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from socialai_dsl.diagnostics import Diagnostic
-from socialai_dsl.loader import Resolved
-from socialai_dsl.schema import Scenario
+from socialai_dsl.loader.resolved import Resolved
+from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.schema.suite import Suite
 from socialai_dsl.semantics.plans import Checked
 from socialai_dsl.semantics.suite import SharedSpace

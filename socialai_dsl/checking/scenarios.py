@@ -9,9 +9,9 @@ from typing import Any, Final
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity, did_you_mean
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
-from socialai_dsl.loader import Data, Resolved
-from socialai_dsl.loader.reader import read_plain
-from socialai_dsl.schema import CastMember, Npc, Scenario
+from socialai_dsl.loader.reader import Data, read_plain
+from socialai_dsl.loader.resolved import Resolved
+from socialai_dsl.schema.scenario import CastMember, Npc, Scenario
 from socialai_dsl.schema.shape import PARAMETER, Shaped, model_of
 from socialai_dsl.semantics.check import check_meaning
 from socialai_dsl.semantics.plans import Checked

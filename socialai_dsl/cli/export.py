@@ -136,8 +136,7 @@ class Moved:
             UsageError: one lies outside the scenario's folder and what ships.
         """
         from socialai_dsl.diagnostics import DiagnosticBag
-        from socialai_dsl.loader import shipped_folder
-        from socialai_dsl.loader.library import name_source, parse_name
+        from socialai_dsl.loader.library import name_source, parse_name, shipped_folder
 
         source = name_source(spec)
         start = source.span(0, 1)

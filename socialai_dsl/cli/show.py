@@ -9,7 +9,7 @@ from socialai_dsl.cli.errors import Exit
 from socialai_dsl.diagnostics import printable
 
 if TYPE_CHECKING:
-    from socialai_dsl.loader import Resolved
+    from socialai_dsl.loader.resolved import Resolved
 
 SUMMARY: Final = "print a scenario after extends and variants, or the program it compiles to"
 

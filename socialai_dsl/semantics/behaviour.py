@@ -8,8 +8,7 @@ from typing import Any, cast
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.schema import FirstRule, Rule, State, Step, ThenRule, WorldRule
-from socialai_dsl.schema.scenario import Effects
+from socialai_dsl.schema.scenario import Effects, FirstRule, Rule, State, Step, ThenRule, WorldRule
 from socialai_dsl.semantics import groups, object_facts, texts
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.groups import performed

@@ -9,8 +9,7 @@ from operator import itemgetter
 from typing import Final, Literal, get_args
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, did_you_mean
-from socialai_dsl.schema import Property, Scenario, Sequence
-from socialai_dsl.schema.scenario import CHANNELS, Expression
+from socialai_dsl.schema.scenario import CHANNELS, Expression, Property, Scenario, Sequence
 from socialai_dsl.semantics import behaviour, entities, groups, object_facts, possible, setup
 from socialai_dsl.semantics.entities import AGENT, Prelude, entities_of
 from socialai_dsl.semantics.free_cells import check_absences, check_placements

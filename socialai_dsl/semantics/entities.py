@@ -9,8 +9,15 @@ from dataclasses import dataclass, field, replace
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.schema import CastMember, Frame, ObjectGroup, Ranged, Scenario, Sequence
-from socialai_dsl.schema.scenario import Expression
+from socialai_dsl.schema.scenario import (
+    CastMember,
+    Expression,
+    Frame,
+    ObjectGroup,
+    Ranged,
+    Scenario,
+    Sequence,
+)
 from socialai_dsl.semantics import groups, object_facts, texts
 from socialai_dsl.semantics.object_facts import initial
 from socialai_dsl.semantics.plans import Entity

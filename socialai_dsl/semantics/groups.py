@@ -8,7 +8,7 @@ from typing import Literal, cast
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.schema import Frame, Sequence
+from socialai_dsl.schema.scenario import Frame, Sequence
 from socialai_dsl.semantics.plans import MemoryPlan
 from socialai_dsl.semantics.resolver import ANY_TEXT, ENTITY, INT, Resolver
 from socialai_dsl.semantics.scope import (

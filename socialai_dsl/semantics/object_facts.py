@@ -9,8 +9,7 @@ from itertools import pairwise
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import ParseProblem, parse_expression
-from socialai_dsl.schema import Frame, Scenario
-from socialai_dsl.schema.scenario import Effects, Ranged
+from socialai_dsl.schema.scenario import Effects, Frame, Ranged, Scenario
 from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.plans import Activity, BeliefPlan, Computed, FramePlan, StatePlan
 from socialai_dsl.semantics.resolver import ENTITY, Declaration, Resolver

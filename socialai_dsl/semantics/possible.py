@@ -10,7 +10,7 @@ from itertools import product
 from typing import Final
 
 from socialai_dsl.diagnostics import did_you_mean
-from socialai_dsl.schema import Frame, Scenario, State
+from socialai_dsl.schema.scenario import Frame, Scenario, State
 from socialai_dsl.semantics import plans, terms
 from socialai_dsl.semantics.plans import Checked, Effect, FramePlan, RulePlan
 from socialai_dsl.semantics.scope import Findings, frames_of

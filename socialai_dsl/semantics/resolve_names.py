@@ -8,7 +8,7 @@ from itertools import chain, pairwise
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.schema import Sequence
+from socialai_dsl.schema.scenario import Sequence
 from socialai_dsl.semantics import object_facts, texts
 from socialai_dsl.semantics.groups import check_moment, check_points, check_toggled, must_be_agent, subject_of
 from socialai_dsl.semantics.resolver import VOCABULARIES, Resolver

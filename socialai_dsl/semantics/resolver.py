@@ -10,7 +10,7 @@ from itertools import chain, islice, product
 from typing import Final, Protocol
 
 from socialai_dsl.grammar import ast
-from socialai_dsl.schema import Scenario, UtteranceGrammar
+from socialai_dsl.schema.scenario import Scenario, UtteranceGrammar
 from socialai_dsl.semantics.plans import Drawn
 from socialai_dsl.semantics.scope import (
     FailedError,

@@ -13,8 +13,7 @@ from typing import Any, Final, TypeVar
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import ParseProblem, parse_expression, parse_text, rebuilt, unparse
-from socialai_dsl.schema import CastMember, Frame, Scenario
-from socialai_dsl.schema.scenario import Expression
+from socialai_dsl.schema.scenario import CastMember, Expression, Frame, Scenario
 from socialai_dsl.semantics.signatures import Signature
 from socialai_dsl.semantics.terms import (
     SIDE,

@@ -9,8 +9,7 @@ from typing import Literal
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.schema import CastMember, ObjectGroup, Scenario
-from socialai_dsl.schema.scenario import Expression
+from socialai_dsl.schema.scenario import CastMember, Expression, ObjectGroup, Scenario
 from socialai_dsl.semantics import groups, object_facts
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.plans import Coloring, Drawn, Facing, Placing, Region, RoomPlan, Setup

@@ -8,7 +8,7 @@ from itertools import product
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.grammar.ast import every
-from socialai_dsl.schema import Scenario
+from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.schema.suite import Suite
 from socialai_dsl.semantics.plans import Checked, FramePlan
 from socialai_dsl.semantics.resolver import texts_of

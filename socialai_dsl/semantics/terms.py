@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import Leaf
-from socialai_dsl.schema import Outcome, Rule, Step, WorldRule
+from socialai_dsl.schema.scenario import Outcome, Rule, Step, WorldRule
 from socialai_dsl.source import Span
 from socialai_dsl.vocabulary import ACTIONS, COLORS, DIRECTIONS, SIDES, TURNS
 

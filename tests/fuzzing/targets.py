@@ -14,9 +14,9 @@ import yaml
 from socialai_dsl.diagnostics import CODES, Diagnostic, ScenarioError, Severity, render_text, to_json
 from socialai_dsl.frontend import check
 from socialai_dsl.grammar.ast import MAX_LENGTH, ParseProblem, parse_expression, parse_text
-from socialai_dsl.loader import Document, reader
+from socialai_dsl.loader import reader
 from socialai_dsl.loader.offsets import Style
-from socialai_dsl.loader.reader import FORBIDDEN, decoded, read_document
+from socialai_dsl.loader.reader import FORBIDDEN, Document, decoded, read_document
 from socialai_dsl.source import Source
 from tests.fuzzing.playground import SECRET, Playground, listening
 

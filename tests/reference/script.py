@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any, Final
 
-from socialai_dsl.loader import Resolved, resolve
+from socialai_dsl.loader.resolved import Resolved, resolve
 
 PRIMITIVES: Final = ("left", "right", "forward", "pickup", "drop", "toggle", "done")
 SHARED_GRAMMARS: Final = {
