@@ -26,8 +26,7 @@ from socialai_dsl.program import (
     Register,
     room_words,
 )
-from socialai_dsl.program.instructions import TABLE, Instruction, Kind, Operand
-from socialai_dsl.program.ranges import ANYTHING, Interval, hull
+from socialai_dsl.program.instructions import ANYTHING, TABLE, Instruction, Interval, Kind, Operand, hull
 
 WHOLE_REGISTER: Interval = (-32768, 32767)
 LAST_BODY = Body.STOP_POINTING

@@ -29,8 +29,7 @@ from socialai_dsl.program import (
     Register,
     TypeColumn,
 )
-from socialai_dsl.program.instructions import TABLE
-from socialai_dsl.program.ranges import ANYTHING
+from socialai_dsl.program.instructions import ANYTHING, TABLE
 
 
 class InvalidProgramError(AssertionError):

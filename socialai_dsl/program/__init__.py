@@ -57,11 +57,7 @@ from socialai_dsl.program.format import (
     TypeColumn,
     pack_cell,
 )
-from socialai_dsl.program.instructions import (
-    CLASS_BITS,
-    Op,
-    OpClass,
-)
+from socialai_dsl.program.instructions import CLASS_BITS, Op, OpClass
 from socialai_dsl.program.program import (
     EntityName,
     Outcome,

@@ -30,9 +30,8 @@ from socialai_dsl.program import (
     Program,
     Register,
 )
-from socialai_dsl.program.instructions import TABLE, Instruction, Kind, Operand
+from socialai_dsl.program.instructions import ANYTHING, TABLE, Instruction, Interval, Kind, Operand
 from socialai_dsl.program.instructions_page import instructions_page
-from socialai_dsl.program.ranges import ANYTHING, Interval
 
 DOCS = Path(__file__).parents[3] / "docs"
 TOWN = Path(__file__).parents[2] / "diagnostics" / "town.yaml"
