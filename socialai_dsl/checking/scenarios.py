@@ -12,10 +12,10 @@ from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_
 from socialai_dsl.loader.reader import Data, read_plain
 from socialai_dsl.loader.resolved import Resolved
 from socialai_dsl.schema.scenario import CastMember, Npc, Scenario
-from socialai_dsl.schema.shape import PARAMETER, Shaped, model_of
+from socialai_dsl.schema.shape import PARAMETER, MovedPlaces, Shaped, model_of, written
 from socialai_dsl.semantics.check import check_meaning
 from socialai_dsl.semantics.plans import Checked
-from socialai_dsl.source import DataPath, Positions, Span
+from socialai_dsl.source import DataPath, Positions
 from socialai_dsl.vocabulary import PRIMITIVES
 
 Value = int | bool | float | str
@@ -41,12 +41,29 @@ class Substituted:
 def substitute(resolved: Resolved, bag: DiagnosticBag) -> Substituted:
     """Put the parameters in: defaults, or what was given behind `?`. Reports S206."""
     assert isinstance(resolved.data, dict), "internal: a file is a mapping"
-    values = _values(resolved, bag)
-    substitution = _Substitution(values, resolved, bag)
-    data = {
-        key: part if key == "params" else substitution.of(part, (key,)) for key, part in resolved.data.items()
-    }
-    return Substituted(data, values, frozenset(substitution.paths))
+    values, declared = _values(resolved, bag), _declared(resolved)
+    paths: list[DataPath] = []
+
+    def filled(part: Data, path: DataPath) -> Data:
+        if isinstance(part, dict):
+            return {key: filled(value, (*path, key)) for key, value in part.items()}
+        if isinstance(part, list):
+            return [filled(value, (*path, i)) for i, value in enumerate(part)]
+        match = _WHOLE.fullmatch(part) if isinstance(part, str) else None
+        if match is None:
+            return part
+        name = match.group(1)
+        if name in values:
+            paths.append(path)
+            return values[name]
+        if name not in declared:  # without a default, it is reported where it is declared
+            near = did_you_mean(name, values)
+            span = resolved.locate(path, 0, len(name) + 1)
+            bag.error("S206", f"unknown parameter `{name}`", span, suggestion=near)
+        return part
+
+    data = {key: part if key == "params" else filled(part, (key,)) for key, part in resolved.data.items()}
+    return Substituted(data, values, frozenset(paths))
 
 
 def _values(resolved: Resolved, bag: DiagnosticBag) -> dict[str, Value]:
@@ -130,37 +147,6 @@ def _alike(value: Data, default: Data) -> bool:
     return isinstance(value, str)
 
 
-class _Substitution:
-    """Replaces whole values, and remembers where."""
-
-    def __init__(self, values: Mapping[str, Value], resolved: Resolved, bag: DiagnosticBag) -> None:
-        self._values = values
-        self._declared = _declared(resolved)
-        self._resolved = resolved
-        self._bag = bag
-        self.paths: list[DataPath] = []
-
-    def of(self, part: Data, path: DataPath) -> Data:
-        """A part with its parameters put in."""
-        if isinstance(part, dict):
-            return {key: self.of(value, (*path, key)) for key, value in part.items()}
-        if isinstance(part, list):
-            return [self.of(value, (*path, i)) for i, value in enumerate(part)]
-        match = _WHOLE.fullmatch(part) if isinstance(part, str) else None
-        if match is None:
-            return part
-        name = match.group(1)
-        if name not in self._values and name in self._declared:
-            return part  # it has no default, which is reported where it is declared
-        if name not in self._values:
-            near = did_you_mean(name, self._values)
-            span = self._resolved.locate(path, 0, len(name) + 1)
-            self._bag.error("S206", f"unknown parameter `{name}`", span, suggestion=near)
-            return part
-        self.paths.append(path)
-        return self._values[name]
-
-
 MOST_MEMBERS: Final = 16
 _AGENT: Final = "agent"
 _KEYS: Final = frozenset(field.alias or name for name, field in CastMember.model_fields.items())
@@ -197,7 +183,7 @@ def spread(
     cast = data.get("cast")
     if not isinstance(cast, dict):
         return Spread(data, places, paths)
-    written: dict[str, object] = {}
+    members: dict[str, object] = {}
     origins: dict[DataPath, DataPath] = {}
     for name, member in cast.items():
         if "[" in str(name):
@@ -206,17 +192,16 @@ def spread(
             bag.error("S104", message, places.key_span(("cast", name)), hint=hint)
         member = _with_one_frame(name, member, places, bag)
         if not isinstance(member, dict) or "count" not in member or name == _AGENT:
-            written[name] = _alone(name, member, places, bag)
+            members[name] = _alone(name, member, places, bag)
             continue
         count = _count(name, member["count"], places, bag)
         for i in range(count or 1):
-            written[f"{name}[{i}]"] = _one(name, member, i, count, places, bag, origins)
+            members[f"{name}[{i}]"] = _one(name, member, i, count, places, bag, origins)
             origins[("cast", f"{name}[{i}]")] = ("cast", name)
-    if written == cast:
+    if members == cast:
         return Spread(data, places, paths)
-    spread_places = _SpreadPlaces(places, origins)
-    moved = {copy for copy in _all_paths(written) if spread_places.written(copy) in paths}
-    return Spread({**data, "cast": written}, spread_places, paths | moved)
+    moved = {copy for copy in _paths(members, ("cast",)) if written(copy, origins) in paths}
+    return Spread({**data, "cast": members}, MovedPlaces(places, origins), paths | moved)
 
 
 def _with_one_frame(name: str, member: object, places: Positions, bag: DiagnosticBag) -> object:
@@ -303,52 +288,12 @@ def _one(
     return made
 
 
-def _all_paths(cast: Mapping[str, object]) -> list[DataPath]:
-    found: list[DataPath] = []
-
-    def walk(part: object, path: DataPath) -> None:
-        found.append(path)
-        if isinstance(part, dict):
-            for key, value in part.items():
-                walk(value, (*path, key))
-        elif isinstance(part, list):
-            for i, value in enumerate(part):
-                walk(value, (*path, i))
-
-    walk(cast, ("cast",))
-    return found
-
-
-@dataclass(frozen=True)
-class _SpreadPlaces:
-    """Positions of a document whose groups are written out."""
-
-    places: Positions
-    origins: Mapping[DataPath, DataPath]
-
-    def written(self, path: DataPath) -> DataPath:
-        """Where the author wrote the part at a path."""
-        for length in (3, 2):
-            origin = self.origins.get(path[:length])
-            if origin is not None:
-                return (*origin, *path[length:])
-        return path
-
-    def locate(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
-        """The place of a character of the text at `path`."""
-        return self.places.locate(self.written(path), offset, width)
-
-    def value_span(self, path: DataPath) -> Span:
-        """The place of the value at `path`."""
-        return self.places.value_span(self.written(path))
-
-    def key_span(self, path: DataPath) -> Span:
-        """The place of the key at `path`."""
-        return self.places.key_span(self.written(path))
-
-    def in_flow(self, path: DataPath) -> bool:
-        """Whether the part at `path` stands inside { } or [ ]."""
-        return self.places.in_flow(self.written(path))
+def _paths(part: object, path: DataPath) -> Iterator[DataPath]:
+    """The paths of a part and of all below it."""
+    yield path
+    items = part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ()
+    for key, value in items:
+        yield from _paths(value, (*path, key))
 
 
 def check_npc(resolved: Resolved, bag: DiagnosticBag) -> None:

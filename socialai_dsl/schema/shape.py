@@ -163,7 +163,7 @@ def written(path: DataPath, moved: Mapping[DataPath, DataPath]) -> DataPath:
 
 @dataclass(frozen=True)
 class MovedPlaces:
-    """Positions of a document some of whose entries are read as if they were written elsewhere."""
+    """Positions of a document some of whose entries are written elsewhere: path as it is now -> where it is written."""
 
     places: Positions
     moved: Mapping[DataPath, DataPath]

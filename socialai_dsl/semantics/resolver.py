@@ -7,10 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain, islice, product
-from typing import Final, Protocol
+from typing import Final
 
 from socialai_dsl.grammar import ast
-from socialai_dsl.schema.scenario import Scenario, UtteranceGrammar
+from socialai_dsl.schema.scenario import UtteranceGrammar
 from socialai_dsl.semantics.plans import Drawn
 from socialai_dsl.semantics.scope import (
     FailedError,
@@ -218,18 +218,6 @@ class Declaration:
     others: tuple[tuple[DataPath, Scalar], ...] = ()
 
 
-class Reader(Protocol):
-    """What gives a meaning to the expressions of registers."""
-
-    findings: Findings
-
-    def written(self, path: DataPath, raw: Scalar, expected: Type | None, scope: Scope) -> Term:
-        """The value of the expression that is written at `path`."""
-
-    def is_wordy(self, node: ast.Expr, scope: Scope) -> bool:
-        """Whether an expression comes down to bare words that several vocabularies have."""
-
-
 class Registers:
     """All registers of a scenario.
 
@@ -239,8 +227,8 @@ class Registers:
         remembered: what is computed at the start of every step, for `prev`.
     """
 
-    def __init__(self, reader: Reader, words: Mapping[str, Type], ranges: Mapping[str, Type]) -> None:
-        self._reader = reader
+    def __init__(self, resolver: Resolver, words: Mapping[str, Type], ranges: Mapping[str, Type]) -> None:
+        self._resolver = resolver
         self._declared: dict[str, Declaration] = {}
         self._terms: dict[str, Term | None] = {}
         self._drawn: dict[str, Drawn] = {}
@@ -312,16 +300,16 @@ class Registers:
         if declaration is None or declaration.expected is not None or not isinstance(declaration.raw, str):
             return False
         try:
-            node = self._reader.findings.expression(declaration.source, declaration.raw)
+            node = self._resolver.findings.expression(declaration.source, declaration.raw)
         except FailedError:
             return False
-        return self._reader.is_wordy(node, declaration.scope)
+        return self._resolver.is_wordy(node, declaration.scope)
 
     def _settle(self, declaration: Declaration, expected: Type, span: Span) -> None:
         settled = self._settled.setdefault(declaration.path, (expected, span))
         if (settled[0].kind, settled[0].words) != (expected.kind, expected.words):
             first, place = settled
-            raise self._reader.findings.fail(
+            raise self._resolver.findings.fail(
                 "S209",
                 f"`{declaration.label}` is used as {described(expected)} here, but as {described(first)} before",
                 span,
@@ -368,7 +356,7 @@ class Registers:
         widened = self._within_range(declaration, term)
         if path in self._given_ranges and widened.kind == "int" and not widened.words:
             widened = _union(widened, self._given_ranges[path])
-        findings = self._reader.findings
+        findings = self._resolver.findings
         sited = Sited(term, declaration.scope.draws.site, findings.at(declaration.source))
         self._terms[path] = Read(widened, path)
         self._drawn[path] = Drawn(path, widened, sited)
@@ -378,7 +366,7 @@ class Registers:
         given = declaration.range
         if given is None:
             return term.type
-        findings = self._reader.findings
+        findings = self._resolver.findings
         if term.type.kind != "int" or term.type.words:
             message = f"`{declaration.label}` has a range, so it must start with a number"
             raise findings.fail("S204", message, findings.at(declaration.source))
@@ -395,7 +383,7 @@ class Registers:
         scope = declaration.scope
         written = [(declaration.source, declaration.raw), *declaration.others]
         terms = [
-            self._reader.written(source, raw, expected, scope.at(source, scope.draws.site))
+            self._resolver.written(source, raw, expected, scope.at(source, scope.draws.site))
             for source, raw in written
         ]
         if len(terms) == 1:
@@ -410,98 +398,12 @@ class Registers:
             f"`{a}` needs `{b}`" if a != b else f"`{a}` needs itself"
             for a, b in zip(labels, labels[1:] + labels[:1], strict=True)
         )
-        findings = self._reader.findings
+        findings = self._resolver.findings
         return findings.fail("S208", needs, findings.places.key_span(circle[0].source))
 
 
 def _union(a: Type, b: Type) -> Type:
     return replace(a, low=min(a.low, b.low), high=max(a.high, b.high))
-
-
-# -- ranges of registers that are set --------------------------------------------------------------------------
-
-
-_WIDEN_AFTER = 12
-_MOST_ROUNDS = 20
-
-
-class Ranges:
-    """Finds, over repeated resolutions, ranges that hold whatever is set.
-
-    Attributes:
-        now: register -> the range to resolve with.
-        unbounded: registers whose growth depends on their size, so that no range can be given.
-    """
-
-    def __init__(self, scenario: Scenario) -> None:
-        self.now: dict[str, Type] = {}
-        self.unbounded: list[str] = []
-        self._growth: dict[str, int] = {}
-        self._rounds = 0
-        self._wide: dict[str, Type] | None = None
-        self._steps = scenario.horizon * _setters(scenario)
-
-    def settled(self, needed: Mapping[str, Type]) -> bool:
-        """Take note of the ranges that a resolution asked for; whether it had them already."""
-        self._rounds += 1
-        fits = all(_within(type_, self.now.get(path)) for path, type_ in needed.items())
-        if self._wide is not None and (not fits or self.now is self._wide):
-            return self._back()
-        if fits:
-            return self._rounds <= _WIDEN_AFTER + 1 or not self._narrow(needed)
-        if self._rounds <= _WIDEN_AFTER:
-            self._growth = {path: _excess(type_, self.now.get(path)) for path, type_ in needed.items()}
-            self.now = dict(needed)
-            return False
-        if self._rounds == _WIDEN_AFTER + 1:
-            self.now = {path: self._widened(type_, self.now[path]) for path, type_ in needed.items()}
-            return False
-        self.unbounded = [p for p, t in needed.items() if _excess(t, self.now[p]) > self._growth[p]]
-        return True
-
-    def _narrow(self, needed: Mapping[str, Type]) -> bool:
-        """After widening, try what is really needed: `min(asked + 1, 9)` never leaves 0..9. Whether that is less."""
-        if self._rounds > _MOST_ROUNDS or needed == self.now:
-            return False
-        self._wide, self.now = self.now, dict(needed)
-        return True
-
-    def _back(self) -> bool:
-        """The narrower ranges do not hold: the last ones that did are taken. Whether they are taken already."""
-        assert self._wide is not None, "internal: nothing was narrowed"
-        done = self.now is self._wide
-        self.now = self._wide
-        return done
-
-    def _widened(self, needed: Type, now: Type) -> Type:
-        """A range that still grows, by as much as it can in a whole episode."""
-        low = needed.low - (now.low - needed.low) * self._steps if needed.low < now.low else needed.low
-        high = needed.high + (needed.high - now.high) * self._steps if needed.high > now.high else needed.high
-        return replace(needed, low=low, high=high)
-
-
-def _within(type_: Type, range_: Type | None) -> bool:
-    return range_ is not None and range_.low <= type_.low and type_.high <= range_.high
-
-
-def _excess(type_: Type, range_: Type | None) -> int:
-    """By how much a type goes beyond a range."""
-    if range_ is None:
-        return 0
-    return max(0, range_.low - type_.low) + max(0, type_.high - range_.high)
-
-
-def _setters(scenario: Scenario) -> int:
-    """How many rules and steps set something."""
-    rules = [
-        rule
-        for frame in scenario.frames.values()
-        for state in (frame.states or {}).values()
-        for rule in (*state.first, *state.then)
-    ]
-    steps = [step for frame in scenario.frames.values() for step in frame.steps or ()]
-    own = sum(bool(entry.set) for entry in (*rules, *steps))
-    return own + sum(bool(rule.set) for rule in scenario.rules)
 
 
 # -- the resolver --------------------------------------------------------------------------------------------
