@@ -9,8 +9,7 @@ from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
 from socialai_dsl.compiler.expressions import Lines
 from socialai_dsl.compiler.lowering import NO_PROBES, Probes, allocate, lower
 from socialai_dsl.compiler.probes import Part, Probe, Probed, Recorder, Value
-from socialai_dsl.compiler.tables import Tables
-from socialai_dsl.compiler.verifier import verify
+from socialai_dsl.compiler.tables import Tables, verify
 from socialai_dsl.program import Header, Program
 from socialai_dsl.program_suite import ProgramSuite
 from socialai_dsl.semantics.plans import Checked

@@ -464,7 +464,7 @@ def of_other_values(resolved: Resolved) -> Iterator[Diagnostic]:
         if number == MOST_CHOICES:
             return
         bag = DiagnosticBag()
-        asked = resolved.with_parameter(name, text, resolved.value_span(("params", name, "values")))
+        asked = resolved.with_params({name: (text, resolved.value_span(("params", name, "values")))})
         check_scenario(asked, bag)
         for found in bag:
             if found.severity is Severity.ERROR and found not in said:

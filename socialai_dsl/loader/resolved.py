@@ -411,10 +411,6 @@ class Resolved(PositionedData):
         """The exception for one finding, with the sources read so far."""
         return self._builder.library.error(code, message, span, hint, suggestion)
 
-    def with_parameter(self, name: str, text: str, span: Span) -> Resolved:
-        """The same with a parameter given as behind `?`; `span` is the place of the value."""
-        return Resolved(self._builder, self._build, {**self._given, name: Part(text, span)})
-
     def find(self, path: DataPath) -> tuple[Document, DataPath]:
         """The file and the path in it where the part at `path`, or its nearest ancestor, was written."""
         path = tuple(path)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from socialai_dsl.compiler.verifier import InvalidProgramError
+from socialai_dsl.compiler.tables import InvalidProgramError
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.program import FrameColumn, Header
 from socialai_dsl.semantics.plans import Activity, Checked, Drawn, Effect, RulePlan

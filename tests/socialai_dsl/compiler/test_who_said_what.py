@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from socialai_dsl.compiler.verifier import InvalidProgramError, verify
+from socialai_dsl.compiler.tables import InvalidProgramError, verify
 from socialai_dsl.program import Flag, Header, LineColumn, Op, Program
 from socialai_dsl.semantics.plans import Checked, Drawn, FramePlan, RulePlan, StatePlan
 from socialai_dsl.semantics.terms import (

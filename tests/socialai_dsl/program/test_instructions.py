@@ -12,7 +12,7 @@ import pytest
 import socialai_dsl as sd
 from socialai_dsl.compiler.assembler import Block
 from socialai_dsl.compiler.instruction_checks import Known, Ranges, problem_of
-from socialai_dsl.compiler.verifier import InvalidProgramError, verify
+from socialai_dsl.compiler.tables import InvalidProgramError, verify
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import (
