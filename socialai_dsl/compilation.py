@@ -8,16 +8,16 @@ from typing import overload
 from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
 from socialai_dsl.compiler.expressions import Lines
 from socialai_dsl.compiler.lowering import NO_PROBES, Probes, allocate, lower
-from socialai_dsl.compiler.probes import Part, Probe, Probed, Recorder, Value
+from socialai_dsl.compiler.probes import Part, Probe, ProbedProgram, Recorder, Value
 from socialai_dsl.compiler.tables import Tables, verify
 from socialai_dsl.program import Header, Program
 from socialai_dsl.program_suite import ProgramSuite
-from socialai_dsl.semantics.plans import Checked
+from socialai_dsl.semantics.plans import CheckedScenario
 
 __all__ = [
     "Part",
     "Probe",
-    "Probed",
+    "ProbedProgram",
     "Value",
     "compile_loaded",
     "compile_probed",
@@ -61,14 +61,14 @@ def compile_loaded(loaded: Loaded) -> Program | ProgramSuite:
     )
 
 
-def scenarios_of(loaded: Loaded) -> tuple[Checked, ...]:
+def scenarios_of(loaded: Loaded) -> tuple[CheckedScenario, ...]:
     """The scenarios of what was loaded, in the order of the programs that `compile_loaded` makes of them."""
     return tuple(
         member.checked for member in (loaded.members if isinstance(loaded, LoadedSuite) else (loaded,))
     )
 
 
-def compile_scenario(checked: Checked) -> Program:
+def compile_scenario(checked: CheckedScenario) -> Program:
     """The program of a scenario in which nothing is wrong.
 
     Raises AssertionError("internal: ...") for our own mistakes only: an author's are found before.
@@ -77,7 +77,7 @@ def compile_scenario(checked: Checked) -> Program:
     return program
 
 
-def compile_probed(checked: Checked) -> Probed:
+def compile_probed(checked: CheckedScenario) -> ProbedProgram:
     """A program that does the same as that of the scenario, and notes why rules do not fire (`probes`)."""
     program, lines = _compiled(checked, NO_PROBES, None)
     recorder = Recorder(checked, program.header(Header.REGISTERS))
@@ -88,7 +88,7 @@ def compile_probed(checked: Checked) -> Probed:
     names = [name for name in probed.registers if name.register < recorder.first]
     assert tuple(names) == program.registers, "internal: registers of a probed program are not the program's"
     assert program.rules == probed.rules, "internal: rules of a probed program are not the program's"
-    return Probed(probed, recorder.first, recorder.rules, recorder.outcomes)
+    return ProbedProgram(probed, recorder.first, recorder.rules, recorder.outcomes)
 
 
 _SAME = (
@@ -97,7 +97,7 @@ _SAME = (
 )
 
 
-def _compiled(checked: Checked, probes: Probes, numbered: Lines | None) -> tuple[Program, Lines]:
+def _compiled(checked: CheckedScenario, probes: Probes, numbered: Lines | None) -> tuple[Program, Lines]:
     """The program and its lines, which are numbered as in `numbered`, if that is given."""
     checked = replace(checked, properties=())  # so that nothing they ask about is part of a program
     allocation = allocate(checked, probes, numbered)

@@ -341,7 +341,7 @@ class PropertyPlan:
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckedScenario:
     """A scenario in which everything is resolved and nothing is wrong: the compiler's input.
 
     Attributes:
