@@ -266,7 +266,7 @@ def test_deep_files_do_not_need_a_deep_stack() -> None:
     program = """
 import threading
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.loader import read_document
+from socialai_dsl.loader.reader import read_document
 from socialai_dsl.source import Source
 refused = []
 def attempt():
