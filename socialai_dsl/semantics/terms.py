@@ -640,7 +640,7 @@ class Readings:
             self.roots[site] = reading
 
     def change(self, site: str, change: Callable[[Term], Term | None]) -> None:
-        """Replace terms in what was read for a site, as `build.changed` does."""
+        """Replace terms in what was read for a site, as `changed` does."""
         root = self.roots.get(site)
         for reading in root.walk() if root is not None else ():
             reading.term = changed(reading.term, change)
