@@ -105,6 +105,8 @@ def write_episodes(evaluation: "Evaluation", folder: Path, count: int, label: st
     place.mkdir(parents=True, exist_ok=True)
     for success in (False, True):
         for number in evaluation.pick(success, count):
+            if evaluation.is_cut_short(number):  # no step ended it, so a film has no end to show
+                continue
             episode = evaluation.record(number, label)
             name = f"{'success' if success else 'failure'}-{number:03d}"
             write_text(place / f"{name}.txt", episode.transcript())

@@ -1,5 +1,7 @@
 """`socialai evaluate llm:MODEL`: any endpoint, its faults, its costs, and going on where it was stopped."""
 
+import base64
+import gzip
 import json
 import re
 from pathlib import Path
@@ -290,3 +292,59 @@ def test_progress_tells_of_costs(tmp_path: Path, capsys: Capture, monkeypatch: p
     assert re.search(
         r"3 of 3 episodes, 0 successes, 0.0% invalid replies, 36 tokens, \$0.0000, 0 s left", said
     )
+
+
+def episodes_in(page: Path) -> list[dict[str, Any]]:
+    found = re.search(r'<script id="episodes"[^>]*>([^<]*)</script>', page.read_text(encoding="utf-8"))
+    assert found is not None
+    traces: list[dict[str, Any]] = json.loads(gzip.decompress(base64.b64decode(found.group(1))))
+    return traces
+
+
+def test_a_replay_shows_what_the_model_answered(tmp_path: Path, capsys: Capture) -> None:
+    replies = iter(["I wonder.", "x" * 9000 + " Act: left", "Act: done"])
+    with endpoint(lambda _: next(replies)) as stub:
+        assert evaluate(stub.url, tmp_path, "--record", "1", "--on-invalid", "retry", episodes=1) == 0
+    page = tmp_path / "talkitout" / "episode.html"
+    assert str(page) in capsys.readouterr().out
+    (trace,) = episodes_in(page)
+    first, second = (moment["replies"] for moment in trace["moments"][1:])
+    assert first[0]["text"] == "I wonder."
+    assert first[0]["error"]
+    assert first[1]["text"].startswith("… x")
+    assert first[1]["text"].endswith("Act: left")
+    assert "error" not in first[1]
+    assert len(first[1]["text"]) < 1000
+    assert second == [{"text": "Act: done"}]
+    # The transcripts are enough: no model is asked.
+    again = tmp_path / "again.html"
+    assert main(["replay", str(page.parent), "-o", str(again)]) == 0
+    assert episodes_in(again) == [trace]
+    assert main(["replay", str(page.parent), "--test-episode", "1", "-o", str(again)]) == 2
+    assert "--test-episode: got 1, expected less than 1" in capsys.readouterr().err
+
+
+def test_a_replay_shows_a_reply_that_ended_the_episode(tmp_path: Path) -> None:
+    replies = iter(["Act: left", "no"])
+    with endpoint(lambda _: next(replies)) as stub:
+        assert evaluate(stub.url, tmp_path, "--record", "1", "--on-invalid", "fail", episodes=1) == 0
+    (trace,) = episodes_in(tmp_path / "talkitout" / "episode.html")
+    _, step, end = trace["moments"]
+    assert step["did"] == "left"
+    assert "did" not in end
+    assert end["replies"][0]["text"] == "no"
+    assert end["ended"] == {"name": "invalid reply", "success": False, "text": "a reply without an action"}
+    assert not list((tmp_path / "talkitout").glob("*.gif"))
+
+
+def test_transcripts_of_another_scenario_are_not_replayed(tmp_path: Path, capsys: Capture) -> None:
+    with endpoint(lambda _: "Act: done") as stub:
+        assert evaluate(stub.url, tmp_path, episodes=1) == 0
+    settings = tmp_path / "talkitout/transcripts/settings.json"
+    settings.write_text(settings.read_text().replace('"program_sha256": "', '"program_sha256": "0'))
+    command = ["replay", str(tmp_path / "talkitout"), "-o", str(tmp_path / "again.html")]
+    assert main(command) == 2
+    assert "holds episodes of another version of the scenario" in capsys.readouterr().err
+    settings.write_text("[]")
+    assert main(command) == 2
+    assert "holds no transcripts of episodes" in capsys.readouterr().err
