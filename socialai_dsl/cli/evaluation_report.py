@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from socialai_dsl.cli.run_folder import REPLAY, RESULT, scenario_folder_name, write_text
+from socialai_dsl.cli.run_folder import EPISODES, REPLAY, RESULT, scenario_folder_name, write_text
 
 if TYPE_CHECKING:
     from socialai_dsl.cli.evaluation import Evaluation
@@ -113,7 +113,7 @@ def write_episodes(evaluation: "Evaluation", folder: Path, count: int, label: st
             episode.save_film(place / f"{name}.gif")
     if traces := evaluation.traces(count):
         write_text(place / REPLAY, replay_page(traces))
-    write_text(place / "episodes.csv", _episodes(evaluation))
+    write_text(place / EPISODES, _episodes(evaluation))
     return place
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlsplit
 
-from socialai_dsl.cli.arguments import positive
+from socialai_dsl.cli.arguments import positive, seconds
 from socialai_dsl.cli.endings import Ending
 from socialai_dsl.cli.errors import RunFailed, UsageError
 from socialai_dsl.cli.run_folder import scenario_folder_name
@@ -92,7 +92,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--concurrency", type=positive, default=4, metavar="N", help="episodes played at once (default: 4)"
     )
     group.add_argument(
-        "--timeout", type=positive, default=120, metavar="SECONDS", help="for one reply (default: 120)"
+        "--timeout", type=seconds, default=120.0, metavar="SECONDS", help="for one reply (default: 120)"
     )
     group.add_argument(
         "--budget", metavar="N", help="what this command may spend: 200000 tokens, or 2.50usd with --prices"
@@ -202,7 +202,7 @@ def _endpoint(kind: Any, agent: str, options: argparse.Namespace) -> Any:
     if not model:
         raise UsageError(f"got the agent {agent!r}, expected the name of a model behind {PREFIX}")
     asked = {"temperature": options.temperature, "max_tokens": options.max_tokens}
-    return kind(model, url, key.strip(), asked, float(options.timeout), _prices(options.prices))
+    return kind(model, url, key.strip(), asked, options.timeout, _prices(options.prices))
 
 
 def _prices(text: str | None) -> tuple[float, float] | None:

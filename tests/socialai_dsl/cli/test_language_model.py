@@ -4,6 +4,7 @@ import base64
 import gzip
 import json
 import re
+import time
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import pytest
 from socialai_dsl.cli.main import main
 from socialai_dsl.llm import Episode
 from socialai_dsl.llm.episode import scripted_reply
-from tests.socialai_dsl.llm.endpoint import completion, endpoint
+from tests.socialai_dsl.llm.endpoint import completion, endpoint, slowly
 
 pytest.importorskip("httpx", reason="language models need the extra llm")
 
@@ -128,6 +129,13 @@ FAULTS: dict[str, Any] = {
     "rate limit": (429, {"Retry-After": "0.01"}, b'{"error": {"message": "slow down"}}'),
     "server error": (500, {}, b"Internal Server Error"),
     "cut off": (200, {"Content-Length": "5000"}, completion("Act: left")),
+    "cut between chunks": (
+        200,
+        {"Transfer-Encoding": "chunked"},
+        [b"14\r\n" + completion("Act: left")[:20] + b"\r\n"],
+    ),
+    "cut in a chunk": (200, {"Transfer-Encoding": "chunked"}, [b"14\r\n" + completion("Act: left")[:10]]),
+    "cut, but closed well": (200, {}, completion("Act: left")[:90]),
     "not JSON": (200, {}, b"<html>busy</html>"),
     "no choices": (200, {}, b'{"choices": []}'),
     "empty body": (200, {}, b""),
@@ -151,6 +159,28 @@ def test_what_passes_is_waited_for(fault: str, tmp_path: Path) -> None:
     result = figures(tmp_path)["eval"]
     assert (result["episodes"], result["replies"], result["invalid_replies"]) == (3, 3, 0)
     assert len(stub.requests) > 3
+
+
+STALLS: dict[str, Any] = {
+    "before the answer": lambda: time.sleep(3) or "Act: left",
+    "after its head": lambda: (200, {}, slowly([completion("Act: left")], 3)),
+    "drip by drip": lambda: (200, {}, slowly([b" "] * 100 + [completion("Act: left")], 0.03)),
+}
+
+
+@pytest.mark.parametrize("stall", STALLS)
+def test_an_answer_that_takes_too_long_is_asked_for_again(stall: str, tmp_path: Path) -> None:
+    with endpoint(lambda _: STALLS[stall]() if len(stub.requests) == 2 else "Act: done") as stub:
+        assert evaluate(stub.url, tmp_path, "--timeout", "0.3", "--concurrency", "1") == 0
+    assert len(stub.requests) > 3
+    assert (figures(tmp_path)["eval"]["replies"], figures(tmp_path)["eval"]["invalid_replies"]) == (3, 0)
+
+
+def test_an_endpoint_that_never_answers_ends_the_command(tmp_path: Path, capsys: Capture) -> None:
+    with endpoint(lambda _: STALLS["before the answer"]()) as stub:
+        assert evaluate(stub.url, tmp_path, "--timeout", "0.1", episodes=1) == 2
+    assert "it took longer than 0.1 s" in capsys.readouterr().err
+    assert len(stub.requests) == 2
 
 
 def test_lost_connections_do_not_make_an_address_wrong(tmp_path: Path) -> None:
@@ -263,6 +293,13 @@ def test_mistakes_are_told_in_one_line(
     error = capsys.readouterr().err
     assert said in error
     assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize("time", ["0", "-1", "nan", "inf", "soon"])
+def test_a_time_out_is_a_time(time: str, capsys: Capture) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["evaluate", "llm:m", "--on", "help", "--timeout", time])
+    assert f"--timeout: expected a number of seconds above 0, got '{time}'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
