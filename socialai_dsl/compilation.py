@@ -1,17 +1,29 @@
-"""What `load` returned to what environments are made of."""
+"""What `load` returned to programs, in four passes: allocate, lower, lay out, verify."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import overload
 
-from socialai_dsl.checking import Loaded, LoadedScenario, LoadedSuite
-from socialai_dsl.compiler import compile_probed, compile_scenario
-from socialai_dsl.compiler.probes import Part, Probe, Probed, Value
-from socialai_dsl.program import Program
+from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
+from socialai_dsl.compiler.expressions import Lines
+from socialai_dsl.compiler.lowering import NO_PROBES, Probes, allocate, lower
+from socialai_dsl.compiler.probes import Part, Probe, ProbedProgram, Recorder, Value
+from socialai_dsl.compiler.tables import Tables, verify
+from socialai_dsl.program import Header, Program
 from socialai_dsl.program_suite import ProgramSuite
-from socialai_dsl.semantics.plans import Checked
+from socialai_dsl.semantics.plans import CheckedScenario
 
-__all__ = ["Part", "Probe", "Probed", "Value", "compile_loaded", "compile_probed", "scenarios_of"]
+__all__ = [
+    "Part",
+    "Probe",
+    "ProbedProgram",
+    "Value",
+    "compile_loaded",
+    "compile_probed",
+    "compile_scenario",
+    "scenarios_of",
+]
 
 
 @overload
@@ -49,8 +61,47 @@ def compile_loaded(loaded: Loaded) -> Program | ProgramSuite:
     )
 
 
-def scenarios_of(loaded: Loaded) -> tuple[Checked, ...]:
+def scenarios_of(loaded: Loaded) -> tuple[CheckedScenario, ...]:
     """The scenarios of what was loaded, in the order of the programs that `compile_loaded` makes of them."""
     return tuple(
         member.checked for member in (loaded.members if isinstance(loaded, LoadedSuite) else (loaded,))
     )
+
+
+def compile_scenario(checked: CheckedScenario) -> Program:
+    """The program of a scenario in which nothing is wrong.
+
+    Raises AssertionError("internal: ...") for our own mistakes only: an author's are found before.
+    """
+    program, _ = _compiled(checked, NO_PROBES, None)
+    return program
+
+
+def compile_probed(checked: CheckedScenario) -> ProbedProgram:
+    """A program that does the same as that of the scenario, and notes why rules do not fire (`probes`)."""
+    program, lines = _compiled(checked, NO_PROBES, None)
+    recorder = Recorder(checked, program.header(Header.REGISTERS))
+    probed, _ = _compiled(checked, recorder, lines)
+    for word in _SAME:
+        same = program.header(word) == probed.header(word)
+        assert same, f"internal: {word.name} of a probed program is not that of the program"
+    names = [name for name in probed.registers if name.register < recorder.first]
+    assert tuple(names) == program.registers, "internal: registers of a probed program are not the program's"
+    assert program.rules == probed.rules, "internal: rules of a probed program are not the program's"
+    return ProbedProgram(probed, recorder.first, recorder.rules, recorder.outcomes)
+
+
+_SAME = (
+    *(Header.CLASSES, Header.LINES, Header.TOKENS, Header.INBOX, Header.INBOX_SIZE, Header.HEARD),
+    *(Header.HEARD_SIZE, Header.LOG, Header.LOG_SIZE, Header.COUNTERS, Header.STATES, Header.FRAMES),
+)
+
+
+def _compiled(checked: CheckedScenario, probes: Probes, numbered: Lines | None) -> tuple[Program, Lines]:
+    """The program and its lines, which are numbered as in `numbered`, if that is given."""
+    checked = replace(checked, properties=())  # so that nothing they ask about is part of a program
+    allocation = allocate(checked, probes, numbered)
+    lowered = lower(allocation)
+    program = Tables(allocation, lowered).program()
+    verify(program)
+    return program, allocation.lines

@@ -8,7 +8,8 @@ import pytest
 
 import socialai_dsl
 from socialai_dsl.analysis.effort import Effort
-from socialai_dsl.analysis.properties import Verdict, by_default, check_property
+from socialai_dsl.analysis.properties import by_default, check_property
+from socialai_dsl.analysis.reports import Verdict
 from socialai_dsl.cli import main
 from socialai_dsl.frontend import check
 

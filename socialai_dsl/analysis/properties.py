@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
-from enum import Enum
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import Final
 
@@ -20,59 +19,42 @@ from socialai_dsl.analysis.guessing import Answer, Guess, Guessing, Plan
 from socialai_dsl.analysis.knowable import Knowing, Known, RoomKnown, followed
 from socialai_dsl.analysis.muting import muted
 from socialai_dsl.analysis.perceiving import perceived
+from socialai_dsl.analysis.reports import (
+    SHOWN,
+    Evidence,
+    Report,
+    Verdict,
+    by_share,
+    names_text,
+    rooms_text,
+    steps_text,
+)
 from socialai_dsl.analysis.rooms import Rooms, name_of, wins_of
 from socialai_dsl.analysis.search import Finding, Search
 from socialai_dsl.analysis.search import Verdict as Searched
-from socialai_dsl.analysis.tellers import SOMEBODY, Tellers
-from socialai_dsl.analysis.twins import Compared, Script, Twins, alike, layouts, random_actions
-from socialai_dsl.checking import LoadedScenario
+from socialai_dsl.analysis.twins import (
+    Compared,
+    Script,
+    Tellers,
+    Twins,
+    alike,
+    layouts,
+    random_actions,
+)
+from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Program, Register
-from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.plans import OutcomePlan, PropertyPlan
-from socialai_dsl.semantics.terms import Const, InState, SaidBy
+from socialai_dsl.semantics.terms import Const, InState, SaidBy, walk
 from socialai_dsl.source import Span
 
 _HOLDS: Final = "the property holds"
 """Name of the outcome that ends an episode of the copy in which a condition is looked for."""
 
 _AS_TRIED: Final = " (chance during the episode was tried only in part)"
-_SHOWN: Final = 5
 _OF_ITSELF: Final = "a success comes of itself, without the agent"
-_NO_TIME: Final = "there was no time to look at a room"
-
-
-class Verdict(Enum):
-    """Whether a property holds."""
-
-    HOLDS = "holds"
-    FAILS = "fails"
-    UNDECIDED = "undecided"
-
-
-@dataclass(frozen=True)
-class Report:
-    """What was found out about one property.
-
-    Attributes:
-        verdict: undecided where a search gave up, or where rooms can be told apart and more was not tried.
-        rooms: how many were tried. held: in how many it is so. undecided: in how many nothing was decided.
-        against: numbers of the first rooms that speak against it: `reset(seed=..., options={"index": number})`.
-        said: what was found, in words.
-        rests: on how many of the rooms it rests; the others say nothing about it.
-        pairs: on how many pairs of episodes, where pairs are compared.
-    """
-
-    verdict: Verdict
-    rooms: int
-    held: int
-    undecided: int
-    against: tuple[int, ...]
-    said: str
-    rests: int
-    pairs: int = 0
 
 
 class Trial:
@@ -145,76 +127,13 @@ def by_default(loaded: LoadedScenario, span: Span) -> tuple[PropertyPlan, ...]:
     return (*plans, PropertyPlan("knowable", "knowable: true", "", span))
 
 
-@dataclass
-class _Tally:
-    """What was found in room after room: the numbers of the rooms, and why some say nothing."""
-
-    held: list[int]
-    against: list[int]
-    undecided: list[int]
-    void: dict[str, list[int]]
-
-    @classmethod
-    def empty(cls) -> _Tally:
-        return cls([], [], [], {})
-
-    @property
-    def rests(self) -> int:
-        return len(self.held) + len(self.against) + len(self.undecided)
-
-    @property
-    def rooms(self) -> int:
-        return self.rests + sum(map(len, self.void.values()))
-
-    def report(self, said: str, share: float | None) -> Report:
-        """How it stands with a claim about this share of the rooms that it rests on; None: about one."""
-        if not self.rooms:
-            return Report(Verdict.UNDECIDED, 0, 0, 0, (), _NO_TIME, 0)
-        if not self.rests:
-            silent = tuple(sorted(room for rooms in self.void.values() for room in rooms))[:_SHOWN]
-            return Report(Verdict.FAILS, self.rooms, 0, 0, silent, f"it rests on nothing: {self._why()}", 0)
-        if self.void:
-            said += f"; the others say nothing: {self._why()}"
-        held, undecided = len(self.held), len(self.undecided)
-        verdict = _by_share(held, undecided, self.rests, share)
-        against = tuple(sorted((*self.against, *self.undecided)))[:_SHOWN]
-        return Report(verdict, self.rooms, held, undecided, against, said, self.rests)
-
-    def _why(self) -> str:
-        return ", ".join(f"in {_rooms(len(rooms))} {why}" for why, rooms in self.void.items())
-
-
-def _by_share(held: int, undecided: int, rooms: int, share: float | None) -> Verdict:
-    """Whether enough rooms are as they should be; one at least, and without a share one is enough."""
-    needed = 1 if share is None else max(1, share * rooms - 1e-9)
-    if held >= needed:
-        return Verdict.HOLDS
-    return Verdict.UNDECIDED if held + undecided >= needed else Verdict.FAILS
-
-
-def _rooms(count: int) -> str:
-    return f"{count} room" if count == 1 else f"{count} rooms"
-
-
-def _steps(count: int | None) -> str:
-    return f"{count} step" if count == 1 else f"{count} steps"
-
-
-def _names(tellers: Sequence[str]) -> str:
-    """Who or what tells, as `Tellers.between` says it."""
-    return ", ".join(name if name == SOMEBODY else f"`{name}`" for name in tellers) or "the walls"
-
-
-# --- by search ---
-
-
 def _reaching(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     """Of `reachable` and `never`: in which rooms something can be made true."""
     program, goals = trial.program, plan.goals
     if plan.condition is not None:
         program, goals = _with_goal(trial.loaded, plan), (_HOLDS,)
     findings = list(search_rooms_of(program, goals, effort, plan.text))
-    tally = _Tally.empty()
+    tally = Evidence.empty()
     named = {"agent", *_named(trial, plan)}
     for room, finding in enumerate(findings):
         missing = trial.rooms.missing(room, named)
@@ -229,14 +148,14 @@ def _reaching(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
         (tally.undecided if finding.verdict is Searched.UNDECIDED else rooms).append(room)
     reached = [k for k, finding in enumerate(findings) if finding.verdict is Searched.SOLVABLE]
     exact = all(finding.exact or finding.verdict is Searched.UNDECIDED for finding in findings)
-    said = f"it can come about in {len(reached)} of {_rooms(tally.rests)}"
+    said = f"it can come about in {len(reached)} of {rooms_text(tally.rests)}"
     if tally.undecided:
         said += f", {len(tally.undecided)} undecided"
     if plan.kind == "reachable":
         return tally.report(said + ("" if exact else _AS_TRIED), plan.share)
     if reached:
-        said += f"; in room {reached[0]} after {_steps(findings[reached[0]].steps)}"
-        return replace(tally.report(said, 1.0), verdict=Verdict.FAILS, against=tuple(reached[:_SHOWN]))
+        said += f"; in room {reached[0]} after {steps_text(findings[reached[0]].steps)}"
+        return replace(tally.report(said, 1.0), verdict=Verdict.FAILS, against=tuple(reached[:SHOWN]))
     return tally.report(said + ("" if exact else _AS_TRIED), 1.0)
 
 
@@ -255,7 +174,7 @@ def _named(trial: Trial, plan: PropertyPlan) -> Iterator[str]:
 
 def _within(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     findings = list(trial.successes(effort, plan.text))
-    tally = _Tally.empty()
+    tally = Evidence.empty()
     for room, finding in enumerate(findings):
         if trial.rooms.solved_by_idling[room]:
             tally.void.setdefault(_OF_ITSELF, []).append(room)
@@ -266,13 +185,12 @@ def _within(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
         else:
             tally.against.append(room)
     known = [finding.steps for finding in findings if finding.steps is not None]
-    said = (
-        f"a shortest success takes at most {_steps(plan.steps)} in {len(tally.held)} of {_rooms(tally.rests)}"
-    )
+    most = steps_text(plan.steps)
+    said = f"a shortest success takes at most {most} in {len(tally.held)} of {rooms_text(tally.rests)}"
     if known:
         said += f", {max(known)} in the longest that can be solved"
     elif tally.rests and not tally.undecided:
-        said = f"no success can be reached in any of {_rooms(tally.rests)}"
+        said = f"no success can be reached in any of {rooms_text(tally.rests)}"
     return tally.report(said, 1.0 if plan.share is None else plan.share)
 
 
@@ -317,12 +235,12 @@ def _oracle(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     if trial.scripted is None:
         return _NOBODY_PLAYS
     won, idle = trial.solved, trial.rooms.solved_by_idling
-    said = f"its own script solves {won.sum()} of {_rooms(effort.rooms)}"
-    against = tuple(np.flatnonzero(~won).tolist()[:_SHOWN])
+    said = f"its own script solves {won.sum()} of {rooms_text(effort.rooms)}"
+    against = tuple(np.flatnonzero(~won).tolist()[:SHOWN])
     verdict = Verdict.HOLDS if won.mean() >= max(plan.share, 1 / len(won)) - 1e-9 else Verdict.FAILS
     rests = int((~idle).sum())
     if not rests:
-        said = f"it rests on nothing: in all of {_rooms(effort.rooms)} a success comes of itself, without the agent"
+        said = f"it rests on nothing: in all of {rooms_text(effort.rooms)} a success comes of itself, without the agent"
         return Report(Verdict.FAILS, effort.rooms, int(won.sum()), 0, against, said, 0)
     if idle.any():
         said += f"; in {int(idle.sum())} of them a success comes of itself"
@@ -339,13 +257,13 @@ def _script(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     if found.pairs == 0:
         said = "it rests on nothing: no two rooms look alike at first"
         return Report(Verdict.FAILS, effort.rooms, 0, 0, (), said, 0)
-    said = f"in {held} of {_rooms(effort.rooms)} the script acts on what it has perceived alone"
+    said = f"in {held} of {rooms_text(effort.rooms)} the script acts on what it has perceived alone"
     said += f" ({found.pairs} pairs of rooms that look alike at first)"
     if found.peeks:
         said += f"; {found.peeks[0]}"
     share = 1.0 if plan.share is None else plan.share
-    verdict = _by_share(held, 0, effort.rooms, share)
-    return Report(verdict, effort.rooms, held, 0, tuple(against[:_SHOWN]), said, effort.rooms, found.pairs)
+    verdict = by_share(held, 0, effort.rooms, share)
+    return Report(verdict, effort.rooms, held, 0, tuple(against[:SHOWN]), said, effort.rooms, found.pairs)
 
 
 def solved_by_script(program: Program, effort: Effort) -> NDArray[np.bool_]:
@@ -415,18 +333,18 @@ def _told(compared: Sequence[Compared], trial: Trial, plan: PropertyPlan, effort
     against = tuple(dict.fromkeys(leak.index for leak in leaks))
     if leaks:
         leak = min(leaks, key=lambda one: one.step)
-        said += f"; room {leak.index} differs after {_steps(leak.step)} between {leak.values[0]} and {leak.values[1]}"
-        said += f", in {_names(leak.by)}"
+        said += f"; room {leak.index} differs after {steps_text(leak.step)} between {leak.values[0]} and "
+        said += f"{leak.values[1]}, in {names_text(leak.by)}"
     elif not cued:
         absent = [
             k for k in range(effort.rooms) if len(trial.rooms.missing(k, plan.members)) == len(plan.members)
         ]
         said = f"it rests on nothing: none of {pairs} pairs of episodes differ in anything"
-        said += f"; in {_rooms(len(absent))} none of the members is there" if absent else ""
+        said += f"; in {rooms_text(len(absent))} none of the members is there" if absent else ""
     verdict = Verdict.FAILS if leaks or not cued else Verdict.HOLDS
     held = effort.rooms - len(against) if verdict is Verdict.HOLDS or leaks else 0
     rests = len({index for one in compared for index in one.rooms})
-    return Report(verdict, effort.rooms, held, 0, against[:_SHOWN], said, rests, cued + len(leaks))
+    return Report(verdict, effort.rooms, held, 0, against[:SHOWN], said, rests, cued + len(leaks))
 
 
 # --- without some of the cast ---
@@ -446,7 +364,7 @@ _ALWAYS_A_GUESS: Final = "there is nothing but a guess with them, too"
 
 def _needs(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     needing = _Needing(trial, plan, effort)
-    tally, counted, exact = _Tally.empty(), Counter[Answer](), True
+    tally, counted, exact = Evidence.empty(), Counter[Answer](), True
     found = effort.each_room(plan.text, needing.in_room, lambda one: one[0] is not Answer.UNDECIDED)
     for room, (answer, is_exact) in enumerate(found):
         if isinstance(answer, str):
@@ -457,7 +375,7 @@ def _needs(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
         open_ = answer in (Answer.UNDECIDED, Answer.TELLS_APART)
         (tally.held if answer is Answer.GUESSES else tally.undecided if open_ else tally.against).append(room)
     said = ", ".join(
-        words.format(_rooms(counted[answer]), "leaves" if counted[answer] == 1 else "leave")
+        words.format(rooms_text(counted[answer]), "leaves" if counted[answer] == 1 else "leave")
         for answer, words in _KNOWN.items()
         if counted[answer]
     )
@@ -595,8 +513,8 @@ class _Draw:
             batch.step(Task.STEP_ONLY)
         for row in range(1, self._table.rows):
             if not alike(self._table, slice(0, row + 1)):
-                names = _names(tellers.between(self._table, (0, row), before))
-                return f"it is {names}, after {_steps(len(plan))}"
+                names = names_text(tellers.between(self._table, (0, row), before))
+                return f"it is {names}, after {steps_text(len(plan))}"
         return None
 
 
@@ -606,7 +524,7 @@ class _Draw:
 def _knowable(trial: Trial, plan: PropertyPlan, effort: Effort) -> Report:
     knowing = Knowing(trial.rooms, effort, trial.scripted)
     found = list(effort.each_room(plan.text, knowing.look_at, lambda one: one.known is not Known.UNDECIDED))
-    tally = _Tally.empty()
+    tally = Evidence.empty()
     for room, one in enumerate(found):
         why = _NO_SUCCESS if one.known is Known.NO_SUCCESS else None
         if trial.rooms.missing(room, ("agent",)):
@@ -631,14 +549,16 @@ def _said_of(found: Collection[RoomKnown]) -> str:
     for one in found:
         for name, step in (one.hidden or {}).items():
             hidden.setdefault(name, []).append(step)
-    parts = [f"{name} stays hidden {_until(steps)} in {_rooms(len(steps))}" for name, steps in hidden.items()]
+    parts = [
+        f"{name} stays hidden {_until(steps)} in {rooms_text(len(steps))}" for name, steps in hidden.items()
+    ]
     if known:
-        parts.append(f"in {_rooms(len(known))} all can be known, within {_steps(max(known))}")
+        parts.append(f"in {rooms_text(len(known))} all can be known, within {steps_text(max(known))}")
     if nothing:
-        parts.append(f"in {_rooms(nothing)} success depends on nothing hidden")
+        parts.append(f"in {rooms_text(nothing)} success depends on nothing hidden")
     undecided = sum(one.known is Known.UNDECIDED for one in found)
     if undecided:
-        parts.append(f"in {_rooms(undecided)} it is undecided")
+        parts.append(f"in {rooms_text(undecided)} it is undecided")
     return ", ".join(parts)
 
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from socialai_dsl.analysis.alone import Alone
     from socialai_dsl.analysis.coverage import Coverage
     from socialai_dsl.analysis.depth import Depth
-    from socialai_dsl.analysis.properties import Report
+    from socialai_dsl.analysis.reports import Report
     from socialai_dsl.semantics.plans import PropertyPlan
     from socialai_dsl.source import Span
 

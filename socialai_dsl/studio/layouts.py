@@ -8,8 +8,8 @@ from typing import Any, Final
 
 import yaml
 
-from socialai_dsl.loader import Document
-from socialai_dsl.loader.document import DataPath
+from socialai_dsl.loader.reader import Document
+from socialai_dsl.source import DataPath
 
 _OF_A_MOMENT: Final = ("member", "t", "last", "heard", "pending")
 _Parser: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader

@@ -9,7 +9,8 @@ import pytest
 
 import socialai_dsl
 from socialai_dsl.analysis.effort import Effort
-from socialai_dsl.analysis.properties import Report, Verdict, check_property
+from socialai_dsl.analysis.properties import check_property
+from socialai_dsl.analysis.reports import Report, Verdict
 
 # One of two doors is right. Ada tells which to whoever asks and is in front of her.
 TOLD = """

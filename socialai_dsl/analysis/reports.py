@@ -1,0 +1,113 @@
+"""What is reported of a claim: a verdict, the rooms it rests on, and what was found, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from socialai_dsl.analysis.twins import SOMEBODY
+
+SHOWN: Final = 5
+"""How many rooms a report names at most."""
+_NO_TIME: Final = "there was no time to look at a room"
+
+
+class Verdict(Enum):
+    """Whether a property holds."""
+
+    HOLDS = "holds"
+    FAILS = "fails"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True)
+class Report:
+    """What was found out about one property.
+
+    Attributes:
+        verdict: undecided where a search gave up, or where rooms can be told apart and more was not tried.
+        rooms: how many were tried. held: in how many it is so. undecided: in how many nothing was decided.
+        against: numbers of the first rooms that speak against it: `reset(seed=..., options={"index": number})`.
+        said: what was found, in words.
+        rests: on how many of the rooms it rests; the others say nothing about it.
+        pairs: on how many pairs of episodes, where pairs are compared.
+    """
+
+    verdict: Verdict
+    rooms: int
+    held: int
+    undecided: int
+    against: tuple[int, ...]
+    said: str
+    rests: int
+    pairs: int = 0
+
+
+@dataclass
+class Evidence:
+    """What was found in room after room: the numbers of the rooms, and why some say nothing."""
+
+    held: list[int]
+    against: list[int]
+    undecided: list[int]
+    void: dict[str, list[int]]
+
+    @classmethod
+    def empty(cls) -> Evidence:
+        """Before any room was tried."""
+        return cls([], [], [], {})
+
+    @property
+    def rests(self) -> int:
+        """How many rooms say anything about it."""
+        return len(self.held) + len(self.against) + len(self.undecided)
+
+    @property
+    def rooms(self) -> int:
+        """How many rooms were tried."""
+        return self.rests + sum(map(len, self.void.values()))
+
+    def report(self, said: str, share: float | None) -> Report:
+        """How it stands with a claim about this share of the rooms that it rests on; None: about one."""
+        if not self.rooms:
+            return Report(Verdict.UNDECIDED, 0, 0, 0, (), _NO_TIME, 0)
+        if not self.rests:
+            silent = tuple(sorted(room for rooms in self.void.values() for room in rooms))[:SHOWN]
+            return Report(Verdict.FAILS, self.rooms, 0, 0, silent, f"it rests on nothing: {self._why()}", 0)
+        if self.void:
+            said += f"; the others say nothing: {self._why()}"
+        held, undecided = len(self.held), len(self.undecided)
+        verdict = by_share(held, undecided, self.rests, share)
+        against = tuple(sorted((*self.against, *self.undecided)))[:SHOWN]
+        return Report(verdict, self.rooms, held, undecided, against, said, self.rests)
+
+    def _why(self) -> str:
+        return ", ".join(f"in {rooms_text(len(rooms))} {why}" for why, rooms in self.void.items())
+
+
+def by_share(held: int, undecided: int, rooms: int, share: float | None) -> Verdict:
+    """Whether enough rooms are as they should be; one at least, and without a share one is enough."""
+    needed = 1 if share is None else max(1, share * rooms - 1e-9)
+    if held >= needed:
+        return Verdict.HOLDS
+    return Verdict.UNDECIDED if held + undecided >= needed else Verdict.FAILS
+
+
+def rooms_text(count: int) -> str:
+    """A number of rooms in words."""
+    return f"{count} room" if count == 1 else f"{count} rooms"
+
+
+def steps_text(count: int | None) -> str:
+    """A number of steps in words."""
+    return f"{count} step" if count == 1 else f"{count} steps"
+
+
+def names_text(tellers: Sequence[str]) -> str:
+    """Who or what tells, as `Tellers.between` says it."""
+    return ", ".join(name if name == SOMEBODY else f"`{name}`" for name in tellers) or "the walls"
+
+
+# --- by search ---
