@@ -5,13 +5,26 @@ from __future__ import annotations
 from typing import overload
 
 from socialai_dsl.checking import Loaded, LoadedScenario, LoadedSuite
-from socialai_dsl.compiler import compile_probed, compile_scenario
+from socialai_dsl.compiler import compile_asking, compile_probed, compile_scenario
 from socialai_dsl.compiler.probes import Part, Probe, Probed, Value
+from socialai_dsl.compiler.questions import ProbeNotes
+from socialai_dsl.compiler.questions import Text as NotedText
 from socialai_dsl.program import Program
 from socialai_dsl.program_suite import ProgramSuite
 from socialai_dsl.semantics.plans import Checked
 
-__all__ = ["Part", "Probe", "Probed", "Value", "compile_loaded", "compile_probed", "scenarios_of"]
+__all__ = [
+    "NotedText",
+    "Part",
+    "Probe",
+    "ProbeNotes",
+    "Probed",
+    "Value",
+    "compile_asking_loaded",
+    "compile_loaded",
+    "compile_probed",
+    "scenarios_of",
+]
 
 
 @overload
@@ -32,10 +45,26 @@ def compile_loaded(loaded: Loaded) -> Program | ProgramSuite:
         return compile_scenario(loaded.checked)
     if not isinstance(loaded, LoadedSuite):
         raise ValueError(f"compile: got {loaded!r}; expected what `load` returns")
+    return _suite(loaded, tuple(compile_scenario(member.checked) for member in loaded.members))
+
+
+def compile_asking_loaded(loaded: Loaded) -> tuple[Program | ProgramSuite, tuple[tuple[ProbeNotes, ...], ...]]:
+    """Programs that do the same as those of `compile_loaded` and note what `probes` ask about; and where they do.
+
+    Returns:
+        The program or suite, and for each of its programs the notes of its probes.
+    """
+    asking = tuple(map(compile_asking, scenarios_of(loaded)))
+    programs = tuple(one.program for one in asking)
+    playable = _suite(loaded, programs) if isinstance(loaded, LoadedSuite) else programs[0]
+    return playable, tuple(one.probes for one in asking)
+
+
+def _suite(loaded: LoadedSuite, programs: tuple[Program, ...]) -> ProgramSuite:
     space = loaded.space
     return ProgramSuite(
         loaded.name,
-        tuple(compile_scenario(member.checked) for member in loaded.members),
+        programs,
         loaded.member_names,
         space.actions,
         space.templates,

@@ -8,12 +8,13 @@ from socialai_dsl.compiler.allocation import allocate
 from socialai_dsl.compiler.lines import Lines
 from socialai_dsl.compiler.lowering import lower
 from socialai_dsl.compiler.probes import NO_PROBES, Probed, Probes, Recorder
+from socialai_dsl.compiler.questions import Asking, notes_of
 from socialai_dsl.compiler.tables import Tables
 from socialai_dsl.compiler.verifier import verify
 from socialai_dsl.program import Header, Program
 from socialai_dsl.semantics.plans import Checked
 
-__all__ = ["compile_probed", "compile_scenario", "verify"]
+__all__ = ["compile_asking", "compile_probed", "compile_scenario", "verify"]
 
 
 def compile_scenario(checked: Checked) -> Program:
@@ -45,9 +46,21 @@ _SAME = (
 )
 
 
-def _compiled(checked: Checked, probes: Probes, numbered: Lines | None) -> tuple[Program, Lines]:
+def compile_asking(checked: Checked) -> Asking:
+    """A program that does the same as that of the scenario, and notes what its `probes` ask about."""
+    own = {item.path: item for probe in checked.probes for item in probe.remembered}
+    known = {item.path: item for item in checked.remembered}
+    program, _ = _compiled(replace(checked, remembered=tuple((own | known).values())), NO_PROBES, None, True)
+    names = {name.path: name for name in program.registers}
+    return Asking(program, tuple(notes_of(plan, names) for plan in checked.probes))
+
+
+def _compiled(
+    checked: Checked, probes: Probes, numbered: Lines | None, asking: bool = False
+) -> tuple[Program, Lines]:
     """The program and its lines, which are numbered as in `numbered`, if that is given."""
-    checked = replace(checked, properties=())  # so that nothing they ask about is part of a program
+    # So that nothing that claims and probes are about is part of a program.
+    checked = replace(checked, properties=(), probes=checked.probes if asking else ())
     allocation = allocate(checked, probes, numbered)
     lowered = lower(allocation)
     program = Tables(allocation, lowered).program()

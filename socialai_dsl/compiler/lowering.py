@@ -12,6 +12,7 @@ from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.memories import push_acts, remember
 from socialai_dsl.compiler.outcomes import outcome_table
 from socialai_dsl.compiler.probes import Recorder
+from socialai_dsl.compiler.questions import ask
 from socialai_dsl.compiler.setup import require, reset
 from socialai_dsl.compiler.world_rules import world_rules
 from socialai_dsl.program import Header
@@ -44,7 +45,7 @@ def lower(allocation: Allocation) -> Lowered:
     frames = [frame_code(allocation, number, frame) for number, frame in enumerate(allocation.checked.frames)]
     entries |= {
         Header.REQUIRE_PC: entry("require", require),
-        Header.BEFORE_PC: entry("before", remember),
+        Header.BEFORE_PC: entry("before", ask, remember),
         Header.LINKS_PC: entry("links", links),
         Header.SETTLE_PC: entry("settle", computed.settle),
         Header.RULES_PC: entry(

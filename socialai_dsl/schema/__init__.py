@@ -14,7 +14,7 @@ from socialai_dsl.schema.behaviour import (
     ThenRule,
     WorldRule,
 )
-from socialai_dsl.schema.properties import OnlyThrough, Property
+from socialai_dsl.schema.properties import OnlyThrough, Probe, Property
 from socialai_dsl.schema.scenario import Memory, Outcome, Parameter, Reward, Scenario, Sequence
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
 
@@ -30,6 +30,7 @@ __all__ = [
     "OnlyThrough",
     "Outcome",
     "Parameter",
+    "Probe",
     "Property",
     "Ranged",
     "Reward",

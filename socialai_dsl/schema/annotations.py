@@ -33,7 +33,7 @@ from socialai_dsl.schema.experiment import (
     Tested,
 )
 from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.schema.properties import OnlyThrough, Property
+from socialai_dsl.schema.properties import OnlyThrough, Probe, Property
 from socialai_dsl.schema.scenario import Memory, Outcome, Parameter, Reward, Scenario, Sequence, SungWith
 from socialai_dsl.schema.suite import Entry, Split, Suite, Value, Values
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
@@ -63,6 +63,7 @@ CALLED: Final[dict[type, str]] = {
     Outcome: "an outcome",
     Property: "a property of `check`",
     OnlyThrough: "`only_through`",
+    Probe: "a probe",
     Parameter: "a parameter",
     Suite: "a suite",
     Split: "a split",

@@ -1,4 +1,4 @@
-"""What a scenario claims about itself: the entries of `check`, which a tool verifies and playing never reads."""
+"""What a scenario says beside what happens: claims of `check` about itself, and `probes`. Playing never reads them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, StringConstraints
 
-from socialai_dsl.schema.base import Expression, Model, Word, _as_tuple, _one_or_many
+from socialai_dsl.schema.base import Expression, Model, TextLine, Texts, Word, _as_tuple, _one_or_many
 from socialai_dsl.schema.behaviour import Probability
 
 _Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\[[0-9]+\])?$", max_length=40)]
@@ -48,3 +48,19 @@ class Property(Model):
         None, description="least share of rooms, for `reachable`, `within`, `script`, `needs` and `knowable`"
     )
     draw: Word | None = Field(None, description="for `needs`: the `let` that has to be guessed")
+
+
+class Probe(Model):
+    """A question to a language model about the present moment, whose right answer the engine computes."""
+
+    when: Expression | None = Field(
+        None, description="asked at the first moment at which this holds; default: when the episode has ended"
+    )
+    ask: TextLine = Field(description="the question; <...> is a value", examples=["Where will Sally look?"])
+    answer: Expression = Field(
+        description="what is right at that moment: a value, or a condition for yes or no",
+        examples=["sally.believes.toy_in.color"],
+    )
+    answers: Texts = Field(
+        (), description="what can be answered; <...> is a value (default: all that the answer can be)"
+    )

@@ -17,7 +17,7 @@ from socialai_dsl.schema.behaviour import (
     WorldRule,
     WrittenCast,
 )
-from socialai_dsl.schema.properties import Property
+from socialai_dsl.schema.properties import Probe, Property
 from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
 from socialai_dsl.vocabulary import PRIMITIVES, Primitive
 
@@ -151,6 +151,9 @@ class Scenario(Model):
     )
     check: Annotated[tuple[Property, ...], BeforeValidator(_as_tuple)] = Field(
         (), description="properties that `socialai check` verifies; playing never reads them"
+    )
+    probes: dict[Word, Probe] = Field(
+        default_factory=dict, description="name: a question to language models; playing never reads them"
     )
 
     def members(self) -> dict[str, CastMember]:

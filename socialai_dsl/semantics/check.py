@@ -31,6 +31,7 @@ from socialai_dsl.semantics.findings import Findings, Scalar, surviving
 from socialai_dsl.semantics.inhabitants import entities_of
 from socialai_dsl.semantics.plans import Checked, FramePlan, OutcomePlan
 from socialai_dsl.semantics.possible import check_possible
+from socialai_dsl.semantics.probes import probes
 from socialai_dsl.semantics.properties import properties
 from socialai_dsl.semantics.registers import Ranges
 from socialai_dsl.semantics.resolve import ScenarioResolver
@@ -184,6 +185,7 @@ class _Run:
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)
         room = room_plan(resolver)
         claimed = tuple(properties(resolver, outcomes, drawn))
+        asked = tuple(probes(resolver))
         if findings.bag.has_errors:
             return None
         for plan in plans:
@@ -218,6 +220,7 @@ class _Run:
             channels=self._channels(),
             each_step=round(scenario.reward.each_step * 1_000_000),
             properties=claimed,
+            probes=asked,
             readings=resolver.readings,
         )
 
