@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from hashlib import sha256
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,7 @@ from socialai_dsl.envs.recording import Recording
 from socialai_dsl.envs.table import Table
 from socialai_dsl.envs.values import shown
 from socialai_dsl.program import Program, Register, RegisterName
+from socialai_dsl.vocabulary import TRUTHS, is_number, normal
 
 
 @dataclass(frozen=True)
@@ -62,18 +65,22 @@ def _called(member: str | None, probe: str) -> str:
 class Asker:
     """Follows the episodes of one environment and says what probes ask.
 
+    Attributes:
+        sha256: digest of all that decides what is asked when, and what is right.
+
     Args:
         loaded: the scenario or suite that the environment plays.
     """
 
     def __init__(self, loaded: Loaded) -> None:
         playable, self._probes = compile_asking_loaded(loaded)
+        self.sha256 = sha256(f"{playable.sha256} {self._probes}".encode()).hexdigest()
         self._table = Table([playable], 1, 1)
         self._lookers = [
             _Looker(program) if probes else None
             for program, probes in zip(self._table.programs, self._probes, strict=True)
         ]
-        self._asked: set[tuple[int, str]] = set()
+        self._asked: set[str] = set()
         self._act = 0
 
     def reset(self, seed: int | None, options: Mapping[str, Any] | None, image: NDArray[np.uint8]) -> list[Question]:
@@ -128,7 +135,7 @@ class _Looker:
     def __init__(self, program: Program) -> None:
         self._program = program
         self._table = Table([program], 1, 1)
-        self._table.reset(0, None)
+        self._table.batch.ports.actions[0] = len(program.actions), 0, 0, 0
         self._registers = self._table.state.registers[0]
 
     def look(self, moment: Recording) -> None:
@@ -141,7 +148,7 @@ class _Looker:
         self._registers[:] = start.registers[: len(self._registers)]
         state.boards[0] = start.board[: state.boards.shape[1]]
         self._registers[Register.ENDED], self._registers[Register.OUTCOME] = 0, -1
-        self._table.step(Task.STEP_ONLY, [[len(self._program.actions), 0, 0, 0]])
+        self._table.batch.step(Task.STEP_ONLY)
 
     def is_set(self, name: RegisterName) -> bool:
         """Whether a register holds something else than 0."""
@@ -149,21 +156,21 @@ class _Looker:
 
     def question(self, probe: ProbeNotes, called: str) -> Question:
         """What a probe asks at the moment that was looked at."""
+        answers = {normal(text): text for text in map(self._text, reversed(probe.answers))}
         right = self._text(probe.right)
-        answers = dict.fromkeys(map(self._text, probe.answers))
-        if right not in answers or any(not isinstance(piece, str) for text in probe.answers for piece in text):
-            # In the order written or drawn what is right would stand at the same place each time.
-            answers = dict.fromkeys(sorted((*answers, right), key=_as_number))
-        return Question(called, self._text(probe.question), tuple(answers), right)
+        right = answers.setdefault(normal(right), right)
+        # Sorted, since in the order written what is right could always stand at the same place.
+        in_order = sorted(answers.values(), key=_by_number)
+        return Question(called, self._text(probe.question), tuple(in_order), right)
 
     def _text(self, pieces: NotedText) -> str:
         return "".join(piece if isinstance(piece, str) else self._spoken(piece) for piece in pieces)
 
     def _spoken(self, name: RegisterName) -> str:
         value = shown(self._program, name, int(self._registers[name.register]))
-        return {False: "no", True: "yes"}[value] if isinstance(value, bool) else str(value)
+        return TRUTHS[value] if isinstance(value, bool) else str(value)
 
 
-def _as_number(text: str) -> tuple[float, str]:
+def _by_number(text: str) -> tuple[float, str]:
     """Numbers by their value, before words."""
-    return (float(text), text) if text.lstrip("-").isdigit() else (float("inf"), text)
+    return (int(text), text) if is_number(text) else (inf, text)

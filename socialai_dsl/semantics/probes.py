@@ -17,10 +17,7 @@ from socialai_dsl.semantics.scope import Scope, at_every_step, reset_scope
 from socialai_dsl.semantics.terms import BOOL, Chance, Sited, Term
 from socialai_dsl.semantics.texts import parts, sayable
 from socialai_dsl.semantics.wording import spoken
-from socialai_dsl.vocabulary import normal
-
-YES_OR_NO: Final = ("no", "yes")
-"""What a truth value is called."""
+from socialai_dsl.vocabulary import TRUTHS, normal
 
 _MOST: Final = 64
 """So many possible answers need not be written out."""
@@ -112,7 +109,7 @@ class _Entry:
         """What the answer can be as far as its declaration says; None if that is too much to list."""
         term = answer.value.term
         if answer.type.kind == "bool":
-            return [YES_OR_NO[value] for value in sorted(values_of(self._resolver, term), reverse=True)]
+            return [TRUTHS[value] for value in sorted(values_of(self._resolver, term), reverse=True)]
         if answer.type.size > _LARGEST:
             return None
         values = sorted(values_of(self._resolver, term))
