@@ -9,7 +9,7 @@ from socialai_dsl.schema import Probe
 from socialai_dsl.schema.base import Expression
 from socialai_dsl.schema.positions import DataPath
 from socialai_dsl.semantics.build import draws, walk
-from socialai_dsl.semantics.findings import surviving
+from socialai_dsl.semantics.findings import FailedError, surviving
 from socialai_dsl.semantics.plans import Drawn, ProbePlan
 from socialai_dsl.semantics.possible_values import values_of
 from socialai_dsl.semantics.resolver import Resolver
@@ -48,10 +48,7 @@ class _Entry:
         remembered = self._resolver.registers.remembered
         known = len(remembered)
         try:
-            when = None if self._entry.when is None else self._condition(self._entry.when)
-            ask = self._text("ask", (*self._path, "ask"), self._entry.ask)
-            answer = self._answer()
-            answers = tuple(self._answers(answer))
+            when, ask, answer, answers = self._parts()
             terms = [sited.term for sited in (*([when] if when else []), *(v.value for v in self._values))]
             used = {part.path for term in terms for part in walk(term) if hasattr(part, "path")}
             own = tuple(item for item in remembered if item.path in used)
@@ -59,6 +56,24 @@ class _Entry:
             del remembered[known:]
         span = self._findings.places.key_span(self._path)
         return ProbePlan(self._name, span, when, ask, answer, answers, own)
+
+    def _parts(self) -> tuple[Sited | None, Text, Drawn, tuple[Text, ...]]:
+        """When, question, answer and answers, after the mistakes in each of them have been reported."""
+        when: Sited | None = None
+        ask: Text | None = None
+        answers: tuple[Text, ...] | None = None
+        fine = False
+        with surviving():
+            when = None if self._entry.when is None else self._condition(self._entry.when)
+            fine = True
+        with surviving():
+            ask = self._text("ask", (*self._path, "ask"), self._entry.ask)
+        with surviving():
+            answer = self._answer()
+            answers = tuple(self._answers(answer))
+        if not fine or ask is None or answers is None:
+            raise FailedError
+        return when, ask, answer, answers
 
     def _condition(self, raw: Expression) -> Sited:
         return self._sited((*self._path, "when"), lambda scope: self._resolver.written(scope.path, raw, BOOL, scope))
