@@ -48,7 +48,9 @@ def compile_loaded(loaded: Loaded) -> Program | ProgramSuite:
     return _suite(loaded, tuple(compile_scenario(member.checked) for member in loaded.members))
 
 
-def compile_asking_loaded(loaded: Loaded) -> tuple[Program | ProgramSuite, tuple[tuple[ProbeNotes, ...], ...]]:
+def compile_asking_loaded(
+    loaded: Loaded,
+) -> tuple[Program | ProgramSuite, tuple[tuple[ProbeNotes, ...], ...]]:
     """Programs that do the same as those of `compile_loaded` and note what `probes` ask about; and where they do.
 
     Returns:

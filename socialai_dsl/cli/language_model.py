@@ -110,7 +110,8 @@ def let_a_model_play(
     Args:
         agent: `llm:MODEL`.
         scenario: as it was asked for.
-        loaded: what its file means. program: its program.
+        loaded: what its file means.
+        program: its program.
         episodes: how many.
         out: gets `SCENARIO/transcripts`.
         options: as `add_options` declares them.

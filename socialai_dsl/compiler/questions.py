@@ -1,7 +1,7 @@
 """A program that does the same as a scenario's, and notes what its `probes` ask about.
 
-The code of the probes stands at the start of a step, before time goes on. So one more step, which is then forgotten, tells
-what is to be asked at a moment, and what is right. The scenario's own program has none of this.
+The code of the probes stands at the start of a step, before time goes on. So one more step, which is then forgotten,
+tells what is to be asked at a moment, and what is right. The scenario's own program has none of this.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def _ask(to: Expressions, plan: ProbePlan) -> None:
 
 
 def _note(to: Expressions, registers: Registers, value: Drawn, nothing: Label) -> None:
-    """Put a value into a register of its own; where it finds nothing, a condition is false and all else is not asked."""
+    """Put a value into a register of its own; a condition that finds nothing is false, any other value skips."""
     block = to.block
     register = registers.add(value.path, value.type, fleeting=True)
     mark = block.taken

@@ -1,7 +1,7 @@
 """What the probes of a scenario ask at each moment of an episode, and what is right.
 
-The episode is played beside its environment by programs that note what probes are about (`compiler.questions`). That both
-see the same is checked at every step.
+The episode is played beside its environment by programs that note what probes are about (`compiler.questions`). That
+both see the same is checked at every step.
 """
 
 from __future__ import annotations
@@ -83,11 +83,14 @@ class Asker:
         self._asked: set[str] = set()
         self._act = 0
 
-    def reset(self, seed: int | None, options: Mapping[str, Any] | None, image: NDArray[np.uint8]) -> list[Question]:
+    def reset(
+        self, seed: int | None, options: Mapping[str, Any] | None, image: NDArray[np.uint8]
+    ) -> list[Question]:
         """Begin the episode that the environment began, as it was asked to; what is asked now.
 
         Args:
-            seed, options: as `ScenarioEnv.reset` takes them.
+            seed: as `ScenarioEnv.reset` takes it.
+            options: likewise.
             image: of the environment's observation.
         """
         self._table.reset(seed, options)
@@ -115,7 +118,9 @@ class Asker:
         if looker is None:
             return []
         waiting = [
-            probe for probe in self._probes[number] if probe.name not in self._asked and (ended or not probe.at_end)
+            probe
+            for probe in self._probes[number]
+            if probe.name not in self._asked and (ended or not probe.at_end)
         ]
         if not waiting:
             return []

@@ -36,8 +36,8 @@ class Manner:
         style, mode, on_invalid, goal: see `Episode`.
         history: how many observations a request holds, the present one included.
         grammar: whether replies are held to a grammar, which llama.cpp's server understands.
-        probes: whether the scenario's probes are asked: apart from play, so that later requests hold nothing of it, kept
-            like other messages, or not at all.
+        probes: whether the scenario's probes are asked: apart from play, so that later requests hold nothing of it,
+            kept like other messages, or not at all.
     """
 
     style: Style = "prose"
@@ -267,7 +267,10 @@ class Conversation:
         return [
             {"role": "system", "content": self._episode.instructions},
             *(message for exchange in kept for message in exchange),
-            {"role": "user", "content": self._text if question is None else f"{self._text}\n\n{self._put(question)}"},
+            {
+                "role": "user",
+                "content": self._text if question is None else f"{self._text}\n\n{self._put(question)}",
+            },
         ]
 
     def constraints(self) -> dict[str, Any]:
@@ -323,7 +326,9 @@ class Conversation:
         if self._episode.question is not None:
             if self._manner.probes == "kept":
                 put = {"role": "user", "content": self._put(self._episode.question)}
-                self._exchanges.append([put, {"role": "assistant", "content": record["reply"] or "(nothing)"}])
+                self._exchanges.append(
+                    [put, {"role": "assistant", "content": record["reply"] or "(nothing)"}]
+                )
             self._episode.answer(record["reply"])
             return
         calls = [ToolCall(*call) for call in record.get("calls", ())]

@@ -86,8 +86,8 @@ def constraints(question: Question, mode: Mode, grammar: bool) -> dict[str, Any]
 def read_answer(reply: str, answers: Sequence[str]) -> str | None:
     """Which of the answers a reply gives; None if it gives none of them, or several.
 
-    What counts is the last JSON object with an `answer` or the last line marked `Answer:`, whichever comes later; without
-    either, the last line, and then the whole reply. Case, punctuation, markdown and further words do not count.
+    What counts is the last JSON object with an `answer` or the last line marked `Answer:`, whichever comes later;
+    without either, the last line, and then the whole reply. Case, punctuation, markdown and further words do not count.
     """
     text = conclusion(reply)
     marked = [(at, line) for at, line in _marked(text)]

@@ -85,7 +85,7 @@ class Ending(_Record):
 
 
 class ProbeFigures(_Record):
-    """How a language model answered a probe: how often it was asked and right, and the share that guessing gets right."""
+    """How a language model answered a probe: how often it was asked, and right; the share that guessing gets right."""
 
     asked: int = Field(ge=0)
     right: int = Field(ge=0)

@@ -139,8 +139,8 @@ def _probe(summary: Summary, name: str, figures: Sequence[ProbeFigures]) -> list
 
 
 _PROBES: Final = (
-    "Questions to language models, apart from play. Asked: how often the moment of the probe came. Right: share of right "
-    "answers. By chance: share that guessing gets right. Success: share of episodes, of what the same models did."
+    "Questions to language models, apart from play. Asked: how often the moment of the probe came. Right: share of "
+    "right answers. By chance: share that guessing gets right. Success: share of episodes, of what the same models did."
 )
 
 

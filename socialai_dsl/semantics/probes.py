@@ -76,13 +76,17 @@ class _Entry:
         return when, ask, answer, answers
 
     def _condition(self, raw: Expression) -> Sited:
-        return self._sited((*self._path, "when"), lambda scope: self._resolver.written(scope.path, raw, BOOL, scope))
+        return self._sited(
+            (*self._path, "when"), lambda scope: self._resolver.written(scope.path, raw, BOOL, scope)
+        )
 
     def _answer(self) -> Drawn:
         """What is right."""
         path = (*self._path, "answer")
         node = self._findings.expression(path, self._entry.answer)
-        return self._value("answer", self._sited(path, lambda s: sayable(self._resolver, node, s, or_condition=True)))
+        return self._value(
+            "answer", self._sited(path, lambda s: sayable(self._resolver, node, s, or_condition=True))
+        )
 
     def _text(self, part: str, path: DataPath, raw: str) -> Text:
         """The pieces of a text and the values in it."""
@@ -147,7 +151,9 @@ class _Entry:
         missing = [word for word in possible or () if normal(word) not in known]
         if missing:
             message = f"the answer can be `{missing[0]}`, which is not among `answers`"
-            self._findings.warning("W403", message, span, hint="what is right is offered all the same, where it is")
+            self._findings.warning(
+                "W403", message, span, hint="it would be offered only where it is right, which gives it away"
+            )
 
     def _check_number(self, number: int) -> None:
         if number < 2:

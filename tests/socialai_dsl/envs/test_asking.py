@@ -39,7 +39,9 @@ def asked(tmp_path: Path) -> Any:
 
     def play(probes: dict[str, Any], *actions: Any, **more: Any) -> list[list[Question]]:
         path = tmp_path / "corner.yaml"
-        path.write_text(yaml.safe_dump({**CORNER, **more, "probes": probes}, sort_keys=False), encoding="utf-8")
+        path.write_text(
+            yaml.safe_dump({**CORNER, **more, "probes": probes}, sort_keys=False), encoding="utf-8"
+        )
         return list(following(str(path), list(actions), {"test_episode": 0}))
 
     return play
@@ -78,7 +80,11 @@ def test_a_probe_is_asked_once_at_its_first_moment(asked: Any) -> None:
 def test_the_state_is_that_after_the_step(asked: Any) -> None:
     probes = {
         "faced": {"when": "agent.did(left)", "ask": "Where to?", "answer": "agent.facing"},
-        "turned": {"when": "prev(agent.facing) != agent.facing", "ask": "Whence?", "answer": "prev(agent.facing)"},
+        "turned": {
+            "when": "prev(agent.facing) != agent.facing",
+            "ask": "Whence?",
+            "answer": "prev(agent.facing)",
+        },
         "said": {"when": "agent.spoke", "ask": "What?", "answer": "agent.noun", "answers": ["red", "blue"]},
         "ended": {"ask": "Did you say red?", "answer": 'agent.said("Say red")'},
     }
@@ -90,7 +96,9 @@ def test_the_state_is_that_after_the_step(asked: Any) -> None:
 def test_what_npcs_said_is_known_even_if_no_rule_asks(asked: Any) -> None:
     frames = {"tell": {"states": {"s": {"then": [{"after": 2, "say": "It is <exit.color>"}]}}}}
     cast = {**CORNER["cast"], "guide": {"frame": "tell", "at": [2, 1], "name": "Ann"}}  # type: ignore[dict-item]
-    probes = {"told": {"when": 'guide.said("It is <exit.color>")', "ask": "Who spoke?", "answer": "exit.color"}}
+    probes = {
+        "told": {"when": 'guide.said("It is <exit.color>")', "ask": "Who spoke?", "answer": "exit.color"}
+    }
     found = asked(probes, *[STAY] * 3, frames=frames, cast=cast)
     assert texts(found) == [[], [], ["told"], []]
 
@@ -101,7 +109,11 @@ def test_answers_are_what_the_answer_can_be(asked: Any) -> None:
         "truth": {"ask": "Red?", "answer": "exit.color == red"},
         "color": {"ask": "Which?", "answer": "exit.color"},
         "table": {"ask": "How is it called?", "answer": "called(exit.color)"},
-        "written": {"ask": "Which?", "answer": "exit.color", "answers": ["<exit.color>", "none", "a blue one"]},
+        "written": {
+            "ask": "Which?",
+            "answer": "exit.color",
+            "answers": ["<exit.color>", "none", "a blue one"],
+        },
     }
     (*_, found) = asked(probes, *[STAY] * 6, tables={"called": {"red": "rouge", "blue": "bleu"}})
     answers = {question.probe: question.answers for question in found}
@@ -118,7 +130,9 @@ def test_the_right_answer_is_always_offered_and_spelt_as_written(asked: Any) -> 
         "spelt": {"ask": "Which?", "answer": "exit.color", "answers": ["Red", "Blue."]},
     }
     (*_, (missing, spelt)) = asked(probes, *[STAY] * 6)
-    assert missing.answers == tuple(sorted((missing.right, "none", "6"), key=lambda word: (word != "6", word)))
+    assert missing.answers == tuple(
+        sorted((missing.right, "none", "6"), key=lambda word: (word != "6", word))
+    )
     assert spelt.answers == ("Blue.", "Red")
     assert spelt.right in spelt.answers
 
@@ -169,7 +183,9 @@ def test_a_program_is_the_same_without_probes(name: str, tmp_path: Path) -> None
     assert probed.listing().splitlines()[1:] == plain.listing().splitlines()[1:]
 
 
-@pytest.mark.parametrize("name", [*SHIPPED, "talkitout+oracle", "novel/gaze_following+oracle", "novel/sally_anne+oracle"])
+@pytest.mark.parametrize(
+    "name", [*SHIPPED, "talkitout+oracle", "novel/gaze_following+oracle", "novel/sally_anne+oracle"]
+)
 def test_the_reference_asks_the_same(name: str) -> None:
     """Random play, or the script; the reference interpreter says which probes' moment it is, and what is right."""
     env, asker, reference = sd.make(name), Asker(sd.load(name)), Reference(name)
@@ -178,7 +194,11 @@ def test_the_reference_asks_the_same(name: str) -> None:
     for number in range(3):
         observation, _ = env.reset(options={"test_episode": number})
         reference.reset(0, episode=number, test=True)
-        now, asked, ended = asker.reset(None, {"test_episode": number}, observation["image"]), set[str](), False
+        now, asked, ended = (
+            asker.reset(None, {"test_episode": number}, observation["image"]),
+            set[str](),
+            False,
+        )
         while True:
             expected = {k: v for k, v in reference.probed(ended).items() if k not in asked}
             for question in now:
@@ -202,4 +222,6 @@ def test_the_reference_asks_the_same(name: str) -> None:
 
 def _moving(env: Any, draw: np.random.Generator) -> Any:
     """A random action that does not end the episode at once."""
-    return np.array([draw.choice([i for i, a in enumerate((*env.program.actions, "")) if a != "done"]), 0, 0, 0])
+    return np.array(
+        [draw.choice([i for i, a in enumerate((*env.program.actions, "")) if a != "done"]), 0, 0, 0]
+    )
