@@ -364,7 +364,9 @@ def test_who_guesses_is_right_by_chance(tmp_path: Path) -> None:
 def test_questions_stay_apart_from_play_unless_they_are_kept(tmp_path: Path) -> None:
     requests = {}
     for probes in ("apart", "kept", "off"):
-        with endpoint(knowing(BELIEF, lambda _: "Answer: it's me") if probes != "off" else lambda _: "Act: none") as stub:
+        with endpoint(
+            knowing(BELIEF, lambda _: "Answer: it's me") if probes != "off" else lambda _: "Act: none"
+        ) as stub:
             options = ["--probes", probes, "--history", "1000", "--concurrency", "1"]
             assert evaluate(stub.url, tmp_path / probes, *options, on=BELIEF, episodes=1) == 0
         requests[probes] = [json.dumps(request["messages"]) for request in stub.requests]
@@ -383,15 +385,17 @@ def test_answers_are_paid_for_once_and_count_for_the_budget(tmp_path: Path, caps
         assert evaluate(stub.url, whole, *ALONE, on=BELIEF, episodes=2) == 0
     expected = figures(whole, BELIEF)["eval"]
     assert expected["prompt_tokens"] == 10 * len(stub.requests)
-    lines = (whole / scenario_folder_name(BELIEF) / "transcripts/episode-000.jsonl").read_text(encoding="utf-8").splitlines()
+    lines = (
+        (whole / scenario_folder_name(BELIEF) / "transcripts/episode-000.jsonl")
+        .read_text(encoding="utf-8")
+        .splitlines()
+    )
     at = next(number for number, line in enumerate(lines) if "probe" in json.loads(line))
     assert json.loads(lines[at])["probe"] == "belief"
     with endpoint(knowing(BELIEF, lambda question: f"Answer: {question.right}")) as again:
         calls = 0
         budget = 12 * (at + 2)  # two of three questions
-        while evaluate(
-            again.url, tmp_path / "parts", *ALONE, "--budget", f"{budget}", on=BELIEF, episodes=2
-        ):
+        while evaluate(again.url, tmp_path / "parts", *ALONE, "--budget", f"{budget}", on=BELIEF, episodes=2):
             calls += 1
             assert "the budget is spent" in capsys.readouterr().err
             assert calls < 100
