@@ -270,13 +270,16 @@ def questions_agree(
         where = f"{env.program.name}, seed {seed}, step {t}"
         for question in now:
             text, _, right = expected.get(question.probe, ("nothing", [], ""))
+            right = "no" if right is None else right
             if (question.text, normal(question.right)) != (text, normal(right)):
                 raise Disagreement(f"{where}: asked {question}, expected {text}, {right}")
         for name in expected.keys() - {question.probe for question in now}:
             _, answers, right = expected[name]
-            if len({*map(normal, answers), normal(right)}) > 1 and answers:
+            if right is not None and answers and len({*map(normal, answers), normal(right)}) > 1:
                 raise Disagreement(f"{where}: {name} was not asked")
-        asked |= expected.keys()
+        asked |= {name for name, (_, _, right) in expected.items() if right is not None} | {
+            q.probe for q in now
+        }
         count += len(now)
         if ended:
             return count

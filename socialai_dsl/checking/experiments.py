@@ -15,6 +15,7 @@ from socialai_dsl.loader.names import looks_like_path
 from socialai_dsl.schema.experiment import AGENTS, NETS, Experiment
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.semantics.experiment import Cell, cells_of
+from trainer.shipped import PREFIX, shipped_agents
 
 if TYPE_CHECKING:
     from socialai_dsl.checking.loaded import Loaded
@@ -94,14 +95,15 @@ def check_experiment(resolved: Resolved, bag: DiagnosticBag) -> LoadedExperiment
 
 
 def _check_agents(cells: Sequence[Cell], resolved: Resolved, bag: DiagnosticBag) -> None:
+    shipped = [PREFIX + name for name in shipped_agents()]
     for cell in cells:
-        if cell.agent in AGENTS or (resolved.path.parent / cell.agent).exists():
+        if cell.agent in (*AGENTS, *shipped) or (resolved.path.parent / cell.agent).exists():
             continue
-        near = did_you_mean(cell.agent, AGENTS)
+        near = did_you_mean(cell.agent, (*AGENTS, *shipped))
         hint = (
             None
             if near
-            else f"an agent is {', '.join(AGENTS)}, or the path of a checkpoint or of a run's folder"
+            else f"an agent is {', '.join(AGENTS)}, {PREFIX}NAME, or the path of a checkpoint or of a run's folder"
         )
         folder = display_name(resolved.path.parent)
         message = f"there is no checkpoint `{cell.agent}` in {folder}"
