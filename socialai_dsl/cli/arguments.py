@@ -1,6 +1,7 @@
 """This module reads numbers from the command line."""
 
 import argparse
+import math
 
 
 def positive(text: str) -> int:
@@ -11,6 +12,17 @@ def positive(text: str) -> int:
 def natural(text: str) -> int:
     """A whole number of at least 0."""
     return _number(text, 0)
+
+
+def seconds(text: str) -> float:
+    """A time above 0; it may have a fraction."""
+    try:
+        found = float(text)
+    except ValueError:
+        found = 0.0
+    if not (0 < found < math.inf):
+        raise argparse.ArgumentTypeError(f"expected a number of seconds above 0, got {text!r}")
+    return found
 
 
 def _number(text: str, least: int) -> int:

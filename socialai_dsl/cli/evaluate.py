@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from socialai_dsl.cli.arguments import natural, positive
 from socialai_dsl.cli.errors import Exit, UsageError
 from socialai_dsl.cli.language_model import PREFIX, add_options, default_folder
-from socialai_dsl.cli.run_folder import RESULT, SETTINGS, read_json, versions, write_json, write_text
+from socialai_dsl.cli.run_folder import REPLAY, RESULT, SETTINGS, read_json, versions, write_json, write_text
 from trainer.config import code_folder
 
 if TYPE_CHECKING:
@@ -99,7 +99,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
             write_json(place / SETTINGS, {key: results[-1][key] for key in ("scenario", "agent", "seed")})
             write_json(place / RESULT, results[-1])
             if not arguments.json:
-                print(f"\nepisodes written to {place}\n", flush=True)
+                replay = f", to look at in {place / REPLAY}" if (place / REPLAY).is_file() else ""
+                print(f"\nepisodes written to {place}{replay}\n", flush=True)
             # After each scenario, so that nothing is lost should the agent not fit the next one.
             write_text(out / FIGURES, _text(results) + "\n")
     if arguments.json:

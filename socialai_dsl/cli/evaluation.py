@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.endings import Ending, endings_of
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
     from socialai_dsl.checking import Loaded
     from socialai_dsl.cli.episode import Episode
+    from socialai_dsl.cli.language_model import Played
     from socialai_dsl.evaluation import EvalResult, Policy
     from socialai_dsl.program_suite import Playable
     from socialai_dsl.replay import Trace
@@ -35,6 +37,7 @@ class Evaluation:
         actions: of each episode, int64 (4,) each.
         warnings: what the agent's checkpoint does not know of this scenario, and the like.
         more: figures that count for this agent alone.
+        replies: of a language model, what it answered before each action of each episode.
     """
 
     scenario: str
@@ -46,6 +49,7 @@ class Evaluation:
     actions: "Mapping[int, list[NDArray[np.int64]]]"
     warnings: Sequence[str] = field(default_factory=tuple)
     more: Mapping[str, Any] = field(default_factory=dict)
+    replies: Mapping[int, Sequence[Sequence[tuple[str, str]]]] = field(default_factory=dict)
 
     def figures(self) -> dict[str, Any]:
         """The figures as a JSON-able object."""
@@ -71,16 +75,19 @@ class Evaluation:
 
     def pick(self, success: bool, count: int) -> list[int]:
         """Numbers of up to `count` episodes that succeeded, or failed: each way of ending has its turn."""
-        from socialai_dsl.llm.episode import INVALID
-
         queues = [
             ((self.result.outcome == i) & (self.result.success == success)).nonzero()[0].tolist()
-            for i, name in enumerate(self.result.names)
-            if name != INVALID  # what a reply ended cannot be played again
+            for i in range(len(self.result.names))
         ]
         queues.sort(key=len, reverse=True)
         rounds = [queue[turn] for turn in range(count) for queue in queues if turn < len(queue)]
         return sorted(rounds[:count])
+
+    def is_cut_short(self, number: int) -> bool:
+        """Whether an answer without an action ended the episode."""
+        from socialai_dsl.llm.episode import INVALID
+
+        return bool(self.result.names[self.result.outcome[number]] == INVALID)
 
     def record(self, number: int, label: str) -> "Episode":
         """Play one of the episodes once more, for people to look at.
@@ -113,10 +120,14 @@ class Evaluation:
         return [self.trace(number) for success in (False, True) for number in self.pick(success, count)]
 
     def trace(self, number: int) -> "Trace":
-        """Play test episode `number` once more, and trace it with what a trained agent made of it."""
+        """Play test episode `number` once more, and trace it with what the agent made of it, or answered."""
         import socialai_dsl
         from socialai_dsl.replay import trace_of
+        from socialai_dsl.replay.document import Outcome
 
+        endings = {one.name: one.text for one in self.endings}
+        ending = self.result.names[self.result.outcome[number]]
+        cut_short = Outcome(name=ending, success=False, text=endings[ending])
         env = socialai_dsl.make(self.scenario)
         try:
             return trace_of(
@@ -126,9 +137,11 @@ class Evaluation:
                 scenario=self.scenario,
                 agent=self.player.agent,
                 episode=f"test episode {number}",
-                endings={ending.name: ending.text for ending in self.endings},
+                endings=endings,
                 about=self.about,
                 think=self._think(env, number),
+                replies=self.replies.get(number, ()),
+                cut_short=cut_short if self.is_cut_short(number) else None,
             )
         finally:
             env.close()
@@ -172,17 +185,15 @@ def evaluate_agent(player: Player, scenario: str, episodes: int) -> Evaluation:
     program = socialai_dsl.compile(loaded)
     endings = endings_of(loaded, program)
     if player.agent == "human":
-        result, played = _let_a_person_play(scenario, program, episodes)
-        return Evaluation(scenario, about_of(loaded), program, player, result, endings, played)
+        result, actions = _let_a_person_play(scenario, program, episodes)
+        return Evaluation(scenario, about_of(loaded), program, player, result, endings, actions)
     if player.options is not None:
         from socialai_dsl.cli.language_model import let_a_model_play
 
-        result, played, others, more = let_a_model_play(
+        played = let_a_model_play(
             player.agent, scenario, loaded, program, episodes, player.out, player.options
         )
-        return Evaluation(
-            scenario, about_of(loaded), program, player, result, [*endings, *others], played, more=more
-        )
+        return _of_model(played, scenario, loaded, program, player)
 
     from socialai_dsl.cli.agents import with_script
     from socialai_dsl.evaluation import evaluate
@@ -203,6 +214,37 @@ def evaluate_agent(player: Player, scenario: str, episodes: int) -> Evaluation:
         envs.close()
     actions = {number: policy.played[number][:length] for number, length in enumerate(result.lengths)}
     return Evaluation(scenario, about_of(loaded), program, player, result, endings, actions, told)
+
+
+def evaluation_of_model(run: Path, agent: str, scenario: str, most: int) -> Evaluation:
+    """The first test episodes that a language model has played, as the folder `run` of its evaluation keeps them.
+
+    Raises:
+        ScenarioError: the scenario has mistakes.
+        UsageError: the folder holds no episodes of this scenario.
+    """
+    import socialai_dsl
+    from socialai_dsl.cli.language_model import episodes_of_model
+
+    loaded = socialai_dsl.load(scenario)
+    program = socialai_dsl.compile(loaded)
+    return _of_model(episodes_of_model(run, program, most), scenario, loaded, program, Player(agent, out=run))
+
+
+def _of_model(
+    played: "Played", scenario: str, loaded: "Loaded", program: "Playable", player: Player
+) -> Evaluation:
+    return Evaluation(
+        scenario,
+        about_of(loaded),
+        program,
+        player,
+        played.result,
+        [*endings_of(loaded, program), *played.endings],
+        played.actions,
+        more=played.figures,
+        replies=played.replies,
+    )
 
 
 class _Remembering:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from socialai_dsl.cli.run_folder import REPLAY, RESULT, scenario_folder_name, write_text
+from socialai_dsl.cli.run_folder import EPISODES, REPLAY, RESULT, scenario_folder_name, write_text
 
 if TYPE_CHECKING:
     from socialai_dsl.cli.evaluation import Evaluation
@@ -118,13 +118,15 @@ def write_episodes(evaluation: "Evaluation", folder: Path, count: int, label: st
     place.mkdir(parents=True, exist_ok=True)
     for success in (False, True):
         for number in evaluation.pick(success, count):
+            if evaluation.is_cut_short(number):  # no step ended it, so a film has no end to show
+                continue
             episode = evaluation.record(number, label)
             name = f"{'success' if success else 'failure'}-{number:03d}"
             write_text(place / f"{name}.txt", episode.transcript())
             episode.save_film(place / f"{name}.gif")
     if traces := evaluation.traces(count):
         write_text(place / REPLAY, replay_page(traces))
-    write_text(place / "episodes.csv", _episodes(evaluation))
+    write_text(place / EPISODES, _episodes(evaluation))
     return place
 
 

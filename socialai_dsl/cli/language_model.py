@@ -5,12 +5,13 @@ import os
 import re
 import sys
 import time
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlsplit
 
-from socialai_dsl.cli.arguments import positive
+from socialai_dsl.cli.arguments import positive, seconds
 from socialai_dsl.cli.endings import Ending
 from socialai_dsl.cli.errors import RunFailed, UsageError
 from socialai_dsl.cli.run_folder import scenario_folder_name
@@ -32,6 +33,23 @@ _KEY: Final = "OPENAI_API_KEY"
 _LOCAL: Final = ("localhost", "127.0.0.1", "::1")
 _SECONDS_BETWEEN_LINES: Final = 5.0
 _BUDGET: Final = re.compile(r"(\d[\d_,]*(?:\.\d+)?) ?(tokens|usd)?", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Played:
+    """What came of test episodes that a model has played.
+
+    Attributes:
+        result: as for all agents.
+        actions: of each episode, int64 (4,) each. replies: what the model answered before each of them.
+        endings: further ways in which episodes ended. figures: further ones.
+    """
+
+    result: "EvalResult"
+    actions: "dict[int, list[NDArray[np.int64]]]"
+    replies: dict[int, list[list[tuple[str, str]]]]
+    endings: list[Ending]
+    figures: dict[str, Any]
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -81,7 +99,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--concurrency", type=positive, default=4, metavar="N", help="episodes played at once (default: 4)"
     )
     group.add_argument(
-        "--timeout", type=positive, default=120, metavar="SECONDS", help="for one reply (default: 120)"
+        "--timeout", type=seconds, default=120.0, metavar="SECONDS", help="for one reply (default: 120)"
     )
     group.add_argument(
         "--budget", metavar="N", help="what this command may spend: 200000 tokens, or 2.50usd with --prices"
@@ -104,7 +122,7 @@ def let_a_model_play(
     episodes: int,
     out: Path,
     options: argparse.Namespace,
-) -> "tuple[EvalResult, dict[int, list[NDArray[np.int64]]], list[Ending], dict[str, Any]]":
+) -> "Played":
     """Let a model play test episodes 0 to `episodes - 1`, those that are in transcripts already excepted.
 
     Args:
@@ -115,9 +133,6 @@ def let_a_model_play(
         episodes: how many.
         out: gets `SCENARIO/transcripts`.
         options: as `add_options` declares them.
-
-    Returns:
-        What came of it, the actions of each episode, further ways in which episodes ended, further figures.
 
     Raises:
         UsageError: the endpoint does not answer, or an option is not what was expected.
@@ -166,7 +181,24 @@ def let_a_model_play(
             f"the budget is spent: {ended} of {episodes} episodes are over; the same command goes on with "
             f"another {options.budget}"
         )
-    return *_result(played, program), _figures(played) | _probes(played, names)
+    return _outcome(played, program, _probes(played, names))
+
+
+def episodes_of_model(run: Path, program: "Playable", most: int) -> "Played":
+    """What came of the first episodes that a model has played, from their transcripts in the folder `run`.
+
+    Raises:
+        UsageError: there are none of this program.
+    """
+    from socialai_dsl.llm.players import OtherSettings, kept_episodes
+
+    try:
+        played = kept_episodes(program, run / TRANSCRIPTS, most)
+    except OtherSettings as error:
+        raise UsageError(str(error)) from None
+    if not played:
+        raise UsageError(f"{run}: no episode is over")
+    return _outcome(played, program)
 
 
 def _endpoint(kind: Any, agent: str, options: argparse.Namespace) -> Any:
@@ -188,7 +220,7 @@ def _endpoint(kind: Any, agent: str, options: argparse.Namespace) -> Any:
     if not model:
         raise UsageError(f"got the agent {agent!r}, expected the name of a model behind {PREFIX}")
     asked = {"temperature": options.temperature, "max_tokens": options.max_tokens}
-    return kind(model, url, key.strip(), asked, float(options.timeout), _prices(options.prices))
+    return kind(model, url, key.strip(), asked, options.timeout, _prices(options.prices))
 
 
 def _prices(text: str | None) -> tuple[float, float] | None:
@@ -219,9 +251,9 @@ def _budget(text: str | None, prices: tuple[float, float] | None) -> "Budget":
     return Budget(cost=amount)
 
 
-def _result(
-    played: "Sequence[PlayedEpisode]", program: "Playable"
-) -> "tuple[EvalResult, dict[int, list[NDArray[np.int64]]], list[Ending]]":
+def _outcome(
+    played: "Sequence[PlayedEpisode]", program: "Playable", probes: dict[str, Any] | None = None
+) -> "Played":
     import numpy as np
 
     from socialai_dsl.evaluation import EvalResult
@@ -242,7 +274,9 @@ def _result(
         rules,
     )
     more = [Ending(INVALID, False, "a reply without an action")] if invalid else []
-    return result, {episode.number: episode.actions for episode in played}, more
+    actions = {episode.number: episode.actions for episode in played}
+    replies = {episode.number: episode.replies for episode in played}
+    return Played(result, actions, replies, more, _figures(played) | (probes or {}))
 
 
 def _figures(played: "Sequence[PlayedEpisode]") -> dict[str, Any]:

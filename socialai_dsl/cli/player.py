@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from socialai_dsl.cli.language_model import PREFIX
+
 if TYPE_CHECKING:
     from socialai_dsl.evaluation import Policy
 
@@ -37,7 +39,7 @@ class Player:
     @property
     def is_trained(self) -> bool:
         """Whether a network plays."""
-        return self.options is None and self.agent not in ("random", "oracle", "human")
+        return self.agent not in ("random", "oracle", "human") and not self.agent.startswith(PREFIX)
 
     @property
     def manner(self) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.cli.arguments import natural, positive
 from socialai_dsl.cli.errors import Exit, UsageError
-from socialai_dsl.cli.run_folder import REPLAY, SETTINGS, write_text
+from socialai_dsl.cli.run_folder import REPLAY, SETTINGS, read_json, write_text
 
 if TYPE_CHECKING:
     from socialai_dsl.cli.evaluation import Evaluation
@@ -95,18 +95,27 @@ def _read(path: Path) -> "list[Trace]":
 
 
 def _played(arguments: argparse.Namespace) -> "list[Trace]":
-    """Test episodes of a run or a scenario: one that was asked for, or failures and successes."""
+    """Test episodes of a run or a scenario: one that was asked for, or failures and successes.
+
+    Raises:
+        UsageError: a language model has not played the one that was asked for.
+    """
     number = arguments.test_episode
     evaluation = _evaluation(arguments, arguments.episodes if number is None else number + 1)
     for warning in evaluation.warnings:
         print(f"warning: {warning}", file=sys.stderr)
+    if number is not None and number not in evaluation.actions:
+        raise UsageError(
+            f"--test-episode: got {number}, expected less than {len(evaluation.actions)}, as many as were played"
+        )
     return evaluation.traces(arguments.record) if number is None else [evaluation.trace(number)]
 
 
 def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
     from socialai_dsl.cli.agents import folder_of, named_agent, require_trainer, scripted_name
     from socialai_dsl.cli.evaluate import own_scenario
-    from socialai_dsl.cli.evaluation import evaluate_agent
+    from socialai_dsl.cli.evaluation import evaluate_agent, evaluation_of_model
+    from socialai_dsl.cli.language_model import PREFIX
     from socialai_dsl.cli.player import Player
 
     source = arguments.source
@@ -116,6 +125,9 @@ def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
                 "--agent: a run is replayed by its own agent; name a scenario to let another play"
             )
         agent, scenario = source, own_scenario(source)
+        played_by = str(read_json(Path(source) / SETTINGS).get("agent"))
+        if played_by.startswith(PREFIX):
+            return evaluation_of_model(Path(source), played_by, scenario, episodes)
     else:
         scenario = source
         usual = "oracle" if scripted_name(scenario) is not None else "random"

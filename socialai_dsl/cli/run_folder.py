@@ -10,6 +10,7 @@ from typing import Any, Final
 from socialai_dsl.atomic import write_json as write_json
 from socialai_dsl.atomic import write_text as write_text
 from socialai_dsl.cli.errors import UsageError
+from socialai_dsl.experiments.folder import EPISODES as EPISODES
 from socialai_dsl.experiments.folder import REPLAY as REPLAY
 
 RESULT: Final = "result.json"

@@ -1,6 +1,7 @@
 """This module is `socialai studio`: scenarios are written, seen and played in a browser on this machine."""
 
 import argparse
+import contextlib
 import errno
 import secrets
 import socket
@@ -57,7 +58,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
     config = uvicorn.Config(
         studio.app, log_level="error", ws="websockets-sansio", ws_max_size=LARGEST_MESSAGE, access_log=False
     )
-    uvicorn.Server(config).run(sockets=[listening])
+    with contextlib.suppress(KeyboardInterrupt):
+        uvicorn.Server(config).run(sockets=[listening])
     return Exit.GOOD
 
 

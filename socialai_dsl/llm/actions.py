@@ -206,18 +206,23 @@ class ActionLanguage:
         }
 
     def tools(self) -> list[dict[str, Any]]:
-        """The tools `move` and `say`, as OpenAI's interface takes them."""
-        tools = [_tool("move", "Move your body.", {"direction": self._actions})]
+        """The tools `move` and `say`, as OpenAI's interface takes them; `say` can move as well."""
+        direction = _choice("what to do", self._actions)
+        tools = [_tool("move", "Move your body.", {"direction": direction})]
         if self._sentences:
-            spoken = {"template": self._templates, "noun": self._nouns}
-            tools.append(_tool("say", "Say a template with a noun for its <noun>.", spoken))
+            spoken = {
+                "template": _choice("what to say", self._templates),
+                "noun": _choice("what stands for <noun>", self._nouns),
+            }
+            both = {"direction": _choice("what to do at the same time", self._actions)}
+            tools.append(_tool("say", "Say a template with a noun for its <noun>.", spoken, both))
         return tools
 
     def _how_to_reply(self, mode: Mode) -> list[str]:
         example = self._sentences[0] if self._sentences else ""
         first = self._actions[0]
         if mode == "tools":
-            both = " Call both in one reply to do both at once." if example else ""
+            both = " To move and speak at once, give `say` a direction." if example else ""
             return [f"Reply by calling a tool.{both}"]
         if mode == "json":
             said = json.dumps(example, ensure_ascii=False) if example else "null"
@@ -384,12 +389,17 @@ def _rule_of(template: str) -> str:
     return " ".join(part for part in [*parts, json.dumps(after, ensure_ascii=False) if after else ""] if part)
 
 
-def _tool(name: str, about: str, choices: Mapping[str, Sequence[str]]) -> dict[str, Any]:
-    properties = {key: {"type": "string", "enum": list(values)} for key, values in choices.items()}
+def _choice(about: str, values: Sequence[str]) -> dict[str, Any]:
+    return {"type": "string", "enum": list(values), "description": about}
+
+
+def _tool(
+    name: str, about: str, required: Mapping[str, Any], optional: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
     parameters = {
         "type": "object",
-        "properties": properties,
-        "required": list(properties),
+        "properties": {**required, **(optional or {})},
+        "required": list(required),
         "additionalProperties": False,
     }
     return {"type": "function", "function": {"name": name, "description": about, "parameters": parameters}}

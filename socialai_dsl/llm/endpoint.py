@@ -27,6 +27,7 @@ _PASSING: Final = frozenset({408, 409, 425, 429, 500, 502, 503, 504, 529})
 """Statuses after which it is worth trying again."""
 _LOST: Final = (httpx.ReadError, httpx.WriteError, httpx.RemoteProtocolError)
 """A connection that was there and broke."""
+_CONNECT_SECONDS: Final = 15.0
 _MOST_BYTES: Final = 4_000_000
 _CITED: Final = 200
 
@@ -81,7 +82,7 @@ class Endpoint:
         model: its name there. base_url: of the interface, without `/chat/completions`.
         key: sent with each request; neither printed nor stored.
         options: of each request, such as `temperature`; None leaves one out.
-        timeout: seconds that an answer may take.
+        timeout: seconds that a whole answer may take.
         prices: US dollars for a million tokens of prompts and of completions, if known.
     """
 
@@ -100,7 +101,7 @@ class Endpoint:
     def client(self) -> httpx.AsyncClient:
         """Connections for many requests; to be closed."""
         headers = {"Authorization": f"Bearer {self.key}"} if self.key else {}
-        return httpx.AsyncClient(headers=headers, timeout=httpx.Timeout(self.timeout, connect=15.0))
+        return httpx.AsyncClient(headers=headers, timeout=httpx.Timeout(None, connect=_CONNECT_SECONDS))
 
     async def ask(
         self,
@@ -134,12 +135,18 @@ class Endpoint:
                 await asyncio.sleep(max(wait, _FIRST_WAIT * 2 ** (attempt - 1) * random.uniform(0.75, 1.25)))
             wait = 0.0
             try:
-                status, headers, content = await self._post(client, body)
+                # httpx's own limit starts anew with every byte.
+                async with asyncio.timeout(self.timeout):
+                    status, headers, content = await self._post(client, body)
             except (httpx.InvalidURL, httpx.UnsupportedProtocol) as error:
                 raise self._failure(f"that is no URL ({error})") from None
+            except TimeoutError:
+                what, strange = f"it took longer than {self.timeout:g} s", strange + 1
+                continue
             except httpx.HTTPError as error:
                 # A server may close a connection just as it is used again; this says nothing about the address.
-                what, strange = _said(error), strange + (not isinstance(error, _LOST))
+                what = f"no connection ({str(error) or type(error).__name__})"
+                strange += not isinstance(error, _LOST)
                 continue
             if status == httpx.codes.OK:
                 answer = self._answer(content, messages)
@@ -211,13 +218,6 @@ def _retry_after(headers: httpx.Headers) -> float:
         except ValueError:
             return 0.0
     return min(max(wait, 0.0), _LONGEST_WAIT)
-
-
-def _said(error: httpx.HTTPError) -> str:
-    """What a lost connection is called."""
-    if isinstance(error, httpx.TimeoutException):
-        return "it took too long"
-    return f"no connection ({str(error) or type(error).__name__})"
 
 
 def _cited(content: bytes) -> str:

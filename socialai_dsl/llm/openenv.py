@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from secrets import randbelow
 from typing import Any, ClassVar
 
@@ -10,7 +11,7 @@ from openenv.core.client_types import StepResult
 from openenv.core.env_client import EnvClient
 from openenv.core.env_server import Environment, create_fastapi_app
 from openenv.core.env_server.types import Action, EnvironmentMetadata, Observation, State
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from socialai_dsl.llm.episode import Episode
 from socialai_dsl.llm.view import Style
@@ -23,6 +24,13 @@ class Reply(Action):
     """What a model replies."""
 
     message: str = Field(description="the reply, which ends with a line such as `Act: left`")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_text(cls, given: Any) -> Any:
+        """Take JSON of any other form for the reply itself: trainers send a reply that is JSON as what it says."""
+        reply = given.get("message", given) if isinstance(given, dict) else given
+        return given if isinstance(reply, str) else {"message": json.dumps(reply, ensure_ascii=False)}
 
 
 class Told(Observation):

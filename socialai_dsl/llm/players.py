@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from itertools import count, islice, takewhile
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -24,6 +25,7 @@ from socialai_dsl.program_suite import Playable
 
 FORMAT: Final = "socialai-transcript/1"
 Probing = Literal["apart", "kept", "off"]
+_SETTINGS: Final = "settings.json"
 _KEPT: Final = 4000
 """So many characters of a reply are kept and shown to the model again."""
 
@@ -79,6 +81,8 @@ class PlayedEpisode:
     Attributes:
         number: of the test episode.
         result: how it went. actions: int64 (4,) each.
+        replies: what the model answered before each action, and after the last one if that ended the episode; each
+            with what was wrong with it.
         rules: how often each of the scenario's rules fired.
         usage: what its replies took.
         answered: the answers to probes. asking: whether a question waits for its answer.
@@ -87,6 +91,7 @@ class PlayedEpisode:
     number: int
     result: EpisodeResult
     actions: list[NDArray[np.int64]]
+    replies: list[list[tuple[str, str]]]
     rules: Mapping[str, int]
     usage: Usage
     answered: Sequence[Answered] = ()
@@ -114,7 +119,7 @@ def transcripts(folder: Path, settings: Mapping[str, Any]) -> Callable[[int], Pa
         OtherSettings: it holds episodes with other settings.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / "settings.json"
+    path = folder / _SETTINGS
     content = {"format": FORMAT, **settings}
     if path.exists():
         try:
@@ -126,7 +131,40 @@ def transcripts(folder: Path, settings: Mapping[str, Any]) -> Callable[[int], Pa
             raise OtherSettings(f"{folder} holds episodes that were played with another {', '.join(other)}")
     else:
         path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    return lambda number: folder / f"episode-{number:03d}.jsonl"
+    return lambda number: _transcript(folder, number)
+
+
+def _transcript(folder: Path, number: int) -> Path:
+    return folder / f"episode-{number:03d}.jsonl"
+
+
+def kept_episodes(program: Playable, folder: Path, most: int) -> list[PlayedEpisode]:
+    """The first episodes that are over, from their transcripts; no model is asked.
+
+    Args:
+        program: of the scenario that was played.
+        folder: of the transcripts.
+        most: how many episodes, at most.
+
+    Raises:
+        OSError: a transcript cannot be read.
+        OtherSettings: there are none, or they are of another program.
+    """
+    try:
+        settings = json.loads((folder / _SETTINGS).read_text(encoding="utf-8"))
+        manner = Manner(**{field.name: settings[field.name] for field in fields(Manner)})
+    except (FileNotFoundError, ValueError, KeyError, TypeError):
+        raise OtherSettings(f"{folder} holds no transcripts of episodes") from None
+    if settings.get("program_sha256") != program.sha256:
+        raise OtherSettings(f"{folder} holds episodes of another version of the scenario")
+    episode = Episode(program, **manner.of_episodes)
+    try:
+        paths = (_transcript(folder, number) for number in count())
+        found = enumerate(takewhile(Path.exists, islice(paths, most)))
+        played = (Conversation(episode, manner, number, path).played() for number, path in found)
+        return list(takewhile(lambda one: one.ended, played))
+    finally:
+        episode.close()
 
 
 class LanguageModelPlayer:
@@ -200,7 +238,9 @@ class LanguageModelPlayer:
             episode = Episode(self._program, **self._manner.of_episodes, probes=self._loaded)
             try:
                 for number in waiting:
-                    conversation = Conversation(episode, self._manner, number, self._place(number))
+                    path = self._place(number)
+                    _mend(path)
+                    conversation = Conversation(episode, self._manner, number, path)
                     # After a failure the others play what they have asked for, which is paid for, and stop as well.
                     while not (conversation.done or failures or budget.is_spent(self._spent)):
                         conversation.add(await self._ask(client, conversation))
@@ -250,6 +290,7 @@ class Conversation:
         self._before = episode.env.counters()["rules"]
         self._text = episode.reset(test_episode=number)
         self._exchanges: list[list[Mapping[str, Any]]] = []
+        self._replies: list[list[tuple[str, str]]] = [[]]
         for record in _records(path):
             if self.done:
                 break
@@ -309,6 +350,7 @@ class Conversation:
             self._number,
             self._episode.result(),
             list(self._episode.actions),
+            [replies for replies in self._replies if replies],
             rules,
             self._usage,
             tuple(self._episode.answered),
@@ -323,6 +365,8 @@ class Conversation:
             record["cost"],
             record.get("estimated", False),
         )
+        if "probe" in record and self._episode.question is None:
+            return  # nobody asks now: the episode is played again from its transcript
         if self._episode.question is not None:
             if self._manner.probes == "kept":
                 put = {"role": "user", "content": self._put(self._episode.question)}
@@ -337,6 +381,10 @@ class Conversation:
         turn = self._episode.step(reply)
         self._exchanges.append(_exchange(self._text, record["reply"], calls, turn))
         self._text = turn.text
+        written = "\n".join([record["reply"], *(f"{call.name}({call.arguments})" for call in calls)])
+        self._replies[-1].append((written.strip(), turn.error))
+        if turn.action is not None:
+            self._replies.append([])
 
     def _put(self, question: Question) -> str:
         return put(question, self._manner.mode)
@@ -357,19 +405,30 @@ def _exchange(text: str, reply: str, calls: list[ToolCall], turn: Turn) -> list[
 
 
 def _records(path: Path) -> Iterator[dict[str, Any]]:
-    """The replies of a transcript; what follows a line that was cut off is dropped from the file."""
+    """The replies of a transcript, up to a line that was cut off."""
+    return (json.loads(line) for line in _whole_lines(path))
+
+
+def _whole_lines(path: Path) -> list[bytes]:
+    """The lines of a transcript, up to one that was cut off."""
     try:
-        lines = path.read_bytes().split(b"\n")
+        lines = path.read_bytes().split(b"\n")[:-1]
     except FileNotFoundError:
-        return
-    kept = 0
-    for line in lines[:-1]:
-        try:
-            record = json.loads(line)
-        except ValueError:
-            break
-        yield record
-        kept += len(line) + 1
-    if kept < sum(map(len, lines)) + len(lines) - 1:
+        return []
+    return list(takewhile(_is_json, lines))
+
+
+def _is_json(line: bytes) -> bool:
+    try:
+        json.loads(line)
+    except ValueError:
+        return False
+    return True
+
+
+def _mend(path: Path) -> None:
+    """Drop what follows a line that was cut off."""
+    kept = sum(len(line) + 1 for line in _whole_lines(path))
+    if path.exists() and path.stat().st_size > kept:
         with open(path, "r+b") as file:
             file.truncate(kept)

@@ -94,8 +94,15 @@ class Thought(_Part):
     value: float | None = None
 
 
+class Reply(_Part):
+    """The end of what a language model answered, and what was wrong with it; empty if it gives an action."""
+
+    text: str
+    error: str = ""
+
+
 class Moment(_Part):
-    """The room after a step, or before the first one.
+    """The room after a step, before the first one, or where a language model ended the episode without a step.
 
     Cells are numbered row by row. `member`, `cast`, `room`, `view` and what is not in `cells` and `state` are as in the
     moment before it where they are left out.
@@ -112,11 +119,12 @@ class Moment(_Part):
             looks up.
         view_gestures: what NPCs in it show.
         state: values that differ, by address: `wizard.state`, `doors[1].color`, `let.exit`.
-        action: body action, speak, template, noun; None before the first step. did: the body action's word.
+        action: body action, speak, template, noun; None without a step. did: the body action's word.
         said: the agent's utterance, None in silence. heard: lines.
         reward: of the step.
         fired: numbers of rules. others: pairs of a rule that was asked and did not fire, and the number of its reason.
         thought: what the agent made of the moment before, from which its action was chosen.
+        replies: what a language model answered to the moment before, until it gave an action or its turn passed.
         ended: how the episode ended in this step.
     """
 
@@ -139,6 +147,7 @@ class Moment(_Part):
     fired: list[_Number] = []
     others: list[tuple[_Number, _Number]] = []
     thought: Thought | None = None
+    replies: list[Reply] = []
     ended: Outcome | None = None
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from itertools import chain, repeat
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +15,19 @@ from socialai_dsl.program import Flag, Header, Program
 from socialai_dsl.program_suite import outcome_name
 from socialai_dsl.render.gestures import Gesture
 from socialai_dsl.replay import document
-from socialai_dsl.replay.document import Line, Member, Moment, Outcome, Rule, Thought, Trace
+from socialai_dsl.replay.document import Line, Member, Moment, Outcome, Reply, Rule, Thought, Trace
 from socialai_dsl.replay.state import leaves, played
 from socialai_dsl.replay.steps import describe_step, heard_line
 from socialai_dsl.semantics.terms import Const
 from socialai_dsl.vocabulary import DIRECTIONS
 
 Action = NDArray[np.int64]
+Answers = Sequence[tuple[str, str]]
+"""What a language model answered, each with what was wrong with it."""
 Think = Callable[[Mapping[str, NDArray[Any]]], Thought | None]
 """What an agent makes of an observation; asked in each moment before a step, in order."""
+_SHOWN: Final = 400
+"""So many characters of an answer are shown; a model's last words hold its action."""
 
 
 def trace_of(
@@ -36,6 +41,8 @@ def trace_of(
     endings: Mapping[str, str] | None = None,
     about: str = "",
     think: Think | None = None,
+    replies: Sequence[Answers] = (),
+    cut_short: Outcome | None = None,
 ) -> Trace:
     """Play an episode with given actions, and trace it.
 
@@ -51,6 +58,9 @@ def trace_of(
         endings: outcome -> what the scenario's file says there; by default its name.
         about: what the file says of the scenario.
         think: what the agent makes of each observation, for a trained one.
+        replies: for a language model, what it answered before each action, and perhaps after the last one, each
+            with what was wrong with it.
+        cut_short: how the episode ended where no step ended it.
 
     Raises:
         ValueError: there is no such episode, or an action is not of its space.
@@ -58,11 +68,15 @@ def trace_of(
     observation, info = env.reset(**reset)
     tracer = Tracer(env, scenario, agent, endings or {}, about)
     tracer.begin(episode, observation, info)
-    for action in actions:
+    answers = chain(replies, repeat(()))
+    for action, said in zip(actions, answers, strict=False):
         thought = think(observation) if think is not None else None
         observation, *result = env.step(action)
-        if tracer.step(action, observation, *result, thought=thought).ended is not None:
+        if tracer.step(action, observation, *result, thought=thought, replies=said).ended is not None:
             break
+    else:
+        if cut_short is not None:
+            tracer.cut_short(next(answers), cut_short)
     return tracer.trace()
 
 
@@ -114,6 +128,7 @@ class Tracer:
         info: Mapping[str, Any],
         *,
         thought: Thought | None = None,
+        replies: Answers = (),
     ) -> Moment:
         """The moment after `env.step`, which returned these."""
         step = describe_step(self._program, action, len(self.moments), info["utterance"])
@@ -132,8 +147,17 @@ class Tracer:
             fired=[self._rule(entry) for entry in explained["fired"]],
             others=[(self._rule(entry), _number(self._texts, entry["why"])) for entry in explained["others"]],
             thought=thought,
+            replies=_replies(replies),
             ended=self._outcome(info) if terminated or truncated else None,
         )
+
+    def cut_short(self, replies: Answers, ended: Outcome) -> Moment:
+        """The moment in which a language model's answers without an action ended the episode."""
+        last = self.moments[-1]
+        kept = {name: getattr(last, name) for name in ("agent", "below", "gestures", "view_gestures")}
+        self.moments.append(Moment(t=len(self.moments), replies=_replies(replies), ended=ended, **kept))
+        self._seen.append(self._seen[-1])
+        return self.moments[-1]
 
     def back(self) -> None:
         """Take the last step back."""
@@ -226,6 +250,13 @@ class Tracer:
 
 
 Marks = tuple[int, int, int, int]
+
+
+def _replies(answers: Answers) -> list[Reply]:
+    return [
+        Reply(text=text if len(text) <= _SHOWN else f"… {text[-_SHOWN:]}", error=error)
+        for text, error in answers
+    ]
 
 
 def _number(known: dict[Any, int], one: Any) -> int:

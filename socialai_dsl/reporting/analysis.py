@@ -23,6 +23,7 @@ from socialai_dsl.reporting.statistics import (
     bootstrapped_iqm,
     compare,
     frames_to,
+    paired_difference,
 )
 
 THRESHOLDS: Final = (0.25, 0.5, 0.75, 0.9)
@@ -149,6 +150,24 @@ class Comparison:
 
 
 @dataclass(frozen=True)
+class Pairing:
+    """Two conditions in the same rooms.
+
+    Attributes:
+        first, second: names of the conditions.
+        rooms: how many both played. ahead, behind: in how many of them the first, or the second, did better.
+        difference: of the success, first minus second.
+    """
+
+    first: str
+    second: str
+    rooms: int
+    ahead: int
+    behind: int
+    difference: Estimate
+
+
+@dataclass(frozen=True)
 class Aggregate:
     """Interquartile mean of a column.
 
@@ -171,12 +190,14 @@ class Section:
     Attributes:
         group: as the experiment calls it. summaries: in order.
         comparisons: of the columns of each row; in a case study also of the rows of each column.
+        pairings: those of them that played the same test episodes, as far as runs list them.
         common_rows: see `Aggregate`.
     """
 
     group: str | None
     summaries: tuple[Summary, ...]
     comparisons: tuple[Comparison, ...]
+    pairings: tuple[Pairing, ...] = ()
     aggregates: tuple[Aggregate, ...] = ()
     common_rows: int = 0
 
@@ -313,10 +334,37 @@ def _section(group: str | None, summaries: Sequence[Summary]) -> Section:
     ]
     adjusted = bonferroni([test.p for *_, test in found])
     comparisons = tuple(Comparison(*one, p) for one, p in zip(found, adjusted, strict=True))
+    pairings = tuple(pairing for pair in bare.pairs() if (pairing := pair_by_room(*pair)) is not None)
     if not bare.is_table:
-        return Section(group, bare.summaries, comparisons)
+        return Section(group, bare.summaries, comparisons, pairings)
     aggregates, common = _aggregates(bare)
-    return Section(group, bare.summaries, comparisons, aggregates, common)
+    return Section(group, bare.summaries, comparisons, pairings, aggregates, common)
+
+
+def pair_by_room(first: Summary, second: Summary) -> Pairing | None:
+    """Compare two conditions in the test episodes that both list; None without such.
+
+    The same number is the same room only in the same program.
+    """
+    digests = {
+        run.result.program_sha256
+        for summary in (first, second)
+        for run in summary.condition.done
+        if run.result is not None
+    }
+    one, other = first.condition.rooms, second.condition.rooms
+    common = sorted(one.keys() & other.keys())
+    if len(digests) != 1 or not common:
+        return None
+    here, there = [one[number] for number in common], [other[number] for number in common]
+    return Pairing(
+        first.name,
+        second.name,
+        len(common),
+        sum(a > b for a, b in zip(here, there, strict=True)),
+        sum(a < b for a, b in zip(here, there, strict=True)),
+        paired_difference(here, there),
+    )
 
 
 def _in_places_of_their_own(summaries: Sequence[Summary]) -> list[Summary]:

@@ -6,6 +6,7 @@ is a problem of that run, which the report names.
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
@@ -16,7 +17,7 @@ from typing import Any, Final, TypeVar
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from socialai_dsl.experiments import claims
-from socialai_dsl.experiments.folder import EXPERIMENT, METRICS, RESULT, RUNS, STATUS, TESTS
+from socialai_dsl.experiments.folder import EPISODES, EXPERIMENT, METRICS, RESULT, RUNS, STATUS, TESTS
 from socialai_dsl.reporting.records import (
     ConditionEntry,
     ExperimentRecord,
@@ -45,7 +46,8 @@ class Run:
             runs and nobody works on it;
             `missing` where there is no folder.
         message: what its status says. attempts: how often it was begun, as far as known.
-        result: of a finished run. tests: scenario -> figures of its further tests.
+        result: of a finished run. rooms: number of a test episode -> its success, where the run lists its episodes.
+        tests: scenario -> figures of its further tests.
         frames: made so far. digest: of its configuration without the seed; empty if it has none.
         starts: in what surroundings it ran.
         problems: what could not be read, in words.
@@ -58,6 +60,7 @@ class Run:
     message: str = ""
     attempts: int = 0
     result: ResultRecord | None = None
+    rooms: Mapping[int, bool] = field(default_factory=dict)
     tests: Mapping[str, Figures] = field(default_factory=dict)
     frames: int = 0
     digest: str = ""
@@ -88,6 +91,13 @@ class Condition:
     def done(self) -> tuple[Run, ...]:
         """The runs that have a result."""
         return tuple(run for run in self.runs if run.result is not None)
+
+    @property
+    def rooms(self) -> dict[int, float]:
+        """Success in each test episode that all its finished runs list, as the mean over them."""
+        listed = [run.rooms for run in self.done]
+        common = set.intersection(*map(set, listed)) if listed else set()
+        return {number: sum(rooms[number] for rooms in listed) / len(listed) for number in sorted(common)}
 
 
 @dataclass(frozen=True)
@@ -220,6 +230,7 @@ def _read_run(folder: Path, name: str, seed: int) -> Run:
         message=(status.message or "") if status is not None else "",
         attempts=len(status.attempts) if status is not None else 0,
         result=result,
+        rooms=_rooms(folder / EPISODES, problems),
         tests=_tests(folder / TESTS, problems),
         frames=frames,
         digest=_digest(settings) if settings is not None else "",
@@ -257,6 +268,23 @@ def _read(path: Path, model: type[Model], problems: list[str]) -> Model | None:
     except ValidationError as error:
         problems.append(f"{path.name} is damaged ({_first(error)})")
     return None
+
+
+def _rooms(path: Path, problems: list[str]) -> dict[int, bool]:
+    """Success of each test episode that a run lists; nothing where it lists none."""
+    try:
+        with open(path, newline="", encoding="utf-8") as file:
+            lines = csv.reader(file)
+            if next(lines)[:2] != ["episode", "success"]:
+                raise ValueError
+            return {int(number): bool(int(success)) for number, success, *_ in lines}
+    except FileNotFoundError:
+        return {}
+    except OSError as error:
+        problems.append(f"{path.name} cannot be read ({error.strerror})")
+    except (ValueError, StopIteration, csv.Error):
+        problems.append(f"{path.name} is damaged")
+    return {}
 
 
 _TESTS: Final = TypeAdapter(dict[str, Figures])

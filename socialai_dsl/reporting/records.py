@@ -93,7 +93,12 @@ class ProbeFigures(_Record):
 
 
 class Figures(_Record):
-    """What came of the test episodes: the object `eval` of a result."""
+    """What came of the test episodes: the object `eval` of a result.
+
+    Attributes:
+        replies, invalid_replies, prompt_tokens, completion_tokens, tokens_estimated, cost: of language models alone;
+            `cost` in US dollars, None where prices are not known.
+    """
 
     episodes: int = Field(ge=1)
     success_rate: float = Field(ge=0, le=1)
@@ -102,6 +107,12 @@ class Figures(_Record):
     outcomes: dict[str, float] = Field(default_factory=dict)
     endings: list[Ending] = Field(default_factory=list)
     rules: dict[str, float] = Field(default_factory=dict)
+    replies: int = Field(0, ge=0)
+    invalid_replies: int = Field(0, ge=0)
+    prompt_tokens: int = Field(0, ge=0)
+    completion_tokens: int = Field(0, ge=0)
+    tokens_estimated: bool = False
+    cost: float | None = Field(None, ge=0)
     probes: dict[str, ProbeFigures] = Field(default_factory=dict)
 
 

@@ -13,7 +13,15 @@ from socialai_dsl.reporting.document import Block, Cell, Folded, Heading, Meter,
 from socialai_dsl.reporting.images import Images
 from socialai_dsl.reporting.records import ProbeFigures, Reference
 from socialai_dsl.reporting.statistics import ALPHA, RESAMPLES, Spread
-from socialai_dsl.reporting.wording import NONE, count_of, estimate_text, number_cell, signed, spread_text
+from socialai_dsl.reporting.wording import (
+    NONE,
+    count_of,
+    estimate_text,
+    number_cell,
+    signed,
+    signed_estimate_text,
+    spread_text,
+)
 
 _TITLES: Final[dict[str | None, str]] = {"table2": "Table 2", None: "Conditions"}
 
@@ -35,6 +43,8 @@ def section_blocks(
         "deviation to either side. Diamonds: published figures. Grey lines: who does not learn (see below).",
     )
     yield from _comparisons(section)
+    yield from _pairings(section, prefix)
+    yield from _language_models(section, prefix)
     yield from _aggregates(section, prefix, images)
     yield from images.figure(
         f"{prefix}-curves",
@@ -177,6 +187,57 @@ def _comparison(comparison: Comparison) -> list[Cell]:
 
 def _p(value: float | None) -> Cell:
     return NONE if value is None else Cell("< 0.0001" if value < 1e-4 else f"{value:.4f}")
+
+
+def _pairings(section: Section, prefix: str) -> Iterator[Block]:
+    if not section.pairings:
+        return
+    yield Heading(3, "In the same rooms", f"{prefix}-rooms")
+    yield Table(
+        ["first", "second", ">rooms", ">first better", ">second better", ">difference"],
+        [
+            [
+                Cell(pairing.first),
+                Cell(pairing.second),
+                *(Cell(f"{count:,}") for count in (pairing.rooms, pairing.ahead, pairing.behind)),
+                Cell(signed_estimate_text(pairing.difference)),
+            ]
+            for pairing in section.pairings
+        ],
+        "Conditions that played the same test episodes: in how many one did better than the other, and the difference "
+        "of their success, first minus second, in brackets with its 95 % interval for paired proportions (Bonett and "
+        "Price 2012). It is about these players in further rooms; of trained agents it takes the seeds as they are.",
+    )
+
+
+def _language_models(section: Section, prefix: str) -> Iterator[Block]:
+    """What language models replied, and what it took."""
+    rows = []
+    for summary in section.summaries:
+        figures = [run.figures for run in summary.condition.done if run.figures and run.figures.replies]
+        if not figures:
+            continue
+        replies, invalid = sum(f.replies for f in figures), sum(f.invalid_replies for f in figures)
+        costs = [f.cost for f in figures if f.cost is not None]
+        about = "about " if any(f.tokens_estimated for f in figures) else ""
+        rows.append(
+            [
+                Cell(summary.name, tone="strong"),
+                Cell(f"{sum(f.episodes for f in figures):,}"),
+                Cell(f"{replies:,}"),
+                Cell(f"{invalid / replies:.1%}"),
+                Cell(f"{about}{sum(f.prompt_tokens for f in figures):,}"),
+                Cell(f"{about}{sum(f.completion_tokens for f in figures):,}"),
+                Cell(f"${sum(costs):.4f}") if len(costs) == len(figures) else NONE,
+            ]
+        )
+    if rows:
+        yield Heading(3, "Language models", f"{prefix}-models")
+        yield Table(
+            ["condition", ">episodes", ">replies", ">invalid", ">tokens read", ">tokens written", ">cost"],
+            rows,
+            "Invalid: share of the replies that held no action. Cost: in US dollars, a dash where prices are unknown.",
+        )
 
 
 def _aggregates(section: Section, prefix: str, images: Images) -> Iterator[Block]:

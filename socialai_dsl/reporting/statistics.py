@@ -171,6 +171,28 @@ def mean_interval(values: Sequence[float]) -> tuple[float, float] | None:
     return float(np.mean(values) - half), float(np.mean(values) + half)
 
 
+def paired_difference(first: Sequence[float], second: Sequence[float]) -> Estimate:
+    """Mean difference of successes in the same rooms, first minus second, with its interval.
+
+    The interval is that of Bonett and Price (2012): two rooms are added, one that the first alone solves and one that
+    the second alone solves. So it is of use for few rooms, too, and where all differences are alike.
+
+    Args:
+        first: success in each room, 0 to 1.
+        second: in the same rooms.
+
+    Raises:
+        ValueError: there is no room, or not as many on both sides.
+    """
+    if len(first) != len(second) or not len(first):
+        raise ValueError(f"got {len(first)} and {len(second)} rooms, expected as many, at least one")
+    differences = np.asarray(first, np.float64) - np.asarray(second, np.float64)
+    added = np.append(differences, [1.0, -1.0])
+    half = stats.norm.ppf((1 + LEVEL) / 2) * np.std(added) / math.sqrt(len(added))
+    low, high = max(-1.0, np.mean(added) - half), min(1.0, np.mean(added) + half)
+    return Estimate(float(np.mean(differences)), float(low), float(high))
+
+
 def frames_to(frames: Float, success: Float, threshold: float) -> float | None:
     """The end of the first bin in which a run's success reached a threshold; None if it never did.
 

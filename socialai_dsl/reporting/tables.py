@@ -15,7 +15,7 @@ Rows = Sequence[Mapping[str, Any]]
 
 
 def tables(analysis: Analysis) -> dict[str, Rows]:
-    """Name of a table -> its rows, each with the same columns: runs, conditions, comparisons and outcomes."""
+    """Name of a table -> its rows, each with the same columns: runs, conditions, comparisons, rooms and outcomes."""
     return {
         "runs": [
             _run(condition, run) for condition in analysis.experiment.conditions for run in condition.runs
@@ -35,6 +35,21 @@ def tables(analysis: Analysis) -> dict[str, Rows]:
             }
             for section in analysis.sections
             for one in section.comparisons
+        ],
+        "rooms": [
+            {
+                "group": section.group,
+                "first": one.first,
+                "second": one.second,
+                "rooms": one.rooms,
+                "first_better": one.ahead,
+                "second_better": one.behind,
+                "difference": one.difference.value,
+                "difference_low": one.difference.low,
+                "difference_high": one.difference.high,
+            }
+            for section in analysis.sections
+            for one in section.pairings
         ],
         "outcomes": [row for condition in analysis.experiment.conditions for row in _outcomes(condition)],
     }
@@ -87,6 +102,10 @@ def _run(condition: Condition, run: Run) -> dict[str, Any]:
         "mean_return": figures.mean_return if figures else None,
         "mean_length": figures.mean_length if figures else None,
         "test_episodes": figures.episodes if figures else None,
+        "replies": figures.replies if figures else None,
+        "invalid_replies": figures.invalid_replies if figures else None,
+        "tokens": figures.prompt_tokens + figures.completion_tokens if figures else None,
+        "cost": figures.cost if figures else None,
         "train_seconds": result.train_seconds if result else None,
         "frames_per_second": result.frames_per_second if result else None,
         "tests": "; ".join(f"{name}={one.success_rate:.6g}" for name, one in run.tests.items()),

@@ -31,6 +31,12 @@ def estimate_text(estimate: Estimate) -> str:
     return f"{estimate.value:.3f} [{estimate.low:.3f}, {estimate.high:.3f}]"
 
 
+def signed_estimate_text(estimate: Estimate) -> str:
+    """A difference and its interval."""
+    value, low, high = (signed(part, "+.3f") for part in (estimate.value, estimate.low, estimate.high))
+    return f"{value} [{low}, {high}]"
+
+
 def duration(seconds: float) -> str:
     """A time, in the unit that fits."""
     if seconds < 60:

@@ -20,13 +20,16 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from socialai_dsl.cli.new import TEMPLATES, template_files
 from socialai_dsl.cli.shipped import file_of, shipped_scenarios, variants_of
 from socialai_dsl.replay.scripts import static_text
-from socialai_dsl.studio.engine import Engine, EngineLostError, start_worker, stop_process
+from socialai_dsl.studio.engine import Engine, EngineLostError, start_worker
 from socialai_dsl.studio.files import ConflictError, FileError, Folder
 from socialai_dsl.studio.session import ASKED
+from socialai_dsl.studio.worker import answer_window, serve_language
 from trainer.shipped import PREFIX, shipped_agents
 
 LARGEST_MESSAGE: Final = 2 << 20
-_SECONDS: Final = {"check": 90.0}
+_PLAYERS: Final = (None, "me", "script", "random")
+_CHECK_SECONDS: Final = 90.0
+_LOADING_SECONDS: Final = 60.0
 _USUAL_SECONDS: Final = 10.0
 _OWN: Final = ("studio.js", "studio.css", "editor.js")
 _SHARED: Final = ("dom.js", "panels.js", "room.js", "tiles.js", "trace.js", "pages.css")
@@ -60,7 +63,6 @@ class Studio:
     def __init__(self, root: Path, opened: str, token: str, host: str) -> None:
         self._folder = Folder(root)
         self._opened, self._token, self._host = opened, token, host
-        self._spare: Engine | None = None
         self.app = Starlette(
             routes=[
                 Route("/", self._page),
@@ -74,10 +76,14 @@ class Studio:
     @contextlib.asynccontextmanager
     async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
         del app
-        await self._engine_in_reserve()
+        loading = asyncio.create_task(self._load())
         yield
-        if self._spare is not None:
-            await self._spare.stop()
+        await loading
+
+    async def _load(self) -> None:
+        """Load what every window's process needs before the first window waits for it."""
+        with contextlib.suppress(EngineLostError):  # the first window tries again, and says why not
+            await (await start_worker(answer_window, self._folder.root)).stop()
 
     # -- pages -----------------------------------------------------------------------------------------------
 
@@ -126,9 +132,8 @@ class Studio:
     async def _session(self, socket: WebSocket) -> None:
         if not await self._welcome(socket):
             return
-        engine, self._spare = self._spare or Engine(self._folder.root), None
-        checking: Engine | None = None
-        reserve = asyncio.create_task(self._engine_in_reserve())
+        # A check has a process of its own, so that playing goes on.
+        engine, checking = Engine(self._folder.root), Engine(self._folder.root)
         try:
             while True:
                 text = await socket.receive_text()
@@ -138,12 +143,7 @@ class Studio:
                 except (ValueError, KeyError, AttributeError, RecursionError):
                     await socket.close(1003, "expected a JSON object with `id` and `do`")
                     return
-                if name == "check":  # by a process of its own, so that playing goes on
-                    checking = checking or Engine(self._folder.root)
-                    chosen = checking
-                else:
-                    chosen = engine
-                answered = self._answer(chosen, name, asked)
+                answered = self._answer(checking if name == "check" else engine, name, asked)
                 if name == "check":
                     task = asyncio.create_task(self._send(socket, number, answered))
                     task.add_done_callback(lambda done: done.cancelled() or done.exception())
@@ -153,9 +153,7 @@ class Studio:
             pass
         finally:
             await engine.stop()
-            if checking is not None:
-                await checking.stop()
-            await reserve
+            await checking.stop()
 
     @staticmethod
     async def _send(socket: WebSocket, number: Any, answered: Any) -> None:
@@ -166,7 +164,9 @@ class Studio:
         try:
             if name in ASKED:
                 self._place(asked)
-                return await engine.ask(asked, _SECONDS.get(name, _USUAL_SECONDS))
+                loads = asked.get("player") not in _PLAYERS
+                seconds = _CHECK_SECONDS if name == "check" else _LOADING_SECONDS if loads else _USUAL_SECONDS
+                return await engine.ask(asked, seconds)
             found = _FILES.get(name)
             if found is None:
                 return {"refused": f"got {name!r}, which nobody can be asked for"}
@@ -186,7 +186,7 @@ class Studio:
         if "path" in asked:
             asked["path"] = str(self._folder.path(str(asked["path"])))
         player = asked.get("player")
-        if player not in (None, "me", "script", "random", *_shipped_players()):
+        if player not in (*_PLAYERS, *_shipped_players()):
             if player not in self._folder.runs():
                 raise FileError(f"{player}: there is no such run in the folder")
             asked["player"] = str(self._folder.root / player)
@@ -195,20 +195,22 @@ class Studio:
         """Hand the messages of an editor to a language server and back."""
         if not await self._welcome(socket):
             return
-        process = await start_worker(self._folder.root, "--language")
-        assert process.stdin is not None, "internal: it has an input"
-        assert process.stdout is not None, "internal: it has an output"
-        back = asyncio.create_task(_relay(process.stdout, socket))
+        try:
+            worker = await start_worker(serve_language, self._folder.root)
+        except EngineLostError as lost:
+            await socket.close(1011, str(lost))
+            return
+        back = asyncio.create_task(_relay(worker.reader, socket))
         try:
             while True:
                 content = (await socket.receive_text()).encode()
-                process.stdin.write(b"Content-Length: %d\r\n\r\n%s" % (len(content), content))
-                await process.stdin.drain()
+                worker.writer.write(b"Content-Length: %d\r\n\r\n%s" % (len(content), content))
+                await worker.writer.drain()
         except (WebSocketDisconnect, RuntimeError, OSError):
             pass
         finally:
             back.cancel()
-            await stop_process(process)
+            await worker.stop()
 
     async def _welcome(self, socket: WebSocket) -> bool:
         """Accept a window that knows the token and comes from our own page."""
@@ -227,15 +229,6 @@ class Studio:
         """Whether the page was asked for under our own address, not under a name that leads here."""
         name = (host or "").rpartition(":")[0]
         return self._host not in ("127.0.0.1", "::1") or name in ("127.0.0.1", "localhost", "[::1]")
-
-    async def _engine_in_reserve(self) -> None:
-        """Start a process for the next window, which then need not wait for it."""
-        engine = Engine(self._folder.root)
-        with contextlib.suppress(EngineLostError):  # the window that needs one tries again, and says why not
-            await engine.start()
-        if self._spare is not None:
-            await self._spare.stop()
-        self._spare = engine
 
 
 async def _relay(stream: asyncio.StreamReader, socket: WebSocket) -> None:
@@ -309,6 +302,10 @@ def _create(folder: Folder, template: str, called: str) -> dict[str, Any]:
     return {"name": names[0]}
 
 
+def _add(folder: Folder, name: str, text: str) -> dict[str, Any]:
+    return {"name": folder.create(name, text)}
+
+
 _FILES: Final[dict[str, Callable[..., dict[str, Any]]]] = {
     "list": _list,
     "read": _read,
@@ -316,5 +313,6 @@ _FILES: Final[dict[str, Callable[..., dict[str, Any]]]] = {
     "draft": _draft,
     "copy": _copy,
     "create": _create,
+    "add": _add,
 }
 """What a window may ask about files."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.checking import LoadedScenario, LoadedSuite
 from socialai_dsl.cli.endings import endings_of
 from socialai_dsl.cli.evaluation import about_of
 from socialai_dsl.cli.typed import Phrases, split_line
@@ -24,6 +26,7 @@ from socialai_dsl.program_suite import unscripted
 from socialai_dsl.replay import Thought, Tracer
 from socialai_dsl.replay.page import replay_page
 from socialai_dsl.source import Source
+from socialai_dsl.studio.layouts import start_layout, suite_text, with_layout
 from socialai_dsl.vocabulary import EMPTY, WALL
 
 Reply = dict[str, Any]
@@ -105,6 +108,7 @@ class Session:
             "trace": self._tracer.trace().model_dump(mode="json", exclude_defaults=True)
             | {"format": "socialai-trace/1"},
             "phrases": {"sentences": self._phrases.sentences()[:2000]},
+            "rules": list(env.counters()["rules"]),
             "player": self._player,
             "seed": seed,
         }
@@ -167,9 +171,7 @@ class Session:
         if not isinstance(one, dict) or "at" not in one:
             raise RefusalError(f"there is nothing called {who!r} in the room")
         one["at"] = at
-        layout = {
-            name: value for name, value in described.items() if name not in ("t", "last", "heard", "pending")
-        }
+        layout = start_layout(described) | ({"member": described["member"]} if "member" in described else {})
         cell = self._playing().scene().codes[at[1], at[0]] if _is_cell(at, described["room"]) else None
         if cell is None or cell[0] not in (EMPTY, _FLOOR, WALL):
             raise RefusalError(f"{who} cannot be put there")
@@ -178,6 +180,28 @@ class Session:
     def layout(self) -> Reply:
         """The room as it is now, as a layout that the commands take."""
         return {"layout": self._playing().describe()}
+
+    def write_layout(self, text: str) -> Reply:
+        """The text of the file, with the room as it is now as the start of every episode.
+
+        Of a suite, the member that is played gets a `layout`. Of a scenario the reply has `suite`, the text of a new
+        suite that begins so, and the `name` of its file.
+        """
+        described = self._playing().describe()
+        layout, stem = start_layout(described), self._path.stem
+        loaded = load(str(self._path), {self._path: Source(display_name(self._path), text)})
+        if not isinstance(loaded, LoadedSuite):
+            name = f"{re.sub(r'[^a-zA-Z0-9_]', '_', stem)}_known"
+            return {"suite": suite_text(name, self._path.name, layout), "name": f"{name}.yaml"}
+        if loaded.suite.members is None or loaded.suite.sweep is not None or loaded.in_sequence:
+            raise RefusalError("members that are acts or made by a tree or sweep get their layouts by hand")
+        document = loaded.resolved.find(())[0]
+        member = loaded.member_names.index(described["member"])
+        try:
+            written = with_layout(document, member, layout)
+        except (KeyError, IndexError):  # another file says what the members are
+            raise RefusalError("the members are not written in this file") from None
+        return {"text": written}
 
     def replay(self) -> Reply:
         """The episode so far as a page of its own."""
@@ -188,7 +212,6 @@ class Session:
     def check(self, path: str, text: str, seconds: float = 20.0) -> Reply:
         """What `socialai check` says of a text."""
         from socialai_dsl.analysis.effort import Clock, Effort
-        from socialai_dsl.checking import LoadedScenario
         from socialai_dsl.cli.check import check_scenario
 
         try:
@@ -198,7 +221,7 @@ class Session:
         if not isinstance(loaded, LoadedScenario):
             raise RefusalError("a suite is checked by `socialai check`; here its members are, one by one")
         effort = Effort(100, 0, clock=Clock(seconds, lambda said: None))
-        return {"lines": list(check_scenario(loaded, path, effort).lines())}
+        return {"lines": list(check_scenario(loaded, display_name(Path(path)), effort).lines())}
 
     # -- within ----------------------------------------------------------------------------------------------
 
@@ -258,6 +281,7 @@ ASKED: Final[Mapping[str, Callable[..., Reply]]] = {
     "back": Session.back,
     "place": Session.place,
     "layout": Session.layout,
+    "write_layout": Session.write_layout,
     "replay": Session.replay,
     "check": Session.check,
 }

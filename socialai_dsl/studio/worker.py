@@ -1,6 +1,6 @@
-"""A process of its own for each window: it answers JSON lines, so that nothing that happens in it ends the server.
+"""What runs in a process of its own for each window, so that nothing that happens in it ends the server.
 
-Started as `python -m socialai_dsl.studio.worker ROOT`, or with `--language` as the language server.
+A window has two of them: one answers a line of JSON with another, one is the language server of its editor.
 """
 
 from __future__ import annotations
@@ -8,46 +8,43 @@ from __future__ import annotations
 import inspect
 import json
 import os
-import sys
-from pathlib import Path
+import resource
+import signal
+import socket
+from collections.abc import Iterable
 from typing import Any, Final, TextIO
 
-_SMALLEST: Final = """scenario: ready
-horizon: 3
-grammar: {templates: [Say <noun>], nouns: [hello]}
-room: {size: 5}
-cast: {agent: {at: [1, 1]}}
-outcome: [{failure: agent.did(done)}, {success: agent.did(toggle)}]
-"""
+MOST_BYTES: Final = 4 << 30
+"""What a process may hold; a trained agent needs a tenth of it."""
 
 
-def main(words: list[str]) -> None:
-    """Answer until the input ends."""
-    root = Path(words[-1]).resolve()
-    os.chdir(root)
-    if words[0] == "--language":
-        from socialai_dsl.authoring.server import make_server
+def answer_window(connection: socket.socket, root: str) -> None:
+    """Answer questions that come over a connection until it is closed.
 
-        make_server().start_io()
-        return
-    # Whatever prints must not come between the answers.
-    answers, sys.stdout = sys.stdout, sys.stderr
-    serve(sys.stdin, answers)
+    Args:
+        connection: to the server.
+        root: the folder of the scenarios.
+    """
+    _settle(root)
+    serve(connection.makefile("r", encoding="utf-8"), connection.makefile("w", encoding="utf-8"))
 
 
-def serve(questions: TextIO, answers: TextIO) -> None:
-    """Say `{"ready": true}`, then answer one line by another.
+def serve_language(connection: socket.socket, root: str) -> None:
+    """Be the language server at this end of a connection; arguments as for `answer_window`."""
+    from socialai_dsl.authoring.server import make_server
+
+    _settle(root)
+    make_server().start_io(connection.makefile("rb"), connection.makefile("wb"))
+
+
+def serve(questions: Iterable[str], answers: TextIO) -> None:
+    """Answer one line by another.
 
     `{"do": name, ...}` is answered by what the method of `Session` returns, or by `{"refused": why}`.
     """
     from socialai_dsl.diagnostics import ScenarioError
     from socialai_dsl.studio.session import RefusalError, Session
 
-    session = Session()
-    session.draw(
-        str(Path("ready.yaml").resolve()), _SMALLEST
-    )  # compiled code is loaded before anybody waits for it
-    print(json.dumps({"ready": True}), file=answers, flush=True)
     session = Session()
     for line in questions:
         try:
@@ -56,6 +53,8 @@ def serve(questions: TextIO, answers: TextIO) -> None:
             reply = {"refused": str(refusal)}
         except ScenarioError as error:
             reply = {"refused": str(error.diagnostics[0].text)}
+        except MemoryError:
+            reply = {"refused": f"this needs more than {MOST_BYTES >> 30} GiB of memory"}
         print(json.dumps(reply), file=answers, flush=True)
 
 
@@ -77,5 +76,10 @@ def answer(session: Any, asked: dict[str, Any]) -> dict[str, Any]:
     return method(session, **asked)
 
 
-if __name__ == "__main__":
-    main(sys.argv[1:])
+def _settle(root: str) -> None:
+    """Be a process of this folder, which the server ends and not Ctrl-C, and which cannot fill the machine."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.chdir(root)
+    _, most = resource.getrlimit(resource.RLIMIT_DATA)
+    allowed = MOST_BYTES if most == resource.RLIM_INFINITY else min(MOST_BYTES, most)
+    resource.setrlimit(resource.RLIMIT_DATA, (allowed, most))

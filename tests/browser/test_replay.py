@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+import socialai_dsl as sd
 from socialai_dsl.cli.main import main
+from socialai_dsl.replay import trace_of
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -45,7 +47,7 @@ def test_it_plays_steps_and_scrubs(replay: Page) -> None:
     assert step(replay).startswith("step 5 of ")
     replay.keyboard.press("End")
     assert step(replay).startswith(f"step {last} of ")
-    replay.keyboard.press("Home")
+    replay.get_by_label("step", exact=True).fill(str(last - 4))
     replay.get_by_label("steps a second").select_option("8")
     replay.get_by_role("button", name="play").click()
     replay.locator(".controls output", has_text=f"step {last} of").wait_for()
@@ -113,3 +115,14 @@ outcome: [{failure: agent.did(done)}]
     assert "</script>" in page.locator("header").inner_text()
     assert page.locator("img").count() == 0
     assert "hostile" in page.title()
+
+
+def test_a_notebook_shows_an_episode_in_a_frame(page: Page) -> None:
+    env = sd.make("talkitout")
+    forward = env.unwrapped.encode_action(("forward", "How are you"))  # type: ignore[attr-defined]
+    trace = trace_of(env, [forward] * 3, {"seed": 7}, scenario="talkitout", agent="me", episode="seed 7")
+    page.set_content(trace._repr_html_())
+    frame = page.frame_locator("iframe[title='an episode']")
+    frame.get_by_role("button", name="last step").click()
+    frame.locator(".controls output", has_text="step 3 of 3").wait_for()
+    assert frame.locator(".transcript b.own").count() == 3

@@ -47,7 +47,7 @@ def all_tiles() -> list[Tile]:
     found += [((code, 0, 0, 0), {}) for code in (tiles.UNSEEN, tiles.EMPTY, 5)]
     found += [((tiles.NPC, kind % 6, kind, 1), {}) for kind in range(30)]
     found += [((tiles.NPC, 2, 3, gaze), {}) for gaze in range(4)]
-    found += [((tiles.MARBLE, 1, 1, way), {}) for way in range(4)]
+    found += [((prelude().types["marble"].code, 1, 1, way), {}) for way in range(4)]
     found += [
         ((tiles.EMPTY, 0, 0, 0), {"agent": way, "seen": seen}) for way in range(4) for seen in (True, False)
     ]
@@ -56,7 +56,7 @@ def all_tiles() -> list[Tile]:
         for pointing in (-1, 0, 1, 2, 3)
         for act in LAST_ACTS
     ]
-    return [*found, ((tiles.NPC, 1, 2, 3), {"below": (tiles.DOOR, 0, 0, 0)})]
+    return [*found, ((tiles.NPC, 1, 2, 3), {"below": (prelude().types["door"].code, 0, 0, 0)})]
 
 
 def as_png(look: tiles.Code, more: dict[str, Any]) -> np.ndarray:

@@ -85,9 +85,15 @@ function roomInWords(scene) {
 function momentInWords({ moment }) {
   if (!moment.t) return "Before the first step.";
   const heard = (moment.heard ?? []).map((line) => `${line.name ? `${line.name}: ` : ""}${line.text}`);
-  const ended = moment.ended ? [`The episode ended: ${moment.ended.success ? "success" : "no success"}, ${moment.ended.text}.`] : [];
+  const ended = moment.ended ? [`The episode ended: ${outcomeInWords(moment.ended)}.`] : [];
   const said = moment.said ? `, said “${moment.said}”` : "";
-  return [`Step ${moment.t}: ${moment.did}${said}.`, ...heard, ...ended].join(" ");
+  return [`Step ${moment.t}: ${moment.did ?? "no action"}${said}.`, ...heard, ...ended].join(" ");
+}
+
+/** How an episode ended; what the file says there often begins with the word. @param {import("./trace.js").Outcome} outcome */
+export function outcomeInWords({ success, text }) {
+  const word = success ? "success" : "failure";
+  return text.startsWith(word) ? text : `${word}: ${text}`;
 }
 
 /** What the agent itself sees. */
@@ -296,6 +302,22 @@ export class Mind {
       return make("li", {}, swatch, word);
     }));
     return make("div", {}, chart, key);
+  }
+}
+
+/** What a language model answered in a step. */
+export class Replies {
+  constructor() {
+    this.list = make("ul", {});
+    this.root = panel("What the model answered", "replies", this.list);
+  }
+
+  /** @param {Episode} episode @param {number} step */
+  show(episode, step) {
+    this.root.hidden = !episode.scenes.some((scene) => scene.moment.replies);
+    const items = (episode.scenes[step].moment.replies ?? []).map(({ text, error }) =>
+      make("li", {}, text || "(nothing)", error ? make("small", { class: "verdict bad" }, `✗ ${error}`) : null));
+    this.list.replaceChildren(...(items.length ? items : [make("li", { class: "quiet" }, "Before the first step.")]));
   }
 }
 

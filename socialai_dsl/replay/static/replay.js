@@ -1,7 +1,7 @@
 // @ts-check
 /** A page on which recorded episodes are played: forwards, backwards, step by step. */
 import { make } from "./dom.js";
-import { Cast, Mind, Rules, Sight, Stage, Transcript, legend } from "./panels.js";
+import { Cast, Mind, Replies, Rules, Sight, Stage, Transcript, legend, outcomeInWords } from "./panels.js";
 import { Episode } from "./trace.js";
 
 /** @typedef {import("./trace.js").Trace} Trace */
@@ -26,7 +26,7 @@ class Replay {
     /** @type {ReturnType<typeof setInterval> | undefined} */ this.timer = undefined;
     const go = (/** @type {number} */ step) => this.go(this.number, step);
     this.stage = new Stage();
-    this.panels = [this.stage, new Sight(), new Transcript(go), new Cast(), new Mind(go), new Rules()];
+    this.panels = [this.stage, new Sight(), new Transcript(go), new Cast(), new Mind(go), new Replies(), new Rules()];
     this.head = make("header");
     this.list = make("ol", { class: "episodes" });
     this.playing = make("button", { class: "main", onclick: () => this.toggle() });
@@ -51,11 +51,11 @@ class Replay {
       button("last step", "▸|", () => Infinity),
       this.scrubber, this.count, this.speeds);
     const keys = KEYS.flatMap(([key, meaning]) => [make("dt", {}, key), make("dd", {}, meaning)]);
-    const [stage, sight, transcript, cast, mind, why] = this.panels.map((one) => one.root);
+    const [stage, sight, transcript, cast, mind, replies, why] = this.panels.map((one) => one.root);
     return make("div", { class: "replay" }, this.head,
       make("nav", { "aria-label": "episodes", class: "panel" }, make("h2", {}, "Episodes"), this.list,
         make("details", {}, make("summary", {}, "Keys and colours"), make("dl", { class: "keys" }, ...keys), legend())),
-      make("main", {}, stage, controls, mind, why),
+      make("main", {}, stage, controls, mind, replies, why),
       make("aside", {}, sight, transcript, cast));
   }
 
@@ -136,7 +136,7 @@ class Replay {
       make("p", {}, `${trace.agent}, ${trace.episode}. `, trace.about ?? ""), verdict(episode));
     this.list.replaceChildren(...this.episodes.map((one, k) => make("li", {},
       make("button", { "aria-current": k === this.number ? "true" : null, onclick: () => this.go(k, 0) },
-        verdict(one), make("span", {}, `${one.trace.episode}, ${one.length} steps`)))));
+        verdict(one), make("span", {}, `${one.trace.episode}, ${one.length} ${one.length === 1 ? "step" : "steps"}`)))));
     this.playing.textContent = this.timer === undefined ? "▶ play" : "⏸ pause";
     this.scrubber.max = String(episode.length);
     this.scrubber.value = String(step);
@@ -149,8 +149,7 @@ class Replay {
 /** How an episode ended, by sign, word and colour. @param {Episode} episode */
 function verdict({ ended }) {
   if (!ended) return make("strong", { class: "verdict open" }, "… not ended");
-  const word = ended.success ? "✓ success" : "✗ failure";
-  return make("strong", { class: `verdict ${ended.success ? "good" : "bad"}`, title: ended.text }, `${word}: ${ended.text}`);
+  return make("strong", { class: `verdict ${ended.success ? "good" : "bad"}` }, `${ended.success ? "✓" : "✗"} ${outcomeInWords(ended)}`);
 }
 
 /** Show the episodes that lie in the page, packed by gzip in base64. */

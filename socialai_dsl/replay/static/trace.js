@@ -29,6 +29,7 @@
  * @property {number[]} [fired]
  * @property {[number, number][]} [others]
  * @property {Thought | null} [thought]
+ * @property {{text: string, error?: string}[]} [replies]
  * @property {Outcome | null} [ended]
  */
 /**

@@ -2,12 +2,12 @@
 /** The studio: the text of a scenario on the left, its room, its game and its reasons on the right. */
 import { make, panel } from "./dom.js";
 import { Editor } from "./editor.js";
-import { Cast, Mind, Rules, Sight, Stage, Transcript, legend } from "./panels.js";
+import { Cast, Mind, Rules, Sight, Stage, Transcript, legend, outcomeInWords } from "./panels.js";
 import { Episode } from "./trace.js";
 
 /** @typedef {Record<string, any>} Reply */
 
-const DRAW_AFTER = 60, KEEP_AFTER = 500, STEP_EVERY = 450;
+const DRAW_AFTER = 30, KEEP_AFTER = 500, STEP_EVERY = 450;
 /** @type {Record<string, string>} */
 const MOVES = { ArrowLeft: "left", a: "left", ArrowRight: "right", d: "right", ArrowUp: "forward", w: "forward",
   t: "toggle", p: "pickup", o: "drop", x: "done", ".": "none", " ": "none" };
@@ -49,22 +49,53 @@ class Line {
   }
 }
 
-/** All rules with how often they have fired in this episode. */
+/** All rules with how often they have fired, in this episode and in all since the text was changed. */
 class Counts {
   /** @param {(at: string) => void} open */
   constructor(open) {
     this.open = open;
     this.rows = make("ul", { class: "rules" });
-    this.root = panel("All rules met so far, and how often each fired", "counts", this.rows);
+    this.root = panel("All rules, and how often each fired", "counts", this.rows);
+    /** @type {string[]} of all rules; of a suite behind their member's name and ": " */ this.names = [];
+    this.episodes = 0;
+    /** @type {Map<string, number>} */ this.before = new Map();
+    /** @type {Map<string, import("./trace.js").Rule>} */ this.met = new Map();
+  }
+
+  /** Begin to count anew. */
+  forget() {
+    this.episodes = 0;
+    this.before.clear();
+    this.met.clear();
+  }
+
+  /** Count an episode that another one follows. @param {Episode} episode */
+  keep(episode) {
+    if (!episode.length) return;
+    this.episodes++;
+    const counts = episode.counts(episode.length);
+    episode.rules.forEach((rule, k) => {
+      const key = JSON.stringify(rule);
+      this.met.set(key, rule);
+      this.before.set(key, (this.before.get(key) ?? 0) + (counts.get(k) ?? 0));
+    });
   }
 
   /** @param {Episode} episode @param {number} step */
   show(episode, step) {
-    const counts = episode.counts(step);
-    this.rows.replaceChildren(...episode.rules.map((rule, k) => make("li", { class: counts.has(k) ? "fired" : "not" },
-      make("b", {}, `${counts.get(k) ?? 0}× ${rule.who}`), rule.state ? ` in ${rule.state} ` : " ",
-      make("small", {}, make("button", { class: "link", onclick: () => this.open(rule.at) }, rule.at)),
-      make("code", {}, rule.words))));
+    const counts = episode.counts(step), now = new Map(episode.rules.map((rule, k) => [JSON.stringify(rule), counts.get(k) ?? 0]));
+    const rules = new Map([...this.met, ...episode.rules.map((rule) => /** @type {const} */ ([JSON.stringify(rule), rule]))]);
+    const { member } = episode.scenes[step], prefix = member ? `${member}: ` : "", known = new Set([...rules.values()].map((rule) => rule.name));
+    const others = this.names.filter((name) => name.startsWith(prefix)).map((name) => name.slice(prefix.length)).filter((name) => !known.has(name));
+    const met = [...rules].map(([key, rule]) => {
+      const here = now.get(key) ?? 0, all = here + (this.before.get(key) ?? 0);
+      return make("li", { class: all ? "fired" : "not" },
+        make("b", {}, `${here}× ${rule.who}`), rule.state ? ` in ${rule.state} ` : " ",
+        make("small", {}, make("button", { class: "link", onclick: () => this.open(rule.at) }, rule.at),
+          this.episodes ? ` · ${all}× in ${this.episodes + 1} episodes` : ""),
+        make("code", {}, rule.words));
+    });
+    this.rows.replaceChildren(...met, ...others.map((name) => make("li", { class: "not" }, make("b", {}, "0× "), name, make("small", {}, " · not asked yet"))));
   }
 }
 
@@ -74,18 +105,20 @@ class Studio {
     this.first = open;
     this.name = "";
     /** @type {string | null} */ this.digest = null;
+    this.saved = "";
     this.dirty = false;
     this.seed = 0;
     this.length = 0;
     /** @type {Episode | null} */ this.episode = null;
-    /** @type {ReturnType<typeof setInterval> | undefined} */ this.timer = undefined;
+    /** @type {ReturnType<typeof setTimeout> | undefined} */ this.timer = undefined;
     /** @type {Record<string, ReturnType<typeof setTimeout>>} */ this.later = {};
     this.drawing = false;
     this.again = false;
 
     const goTo = (/** @type {string} */ at) => this.editorAt(at);
     this.stage = new Stage();
-    const parts = { why: new Rules(goTo), said: new Transcript((step) => this.back(step)), cast: new Cast(), sight: new Sight(), counts: new Counts(goTo), mind: new Mind((step) => this.back(step)) };
+    this.counts = new Counts(goTo);
+    const parts = { why: new Rules(goTo), said: new Transcript((step) => this.back(step)), cast: new Cast(), sight: new Sight(), counts: this.counts, mind: new Mind((step) => this.back(step)) };
     this.parts = [this.stage, ...Object.values(parts)];
     this.files = make("select", { "aria-label": "scenario", onchange: () => this.openFile(this.files.value) });
     this.state = make("output", { class: "quiet", "aria-live": "polite" });
@@ -96,6 +129,10 @@ class Studio {
     this.players = make("select", { "aria-label": "who plays", onchange: () => this.begin(this.seed) });
     this.watch = make("button", { onclick: () => this.toggleWatch() }, "▶ watch");
     this.count = make("output", {});
+    this.thing = make("select", { "aria-label": "thing to move", onchange: () => this.moving(null) });
+    this.target = make("div", { class: "target", hidden: true });
+    this.stage.sheet.append(this.target);
+    /** @type {[number, number] | null} where the chosen thing is about to be put */ this.aim = null;
     this.moves = make("div", { class: "moves", role: "group", "aria-label": "movements" });
     this.template = make("select", { "aria-label": "template" });
     this.noun = make("select", { "aria-label": "noun" });
@@ -123,7 +160,6 @@ class Studio {
       button("Save", () => this.save(), "Ctrl-S"), this.state,
       make("span", { class: "filler" }),
       button("Replay", () => this.export("replay"), "save this episode as a page of its own"),
-      button("Layout", () => this.export("layout"), "save the room as it is now, for --layout"),
       button("◐", () => this.shade(), "light or dark"));
     const game = make("div", { class: "controls" },
       button("⟲ again", () => this.begin(this.seed), "begin the episode again (R)"),
@@ -133,12 +169,15 @@ class Studio {
       button("one step", () => this.auto(), "let whoever plays do one step"));
     const say = make("form", { class: "controls say", onsubmit: (/** @type {Event} */ event) => this.submit(event) },
       this.template, this.noun, make("button", { type: "button", onclick: () => this.say() }, "Say"), this.typed, this.sentences, make("button", {}, "Do"));
+    const arrange = make("div", { class: "controls arrange" }, make("label", {}, "thing ", this.thing),
+      button("Move it", () => this.moving(this.placeOf(this.thing.value)), "then by the arrow keys; Enter puts it down, Esc leaves it (M)"),
+      button("Layout…", () => this.offerLayout(), "begin episodes in the room as it is now"));
     const check = panel("Check", "check", button("Check the claims", () => this.check()), this.checked);
     const help = make("details", { class: "panel" }, make("summary", {}, "Keys and colours"),
-      make("p", {}, "Outside of the text: arrows or W A D move, T toggles, P picks up, O drops, X is done, space stands still; / or Enter types a line; U or backspace takes a step back; R begins again, N draws another room, L shows letters for colours. Before the first step, drag things to other cells."), legend());
+      make("p", {}, "Outside of the text: arrows or W A D move, T toggles, P picks up, O drops, X is done, space stands still; / or Enter types a line; U or backspace takes a step back; R begins again, N draws another room, L shows letters for colours. Drag things to other cells, or choose one by M and move it by the arrow keys; that begins the episode again."), legend());
     return make("div", { class: "studio" }, bar,
       make("section", { class: "writing", "aria-label": "scenario" }, this.pane, this.findings),
-      make("main", {}, this.stage.root, this.message, this.moves, say, game, ...[parts.mind, parts.why].map((one) => one.root), check),
+      make("main", {}, this.stage.root, this.message, this.moves, say, game, arrange, ...[parts.mind, parts.why].map((one) => one.root), check),
       make("aside", {}, ...[parts.sight, parts.said, parts.cast, parts.counts].map((one) => one.root), help), this.dialog);
   }
 
@@ -179,7 +218,7 @@ class Studio {
       return;
     }
     const same = name === this.name;
-    Object.assign(this, { name, digest: found.digest, seed: same ? this.seed : 0 });
+    Object.assign(this, { name, digest: found.digest, saved: found.text, seed: same ? this.seed : 0 });
     this.files.value = name;
     document.title = this.title.textContent = name;
     this.players.value = "me";
@@ -188,27 +227,29 @@ class Studio {
       this.editor.replace(found.draft);
       this.tell("what you had typed and not saved is here again; Ctrl-Z takes it back");
     }
-    this.marked(this.editor.text !== found.text);
+    this.mark();
     this.draw();
   }
 
   typedText() {
     if (!this.name) return;
-    this.marked(true);
+    this.mark();
     clearTimeout(this.later.draw);
     this.later.draw = setTimeout(() => this.draw(), DRAW_AFTER);
     clearTimeout(this.later.keep);
     this.later.keep = setTimeout(() => this.keep(), KEEP_AFTER);
   }
 
-  /** @param {boolean} dirty */
-  marked(dirty) {
-    this.dirty = dirty;
-    this.state.textContent = dirty ? "not saved; a draft is kept" : "saved";
+  /** Say whether the file holds what is written. */
+  mark() {
+    this.dirty = this.editor.text !== this.saved;
+    this.state.textContent = this.dirty ? "not saved; a draft is kept" : "saved";
   }
 
   async keep() {
-    if (this.dirty) await this.line.ask("draft", { name: this.name, text: this.editor.text });
+    if (!this.name) return;
+    const done = await this.line.ask("draft", { name: this.name, text: this.dirty ? this.editor.text : null });
+    if (done.refused && this.dirty) this.state.textContent = `not saved; ${done.refused}`;
   }
 
   async save() {
@@ -218,7 +259,8 @@ class Studio {
     else if (done.refused) this.tell(done.refused);
     else {
       this.digest = done.digest;
-      this.marked(this.editor.text !== text);
+      this.saved = text;
+      this.mark();
     }
   }
 
@@ -296,24 +338,30 @@ class Studio {
       make("button", { class: "link", onclick: () => this.editor.goTo(one.line) }, `${one.line}:${one.column}`), ` ${one.code} `, one.message)));
     this.stage.root.classList.toggle("stale", !drawn.trace);
     if (drawn.trace) {
+      this.counts.forget();
+      this.episode = null;
       this.players.value = drawn.player;
       this.tell("");
       this.take(drawn);
     } else this.tell(drawn.refused ?? (this.episode ? "the last good room is shown until the mistakes are mended" : "the room is shown when the mistakes are mended"));
-    document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
   }
 
   /** @param {Reply} begun */
   take(begun) {
+    if (this.episode) this.counts.keep(this.episode);
     this.episode = new Episode(begun.trace);
+    this.counts.names = begun.rules;
     this.length = 0;
     this.seed = begun.seed;
     this.seedField.value = String(begun.seed);
+    document.body.dataset.rooms = String(Number(document.body.dataset.rooms ?? 0) + 1);
     const { actions, templates, nouns } = this.episode.trace;
     const options = (/** @type {HTMLSelectElement} */ select, /** @type {string[]} */ words) => {
       const chosen = select.value;
       select.replaceChildren(...words.map((word) => make("option", { selected: word === chosen }, word)));
     };
+    options(this.thing, Object.keys(this.episode.scenes[0].state).filter((key) => key.endsWith(".at") && this.placeOf(key.slice(0, -3))).map((key) => key.slice(0, -3)));
+    this.moving(null);
     options(this.template, templates);
     options(this.noun, nouns);
     this.sentences.replaceChildren(...begun.phrases.sentences.map((/** @type {string} */ said) => make("option", { value: said })));
@@ -383,42 +431,89 @@ class Studio {
 
   toggleWatch() {
     if (this.timer !== undefined) return this.pause();
-    this.timer = setInterval(async () => {
-      if (this.episode?.ended || !(await this.auto())) this.pause();
-    }, STEP_EVERY);
+    const play = async () => {
+      const goesOn = !this.episode?.ended && (await this.auto());
+      if (!goesOn) this.pause();
+      else if (this.timer !== undefined) this.timer = setTimeout(play, STEP_EVERY);
+    };
+    this.timer = setTimeout(play);
     this.watch.textContent = "⏸ pause";
   }
 
   pause() {
-    clearInterval(this.timer);
+    clearTimeout(this.timer);
     this.timer = undefined;
     this.watch.textContent = "▶ watch";
   }
 
-  /** Things are dragged to other cells before the first step. */
+  /** Where a thing is now. @param {string} who @returns {[number, number] | null} */
+  placeOf(who) {
+    return this.episode?.scenes[this.length].state[`${who}.at`] ?? null;
+  }
+
+  /** Show where the chosen thing is about to be put; null: it is not moved any more.
+   * @param {[number, number] | null} aim */
+  moving(aim) {
+    const room = this.episode?.scenes[this.length].room;
+    this.aim = aim && room ? [Math.max(0, Math.min(aim[0], room.width - 1)), Math.max(0, Math.min(aim[1], room.height - 1))] : null;
+    this.target.hidden = !this.aim;
+    if (!this.aim || !room) return;
+    const [x, y] = this.aim, share = (/** @type {number} */ part, /** @type {number} */ whole) => `${(100 * part) / whole}%`;
+    Object.assign(this.target.style, { left: share(x, room.width), top: share(y, room.height), width: share(1, room.width), height: share(1, room.height) });
+    this.tell(`${this.thing.value} to ${x}, ${y}: Enter puts it there, Esc leaves it`);
+  }
+
+  /** Put the chosen thing where it is aimed at; the episode begins again. */
+  async put() {
+    const who = this.thing.value, at = this.aim, from = this.placeOf(who);
+    this.moving(null);
+    this.tell("");
+    if (!at || !from || (from[0] === at[0] && from[1] === at[1])) return;
+    if (this.length) await this.back(0);
+    const done = await this.line.ask("place", { who, at });
+    if (done.refused) return this.tell(done.refused);
+    this.take(done);
+    this.tell(`${who} was put at ${at.join(", ")}; “Layout…” begins episodes so`);
+  }
+
+  /** Things are dragged to other cells. */
   dragging() {
     const { canvas } = this.stage;
-    /** @type {string | undefined} */ let held;
     const cell = (/** @type {PointerEvent} */ event) => {
       const box = canvas.getBoundingClientRect(), { width, height } = this.episode?.scenes[this.length].room ?? { width: 1, height: 1 };
-      return [Math.floor(((event.clientX - box.left) / box.width) * width), Math.floor(((event.clientY - box.top) / box.height) * height)];
+      return /** @type {[number, number]} */ ([Math.floor(((event.clientX - box.left) / box.width) * width), Math.floor(((event.clientY - box.top) / box.height) * height)]);
     };
     canvas.addEventListener("pointerdown", (event) => {
-      const state = this.episode?.scenes[this.length].state ?? {}, [x, y] = cell(event);
-      held = Object.keys(state).find((key) => key.endsWith(".at") && state[key]?.[0] === x && state[key]?.[1] === y)?.slice(0, -3);
-      if (held) canvas.setPointerCapture(event.pointerId);
+      const [x, y] = cell(event);
+      const held = [...this.thing.options].map((one) => one.value).find((who) => this.placeOf(who)?.[0] === x && this.placeOf(who)?.[1] === y);
+      if (!held) return;
+      this.thing.value = held;
+      this.moving([x, y]);
+      canvas.setPointerCapture(event.pointerId);
     });
-    canvas.addEventListener("pointerup", async (event) => {
-      const who = held, at = cell(event);
-      held = undefined;
-      const from = who ? this.episode?.scenes[this.length].state[`${who}.at`] : null;
-      if (!who || !from || (from[0] === at[0] && from[1] === at[1])) return;
-      if (this.length) await this.back(0);
-      const done = await this.line.ask("place", { who, at });
-      if (done.refused) return this.tell(done.refused);
-      this.take(done);
-      this.tell(`${who} was put at ${at.join(", ")}; “Layout” saves the room`);
-    });
+    canvas.addEventListener("pointermove", (event) => this.aim && event.buttons && this.moving(cell(event)));
+    canvas.addEventListener("pointerup", () => this.put());
+    canvas.addEventListener("pointercancel", () => this.moving(null));
+  }
+
+  /** The room as it is now, as a layout: in the text, in a new suite, or as a file. */
+  async offerLayout() {
+    const written = await this.line.ask("write_layout", { text: this.editor.text });
+    /** @type {[string, () => void]} */
+    const toFile = ["Save a file for --layout", () => this.export("layout")];
+    const here = () => {
+      this.editor.replace(written.text);
+      this.tell("the layout was written into the text; Ctrl-Z takes it back");
+    };
+    const anew = async () => {
+      const added = await this.line.ask("add", { name: written.name, text: written.suite });
+      if (added.refused) return this.tell(added.refused);
+      await this.list();
+      await this.openFile(added.name);
+    };
+    /** @type {[string, () => void][]} */
+    const own = written.text ? [["Write it into the text", here]] : written.suite ? [[`Begin so in a new suite, ${written.name}`, anew]] : [];
+    this.ask(`Every episode can begin in the room as it is now. What a layout leaves out is drawn. ${written.refused ?? ""}`, [...own, toFile, ["Close", () => {}]]);
   }
 
   async check() {
@@ -448,6 +543,21 @@ class Studio {
   /** @param {KeyboardEvent} event */
   key(event) {
     const { target, key } = event;
+    if ((event.ctrlKey || event.metaKey) && key === "s" && !event.defaultPrevented) {
+      event.preventDefault();
+      this.save();
+    }
+    const aside = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[key];
+    if (this.aim && (aside || key === "Enter" || key === "Escape")) {
+      event.preventDefault();
+      if (aside) this.moving([this.aim[0] + aside[0], this.aim[1] + aside[1]]);
+      else if (key === "Enter") this.put();
+      else {
+        this.moving(null);
+        this.tell("");
+      }
+      return;
+    }
     if (event.ctrlKey || event.metaKey || event.altKey || this.dialog.open || !(target instanceof HTMLElement)) return;
     if (target.closest("input, select, textarea, .text") || (target instanceof HTMLButtonElement && [" ", "Enter"].includes(key))) {
       if (key === "Escape") target.blur();
@@ -459,6 +569,7 @@ class Studio {
     const others = {
       "/": () => this.typed.focus(),
       Enter: () => this.typed.focus(),
+      m: () => this.thing.focus(),
       u: () => this.back(this.length - 1),
       Backspace: () => this.back(this.length - 1),
       r: () => this.begin(this.seed),
@@ -484,7 +595,7 @@ class Studio {
     if (!episode) return;
     const { ended } = episode;
     this.count.textContent = `step ${length} · reward ${episode.scenes[length].reward.toFixed(3)}`;
-    if (ended) this.tell(`${ended.success ? "✓ success" : "✗ no success"}: ${ended.text}`);
+    if (ended) this.tell(`${ended.success ? "✓" : "✗"} ${outcomeInWords(ended)}`);
     this.message.className = `message ${ended ? (ended.success ? "good" : "bad") : ""}`;
     for (const part of this.parts) part.show(episode, length);
   }

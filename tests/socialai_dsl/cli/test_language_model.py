@@ -1,8 +1,11 @@
 """`socialai evaluate llm:MODEL`: any endpoint, its faults, its costs, and going on where it was stopped."""
 
+import base64
+import gzip
 import json
 import random
 import re
+import time
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +17,7 @@ from socialai_dsl.cli.run_folder import scenario_folder_name
 from socialai_dsl.envs.asking import Question
 from socialai_dsl.llm import Episode
 from socialai_dsl.llm.episode import scripted_reply
-from tests.socialai_dsl.llm.endpoint import completion, endpoint
+from tests.socialai_dsl.llm.endpoint import completion, endpoint, slowly
 
 pytest.importorskip("httpx", reason="language models need the extra llm")
 
@@ -132,6 +135,13 @@ FAULTS: dict[str, Any] = {
     "rate limit": (429, {"Retry-After": "0.01"}, b'{"error": {"message": "slow down"}}'),
     "server error": (500, {}, b"Internal Server Error"),
     "cut off": (200, {"Content-Length": "5000"}, completion("Act: left")),
+    "cut between chunks": (
+        200,
+        {"Transfer-Encoding": "chunked"},
+        [b"14\r\n" + completion("Act: left")[:20] + b"\r\n"],
+    ),
+    "cut in a chunk": (200, {"Transfer-Encoding": "chunked"}, [b"14\r\n" + completion("Act: left")[:10]]),
+    "cut, but closed well": (200, {}, completion("Act: left")[:90]),
     "not JSON": (200, {}, b"<html>busy</html>"),
     "no choices": (200, {}, b'{"choices": []}'),
     "empty body": (200, {}, b""),
@@ -155,6 +165,28 @@ def test_what_passes_is_waited_for(fault: str, tmp_path: Path) -> None:
     result = figures(tmp_path)["eval"]
     assert (result["episodes"], result["replies"], result["invalid_replies"]) == (3, 3, 0)
     assert len(stub.requests) > 3
+
+
+STALLS: dict[str, Any] = {
+    "before the answer": lambda: time.sleep(3) or "Act: left",
+    "after its head": lambda: (200, {}, slowly([completion("Act: left")], 3)),
+    "drip by drip": lambda: (200, {}, slowly([b" "] * 100 + [completion("Act: left")], 0.03)),
+}
+
+
+@pytest.mark.parametrize("stall", STALLS)
+def test_an_answer_that_takes_too_long_is_asked_for_again(stall: str, tmp_path: Path) -> None:
+    with endpoint(lambda _: STALLS[stall]() if len(stub.requests) == 2 else "Act: done") as stub:
+        assert evaluate(stub.url, tmp_path, "--timeout", "0.3", "--concurrency", "1") == 0
+    assert len(stub.requests) > 3
+    assert (figures(tmp_path)["eval"]["replies"], figures(tmp_path)["eval"]["invalid_replies"]) == (3, 0)
+
+
+def test_an_endpoint_that_never_answers_ends_the_command(tmp_path: Path, capsys: Capture) -> None:
+    with endpoint(lambda _: STALLS["before the answer"]()) as stub:
+        assert evaluate(stub.url, tmp_path, "--timeout", "0.1", episodes=1) == 2
+    assert "it took longer than 0.1 s" in capsys.readouterr().err
+    assert len(stub.requests) == 2
 
 
 def test_lost_connections_do_not_make_an_address_wrong(tmp_path: Path) -> None:
@@ -269,6 +301,13 @@ def test_mistakes_are_told_in_one_line(
     assert error.count("\n") == 1
 
 
+@pytest.mark.parametrize("time", ["0", "-1", "nan", "inf", "soon"])
+def test_a_time_out_is_a_time(time: str, capsys: Capture) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["evaluate", "llm:m", "--on", "help", "--timeout", time])
+    assert f"--timeout: expected a number of seconds above 0, got '{time}'" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("answer", "said"),
     [
@@ -296,6 +335,62 @@ def test_progress_tells_of_costs(tmp_path: Path, capsys: Capture, monkeypatch: p
     assert re.search(
         r"3 of 3 episodes, 0 successes, 0.0% invalid replies, 36 tokens, \$0.0000, 0 s left", said
     )
+
+
+def episodes_in(page: Path) -> list[dict[str, Any]]:
+    found = re.search(r'<script id="episodes"[^>]*>([^<]*)</script>', page.read_text(encoding="utf-8"))
+    assert found is not None
+    traces: list[dict[str, Any]] = json.loads(gzip.decompress(base64.b64decode(found.group(1))))
+    return traces
+
+
+def test_a_replay_shows_what_the_model_answered(tmp_path: Path, capsys: Capture) -> None:
+    replies = iter(["I wonder.", "x" * 9000 + " Act: left", "Act: done"])
+    with endpoint(lambda _: next(replies)) as stub:
+        assert evaluate(stub.url, tmp_path, "--record", "1", "--on-invalid", "retry", episodes=1) == 0
+    page = tmp_path / "talkitout" / "episode.html"
+    assert str(page) in capsys.readouterr().out
+    (trace,) = episodes_in(page)
+    first, second = (moment["replies"] for moment in trace["moments"][1:])
+    assert first[0]["text"] == "I wonder."
+    assert first[0]["error"]
+    assert first[1]["text"].startswith("… x")
+    assert first[1]["text"].endswith("Act: left")
+    assert "error" not in first[1]
+    assert len(first[1]["text"]) < 1000
+    assert second == [{"text": "Act: done"}]
+    # The transcripts are enough: no model is asked.
+    again = tmp_path / "again.html"
+    assert main(["replay", str(page.parent), "-o", str(again)]) == 0
+    assert episodes_in(again) == [trace]
+    assert main(["replay", str(page.parent), "--test-episode", "1", "-o", str(again)]) == 2
+    assert "--test-episode: got 1, expected less than 1" in capsys.readouterr().err
+
+
+def test_a_replay_shows_a_reply_that_ended_the_episode(tmp_path: Path) -> None:
+    replies = iter(["Act: left", "no"])
+    with endpoint(lambda _: next(replies)) as stub:
+        assert evaluate(stub.url, tmp_path, "--record", "1", "--on-invalid", "fail", episodes=1) == 0
+    (trace,) = episodes_in(tmp_path / "talkitout" / "episode.html")
+    _, step, end = trace["moments"]
+    assert step["did"] == "left"
+    assert "did" not in end
+    assert end["replies"][0]["text"] == "no"
+    assert end["ended"] == {"name": "invalid reply", "success": False, "text": "a reply without an action"}
+    assert not list((tmp_path / "talkitout").glob("*.gif"))
+
+
+def test_transcripts_of_another_scenario_are_not_replayed(tmp_path: Path, capsys: Capture) -> None:
+    with endpoint(lambda _: "Act: done") as stub:
+        assert evaluate(stub.url, tmp_path, episodes=1) == 0
+    settings = tmp_path / "talkitout/transcripts/settings.json"
+    settings.write_text(settings.read_text().replace('"program_sha256": "', '"program_sha256": "0'))
+    command = ["replay", str(tmp_path / "talkitout"), "-o", str(tmp_path / "again.html")]
+    assert main(command) == 2
+    assert "holds episodes of another version of the scenario" in capsys.readouterr().err
+    settings.write_text("[]")
+    assert main(command) == 2
+    assert "holds no transcripts of episodes" in capsys.readouterr().err
 
 
 # -- probes ------------------------------------------------------------------------------------------------------------

@@ -27,7 +27,8 @@ def test_everything_is_written(folder: Path, capsys: Capture) -> None:
     assert f"written to {out / 'index.html'}" in capsys.readouterr().out
     names = {path.name for path in out.iterdir()} - {path.name for path in out.glob("*.parquet")}
     assert names == {
-        "index.html", "report.md", "figures", "runs.csv", "conditions.csv", "comparisons.csv", "outcomes.csv",
+        "index.html", "report.md", "figures",
+        "runs.csv", "conditions.csv", "comparisons.csv", "rooms.csv", "outcomes.csv",
     }  # fmt: skip
     markdown = (out / "report.md").read_text(encoding="utf-8")
     for name in ("part1-success", "part1-curves"):

@@ -2,13 +2,17 @@
 
 import json
 import threading
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 Respond = Callable[[dict[str, Any]], Any]
-"""Takes a request; returns a message (or its text), (status, headers, content), or None to hang up."""
+"""Takes a request; returns a message (or its text), (status, headers, content), or None to hang up.
+
+Content that is not bytes is sent piece by piece.
+"""
 
 
 class Stub:
@@ -33,6 +37,25 @@ def completion(message: Any) -> bytes:
     return json.dumps({**found, "usage": usage}).encode()
 
 
+def slowly(pieces: Iterable[bytes], seconds: float) -> Iterator[bytes]:
+    """Wait before each piece."""
+    for piece in pieces:
+        time.sleep(seconds)
+        yield piece
+
+
+def stream(text: str) -> tuple[int, dict[str, str], bytes]:
+    """The same as events, for requests with `stream`."""
+    head = {"id": "1", "object": "chat.completion.chunk", "created": 0, "model": "stub"}
+    delta = {"index": 0, "delta": {"role": "assistant", "content": text}, "finish_reason": None}
+    end = {"index": 0, "delta": {}, "finish_reason": "stop"}
+    usage = {"prompt_tokens": 10, "completion_tokens": 2, "total_tokens": 12}
+    chunks = [{"choices": [delta]}, {"choices": [end]}, {"choices": [], "usage": usage}]
+    events = [*(json.dumps({**head, **chunk}) for chunk in chunks), "[DONE]"]
+    content = "".join(f"data: {event}\n\n" for event in events)
+    return 200, {"Content-Type": "text/event-stream"}, content.encode()
+
+
 @contextmanager
 def endpoint(respond: Respond) -> Iterator[Stub]:
     """Serve on a free port of the loopback interface."""
@@ -49,16 +72,15 @@ def endpoint(respond: Respond) -> Iterator[Stub]:
             if answer is None:
                 return
             status, headers, content = answer if isinstance(answer, tuple) else (200, {}, completion(answer))
+            whole = isinstance(content, bytes)
+            length = {"Content-Length": str(len(content))} if whole else {}
             self.send_response(status)
-            for name, value in {
-                "Content-Length": str(len(content)),
-                "Connection": "close",
-                **headers,
-            }.items():
+            for name, value in {**length, "Connection": "close", **headers}.items():
                 self.send_header(name, value)
             with suppress(ConnectionError):  # one who is answered may have left
                 self.end_headers()
-                self.wfile.write(content)
+                for piece in [content] if whole else content:
+                    self.wfile.write(piece)
 
         def log_message(self, format: str, *arguments: Any) -> None:
             """Say nothing."""

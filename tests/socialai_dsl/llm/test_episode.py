@@ -14,6 +14,7 @@ from socialai_dsl.llm.view import Style
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 ROOMS = 3
+MANY_ROOMS = 100
 
 
 def scripted(path: Path) -> str:
@@ -24,15 +25,15 @@ def scripted(path: Path) -> str:
     return f"{base}+asocial+oracle" if alone else f"{name}+oracle"
 
 
-SCRIPTED = sorted(map(scripted, SCENARIOS.rglob("*_oracle.yaml")))
+SCRIPTED = [*sorted(map(scripted, SCENARIOS.rglob("*_oracle.yaml"))), "social_env+oracle"]
 
 
-@pytest.mark.parametrize("name", [*SCRIPTED, "social_env+oracle"])
-def test_a_script_loses_nothing_in_text(name: str) -> None:
-    """Same rooms, same ends, step by step: the model answers text with text, beside an environment without text."""
+def play_beside(name: str, rooms: range) -> int:
+    """Let a script play test episodes in text, beside an environment without text, and compare each step."""
     episode = Episode(name, style="json")
     beside = sd.make(name)
-    for number in range(ROOMS):
+    steps = 0
+    for number in rooms:
         text = episode.reset(test_episode=number)
         observation, info = beside.reset(options={"test_episode": number})
         done = False
@@ -42,10 +43,23 @@ def test_a_script_loses_nothing_in_text(name: str) -> None:
             observation, reward, terminated, truncated, info = beside.step(beside.scripted_action())
             text, done = turn.text, terminated or truncated
             assert (turn.reward, turn.done, turn.error) == (reward, done, "")
+            steps += 1
         assert episode.result().success == info["success"]
         assert episode.result().ending.endswith(info["outcome"])
     episode.close()
     beside.close()
+    return steps
+
+
+@pytest.mark.parametrize("name", SCRIPTED)
+def test_a_script_loses_nothing_in_text(name: str) -> None:
+    assert play_beside(name, range(ROOMS)) > ROOMS
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SCRIPTED)
+def test_a_script_loses_nothing_in_many_rooms(name: str) -> None:
+    assert play_beside(name, range(ROOMS, ROOMS + MANY_ROOMS)) > MANY_ROOMS
 
 
 def test_every_paper_school_and_novel_scenario_with_a_script_is_played() -> None:

@@ -19,6 +19,7 @@ pytest.importorskip("openenv", reason="serving OpenEnv needs the extra openenv")
 
 import uvicorn
 import yaml
+from openenv import GenericEnvClient
 
 from socialai_dsl.llm.openenv import Reply, ScenarioClient, application
 
@@ -99,6 +100,26 @@ def test_a_hundred_sessions_do_not_mix(url: str) -> None:
         for reply, told in zip(np.random.default_rng(number).choice(REPLIES, 20), texts[1:], strict=True):
             turn = alone.step(str(reply))
             assert told == (turn.text, turn.reward, turn.done)
+
+
+@pytest.mark.parametrize(
+    ("action", "understood"),
+    [
+        ({"move": "left", "say": None}, True),
+        ({"message": '{"move": "left", "say": null}'}, True),
+        ({"message": {"move": "left"}}, True),
+        ({"message": 7}, False),
+        ({}, False),
+        ({"move": "up"}, False),
+    ],
+)
+def test_json_of_any_form_is_a_reply(url: str, action: dict[str, Any], understood: bool) -> None:
+    """verifiers sends a model's JSON as the action itself."""
+    with GenericEnvClient(base_url=url).sync() as client:
+        client.reset(seed=3)
+        result = client.step(action)
+        assert ("Your reply was not understood" in result.observation["text"]) is not understood
+        assert client.state()["step_count"] == 1
 
 
 @pytest.mark.parametrize(

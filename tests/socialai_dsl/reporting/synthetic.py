@@ -55,6 +55,14 @@ def write_run(run: Path, scenario: str, seed: int, rate: float, frames: int = FR
     return run
 
 
+def write_rooms(run: Path, successes: Mapping[int, bool]) -> None:
+    """A list of the test episodes of a run."""
+    lines = [f"{number},{int(success)},x,9,0\n" for number, success in successes.items()]
+    (run / "episodes.csv").write_text(
+        "episode,success,outcome,length,return\n" + "".join(lines), encoding="utf-8"
+    )
+
+
 def write_tests(run: Path, rates: Mapping[str, float]) -> None:
     """Further tests of a run, by scenario."""
     _write(run / "tests.json", {name: figures(rate) for name, rate in rates.items()})

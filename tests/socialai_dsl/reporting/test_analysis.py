@@ -8,7 +8,13 @@ import pytest
 
 from socialai_dsl.reporting.analysis import Analysis, analyse
 from socialai_dsl.reporting.collect import read_experiment
-from tests.socialai_dsl.reporting.synthetic import condition, write_experiment, write_run, write_tests
+from tests.socialai_dsl.reporting.synthetic import (
+    condition,
+    write_experiment,
+    write_rooms,
+    write_run,
+    write_tests,
+)
 
 
 def analysed(folder: Path, *conditions: dict[str, Any]) -> Analysis:
@@ -80,6 +86,32 @@ def test_interquartile_means_of_all_rows_and_of_those_in_common(tmp_path: Path) 
         pytest.approx(0.2),
     )
     assert (y.rows, y.estimate.value) == (1, pytest.approx(0.4))
+
+
+def test_conditions_are_paired_by_room(tmp_path: Path) -> None:
+    """Of rooms that all seeds of both list, over whose seeds success is averaged."""
+    write_experiment(
+        tmp_path, [condition("A / x", [0.5, 0.5]), condition("A / y", [0.5]), condition("A / z", [0.5])]
+    )
+    runs = tmp_path / "runs"
+    write_rooms(runs / "c0-s0", {0: True, 1: True, 2: False, 3: True})
+    write_rooms(runs / "c0-s1", {0: True, 1: False, 2: False})
+    write_rooms(runs / "c1-s0", {1: False, 2: True, 0: False, 7: True})
+    (pairing,) = analyse(read_experiment(tmp_path), {}).sections[0].pairings
+    assert (pairing.first, pairing.second, pairing.rooms) == ("A / x", "A / y", 3)
+    assert (pairing.ahead, pairing.behind) == (2, 1)
+    assert pairing.difference.value == pytest.approx((1.0 + 0.5 - 1.0) / 3)
+    assert -1 <= pairing.difference.low < pairing.difference.value < pairing.difference.high <= 1
+
+
+def test_rooms_of_other_programs_are_other_rooms(tmp_path: Path) -> None:
+    write_experiment(tmp_path, [condition("A / x", [0.5]), condition("A / y", [0.5])])
+    for name in ("c0-s0", "c1-s0"):
+        write_rooms(tmp_path / "runs" / name, {0: True})
+    assert len(analyse(read_experiment(tmp_path), {}).sections[0].pairings) == 1
+    result = tmp_path / "runs" / "c1-s0" / "result.json"
+    result.write_text(result.read_text().replace("b" * 64, "c" * 64))
+    assert analyse(read_experiment(tmp_path), {}).sections[0].pairings == ()
 
 
 def test_further_tests_are_spread_over_the_seeds_that_have_them(tmp_path: Path) -> None:

@@ -84,6 +84,16 @@ def test_damaged_files_are_problems_of_their_run(folder: Path, name: str, conten
     assert [run.problems for run in runs(folder) if run.seed != 2] == [()] * 3
 
 
+@pytest.mark.parametrize(
+    "content", ["episode,success\n0,maybe\n", "number\n0\n", "episode,success\n0\n", "\xff\x00\n"]
+)
+def test_a_damaged_list_of_episodes_is_a_problem(folder: Path, content: str) -> None:
+    (folder / "runs" / "c0-s2" / "episodes.csv").write_text(content, encoding="latin-1")
+    damaged = runs(folder)[2]
+    assert damaged.problems == ("episodes.csv is damaged",)
+    assert (damaged.rooms, damaged.state) == ({}, "done")
+
+
 def test_a_folder_in_place_of_a_file_is_a_problem_too(folder: Path) -> None:
     run = folder / "runs" / "c0-s0"
     (run / "result.json").unlink()

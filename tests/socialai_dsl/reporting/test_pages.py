@@ -164,7 +164,7 @@ def test_hostile_names_stay_text(tmp_path: Path) -> None:
 def test_tables_for_other_programs(analysis: Analysis) -> None:
     read = {name: list(csv.DictReader(io.StringIO(as_csv(rows)))) for name, rows in tables(analysis).items()}
     assert {name: len(rows) for name, rows in read.items()} == {
-        "runs": 7, "conditions": 3, "comparisons": 1, "outcomes": 21,
+        "runs": 7, "conditions": 3, "comparisons": 1, "rooms": 0, "outcomes": 21,
     }  # fmt: skip
     first = read["conditions"][0]
     assert float(first["success_mean"]) == pytest.approx(0.5)

@@ -14,6 +14,7 @@ from socialai_dsl.reporting.statistics import (
     frames_to,
     interquartile_mean,
     mean_interval,
+    paired_difference,
 )
 
 
@@ -98,6 +99,28 @@ def test_the_interval_of_a_mean() -> None:
         (0.5 - 0.1 * math.tan(0.475 * math.pi), 0.5 + 0.1 * math.tan(0.475 * math.pi))
     )
     assert mean_interval([0.4]) is None
+
+
+def test_a_paired_difference_has_the_interval_of_bonett_and_price() -> None:
+    """With 12 rooms that the first alone solves and 3 that the second alone solves, of 50."""
+    first = [1.0] * 12 + [0.0] * 3 + [1.0] * 20 + [0.0] * 15
+    second = [0.0] * 12 + [1.0] * 3 + [1.0] * 20 + [0.0] * 15
+    found = paired_difference(first, second)
+    ahead, behind = 13 / 52, 4 / 52
+    half = 1.959964 * math.sqrt((ahead + behind - (ahead - behind) ** 2) / 52)
+    assert found.value == pytest.approx(9 / 50)
+    assert (found.low, found.high) == pytest.approx((ahead - behind - half, ahead - behind + half), abs=1e-6)
+
+
+def test_rooms_that_all_agree_leave_an_interval() -> None:
+    found = paired_difference([1.0] * 10, [0.0] * 10)
+    assert (found.value, found.high) == (1.0, 1.0)
+    assert 0.4 < found.low < 0.7
+    alike = paired_difference([1.0] * 10, [1.0] * 10)
+    assert alike.value == 0.0
+    assert alike.low == -alike.high < -0.1
+    with pytest.raises(ValueError, match="got 1 and 2 rooms, expected as many, at least one"):
+        paired_difference([1.0], [1.0, 0.0])
 
 
 def test_sample_efficiency_passes_over_unknown_bins() -> None:

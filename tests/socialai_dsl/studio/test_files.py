@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Final
 
 import pytest
 
+from socialai_dsl.cli.main import main
 from socialai_dsl.studio.files import ConflictError, FileError, Folder
+
+_NOBODY: Final = 65534
 
 
 @pytest.fixture
@@ -74,6 +82,50 @@ def test_what_is_no_text_is_told_in_words(root: Path) -> None:
         folder.read("large.yaml")
     with pytest.raises(FileError, match="larger than"):
         folder.write("one.yaml", "a" * (5 << 20), folder.read("one.yaml")[1])
+
+
+@contextmanager
+def as_another_user() -> Iterator[Path]:
+    """A folder of a user who may do no more than its files' modes say, which root could ignore."""
+    with tempfile.TemporaryDirectory() as name:
+        root = Path(name)
+        is_root = os.geteuid() == 0
+        if is_root:
+            os.chown(root, _NOBODY, _NOBODY)
+        for file, mode in (("secret.yaml", 0o000), ("theirs.yaml", 0o444)):
+            (root / file).write_text("scenario: one\n")
+            (root / file).chmod(mode)
+        if is_root:
+            os.setresuid(_NOBODY, _NOBODY, 0)
+        try:
+            yield root
+        finally:
+            if is_root:
+                os.setresuid(0, 0, 0)
+            root.chmod(0o755)
+
+
+def test_files_of_another_user_are_refused_in_words(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["studio", "none", "--no-browser"]) == 2  # everything is imported before the user changes
+    with as_another_user() as root:
+        folder = Folder(root)
+        with pytest.raises(FileError, match=r"secret.yaml: .*permission denied"):
+            folder.read("secret.yaml")
+        text, known = folder.read("theirs.yaml")
+        with pytest.raises(FileError, match="this user may not write"):
+            folder.write("theirs.yaml", text + "# mine\n", known)
+        folder.keep_draft("theirs.yaml", text + "# mine\n")
+        assert folder.draft("theirs.yaml") == text + "# mine\n"
+        shutil.rmtree(root / ".studio")
+        root.chmod(0o555)
+        with pytest.raises(FileError, match="cannot be written: Permission denied"):
+            folder.create("new.yaml", text)
+        with pytest.raises(FileError, match="the draft cannot be kept: Permission denied"):
+            folder.keep_draft("theirs.yaml", "typed")
+        assert folder.scenarios() == ["secret.yaml", "theirs.yaml"]
+        root.chmod(0o000)
+        assert main(["studio", str(root), "--no-browser"]) == 2
+    assert "Permission denied" in capsys.readouterr().err
 
 
 def test_copies_take_a_free_name(root: Path) -> None:

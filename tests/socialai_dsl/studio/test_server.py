@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
+import re
 import shutil
 import signal
 import socket
+import subprocess
+import sys
 import threading
 import time
+import webbrowser
 from collections.abc import Iterator
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import dataclass
 from http.client import HTTPConnection, HTTPResponse
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -150,21 +156,70 @@ def test_what_takes_too_long_is_stopped_and_says_so(client: Client, monkeypatch:
         assert "trace" in window.ask("draw", path="talkitout.yaml", text=found["text"])
 
 
-@pytest.mark.skipif(not Path("/proc/self/cmdline").exists(), reason="processes are found in /proc")
-def test_a_process_that_dies_is_replaced(client: Client, tmp_path: Path) -> None:
-    with client.window() as opened:
-        window = Window(opened)
+def test_a_process_that_dies_is_replaced_and_harms_no_other(client: Client) -> None:
+    with client.window() as opened, client.window() as other:
+        window, neighbour = Window(opened), Window(other)
         found = window.ask("read", name="talkitout.yaml")
         assert "trace" in window.ask("draw", path="talkitout.yaml", text=found["text"])
-        for process in Path("/proc").glob("[0-9]*"):
-            with suppress(OSError):
-                words = (process / "cmdline").read_bytes()
-                if b"studio.worker" in words and str(tmp_path).encode() in words:
-                    os.kill(int(process.name), signal.SIGKILL)
+        deadline = time.monotonic() + 30
+        # The one that has loaded everything is on its way out.
+        while len(multiprocessing.active_children()) > 1:
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+        (own,) = multiprocessing.active_children()
+        assert "trace" in neighbour.ask("draw", path="talkitout.yaml", text=found["text"])
+        own.kill()
         lost = window.ask("act", movement="forward")
         assert lost["lost"]
         assert "has ended" in lost["refused"]
+        assert "more" in neighbour.ask("act", movement="forward")
         assert "trace" in window.ask("draw", path="talkitout.yaml", text=found["text"])
+
+
+def test_a_process_cannot_fill_the_machine() -> None:
+    command = (
+        "import os, socket\nfrom socialai_dsl.studio.worker import MOST_BYTES, answer_window\n"
+        "ours, theirs = socket.socketpair()\nours.close()\nanswer_window(theirs, os.getcwd())\nbytearray(MOST_BYTES)"
+    )
+    done = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, timeout=60)
+    assert "MemoryError" in done.stderr
+
+
+def test_ctrl_c_ends_it_without_a_word_and_no_module_of_the_folder_was_imported(tmp_path: Path) -> None:
+    shutil.copy(SCENARIOS / "talkitout.yaml", tmp_path)
+    for name in ("yaml", "multiprocessing", "socialai_dsl"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('a module of the folder was imported')\n")
+    # As the installed command starts, which does not look for modules in the present folder.
+    command = "import sys; sys.path.remove(''); from socialai_dsl.cli.main import main; sys.exit(main())"
+    running = subprocess.Popen(
+        [sys.executable, "-c", command, "studio", "--no-browser", "--port", "0"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        cwd=tmp_path,
+    )
+    assert running.stdout is not None
+    found = re.search(r"http://127.0.0.1:(\d+)/\?token=(\S+)", running.stdout.readline())
+    assert found is not None
+    with Client(int(found[1])).window(f"session?token={found[2]}") as opened:
+        text = (tmp_path / "talkitout.yaml").read_text()
+        assert "trace" in Window(opened).ask("draw", path="talkitout.yaml", text=text)
+        os.killpg(running.pid, signal.SIGINT)  # as a terminal does
+        _, told = running.communicate(timeout=30)
+    assert (told, running.returncode) == ("", 0)
+
+
+@pytest.mark.parametrize("failing", [lambda address: False, Mock(side_effect=webbrowser.Error("none"))])
+def test_without_a_browser_it_prints_the_address(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], failing: Any
+) -> None:
+    monkeypatch.setattr(webbrowser, "open", failing)
+    monkeypatch.setattr(uvicorn.Server, "run", lambda self, sockets: sockets[0].close())
+    assert main(["studio", str(tmp_path), "--port", "0"]) == 0
+    told = capsys.readouterr().out
+    assert "http://127.0.0.1:" in told
+    assert "no browser could be opened" in told
 
 
 def test_mistakes_of_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

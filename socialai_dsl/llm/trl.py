@@ -1,0 +1,101 @@
+"""Any scenario as an environment of TRL's `GRPOTrainer`, which calls its methods as tools."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from inspect import Parameter, Signature
+from typing import Any, ClassVar, Final, Literal
+
+from socialai_dsl.envs.factory import Scenario, playable_of
+from socialai_dsl.llm.actions import ActionLanguage, ToolCall
+from socialai_dsl.llm.episode import Episode
+from socialai_dsl.llm.view import Style
+from socialai_dsl.program_suite import Playable
+
+_OVER: Final = "The episode is over. Reply without calling a tool."
+
+
+class SocialEnv:
+    """One rollout at a time. `social_env` makes a class of it for each scenario, with `move` and `say` as methods.
+
+    TRL takes every other public method for a tool.
+    """
+
+    _program: ClassVar[Playable]
+    _style: ClassVar[Style]
+    _goal: ClassVar[str]
+
+    def __init__(self) -> None:
+        self._episode = Episode(self._program, self._style, mode="tools", goal=self._goal)
+        self._done = True
+
+    def reset(self, seed: int | None = None, test_episode: int | None = None, **_: Any) -> str:
+        """Begin an episode; the instructions and what is seen. The arguments are columns of the data set.
+
+        Args:
+            seed: starts episode 0 of the seed; without it and `test_episode`, the next one is played.
+            test_episode: number of an episode of the fixed test set.
+
+        Raises:
+            ValueError: a number is out of range.
+        """
+        self._done = False
+        return f"{self._episode.instructions}\n\n{self._episode.reset(seed, test_episode)}"
+
+    def get_reward(self) -> float:
+        """Sum of the episode's rewards so far."""
+        return self._episode.result().total
+
+    def _call(self, tool: str, arguments: Mapping[str, str]) -> str:
+        """Play what a tool means; what the model is told of it."""
+        if self._done:
+            return _OVER
+        turn = self._episode.step([ToolCall(tool, json.dumps(arguments))])
+        self._done = turn.done
+        return f"{turn.text}\n{_OVER}" if turn.done else turn.text
+
+
+def social_env(scenario: Scenario, style: Style = "prose", goal: str = "") -> type[SocialEnv]:
+    """The environment of a scenario: `GRPOTrainer(..., environment_factory=social_env("talkitout"))`.
+
+    Args:
+        scenario: a path, a name or a program.
+        style: how observations are written, see `TextView`.
+        goal: what the instructions say of the aim; nothing by default.
+
+    Raises:
+        ScenarioError: the scenario has mistakes.
+    """
+    program = playable_of(scenario)
+    tools = [tool["function"] for tool in ActionLanguage(program).tools()]
+    content = {"_program": program, "_style": style, "_goal": goal}
+    # Rewards are logged under the name of the class.
+    return type(program.name, (SocialEnv,), {**content, **{tool["name"]: _method(tool) for tool in tools}})
+
+
+def _method(tool: Mapping[str, Any]) -> Callable[..., str]:
+    """A tool as a method, from whose signature and docstring transformers makes the same tool again."""
+    name = tool["name"]
+
+    def method(self: SocialEnv, **arguments: str) -> str:
+        return self._call(name, arguments)
+
+    properties, required = tool["parameters"]["properties"], tool["parameters"]["required"]
+    choices = {key: Literal[tuple(choice["enum"])] for key, choice in properties.items()}
+    parameters = [
+        Parameter(
+            key,
+            Parameter.KEYWORD_ONLY,
+            default=Parameter.empty if key in required else None,
+            annotation=choice,
+        )
+        for key, choice in choices.items()
+    ]
+    own = Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)
+    method.__name__ = method.__qualname__ = name
+    method.__annotations__ = {**choices, "return": str}
+    vars(method)["__signature__"] = Signature([own, *parameters], return_annotation=str)
+    told = [f"    {key}: {choice['description']}" for key, choice in properties.items()]
+    method.__doc__ = "\n".join([tool["description"], "", "Args:", *told])
+    return method
