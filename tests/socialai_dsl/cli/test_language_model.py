@@ -525,3 +525,16 @@ def test_json_and_grammars_hold_answers_to_those_that_there_are(tmp_path: Path) 
 def test_scripts_are_not_asked(capsys: Capture) -> None:
     assert main(["evaluate", "oracle", "--on", BELIEF, "--episodes", "2", "--json"]) == 0
     assert "probes" not in json.loads(capsys.readouterr().out)[0]["eval"]
+
+
+def test_a_replay_passes_questions_over(tmp_path: Path) -> None:
+    with endpoint(knowing(BELIEF, lambda question: f"Answer: {question.right}")) as stub:
+        assert evaluate(stub.url, tmp_path, *ALONE, on=BELIEF, episodes=1) == 0
+    assert (
+        main(["replay", str(tmp_path / scenario_folder_name(BELIEF)), "-o", str(tmp_path / "again.html")])
+        == 0
+    )
+    (trace,) = episodes_in(tmp_path / "again.html")
+    told = [reply["text"] for moment in trace["moments"] for reply in moment.get("replies", ())]
+    assert set(told) == {"Act: none"}
+    assert len(told) == len(trace["moments"]) - 1
