@@ -178,7 +178,7 @@ def evaluate_agent(player: Player, scenario: str, episodes: int) -> Evaluation:
         from socialai_dsl.cli.language_model import let_a_model_play
 
         result, played, others, more = let_a_model_play(
-            player.agent, scenario, program, episodes, player.out, player.options
+            player.agent, scenario, loaded, program, episodes, player.out, player.options
         )
         return Evaluation(
             scenario, about_of(loaded), program, player, result, [*endings, *others], played, more=more

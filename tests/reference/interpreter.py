@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from socialai_dsl.grammar import ast
 from tests.reference import bodies, chance, geometry, motion, rules, speech
 from tests.reference.effects import remember
 from tests.reference.evaluate import Context, NothingFoundError, evaluate, holds
@@ -16,7 +17,7 @@ from tests.reference.picture import picture
 from tests.reference.room import Setup, sizes
 from tests.reference.script import Outcome, script_of
 from tests.reference.settling import Settling
-from tests.reference.source import Sources
+from tests.reference.source import Sources, Value
 from tests.reference.vocabulary import Vocabulary, Words
 from tests.reference.world import Entity, Performance, World, as_list
 
@@ -290,6 +291,35 @@ class Reference:
         return float(min(max(per_cent, 0), 100) / 100 * left)
 
     # -- questions -----------------------------------------------------------------------------------------
+
+    def probed(self, ended: bool) -> dict[str, tuple[str, list[str], str]]:
+        """Of each probe whose moment is now, be it the first or not: question, written answers, right answer."""
+        found = {}
+        for name, probe in self.scenario.probes.items():
+            texts = [self.sources.text(f"probes.{name}.text", text) for text in (probe.ask, *probe.answers)]
+            context = Context(self.world)
+            try:
+                now = ended if probe.when is None else self._probe_holds(name, "when", probe.when)
+                if now:
+                    right = self.sources.expression(f"probes.{name}.answer", probe.answer)
+                    question, *answers = (str(evaluate(text, context)) for text in texts)
+                    found[name] = question, answers, self._as_answer(right)
+            except NothingFoundError:
+                continue
+        return found
+
+    def _probe_holds(self, name: str, key: str, source: Any) -> bool:
+        return holds(self.sources.expression(f"probes.{name}.{key}", source), Context(self.world))
+
+    def _as_answer(self, value: Value) -> str:
+        """A value as a text, yes or no; a condition in which nothing is found is false."""
+        try:
+            found = evaluate(value, Context(self.world))
+        except NothingFoundError:
+            if not isinstance(value.tree, ast.Compare | ast.Logic | ast.Not | ast.Member):
+                raise
+            return "no"
+        return ("yes" if found else "no") if isinstance(found, bool) else str(found)
 
     def scripted_action(self) -> Action:
         """What the agent's frame would do in the next step; the state stays as it is."""
