@@ -8,20 +8,20 @@ from typing import overload
 from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
 from socialai_dsl.compiler.expressions import Lines
 from socialai_dsl.compiler.lowering import NO_PROBES, Probes, allocate, lower
-from socialai_dsl.compiler.probes import Part, Probe, Probed, Recorder, Value
+from socialai_dsl.compiler.probes import Part, Probe, ProbedProgram, Recorder, Value
 from socialai_dsl.compiler.questions import Asking, ProbeNotes, notes_of
 from socialai_dsl.compiler.questions import Text as NotedText
 from socialai_dsl.compiler.tables import Tables, verify
 from socialai_dsl.program import Header, Program
 from socialai_dsl.program_suite import ProgramSuite
-from socialai_dsl.semantics.plans import Checked
+from socialai_dsl.semantics.plans import CheckedScenario
 
 __all__ = [
     "NotedText",
     "Part",
     "Probe",
     "ProbeNotes",
-    "Probed",
+    "ProbedProgram",
     "Value",
     "compile_asking",
     "compile_asking_loaded",
@@ -85,14 +85,14 @@ def _suite(loaded: LoadedSuite, programs: tuple[Program, ...]) -> ProgramSuite:
     )
 
 
-def scenarios_of(loaded: Loaded) -> tuple[Checked, ...]:
+def scenarios_of(loaded: Loaded) -> tuple[CheckedScenario, ...]:
     """The scenarios of what was loaded, in the order of the programs that `compile_loaded` makes of them."""
     return tuple(
         member.checked for member in (loaded.members if isinstance(loaded, LoadedSuite) else (loaded,))
     )
 
 
-def compile_scenario(checked: Checked) -> Program:
+def compile_scenario(checked: CheckedScenario) -> Program:
     """The program of a scenario in which nothing is wrong.
 
     Raises AssertionError("internal: ...") for our own mistakes only: an author's are found before.
@@ -101,7 +101,7 @@ def compile_scenario(checked: Checked) -> Program:
     return program
 
 
-def compile_probed(checked: Checked) -> Probed:
+def compile_probed(checked: CheckedScenario) -> ProbedProgram:
     """A program that does the same as that of the scenario, and notes why rules do not fire (`probes`)."""
     program, lines = _compiled(checked, NO_PROBES, None)
     recorder = Recorder(checked, program.header(Header.REGISTERS))
@@ -112,7 +112,7 @@ def compile_probed(checked: Checked) -> Probed:
     names = [name for name in probed.registers if name.register < recorder.first]
     assert tuple(names) == program.registers, "internal: registers of a probed program are not the program's"
     assert program.rules == probed.rules, "internal: rules of a probed program are not the program's"
-    return Probed(probed, recorder.first, recorder.rules, recorder.outcomes)
+    return ProbedProgram(probed, recorder.first, recorder.rules, recorder.outcomes)
 
 
 _SAME = (
@@ -121,7 +121,7 @@ _SAME = (
 )
 
 
-def compile_asking(checked: Checked) -> Asking:
+def compile_asking(checked: CheckedScenario) -> Asking:
     """A program that does the same as that of the scenario, and notes what its `probes` ask about."""
     own = {item.path: item for probe in checked.probes for item in probe.remembered}
     known = {item.path: item for item in checked.remembered}
@@ -131,7 +131,7 @@ def compile_asking(checked: Checked) -> Asking:
 
 
 def _compiled(
-    checked: Checked, probes: Probes, numbered: Lines | None, asking: bool = False
+    checked: CheckedScenario, probes: Probes, numbered: Lines | None, asking: bool = False
 ) -> tuple[Program, Lines]:
     """The program and its lines, which are numbered as in `numbered`, if that is given."""
     # So that nothing that claims and probes are about is part of a program.

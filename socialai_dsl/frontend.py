@@ -31,9 +31,9 @@ from socialai_dsl.diagnostics import (
 from socialai_dsl.loader.comments import comments_of
 from socialai_dsl.loader.offsets import Style
 from socialai_dsl.loader.reader import Data, display_name, read_document
-from socialai_dsl.loader.resolved import Resolved, resolve
+from socialai_dsl.loader.resolved import ResolvedFile, resolve
 from socialai_dsl.schema.scenario import Scenario
-from socialai_dsl.semantics.plans import Checked
+from socialai_dsl.semantics.plans import CheckedScenario
 from socialai_dsl.source import DataPath, Source, Span
 
 __all__ = [
@@ -190,7 +190,7 @@ _GLUED: Final = re.compile(r"[ \t]+(#\w\S*)")
 """A comment whose text begins without a blank, as in `#1`."""
 
 
-def swallowed(resolved: Resolved) -> Iterator[Diagnostic]:
+def swallowed(resolved: ResolvedFile) -> Iterator[Diagnostic]:
     """A warning for each text that is written without quotes and seems to go on behind a `#`."""
     for path, text in _texts(resolved.data, ()):
         node = resolved.node_span(path)
@@ -240,11 +240,11 @@ class CheckResult:
     """
 
     name: str
-    checked: Checked | None
+    checked: CheckedScenario | None
     scenario: Scenario | None
     diagnostics: tuple[Diagnostic, ...]
     sources: dict[str, Source]
-    resolved: Resolved | None
+    resolved: ResolvedFile | None
     suite: LoadedSuite | None = None
     used: frozenset[Span] = frozenset()
     experiment: LoadedExperiment | None = None
@@ -381,7 +381,7 @@ def _files(path: Path) -> list[str]:
     return sorted(str(file) for file in path.rglob("*") if file.suffix in SUFFIXES and file.is_file())
 
 
-def _checked(resolved: Resolved, bag: DiagnosticBag) -> tuple[Checked | None, Scenario | None]:
+def _checked(resolved: ResolvedFile, bag: DiagnosticBag) -> tuple[CheckedScenario | None, Scenario | None]:
     """A file that is no suite; only a scenario has a meaning of its own."""
     match resolved.kind:
         case "scenario":

@@ -64,6 +64,10 @@ def test_a_wheel_carries_the_scenarios_and_the_data_files(tmp_path: Path) -> Non
         assert f"socialai_dsl/scenarios/{path.relative_to(ROOT / 'scenarios')}" in names
     for path in (ROOT / "experiments").glob("*.yaml"):
         assert f"socialai_dsl/experiments/shipped/{path.name}" in names
+    weights = list((ROOT / "agents").rglob("*.safetensors"))
+    assert weights
+    for path in weights:
+        assert f"trainer/agents/{path.relative_to(ROOT / 'agents')}" in names
     for path in (ROOT / "docs" / "diagnostics").glob("*.md"):
         assert f"socialai_dsl/pages/{path.name}" in names
     for package in ("socialai_dsl", "trainer"):

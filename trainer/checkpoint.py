@@ -20,6 +20,7 @@ from torch import Tensor
 from trainer.config import RunConfig
 from trainer.errors import CheckpointError
 from trainer.nets import ActorCritic, NetSpec, build_net
+from trainer.shipped import located
 
 FOLDER = "checkpoints"
 """Where a run keeps its checkpoints, in its own folder."""
@@ -158,6 +159,18 @@ def read(path: Path) -> Checkpoint:
     raise CheckpointError("; ".join(failures) or f"{path}: there is no checkpoint in this directory")
 
 
+def read_agent(agent: Path | str) -> Checkpoint:
+    """Read the newest checkpoint of an agent: `shipped:NAME`, a run's folder, or what `read` takes.
+
+    Raises:
+        CheckpointError: see `read`.
+        ValueError: no agent of this name ships.
+    """
+    path = located(agent)
+    saved = path / FOLDER
+    return read(saved if saved.is_dir() else path)
+
+
 def _read_file(path: Path) -> Checkpoint:
     try:
         if path.stat().st_size > _FILE_LIMIT:
@@ -223,7 +236,7 @@ def restore_net(
             f"checkpoint was made with the network {name}; name it (--net {name}) to load that code"
         )
     model = build_net(name, spec, meta.config.seed, meta.config.precision, folder)
-    weights = checkpoint.part("net")
+    weights = _widened(checkpoint.part("net"), model.state_dict())
     if list(spec.vocabulary) != meta.vocabulary:
         _warn_of_words(set(meta.vocabulary), set(spec.vocabulary))
         _move_words(weights, model, meta.vocabulary)
@@ -254,6 +267,15 @@ def _move_words(weights: dict[str, Tensor], model: ActorCritic, vocabulary: list
             if word in position:
                 fresh[index] = source[position[word]]
         weights[name] = fresh
+
+
+def _widened(weights: dict[str, Tensor], expected: dict[str, Tensor]) -> dict[str, Tensor]:
+    """Weights that are kept in half precision, as those of shipped agents are, as float32 where that is expected."""
+    wide = {name for name, value in expected.items() if value.dtype == torch.float32}
+    return {
+        name: value.float() if value.dtype == torch.float16 and name in wide else value
+        for name, value in weights.items()
+    }
 
 
 def _check_weights(weights: dict[str, Tensor], expected: dict[str, Tensor]) -> None:

@@ -46,7 +46,8 @@ class RunConfig(BaseModel):
     scenario: str = _option("", "path or name of what is played, with +variants and ?parameters", role="kept")
     agent: str = _option(
         "ppo",
-        "ppo, random, oracle, human, or a checkpoint or run folder; only ppo is trained",
+        "ppo, random, oracle, human, shipped (the trained agent that comes with the scenario), shipped:NAME, or a "
+        "checkpoint or run folder; only ppo is trained",
         role="flag",
         min_length=1,
     )
@@ -91,9 +92,6 @@ class RunConfig(BaseModel):
     )
     imitation_coef: float = _option(
         1.0, "weight of the cross-entropy to the guide's actions (measured)", ge=0
-    )
-    imitation_floor: float = _option(
-        0.0, "cross-entropy of a step, nats, below which it is imitated well enough and left alone", ge=0
     )
 
     horizon: int = _option(32, "steps of each environment in one rollout (measured)", ge=1)
@@ -299,13 +297,12 @@ RECIPES: Final[Mapping[str, Preset]] = {
             "envs": 128,
             "horizon": 64,
             "minibatches": 16,
+            "lr": 1e-3,
             "lr_end": 1e-4,
             "entropy_coef_end": 0.002,
             # Imitation ends with tiny gradients. Remembered for longer, they would make the first steps of PPO, whose
             # gradients are large, up to six times too long.
             "adam_beta2": 0.95,
-            # A policy imitated to certainty draws nothing else any more, so that PPO can only break it.
-            "imitation_floor": 0.01,
             # Imitation leaves little to learn; without a limit PPO unlearns it in its first updates.
             "target_kl": 0.02,
         },

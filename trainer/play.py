@@ -11,10 +11,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+import socialai_dsl
 from socialai_dsl.evaluation import Observation, Streams
 from trainer import actions as heads
 from trainer import checkpoint as checkpoints
 from trainer.checkpoint import CheckpointMeta
+from trainer.errors import CheckpointError
 from trainer.features import Actor, Int64
 from trainer.nets import ActorCritic, NetSpec
 from trainer.nets.memory import emptied
@@ -45,7 +47,7 @@ class CheckpointPolicy:
     def load(
         cls,
         path: Path | str,
-        envs: Any,
+        envs: Any = None,
         greedy: bool = False,
         seed: int = 0,
         device: str = "cpu",
@@ -55,8 +57,10 @@ class CheckpointPolicy:
         """Load an agent for playing `envs`; where they are not what it was trained on, a warning lists the differences.
 
         Args:
-            path: a run's folder, its folder of checkpoints (of both the newest is taken), or one checkpoint.
-            envs: the environment, single or vector, wrapped or not.
+            path: `shipped:NAME`, a run's folder, its folder of checkpoints (of both the newest is taken), or one
+                checkpoint.
+            envs: the environment, single or vector, wrapped or not; None: the agent plays the scenario on which it
+                was trained.
             greedy: take the most probable action instead of sampling.
             seed: of the sampling.
             device: where the network runs.
@@ -64,13 +68,18 @@ class CheckpointPolicy:
             folder: where the file of such a network is looked for first.
 
         Raises:
-            CheckpointError: see `checkpoint.read` and `checkpoint.restore_net`.
+            CheckpointError: see `checkpoint.read_agent` and `checkpoint.restore_net`; or `envs` is None and the
+                checkpoint does not say which scenario it is for.
+            ValueError: no agent of this name ships.
         """
-        path, program = Path(path), envs.unwrapped.program
-        saved = path / checkpoints.FOLDER
-        checkpoint = checkpoints.read(saved if saved.is_dir() else path)
+        checkpoint = checkpoints.read_agent(path)
+        if envs is None:
+            scenario = checkpoint.meta.config.scenario
+            if not scenario:
+                raise CheckpointError(f"{path}: does not say which scenario it is for, expected envs")
+            envs = socialai_dsl.make(scenario)
         restored = checkpoints.restore_net(checkpoint, NetSpec.of(envs.unwrapped), net, folder)
-        warn_of_differences(checkpoint.meta, program)
+        warn_of_differences(checkpoint.meta, envs.unwrapped.program)
         return cls(restored.to(device), greedy, seed)
 
     def reset(self, mask: NDArray[np.bool_] | None = None, episodes: Int64 | None = None) -> None:

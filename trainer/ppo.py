@@ -161,9 +161,7 @@ def ppo_loss(
     total = policy_term + config.value_coef * value_term - entropy_coef * entropy_term
     imitation = torch.zeros((), device=logits.device)
     if batch.lead is not None:
-        imitation = imitation_loss(
-            logits, batch.lead.actions, batch.lead.weights, sizes, config.imitation_floor
-        )
+        imitation = imitation_loss(logits, batch.lead.actions, batch.lead.weights, sizes)
         total = total + config.imitation_coef * imitation
     with torch.no_grad():
         kl = (ratio - 1 - log_ratio).mean()
@@ -172,9 +170,7 @@ def ppo_loss(
         return LossParts(total, *(part.detach() for part in known))
 
 
-def imitation_loss(
-    logits: Tensor, actions: Tensor, weights: Tensor, sizes: tuple[int, ...], floor: float
-) -> Tensor:
+def imitation_loss(logits: Tensor, actions: Tensor, weights: Tensor, sizes: tuple[int, ...]) -> Tensor:
     """Weighted mean cross-entropy between the policy and given actions: behaviour cloning (Pomerleau 1991).
 
     Args:
@@ -182,10 +178,9 @@ def imitation_loss(
         actions: int64 (N, 4); template and noun count only where they speak.
         weights: (N,) of the frames.
         sizes: choices of each head.
-        floor: nats; a frame below it counts as that much and has no gradient.
     """
     log_probs = heads.log_probs(logits, actions, sizes) * heads.spoken_mask(actions)  # (N, 4)
-    return ((-log_probs.sum(-1)).clamp(min=floor) * weights).mean()
+    return -(log_probs.sum(-1) * weights).mean()
 
 
 # -- update -------------------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from socialai_dsl.analysis.rooms import name_of
 from socialai_dsl.envs.table import Table
 from socialai_dsl.envs.values import shown
 from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, VIEW, Field, Flag, Header, Program
-from socialai_dsl.semantics.plans import Checked, Entity
+from socialai_dsl.semantics.plans import CheckedScenario, Entity
 from socialai_dsl.semantics.terms import Const, Read
 
 _PLACE: Final = (Field.X, Field.Y, Field.DIR)
@@ -28,7 +28,7 @@ class Tellers:
         program: what is played. checked: of the same scenario.
     """
 
-    def __init__(self, program: Program, checked: Checked) -> None:
+    def __init__(self, program: Program, checked: CheckedScenario) -> None:
         self._program, self._checked = program, checked
         self._before_npcs = bool(program.header(Header.FLAGS) & Flag.PICTURE_BEFORE_NPCS)
 

@@ -14,7 +14,7 @@ from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.envs.values import shown
 from socialai_dsl.program import Header, Program, Register
-from socialai_dsl.semantics.plans import Checked
+from socialai_dsl.semantics.plans import CheckedScenario
 
 Actions = Callable[[int], NDArray[np.int64]]
 """What is done in each pair of twins in step t, int64 (pairs, 4)."""
@@ -69,7 +69,7 @@ class Twins:
     def __init__(
         self,
         program: Program,
-        checked: Checked,
+        checked: CheckedScenario,
         path: str,
         values: NDArray[np.int64],
         by: Sequence[str],

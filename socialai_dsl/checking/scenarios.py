@@ -10,11 +10,11 @@ from typing import Any, Final
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity, did_you_mean
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
 from socialai_dsl.loader.reader import Data, read_plain
-from socialai_dsl.loader.resolved import Resolved
+from socialai_dsl.loader.resolved import ResolvedFile
 from socialai_dsl.schema.scenario import CastMember, Npc, Scenario
-from socialai_dsl.schema.shape import PARAMETER, MovedPlaces, Shaped, model_of, written
+from socialai_dsl.schema.shape import PARAMETER, MovedPlaces, ShapedFile, model_of, written
 from socialai_dsl.semantics.check import check_meaning
-from socialai_dsl.semantics.plans import Checked
+from socialai_dsl.semantics.plans import CheckedScenario
 from socialai_dsl.source import DataPath, Positions
 from socialai_dsl.vocabulary import PRIMITIVES
 
@@ -24,7 +24,7 @@ _WHOLE = re.compile(r"\$([A-Za-z_]\w*)")
 
 
 @dataclass(frozen=True)
-class Substituted:
+class Substitution:
     """A document with its parameters put in.
 
     Attributes:
@@ -38,7 +38,7 @@ class Substituted:
     paths: frozenset[DataPath] = frozenset()
 
 
-def substitute(resolved: Resolved, bag: DiagnosticBag) -> Substituted:
+def substitute(resolved: ResolvedFile, bag: DiagnosticBag) -> Substitution:
     """Put the parameters in: defaults, or what was given behind `?`. Reports S206."""
     assert isinstance(resolved.data, dict), "internal: a file is a mapping"
     values, declared = _values(resolved, bag), _declared(resolved)
@@ -63,10 +63,10 @@ def substitute(resolved: Resolved, bag: DiagnosticBag) -> Substituted:
         return part
 
     data = {key: part if key == "params" else filled(part, (key,)) for key, part in resolved.data.items()}
-    return Substituted(data, values, frozenset(paths))
+    return Substitution(data, values, frozenset(paths))
 
 
-def _values(resolved: Resolved, bag: DiagnosticBag) -> dict[str, Value]:
+def _values(resolved: ResolvedFile, bag: DiagnosticBag) -> dict[str, Value]:
     declared = _declared(resolved)
     values: dict[str, Value] = {}
     for name, declaration in declared.items():
@@ -87,7 +87,7 @@ def _values(resolved: Resolved, bag: DiagnosticBag) -> dict[str, Value]:
     return values
 
 
-def _declared(resolved: Resolved) -> dict[str, Data]:
+def _declared(resolved: ResolvedFile) -> dict[str, Data]:
     assert isinstance(resolved.data, dict), "internal: a file is a mapping"
     declared = _entry(resolved.data, "params")
     return declared if isinstance(declared, dict) else {}
@@ -100,7 +100,7 @@ def _entry(mapping: Mapping[str, Data], key: str) -> Data:
     return next((value for word, value in mapping.items() if did_you_mean(word, [key])), None)
 
 
-def _chosen(name: str, default: Data, choices: Data, resolved: Resolved, bag: DiagnosticBag) -> Data:
+def _chosen(name: str, default: Data, choices: Data, resolved: ResolvedFile, bag: DiagnosticBag) -> Data:
     """The value that the default is, or, where values have labels, stands for."""
     if isinstance(choices, dict) and default in choices.values():
         return default
@@ -114,7 +114,7 @@ def _chosen(name: str, default: Data, choices: Data, resolved: Resolved, bag: Di
     return choices.get(str(default), default) if isinstance(choices, dict) else default
 
 
-def _given(name: str, default: Data, choices: Data, resolved: Resolved, bag: DiagnosticBag) -> Data:
+def _given(name: str, default: Data, choices: Data, resolved: ResolvedFile, bag: DiagnosticBag) -> Data:
     """The value that was asked for, read as YAML would read it; the default if it cannot be had."""
     text, span = resolved.params[name], resolved.param_span(name)
     if isinstance(choices, dict):
@@ -155,7 +155,7 @@ _ONE_EACH: Final = ("name", "color", "place", "facing", "at")
 
 
 @dataclass(frozen=True)
-class Spread:
+class SpreadCast:
     """A document whose groups of the cast are written out.
 
     Attributes:
@@ -171,7 +171,7 @@ class Spread:
 
 def spread(
     data: Mapping[str, object], places: Positions, paths: frozenset[DataPath], bag: DiagnosticBag
-) -> Spread:
+) -> SpreadCast:
     """Write out the groups; reports counts that are none, and lists of another length.
 
     Args:
@@ -182,7 +182,7 @@ def spread(
     """
     cast = data.get("cast")
     if not isinstance(cast, dict):
-        return Spread(data, places, paths)
+        return SpreadCast(data, places, paths)
     members: dict[str, object] = {}
     origins: dict[DataPath, DataPath] = {}
     for name, member in cast.items():
@@ -199,9 +199,9 @@ def spread(
             members[f"{name}[{i}]"] = _one(name, member, i, count, places, bag, origins)
             origins[("cast", f"{name}[{i}]")] = ("cast", name)
     if members == cast:
-        return Spread(data, places, paths)
+        return SpreadCast(data, places, paths)
     moved = {copy for copy in _paths(members, ("cast",)) if written(copy, origins) in paths}
-    return Spread({**data, "cast": members}, MovedPlaces(places, origins), paths | moved)
+    return SpreadCast({**data, "cast": members}, MovedPlaces(places, origins), paths | moved)
 
 
 def _with_one_frame(name: str, member: object, places: Positions, bag: DiagnosticBag) -> object:
@@ -296,13 +296,13 @@ def _paths(part: object, path: DataPath) -> Iterator[DataPath]:
         yield from _paths(value, (*path, key))
 
 
-def check_npc(resolved: Resolved, bag: DiagnosticBag) -> None:
+def check_npc(resolved: ResolvedFile, bag: DiagnosticBag) -> None:
     """The shape of an npc file."""
     assert isinstance(resolved.data, dict), "internal: a file is a mapping"
     model_of(Npc, resolved.data, resolved, bag, partial=resolved.data.get("abstract") is True)
 
 
-def check_library(resolved: Resolved, bag: DiagnosticBag) -> None:
+def check_library(resolved: ResolvedFile, bag: DiagnosticBag) -> None:
     """The shape of a library."""
     assert isinstance(resolved.data, dict), "internal: a file is a mapping"
     kind = resolved.data["library"]
@@ -357,8 +357,8 @@ class Draft:
 
     scenario: Scenario
     name: str
-    shaped: Shaped[Scenario]
-    filled: Substituted
+    shaped: ShapedFile[Scenario]
+    filled: Substitution
     patched: bool = False
 
     def with_actions(self, actions: tuple[str, ...]) -> Draft:
@@ -371,7 +371,9 @@ class Draft:
         return replace(self, scenario=self.scenario.model_copy(update={"horizon": horizon}))
 
 
-def check_scenario(resolved: Resolved, bag: DiagnosticBag) -> tuple[Checked | None, Scenario | None]:
+def check_scenario(
+    resolved: ResolvedFile, bag: DiagnosticBag
+) -> tuple[CheckedScenario | None, Scenario | None]:
     """What a scenario means, and its models; None for what cannot be had. `bag` takes the findings."""
     draft = draft_of(resolved, bag)
     if draft is None:
@@ -380,7 +382,7 @@ def check_scenario(resolved: Resolved, bag: DiagnosticBag) -> tuple[Checked | No
     return meaning_of(draft, bag), draft.scenario if right_shape else None
 
 
-def draft_of(resolved: Resolved, bag: DiagnosticBag) -> Draft | None:
+def draft_of(resolved: ResolvedFile, bag: DiagnosticBag) -> Draft | None:
     """A scenario's models; None if it is abstract or has mistakes that keep its meaning from being looked at."""
     try:
         resolved = resolved.with_drawn_files()
@@ -400,7 +402,7 @@ def draft_of(resolved: Resolved, bag: DiagnosticBag) -> Draft | None:
     return Draft(shaped.model, resolved.name, shaped, filled, bool(resolved.edits))
 
 
-def meaning_of(draft: Draft, bag: DiagnosticBag) -> Checked | None:
+def meaning_of(draft: Draft, bag: DiagnosticBag) -> CheckedScenario | None:
     """What a scenario means; None if something is wrong, which `bag` then says.
 
     Args:
@@ -422,7 +424,7 @@ def meaning_of(draft: Draft, bag: DiagnosticBag) -> Checked | None:
     return None
 
 
-def _with_grammar(filled: Substituted, resolved: Resolved, bag: DiagnosticBag) -> dict[str, object]:
+def _with_grammar(filled: Substitution, resolved: ResolvedFile, bag: DiagnosticBag) -> dict[str, object]:
     """The data with the name of a shared grammar replaced by the grammar."""
     data = dict(filled.data)
     name = data.get("grammar")
@@ -438,7 +440,7 @@ def _with_grammar(filled: Substituted, resolved: Resolved, bag: DiagnosticBag) -
     return {**data, "grammar": next(iter(shared.values()))}
 
 
-def naming_the_patch(finding: Diagnostic, resolved: Resolved) -> Diagnostic:
+def naming_the_patch(finding: Diagnostic, resolved: ResolvedFile) -> Diagnostic:
     """A mistake in a patched scenario says what it was patched by, since its file alone may be right."""
     if not resolved.edits or finding.severity is not Severity.ERROR:
         return finding
@@ -454,7 +456,7 @@ MOST_CHOICES: Final = 64
 """How many values of a file are tried; each takes about as long as the scenario itself."""
 
 
-def of_other_values(resolved: Resolved) -> Iterator[Diagnostic]:
+def of_other_values(resolved: ResolvedFile) -> Iterator[Diagnostic]:
     """The errors that a scenario has with another value of one of its parameters, each alone.
 
     The scenario itself is right. What is found says which value it was.
@@ -473,7 +475,7 @@ def of_other_values(resolved: Resolved) -> Iterator[Diagnostic]:
                 yield replace(found, hint=f"{found.hint}; {note}" if found.hint else note)
 
 
-def _others(resolved: Resolved) -> Iterator[tuple[str, str]]:
+def _others(resolved: ResolvedFile) -> Iterator[tuple[str, str]]:
     """Name and value of what can be asked for behind `?`, but for defaults and what is given already."""
     declared = resolved.data.get("params") if isinstance(resolved.data, dict) else None
     for name, declaration in declared.items() if isinstance(declared, dict) else ():

@@ -16,6 +16,7 @@ from socialai_dsl.cli.run_folder import SETTINGS, read_json
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.experiments.settings import resolved_config
 from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, RunConfig
+from trainer.shipped import PREFIX, located, shipped_agents
 
 if TYPE_CHECKING:
     from socialai_dsl.checking.loaded import Loaded
@@ -271,6 +272,47 @@ def _closest_script(scenario: str) -> tuple[str, Sequence[str]]:
             return scenario, lacking
         raise
     return scripted, unscripted(socialai_dsl.compile(loaded))
+
+
+# -- agents that are trained already ----------------------------------------------------------------------------
+
+
+def folder_of(agent: str) -> Path:
+    """Where a trained agent is kept: for `shipped:NAME` the folder that comes with the product.
+
+    Raises:
+        UsageError: no agent of that name ships.
+    """
+    try:
+        return located(agent)
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+
+
+def named_agent(agent: str, scenario: str) -> str:
+    """What `--agent` stands for: the word `shipped` is the agent that ships for the scenario, as `shipped:NAME`.
+
+    A variant is played by the agent of what it is a variant of, unless it has one of its own.
+
+    Raises:
+        ScenarioError: the scenario has mistakes.
+        UsageError: none ships for it.
+    """
+    import socialai_dsl
+    from socialai_dsl.loader.library import shipped_folder
+
+    if agent != "shipped":
+        return agent
+    path, shipped = socialai_dsl.load(scenario).resolved.path, shipped_folder().resolve()
+    _, *variants = scenario.partition("?")[0].split("+")
+    known = shipped_agents()
+    if path.is_relative_to(shipped):
+        base = path.relative_to(shipped).with_suffix("").as_posix()
+        for count in range(len(variants), -1, -1):
+            name = "_".join([base, *variants[:count]])
+            if name in known:
+                return PREFIX + name
+    raise UsageError(f"{scenario}: no agent ships for it; these scenarios have one: {', '.join(known)}")
 
 
 # -- training -----------------------------------------------------------------------------------------------------

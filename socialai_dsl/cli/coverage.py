@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--agent",
         action="append",
         metavar="AGENT",
-        help="oracle, random, or a checkpoint or run folder; may be given several times "
+        help="oracle, random, shipped, or a checkpoint or run folder; may be given several times "
         "(default: random, and oracle where there is one)",
     )
     parser.add_argument(
@@ -101,7 +101,7 @@ def _played(scenario: str, agent: str, episodes: int, seed: int) -> "Tally":
 
     import socialai_dsl
     from socialai_dsl.analysis.tally import tally
-    from socialai_dsl.cli.agents import require_trainer
+    from socialai_dsl.cli.agents import named_agent, require_trainer
     from socialai_dsl.cli.player import Player, make_policy
     from socialai_dsl.compilation import scenarios_of
     from socialai_dsl.frontend import load
@@ -127,7 +127,7 @@ def _played(scenario: str, agent: str, episodes: int, seed: int) -> "Tally":
                 seed,
             )
         require_trainer()
-        policy, told = make_policy(Player(agent, seed=seed), envs)
+        policy, told = make_policy(Player(named_agent(agent, scenario), seed=seed), envs)
         for warning in told:
             print(f"socialai: {printable(warning)}", file=sys.stderr)
         return tally(envs, played, policy.act, policy.reset, episodes, seed)

@@ -3,6 +3,7 @@
 import argparse
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -24,7 +25,10 @@ _RECORDED: Final = 3
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
     parser.add_argument(
-        "run", metavar="RUN_DIR", help="a run's folder or a checkpoint; also random, oracle or llm:MODEL"
+        "run",
+        metavar="RUN_DIR",
+        help="a run's folder or a checkpoint; also shipped:NAME, shipped (the agent of each scenario), random, oracle "
+        "or llm:MODEL",
     )
     parser.add_argument(
         "--on", action="append", metavar="SCENARIO", help="what to play (default: the run's own); repeatable"
@@ -69,6 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Evaluate on each scenario."""
+    from socialai_dsl.cli.agents import named_agent
     from socialai_dsl.cli.evaluation import evaluate_agent
     from socialai_dsl.cli.evaluation_report import write_episodes
 
@@ -80,7 +85,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
     out = player.out if player.options is not None else arguments.out
     results = []
     for scenario in arguments.on or [own_scenario(arguments.run)]:
-        evaluation = evaluate_agent(player, scenario, arguments.episodes)
+        playing = replace(player, agent=named_agent(player.agent, scenario))
+        evaluation = evaluate_agent(playing, scenario, arguments.episodes)
         for warning in evaluation.warnings:
             print(f"warning: {warning}", file=sys.stderr)
         results.append(_result(evaluation))
@@ -110,10 +116,10 @@ def _player(arguments: argparse.Namespace) -> "Player":
         return Player(agent, out=arguments.out or default_folder(agent), options=arguments)
     if agent in ("random", "oracle", "human"):
         return Player(agent, seed=arguments.seed)
-    from socialai_dsl.cli.agents import require_trainer, resolve_device
+    from socialai_dsl.cli.agents import folder_of, require_trainer, resolve_device
 
     require_trainer()
-    has_own = arguments.on is None or (Path(agent) / SETTINGS).is_file()
+    has_own = arguments.on is None or (folder_of(agent) / SETTINGS).is_file()
     return Player(
         agent,
         resolve_device(arguments.device),
@@ -161,12 +167,14 @@ def _table(evaluation: "Evaluation", figures: dict[str, Any]) -> str:
 
 
 def own_scenario(agent: str) -> str:
-    """The scenario on which the agent of a run's folder was trained.
+    """The scenario on which the agent of a run's folder, or one that ships, was trained.
 
     Raises:
-        UsageError: it is not such a folder.
+        UsageError: it is neither.
     """
-    run = Path(agent)
+    from socialai_dsl.cli.agents import folder_of
+
+    run = folder_of(agent)
     if not (run / SETTINGS).is_file():
         raise UsageError(f"--on: {run} does not say which scenario it was trained on; name one")
     scenario = read_json(run / SETTINGS).get("scenario")

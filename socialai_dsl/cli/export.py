@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from trainer.config import RunConfig
 
 SUMMARY: Final = "make a folder of a trained agent that can be given to others"
-WEIGHTS: Final = "model.safetensors"
 CARD: Final = "README.md"
 VOCABULARY: Final = "vocabulary.json"
 SCENARIO: Final = "scenario"
@@ -27,7 +26,7 @@ _FILM: Final = "episode.gif"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
-    parser.add_argument("run", type=Path, metavar="RUN_DIR", help="folder of a finished run")
+    parser.add_argument("run", metavar="RUN_DIR", help="folder of a finished run, or shipped:NAME")
     parser.add_argument(
         "--out",
         type=Path,
@@ -39,12 +38,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(arguments: argparse.Namespace) -> Exit:
     """Write the folder."""
     import socialai_dsl
-    from socialai_dsl.cli.agents import read_config, require_trainer
+    from socialai_dsl.cli.agents import folder_of, require_trainer
+
+    require_trainer()
+    run = folder_of(arguments.run)
+    config, loaded, checkpoint = finished_agent(run)
+    if socialai_dsl.compile(loaded).sha256 != checkpoint.meta.program_sha256:
+        print("warning: the scenario has changed since the agent was trained on it", file=sys.stderr)
+    out = _new_folder(arguments.out or Path("exports") / _name(config))
+    if (run / _FILM).is_file():
+        shutil.copyfile(run / _FILM, out / _FILM)
+    write_agent(out, config, loaded, checkpoint, read_json(run / RESULT))
+    print(f"written to {out}; try it: socialai evaluate {out}")
+    return Exit.GOOD
+
+
+def finished_agent(run: Path) -> "tuple[RunConfig, Loaded, Checkpoint]":
+    """The configuration, the scenario and the network of a run's or an agent's folder.
+
+    Raises:
+        UsageError: it is not such a folder, it is not finished, or its agent was not trained.
+    """
+    import socialai_dsl
+    from socialai_dsl.cli.agents import read_config
     from trainer import checkpoint as checkpoints
     from trainer.errors import CheckpointError
 
-    require_trainer()
-    run: Path = arguments.run
     config = read_config(run)
     if not config.trains:
         raise UsageError(f"{run}: the agent {config.agent!r} is not trained, there is nothing to export")
@@ -52,15 +71,9 @@ def execute(arguments: argparse.Namespace) -> Exit:
         raise UsageError(f"{run}: expected a finished run, it has no {RESULT}")
     loaded = socialai_dsl.load(config.scenario)
     try:
-        checkpoint = checkpoints.weights_only(checkpoints.read(run / checkpoints.FOLDER))
+        return config, loaded, checkpoints.weights_only(checkpoints.read_agent(run))
     except CheckpointError as error:
         raise UsageError(str(error)) from error
-    if socialai_dsl.compile(loaded).sha256 != checkpoint.meta.program_sha256:
-        print("warning: the scenario has changed since the agent was trained on it", file=sys.stderr)
-    out = _new_folder(arguments.out or Path("exports") / _name(config))
-    _write(run, out, config, loaded, checkpoint)
-    print(f"written to {out}; try it: socialai evaluate {out}")
-    return Exit.GOOD
 
 
 def _name(config: "RunConfig") -> str:
@@ -75,9 +88,29 @@ def _new_folder(out: Path) -> Path:
     return out
 
 
-def _write(run: Path, out: Path, config: "RunConfig", loaded: "Loaded", checkpoint: "Checkpoint") -> None:
+def write_agent(
+    out: Path,
+    config: "RunConfig",
+    loaded: "Loaded",
+    checkpoint: "Checkpoint",
+    result: Mapping[str, Any],
+    agent: str = ".",
+) -> None:
+    """Write the folder of an agent: its weights, what they are for, its card, and the scenario unless that ships.
+
+    Args:
+        out: the folder, which is there.
+        config: of the run.
+        loaded: its scenario.
+        checkpoint: its network.
+        result: content of the run's `result.json`.
+        agent: by which name `CheckpointPolicy.load` finds the agent, for its card.
+    """
+    from socialai_dsl.cli.evaluation import about_of
+    from socialai_dsl.cli.model_card import model_card
     from trainer import checkpoint as checkpoints
     from trainer.config import code_folder
+    from trainer.shipped import WEIGHTS
 
     moved = Moved.of(loaded, config.scenario)
     moved.copy(out)
@@ -93,20 +126,10 @@ def _write(run: Path, out: Path, config: "RunConfig", loaded: "Loaded", checkpoi
     checkpoints.write_file(out / WEIGHTS, checkpoints.Checkpoint(meta, checkpoint.tensors))
     words = {name: getattr(meta, name) for name in ("vocabulary", "actions", "templates", "nouns")}
     write_json(out / VOCABULARY, words)
-    result = moved.told(read_json(run / RESULT) | {"scenario": moved.scenario})
-    if (run / _FILM).is_file():
-        shutil.copyfile(run / _FILM, out / _FILM)
-    write_text(out / CARD, _card(config, result, loaded))
+    result = moved.told({**result, "scenario": moved.scenario})
+    write_text(out / CARD, model_card(config, result, about_of(loaded), agent, WEIGHTS))
     write_json(out / SETTINGS, config.model_dump())
     write_json(out / RESULT, result)  # last, so that its presence means a complete folder
-
-
-def _card(config: "RunConfig", result: Mapping[str, Any], loaded: "Loaded") -> str:
-    from socialai_dsl.cli.model_card import model_card
-
-    data = loaded.resolved.data
-    about = str(data.get("about", "")) if isinstance(data, dict) else ""
-    return model_card(config, result, about, Path(), Path(WEIGHTS))
 
 
 def _without_place(text: str) -> str:

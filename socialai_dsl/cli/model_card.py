@@ -1,7 +1,7 @@
 """Model cards: what an agent is, how well it does, and how to load it, beside its weights."""
 
+import json
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any, Final
 
 import yaml
@@ -10,6 +10,7 @@ from socialai_dsl.cli.evaluation_report import ending_rows, summary_rows
 from socialai_dsl.cli.run_folder import scenario_folder_name
 from socialai_dsl.experiments.arguments import typed
 from trainer.config import FLAGS, WITHOUT_EFFECT, RunConfig, configure
+from trainer.shipped import PREFIX
 
 FILE: Final = "model_card.md"
 # Options that change where and how a run is made, not what it learns.
@@ -22,8 +23,8 @@ def model_card(
     config: RunConfig,
     result: Mapping[str, Any],
     about: str,
-    folder: Path,
-    weights: Path,
+    agent: str,
+    weights: str,
 ) -> str:
     """The card of a trained agent, as Markdown with the front matter of the Hugging Face Hub.
 
@@ -31,8 +32,8 @@ def model_card(
         config: of the run.
         result: content of the run's `result.json`.
         about: what the scenario says about itself.
-        folder: of the run.
-        weights: the checkpoint in it.
+        agent: what `CheckpointPolicy.load` finds it by: a run's folder, `.` for the card's own, or `shipped:NAME`.
+        weights: the checkpoint, as seen from its folder.
     """
     name = f"{scenario_folder_name(config.scenario)}-{config.net}-s{config.seed}"
     parts = [
@@ -43,10 +44,10 @@ def model_card(
         "## Evaluation",
         _evaluation(result["eval"]),
         "## How to load it",
-        f"{_place(folder)}, with `pip install 'socialai-dsl[train]'`:",
-        f"```python\n{_snippet(config, folder)}```",
+        f"{_place(agent)}, with `pip install 'socialai-dsl[train]'`:",
+        f"```python\n{_snippet(config, agent)}```",
         "## Training",
-        _table(("", ""), _facts(config, result, weights.relative_to(folder))),
+        _table(("", ""), _facts(config, result, weights)),
         f"Trained again by `{_command(config)}`. The hyper-parameters:",
         _table(
             ("name", "value"),
@@ -111,33 +112,48 @@ def _evaluation(figures: Mapping[str, Any]) -> str:
     )
 
 
-def _facts(config: RunConfig, result: Mapping[str, Any], weights: Path) -> list[tuple[str, str]]:
+def _facts(config: RunConfig, result: Mapping[str, Any], weights: str) -> list[tuple[str, str]]:
     versions = ", ".join(f"{package} {version}" for package, version in result["versions"].items())
-    return [
+    rows = [
         ("scenario", f"`{config.scenario}`"),
         ("program (SHA-256)", f"`{result['program_sha256']}`"),
-        ("weights", f"`{weights.as_posix()}`"),
+        ("weights", f"`{weights}`" + _precision(result.get("half_precision"))),
         ("frames", f"{result['frames']:,}"),
         ("seed", str(config.seed)),
-        ("time", f"{result['train_seconds']:.0f} s on `{config.device}`"),
-        ("versions", versions),
     ]
+    if "train_seconds" in result:
+        rows.append(("time", f"{result['train_seconds']:.0f} s on `{config.device}`"))
+    if "trained" in result:
+        rows.append(("trained", f"{result['trained']['date']}, with commit `{result['trained']['commit']}`"))
+    return [*rows, ("versions", versions)]
 
 
-def _place(folder: Path) -> str:
-    return "From this folder" if folder == Path() else "From the folder in which it was trained"
+def _precision(compared: Mapping[str, Any] | None) -> str:
+    """What half precision changed, where the weights were reduced to it."""
+    if compared is None:
+        return ""
+    return (
+        ", in half precision: of the {episodes} test episodes {identical} are played with the same actions as in "
+        "single precision, {only_single} are lost and {only_half} won".format(**compared)
+    )
 
 
-def _snippet(config: RunConfig, folder: Path) -> str:
+def _place(agent: str) -> str:
+    if agent.startswith(PREFIX):
+        return "Anywhere"
+    return "From this folder" if agent == "." else "From the folder in which it was trained"
+
+
+def _snippet(config: RunConfig, agent: str) -> str:
     """Code that plays one episode; a test runs it."""
     own = ":" in config.net
-    net = f", net={config.net!r}, folder=Path({config.code_folder.as_posix()!r})" if own else ""
+    net = f", net={_quoted(config.net)}, folder=Path({_quoted(config.code_folder.as_posix())})" if own else ""
     return f"""\
 {"from pathlib import Path" + chr(10) * 2 if own else ""}import socialai_dsl as sd
 from trainer.play import CheckpointPolicy
 
-env = sd.make({config.scenario!r})
-agent = CheckpointPolicy.load({folder.as_posix()!r}, env{net})
+env = sd.make({_quoted(config.scenario)})
+agent = CheckpointPolicy.load({_quoted(agent)}, env{net})
 observation, info = env.reset(seed=0)
 agent.reset()
 ended = False
@@ -148,10 +164,18 @@ print(info["outcome"])
 """
 
 
+def _quoted(text: str) -> str:
+    """A text in Python, between double quotes."""
+    return json.dumps(text)
+
+
 def _command(config: RunConfig) -> str:
-    """The command that trains the same agent."""
+    """The command that trains the same agent, also where recipe and machine would choose frames and threads."""
     usual = configure(config.recipe, net=config.net, scenario=config.scenario).model_dump()
-    asked = {name: value for name, value in config.model_dump().items() if value != usual[name]}
+    always = ("frames", "threads")
+    asked = {
+        name: value for name, value in config.model_dump().items() if value != usual[name] or name in always
+    }
     flags = {name: asked[name] for name in FLAGS if name in asked and name not in _NOT_REPEATED}
     if config.net != "fast":
         flags["net"] = config.net

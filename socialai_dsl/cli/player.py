@@ -15,7 +15,8 @@ class Player:
     """Who plays, and how.
 
     Attributes:
-        agent: `random`, `oracle`, `human`, `llm:MODEL`, or the path of a run, of a folder of checkpoints or of one.
+        agent: `random`, `oracle`, `human`, `llm:MODEL`, `shipped:NAME`, or the path of a run, of a folder of
+            checkpoints or of one.
         device: where a network runs.
         greedy: whether a network takes its most probable action instead of sampling.
         seed: of what a network or `random` draws; rooms do not depend on it.
@@ -65,6 +66,6 @@ def make_policy(player: Player, envs: Any) -> "tuple[Policy, list[str]]":
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         policy = CheckpointPolicy.load(
-            Path(player.agent), envs, player.greedy, player.seed, player.device, player.net, player.folder
+            player.agent, envs, player.greedy, player.seed, player.device, player.net, player.folder
         )
     return policy, [str(warning.message) for warning in caught]

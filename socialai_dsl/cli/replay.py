@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "source",
         metavar="RUN|SCENARIO|TRACES",
-        help="a run's folder; a scenario's path or name; or traces as `-o episodes.json` writes them",
+        help="a run's folder, or shipped:NAME; a scenario's path or name; or traces as `-o episodes.json` writes them",
     )
     parser.add_argument(
         "-o",
@@ -36,7 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--agent",
         metavar="AGENT",
-        help="who plays a scenario: oracle, random, or a run's folder (default: oracle if there is one, else random)",
+        help="who plays a scenario: oracle, random, shipped, or a run's folder (default: oracle if there is one, else "
+        "random)",
     )
     parser.add_argument(
         "--episodes", type=positive, default=100, metavar="N", help="of the test set (default: 100)"
@@ -103,13 +104,13 @@ def _played(arguments: argparse.Namespace) -> "list[Trace]":
 
 
 def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
-    from socialai_dsl.cli.agents import require_trainer, scripted_name
+    from socialai_dsl.cli.agents import folder_of, named_agent, require_trainer, scripted_name
     from socialai_dsl.cli.evaluate import own_scenario
     from socialai_dsl.cli.evaluation import evaluate_agent
     from socialai_dsl.cli.player import Player
 
     source = arguments.source
-    if (Path(source) / SETTINGS).is_file():
+    if (folder_of(source) / SETTINGS).is_file():
         if arguments.agent is not None:
             raise UsageError(
                 "--agent: a run is replayed by its own agent; name a scenario to let another play"
@@ -117,7 +118,8 @@ def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
         agent, scenario = source, own_scenario(source)
     else:
         scenario = source
-        agent = arguments.agent or ("oracle" if scripted_name(scenario) is not None else "random")
+        usual = "oracle" if scripted_name(scenario) is not None else "random"
+        agent = named_agent(arguments.agent or usual, scenario)
     if agent not in ("oracle", "random", "human"):
         require_trainer()
     return evaluate_agent(Player(agent, greedy=arguments.greedy), scenario, episodes)

@@ -137,14 +137,14 @@ def _training_figures(folder: Path) -> dict[str, Any]:
 
 def _started(arguments: argparse.Namespace) -> "RunConfig":
     """The configuration of a new run."""
-    from socialai_dsl.cli.agents import new_config
+    from socialai_dsl.cli.agents import folder_of, named_agent, new_config
 
     if arguments.scenario is None:
         raise UsageError("expected a scenario (a path or a name), or --resume RUN_DIR")
-    agent = arguments.agent or "ppo"
-    if agent not in BUILT_IN_AGENTS and not Path(agent).exists():
+    arguments.agent = agent = named_agent(arguments.agent or "ppo", arguments.scenario)
+    if agent not in BUILT_IN_AGENTS and not folder_of(agent).exists():
         known = ", ".join(BUILT_IN_AGENTS)
-        raise UsageError(f"--agent: expected {known} or the path of a checkpoint, got {agent!r}")
+        raise UsageError(f"--agent: expected {known}, shipped or the path of a checkpoint, got {agent!r}")
     if agent == "human" and arguments.json:
         raise UsageError("--json: the agent 'human' plays on standard output")
     return new_config(arguments)
@@ -192,7 +192,8 @@ def _write_card(
     from socialai_dsl.cli.evaluation import about_of
     from socialai_dsl.cli.model_card import FILE, model_card
 
-    write_text(folder / FILE, model_card(config, result, about_of(loaded), folder, weights))
+    place = weights.relative_to(folder).as_posix()
+    write_text(folder / FILE, model_card(config, result, about_of(loaded), folder.as_posix(), place))
 
 
 def _size(program: "Playable") -> str:

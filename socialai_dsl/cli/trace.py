@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     played.add_argument(
         "--agent",
         metavar="AGENT",
-        help="oracle, random, or a checkpoint or run folder (default: oracle where there is one, else random)",
+        help="oracle, random, shipped, or a checkpoint or run folder (default: oracle where there is one, else random)",
     )
     played.add_argument(
         "--do",

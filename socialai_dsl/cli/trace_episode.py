@@ -102,7 +102,7 @@ class Traced:
 
     Args:
         scenario: a path or a name.
-        agent: oracle, random, or a checkpoint; None: oracle where there is one, else random.
+        agent: oracle, random, shipped, or a checkpoint; None: oracle where there is one, else random.
         lines: what the agent does, step by step, as typed in `socialai play`; then there is no other agent.
         seed: of an agent that chooses by chance.
 
@@ -112,9 +112,9 @@ class Traced:
 
     def __init__(self, scenario: str, agent: str | None, lines: list[str] | None, seed: int) -> None:
         import socialai_dsl
-        from socialai_dsl.cli.agents import with_script
+        from socialai_dsl.cli.agents import named_agent, with_script
 
-        self.agent = agent or "typed"
+        self.agent = "typed" if agent is None else named_agent(agent, scenario)
         self._lines, self._seed = lines, seed
         if lines is None and agent in (None, "oracle"):
             try:

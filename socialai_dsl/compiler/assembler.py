@@ -19,7 +19,7 @@ from socialai_dsl.program import (
     RegisterName,
 )
 from socialai_dsl.program.instructions import TABLE
-from socialai_dsl.semantics.plans import Checked, Drawn, Entity, FramePlan, MemoryPlan
+from socialai_dsl.semantics.plans import CheckedScenario, Drawn, Entity, FramePlan, MemoryPlan
 from socialai_dsl.semantics.terms import ACTION, BOOL, Type, may_find_nothing
 from socialai_dsl.source import Span
 from socialai_dsl.vocabulary import FINISHED
@@ -208,7 +208,7 @@ class Registers:
     end: int = 0
 
     @classmethod
-    def of(cls, checked: Checked) -> Registers:
+    def of(cls, checked: CheckedScenario) -> Registers:
         """Entities, draws in the order of the setup, states and clocks of the frames, then what is remembered."""
         registers = cls(FIRST_ENTITY + ENTITY_FIELDS * len(checked.entities), checked.room.canvas)
         for item in checked.setup:

@@ -12,7 +12,7 @@ from socialai_dsl.compiler.assembler import LARGEST, NOWHERE, Block, Label, Regi
 from socialai_dsl.compiler.folding import TRUE, Classes, Facts, fold, leaving, mentions, substitute
 from socialai_dsl.program import BOARDS, CELL, Counting, Field, Op, Register
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.plans import Checked
+from socialai_dsl.semantics.plans import CheckedScenario
 from socialai_dsl.semantics.terms import Const, Read, Select, Term, may_find_nothing
 
 
@@ -41,7 +41,7 @@ class Emitter(ABC):
     def __init__(
         self,
         block: Block,
-        checked: Checked,
+        checked: CheckedScenario,
         registers: Registers,
         classes: Classes,
         sites: Sites,

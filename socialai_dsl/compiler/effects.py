@@ -22,7 +22,7 @@ from socialai_dsl.compiler.folding import Changes, Mobility, When, numbers_of, p
 from socialai_dsl.program import CELL, TEMPORARY, Field, Op, Register
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import (
-    Checked,
+    CheckedScenario,
     Computed,
     Drawn,
     Effect,
@@ -50,7 +50,7 @@ class Home:
 class Homes:
     """Makes room for what a `reset` may put back: `NAME.reset.home`, the cell, then `.gone`, `.facing`, `.inside`."""
 
-    def __init__(self, checked: Checked, registers: Registers) -> None:
+    def __init__(self, checked: CheckedScenario, registers: Registers) -> None:
         self.checked = checked
         mobility = Mobility(checked)
         self.pointing = mobility.pointing
@@ -113,7 +113,7 @@ class Homes:
         block.bind(elsewhere)
 
 
-def _named(checked: Checked) -> Iterator[int]:
+def _named(checked: CheckedScenario) -> Iterator[int]:
     """What a `reset` names, and what may lie in that."""
     for plan in plans(checked):
         for effect in plan.causes:
@@ -660,7 +660,7 @@ def _type(thing: Entity) -> ObjectType:
 class ComputedStatuses:
     """The computed statuses of a scenario: those that a reset decides for good, and those that are settled."""
 
-    def __init__(self, checked: Checked) -> None:
+    def __init__(self, checked: CheckedScenario) -> None:
         changes = Changes(checked)
         whens = [(item, changes.of(item.condition.term)) for item in checked.computed]
         for_good = [when == When.NEVER and not changes.touched(item.entity) for item, when in whens]

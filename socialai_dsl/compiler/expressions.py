@@ -35,7 +35,7 @@ from socialai_dsl.compiler.folding import SILENCE, Classes, fold, fold_whole, te
 from socialai_dsl.grammar.ast import every
 from socialai_dsl.program import CONSTANT, TEMPORARY, Field, Op, Register
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.plans import Activity, Checked, Entity
+from socialai_dsl.semantics.plans import Activity, CheckedScenario, Entity
 from socialai_dsl.semantics.terms import Const, Line, Pattern, SaidBy, Term, Type, Variable
 from socialai_dsl.vocabulary import normal, words
 
@@ -364,7 +364,7 @@ class Lines:
         speakers: for each entity that says something, the numbers of its lines.
     """
 
-    checked: Checked
+    checked: CheckedScenario
     classes_of: Classes
     texts: list[str] = field(default_factory=list)
     classes: list[int] = field(default_factory=list)
@@ -552,7 +552,7 @@ class Lines:
         return max(8, min(MAX_TOKENS, -(-bound // 8) * 8))
 
 
-def note_what_is_said(checked: Checked, lines: Lines, registers: Registers) -> None:
+def note_what_is_said(checked: CheckedScenario, lines: Lines, registers: Registers) -> None:
     """Where somebody asks what an NPC has said: find all lines there are, and make room to note them."""
     asked = list(every(SaidBy, checked))
     if not asked:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar, assert_never
 from socialai_dsl.grammar.ast import children, every, rebuilt
 from socialai_dsl.program import Body
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.plans import Activity, Checked, Effect, Entity, RulePlan, StepPlan
+from socialai_dsl.semantics.plans import Activity, CheckedScenario, Effect, Entity, RulePlan, StepPlan
 from socialai_dsl.semantics.signatures import ACTIVITIES
 from socialai_dsl.semantics.terms import BOOL, Const, HeardNoun, Pattern, Speaker, Term, may_find_nothing
 from socialai_dsl.vocabulary import normal
@@ -34,7 +34,7 @@ class Classes:
         said: for each NPC and pattern that somebody asks about, the lines of that NPC that fit it.
     """
 
-    def __init__(self, checked: Checked) -> None:
+    def __init__(self, checked: CheckedScenario) -> None:
         self.patterns = list(dict.fromkeys(every(Pattern, checked)))
         self.speakers_matter = any(True for kind in (Speaker, HeardNoun) for _ in every(kind, checked))
         self.sets: list[frozenset[int]] = []
@@ -102,7 +102,7 @@ class Classes:
         return len(self._numbers) + 1
 
 
-def texts_of_pairs(checked: Checked) -> list[str]:
+def texts_of_pairs(checked: CheckedScenario) -> list[str]:
     """Texts of all pairs, row by row."""
     return [template.replace("<noun>", noun) for template in checked.templates for noun in checked.nouns]
 
@@ -268,7 +268,7 @@ class When(IntEnum):
 class Changes:
     """Answers for one scenario. What it says is never too little; now and then it is too much."""
 
-    def __init__(self, checked: Checked) -> None:
+    def __init__(self, checked: CheckedScenario) -> None:
         self.entities = checked.entities
         self.occlusion = checked.room.occlusion
         self.written = {path for plan in plans(checked) for path, _ in plan.sets}
@@ -423,7 +423,7 @@ class Mobility:
         into it. contents: those that may lie in others. pointing: whether anybody points.
     """
 
-    def __init__(self, checked: Checked) -> None:
+    def __init__(self, checked: CheckedScenario) -> None:
         # The agent does what it likes.
         self.turning, self.walking = {0}, {0}
         self.vanishing: set[int] = set()
@@ -462,7 +462,7 @@ class Mobility:
             self.contents |= targets
 
 
-def leaving(checked: Checked) -> frozenset[int]:
+def leaving(checked: CheckedScenario) -> frozenset[int]:
     """The entities that leave the room at some time.
 
     Any may be out of it from the beginning, for want of a free cell, say, or as a layout has it.
@@ -475,7 +475,7 @@ def numbers_of(term: Term) -> list[int]:
     return [term.value] if isinstance(term, Const) else list(range(term.type.low, term.type.high + 1))
 
 
-def plans(checked: Checked) -> Iterable[RulePlan | StepPlan]:
+def plans(checked: CheckedScenario) -> Iterable[RulePlan | StepPlan]:
     """Everything that has effects."""
     yield from checked.rules
     for frame in checked.frames:
@@ -484,7 +484,7 @@ def plans(checked: Checked) -> Iterable[RulePlan | StepPlan]:
             yield from (*state.first, *state.then)
 
 
-def activities(checked: Checked) -> Iterable[tuple[int, Activity]]:
+def activities(checked: CheckedScenario) -> Iterable[tuple[int, Activity]]:
     """Who may do what."""
     for frame in checked.frames:
         for step in frame.steps:

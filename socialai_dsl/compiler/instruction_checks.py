@@ -200,7 +200,7 @@ def problem_of(
     entry = TABLE.get(op)  # type: ignore[call-overload]
     if entry is None:
         return "the instruction table has no such op"
-    return _Checked(entry, words, program, known, writable, is_agents).problem()
+    return _Check(entry, words, program, known, writable, is_agents).problem()
 
 
 def written_temporaries(op: int, a: int, b: int, c: int) -> range:
@@ -211,7 +211,7 @@ def written_temporaries(op: int, a: int, b: int, c: int) -> range:
     return range(written.start - TEMPORARY, written.stop - TEMPORARY)
 
 
-class _Checked:
+class _Check:
     """One instruction where so much is known."""
 
     def __init__(
@@ -441,44 +441,44 @@ class _Checked:
         return None if self.known.has_room else "there is no room yet"
 
 
-_KINDS: Final[dict[Kind, Callable[[_Checked, Operand, int], str | None]]] = {
-    Kind.VALUE: _Checked._value,
-    Kind.ENTITY: _Checked._entity,
-    Kind.PLACE: _Checked._place,
-    Kind.UPDATED: _Checked._updated,
-    Kind.TEMPORARIES: _Checked._temporaries,
-    Kind.COORDINATES: _Checked._coordinates,
-    Kind.BOARD: _Checked._board,
-    Kind.FILLED: _Checked._board,
-    Kind.CHANGED: _Checked._board,
-    Kind.SITE: _Checked._site,
-    Kind.INBOX: _Checked._inbox,
-    Kind.REGISTER: _Checked._register,
-    Kind.LITERAL: _Checked._literal,
+_KINDS: Final[dict[Kind, Callable[[_Check, Operand, int], str | None]]] = {
+    Kind.VALUE: _Check._value,
+    Kind.ENTITY: _Check._entity,
+    Kind.PLACE: _Check._place,
+    Kind.UPDATED: _Check._updated,
+    Kind.TEMPORARIES: _Check._temporaries,
+    Kind.COORDINATES: _Check._coordinates,
+    Kind.BOARD: _Check._board,
+    Kind.FILLED: _Check._board,
+    Kind.CHANGED: _Check._board,
+    Kind.SITE: _Check._site,
+    Kind.INBOX: _Check._inbox,
+    Kind.REGISTER: _Check._register,
+    Kind.LITERAL: _Check._literal,
 }
 
-_OWN_CHECKS: Final[dict[Op, Callable[[_Checked], str | None]]] = {
-    Op.IF_HEARD: _Checked._if_heard,
-    Op.FIELD: _Checked._field,
-    Op.NEAREST: _Checked._nearest,
-    Op.DRAW_OTHER: _Checked._draw_other,
-    Op.LOWEST_BIT: _Checked._not_negative,
-    Op.PICK_BIT: _Checked._not_negative,
-    Op.HEARD_FROM: _Checked._heard,
-    Op.HEARD_NOUN: _Checked._heard,
-    Op.SET_FIELD: _Checked._set_field,
-    Op.BECOME: _Checked._become,
-    Op.SAY: _Checked._line,
-    Op.GOTO: _Checked._goto,
-    Op.COUNT: _Checked._count,
-    Op.ANSWER: _Checked._answer,
-    Op.END: _Checked._outcome,
-    Op.END_GRADED: _Checked._outcome,
-    Op.BODY: _Checked._body,
-    Op.CHOOSE: _Checked._choose,
-    Op.POINT: _Checked._point,
-    Op.PUT: _Checked._put,
-    Op.MAKE_ROOM: _Checked._make_room,
-    Op.DRAW_ROOM: _Checked._draw_room,
+_OWN_CHECKS: Final[dict[Op, Callable[[_Check], str | None]]] = {
+    Op.IF_HEARD: _Check._if_heard,
+    Op.FIELD: _Check._field,
+    Op.NEAREST: _Check._nearest,
+    Op.DRAW_OTHER: _Check._draw_other,
+    Op.LOWEST_BIT: _Check._not_negative,
+    Op.PICK_BIT: _Check._not_negative,
+    Op.HEARD_FROM: _Check._heard,
+    Op.HEARD_NOUN: _Check._heard,
+    Op.SET_FIELD: _Check._set_field,
+    Op.BECOME: _Check._become,
+    Op.SAY: _Check._line,
+    Op.GOTO: _Check._goto,
+    Op.COUNT: _Check._count,
+    Op.ANSWER: _Check._answer,
+    Op.END: _Check._outcome,
+    Op.END_GRADED: _Check._outcome,
+    Op.BODY: _Check._body,
+    Op.CHOOSE: _Check._choose,
+    Op.POINT: _Check._point,
+    Op.PUT: _Check._put,
+    Op.MAKE_ROOM: _Check._make_room,
+    Op.DRAW_ROOM: _Check._draw_room,
 }
 """What the kinds of an instruction's operands do not say."""

@@ -25,7 +25,7 @@ from socialai_dsl.compiler.questions import ask
 from socialai_dsl.compiler.setup import require, reset
 from socialai_dsl.program import Body, Header, Op
 from socialai_dsl.semantics import plans, terms
-from socialai_dsl.semantics.plans import FOR_EVER, Checked, FramePlan, OutcomePlan, RulePlan, StepPlan
+from socialai_dsl.semantics.plans import FOR_EVER, CheckedScenario, FramePlan, OutcomePlan, RulePlan, StepPlan
 from socialai_dsl.semantics.terms import BOOL, Type
 
 
@@ -80,7 +80,7 @@ class Allocation:
         rules: name of each counted rule, in the order of their counters.
     """
 
-    checked: Checked
+    checked: CheckedScenario
     probes: Probes
     registers: Registers
     classes: Classes
@@ -101,7 +101,7 @@ class Allocation:
         return to
 
 
-def allocate(checked: Checked, probes: Probes, numbered: Lines | None) -> Allocation:
+def allocate(checked: CheckedScenario, probes: Probes, numbered: Lines | None) -> Allocation:
     """Where everything of a scenario is; lines are numbered as in `numbered`, if that is given."""
     registers = Registers.of(checked)
     classes = Classes(checked)
@@ -534,7 +534,7 @@ def outcome_table(allocation: Allocation) -> list[int]:
     return table
 
 
-def _first_that_holds(to: Expressions, checked: Checked, probes: Probes) -> None:
+def _first_that_holds(to: Expressions, checked: CheckedScenario, probes: Probes) -> None:
     block = to.block
     for number, outcome in enumerate(checked.outcomes):
         never = fold_whole(outcome.condition.term, to.facts, to.classes) == FALSE
@@ -561,7 +561,7 @@ def _first_that_holds(to: Expressions, checked: Checked, probes: Probes) -> None
 
 
 @dataclass(frozen=True)
-class Lowered:
+class LoweredCode:
     """Where the code of a scenario begins.
 
     Attributes:
@@ -573,7 +573,7 @@ class Lowered:
     outcomes: list[int]
 
 
-def lower(allocation: Allocation) -> Lowered:
+def lower(allocation: Allocation) -> LoweredCode:
     """The code of a scenario, collected in the allocation's table."""
 
     def entry(label: str, *emitters: Callable[[Expressions], None]) -> int:
@@ -599,4 +599,4 @@ def lower(allocation: Allocation) -> Lowered:
     }
     outcomes = outcome_table(allocation)
     probes.declare(allocation.registers)
-    return Lowered(entries, frames, outcomes)
+    return LoweredCode(entries, frames, outcomes)

@@ -18,7 +18,7 @@ from socialai_dsl.compiler.lowering import Asked, Probes
 from socialai_dsl.grammar.ast import unparse
 from socialai_dsl.program import Op, Program, RegisterName
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.plans import Checked, OutcomePlan, RulePlan, StepPlan
+from socialai_dsl.semantics.plans import CheckedScenario, OutcomePlan, RulePlan, StepPlan
 from socialai_dsl.semantics.terms import BOOL, Const, Reading, Readings, Term, Type, all_of
 
 _LEAST, _GREATEST = -32768, 32767
@@ -68,7 +68,7 @@ class Probe:
 
 
 @dataclass(frozen=True)
-class Probed:
+class ProbedProgram:
     """A probed program, its first register that the program explained does not have, and its probes.
 
     Attributes:
@@ -86,7 +86,7 @@ class Recorder(Probes):
 
     recording = True
 
-    def __init__(self, checked: Checked, first: int) -> None:
+    def __init__(self, checked: CheckedScenario, first: int) -> None:
         self.checked, self.readings = checked, checked.readings or Readings()
         self.first = self.next = first
         self.rules: dict[int, Probe] = {}
@@ -245,7 +245,7 @@ def _conjuncts(sited: terms.Sited, readings: Readings) -> list[tuple[Term, Readi
     return [(arg, next((one for one in known if one.term == arg), None)) for arg in args]
 
 
-def _asked_about(term: Term, reading: Reading | None, checked: Checked) -> Iterator[_Shown]:
+def _asked_about(term: Term, reading: Reading | None, checked: CheckedScenario) -> Iterator[_Shown]:
     """The values that a condition is about, each once, with how they were written; what is known tells nothing."""
     if reading is None:
         return
@@ -283,7 +283,7 @@ def _values(term: Term, outermost: bool) -> Iterator[Term]:
             yield term
 
 
-def _unwritten(term: Term, checked: Checked) -> _Shown | None:
+def _unwritten(term: Term, checked: CheckedScenario) -> _Shown | None:
     """What `x.is(state)` asks about, of an object or a member of the cast."""
     if isinstance(term, terms.InState):
         return _state_of(term, checked)
@@ -292,7 +292,7 @@ def _unwritten(term: Term, checked: Checked) -> _Shown | None:
     return None
 
 
-def _state_of(term: terms.InState, checked: Checked) -> _Shown:
+def _state_of(term: terms.InState, checked: CheckedScenario) -> _Shown:
     frame = next(f for f in checked.frames if f.member == term.member and f.frame == term.frame)
     names = state_names(frame)
     return _Shown(

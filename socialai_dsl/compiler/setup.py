@@ -19,7 +19,7 @@ from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.free_cells import EXACT
 from socialai_dsl.semantics.plans import (
     FOR_EVER,
-    Checked,
+    CheckedScenario,
     Coloring,
     Drawn,
     Entity,
@@ -378,7 +378,7 @@ def _color(to: Expressions, item: Coloring, pinned: Label) -> None:
     block.emit(Op.PICK_BIT, register, left, site)
 
 
-def _distinct_later(checked: Checked, item: Coloring) -> list[int]:
+def _distinct_later(checked: CheckedScenario, item: Coloring) -> list[int]:
     """Members of the group that get their distinct colours after this one."""
     return [
         other.entity

@@ -17,7 +17,7 @@ from socialai_dsl.compiler.instruction_checks import (
     problem_of,
     written_temporaries,
 )
-from socialai_dsl.compiler.lowering import Allocation, FrameCode, Lowered
+from socialai_dsl.compiler.lowering import Allocation, FrameCode, LoweredCode
 from socialai_dsl.program import (
     ENTITY_FIELDS,
     FIRST_ENTITY,
@@ -39,7 +39,7 @@ from socialai_dsl.program import (
 )
 from socialai_dsl.program.instructions import ANYTHING, TABLE
 from socialai_dsl.semantics.free_cells import interior_cells
-from socialai_dsl.semantics.plans import Checked, Entity, RoomPlan
+from socialai_dsl.semantics.plans import CheckedScenario, Entity, RoomPlan
 from socialai_dsl.semantics.terms import ObjectType
 from socialai_dsl.vocabulary import ACTIONS, COLORS, EMPTY, NPC, WALL
 
@@ -50,7 +50,7 @@ class Tables:
     Registers of what is heard and of the log are reserved here, since only now it is known how many there are.
     """
 
-    def __init__(self, allocation: Allocation, lowered: Lowered) -> None:
+    def __init__(self, allocation: Allocation, lowered: LoweredCode) -> None:
         self.allocation, self.lowered = allocation, lowered
         self.checked, self.registers, self.classes = (
             allocation.checked,
@@ -205,7 +205,7 @@ class Tables:
 class _TypeTable:
     """One row for each status of each object type in the scenario, one for NPCs, one for the agent."""
 
-    def __init__(self, checked: Checked) -> None:
+    def __init__(self, checked: CheckedScenario) -> None:
         self.rows: list[list[int]] = []
         self.deadly = 0
         self.agent = self._add(code=EMPTY, status=0, toggled=0)

@@ -23,7 +23,7 @@ from socialai_dsl.envs.ways import Moment
 from socialai_dsl.program import EntityColumn, Header, LineColumn, Program, Register
 from socialai_dsl.program_suite import ProgramSuite
 from socialai_dsl.schema.scenario import Model
-from socialai_dsl.semantics.plans import Checked, FramePlan, OutcomePlan, RulePlan, StepPlan
+from socialai_dsl.semantics.plans import CheckedScenario, FramePlan, OutcomePlan, RulePlan, StepPlan
 from socialai_dsl.semantics.terms import Const, Read, Readings, Term
 from socialai_dsl.source import Span
 
@@ -43,7 +43,9 @@ class Explainer:
         number: which member it is.
     """
 
-    def __init__(self, program: Program, scenario: Checked, suite: ProgramSuite | None, number: int) -> None:
+    def __init__(
+        self, program: Program, scenario: CheckedScenario, suite: ProgramSuite | None, number: int
+    ) -> None:
         self._checked = scenario
         self._program = program
         self._probed = compile_probed(scenario)
@@ -212,7 +214,7 @@ class _Notes:
 class _Story:
     """The rules of a step in the order in which they were asked."""
 
-    checked: Checked
+    checked: CheckedScenario
     rules: dict[int, Probe]
     outcomes: dict[int, Probe]
     notes: _Notes

@@ -19,7 +19,7 @@ from socialai_dsl.program import EntityName, Register
 from socialai_dsl.program_suite import Playable, ProgramSuite
 from socialai_dsl.render.panel import Face
 from socialai_dsl.render.tiles import Code
-from socialai_dsl.semantics.plans import Checked
+from socialai_dsl.semantics.plans import CheckedScenario
 
 Observation = dict[str, NDArray[Any]]
 
@@ -45,7 +45,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
     metadata = {"render_modes": ["rgb_array", "ansi", "human"], "render_fps": 4}  # noqa: RUF012 - Gymnasium's protocol
 
     def __init__(
-        self, program: Playable, render_mode: str | None = None, scenarios: Sequence[Checked] = ()
+        self, program: Playable, render_mode: str | None = None, scenarios: Sequence[CheckedScenario] = ()
     ) -> None:
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             modes = ", ".join(self.metadata["render_modes"])
@@ -176,7 +176,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         return self._table.describe(0)
 
     @property
-    def scenario(self) -> Checked:
+    def scenario(self) -> CheckedScenario:
         """What the program of this episode was compiled from.
 
         Raises:
@@ -184,7 +184,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         """
         return self._scenario(self._table.number(0))
 
-    def _scenario(self, number: int) -> Checked:
+    def _scenario(self, number: int) -> CheckedScenario:
         if not self._scenarios:
             raise ValueError(f"got an environment of a program; expected make({self.program.name!r})")
         return self._scenarios[number]

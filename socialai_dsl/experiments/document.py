@@ -15,6 +15,7 @@ from socialai_dsl.experiments.settings import resolved_config
 from socialai_dsl.schema.experiment import AGENTS, Reference
 from socialai_dsl.semantics.experiment import Cell
 from trainer.config import WITHOUT_EFFECT, RunConfig
+from trainer.shipped import PREFIX, located
 
 FORMAT: Final = 1
 
@@ -40,7 +41,9 @@ def document_of(loaded: LoadedExperiment, profile: str | None) -> dict[str, Any]
         name: compile_loaded(loaded.played[name]).sha256 for name in {cell.scenario for cell in cells}
     }
     weights = {
-        cell.agent: _weights_digest(loaded.folder / cell.agent) for cell in cells if cell.agent not in AGENTS
+        cell.agent: _weights_digest(loaded.folder / located(cell.agent))
+        for cell in cells
+        if cell.agent not in AGENTS
     }
     return {
         "format": FORMAT,
@@ -184,7 +187,7 @@ def _condition(cell: Cell, folder: Path) -> dict[str, Any]:
         "column": cell.column,
         "group": cell.group,
         "scenario": from_anywhere(cell.scenario, folder),
-        "agent": cell.agent if cell.agent in AGENTS else str((folder / cell.agent).resolve()),
+        "agent": _agent(cell.agent, folder),
         "frames": cell.frames if cell.trains else None,
         "options": options_of(cell),
         "tests": [from_anywhere(name, folder) for name in cell.tests],
@@ -195,6 +198,12 @@ def _condition(cell: Cell, folder: Path) -> dict[str, Any]:
             if reference is not None
         },
     }
+
+
+def _agent(agent: str, folder: Path) -> str:
+    """The agent of a condition as `socialai run` takes it from any folder."""
+    named = agent in AGENTS or agent.startswith(PREFIX)
+    return agent if named else str((folder / agent).resolve())
 
 
 def _reference(reference: Reference | None) -> dict[str, Any] | None:

@@ -10,7 +10,7 @@ from itertools import product
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
 from socialai_dsl.loader.leaves import MAX_LEAVES, Leaf, label_of, leaves_of, parameters_of
 from socialai_dsl.loader.reader import Data
-from socialai_dsl.loader.resolved import Resolved
+from socialai_dsl.loader.resolved import ResolvedFile
 from socialai_dsl.source import DataPath
 
 
@@ -28,14 +28,14 @@ class Member:
     """
 
     name: str
-    scenario: Resolved
+    scenario: ResolvedFile
     place: DataPath
     weight: Fraction = Fraction(1)
     labels: Mapping[str, str] = field(default_factory=dict)
     layout: DataPath | None = None
 
 
-def members_of(suite: Resolved) -> tuple[Member, ...]:
+def members_of(suite: ResolvedFile) -> tuple[Member, ...]:
     """The members in order: of the split that `?split=` chooses, with the variants passed on.
 
     Raises:
@@ -54,7 +54,7 @@ def members_of(suite: Resolved) -> tuple[Member, ...]:
     return tuple(_with_variants(suite, members))
 
 
-def check_splits(suite: Resolved) -> None:
+def check_splits(suite: ResolvedFile) -> None:
     """Whether every split names members, also those that are not chosen.
 
     Raises:
@@ -73,7 +73,7 @@ def check_splits(suite: Resolved) -> None:
     found.raise_errors(suite.files)
 
 
-def _with_variants(suite: Resolved, members: Sequence[Member]) -> Sequence[Member]:
+def _with_variants(suite: ResolvedFile, members: Sequence[Member]) -> Sequence[Member]:
     for variant in suite.passed_on:
         changed = [member.scenario.varied(variant) for member in members]
         if not any(changed) and variant.text not in suite.own_variants:
@@ -89,7 +89,7 @@ def _with_variants(suite: Resolved, members: Sequence[Member]) -> Sequence[Membe
 # --- members that are listed ---
 
 
-def _member(suite: Resolved, place: DataPath, found: DiagnosticBag) -> Member | None:
+def _member(suite: ResolvedFile, place: DataPath, found: DiagnosticBag) -> Member | None:
     """The scenario that is named at a place; None if something is wrong with it."""
     entry = suite.part(place) if place[0] != "sweep" else None
     try:
@@ -108,12 +108,14 @@ def _member(suite: Resolved, place: DataPath, found: DiagnosticBag) -> Member | 
     return member if _can_be_played(suite, member.scenario, member.place, found) else None
 
 
-def _called(scenario: Resolved) -> str:
+def _called(scenario: ResolvedFile) -> str:
     given = "&".join(f"{name}={value}" for name, value in scenario.params.items())
     return f"{scenario.name}?{given}" if given else scenario.name
 
 
-def _can_be_played(suite: Resolved, scenario: Resolved, place: DataPath, found: DiagnosticBag) -> bool:
+def _can_be_played(
+    suite: ResolvedFile, scenario: ResolvedFile, place: DataPath, found: DiagnosticBag
+) -> bool:
     abstract = isinstance(scenario.data, dict) and scenario.data.get("abstract") is True
     if scenario.kind == "scenario" and not abstract:
         return True
@@ -124,7 +126,7 @@ def _can_be_played(suite: Resolved, scenario: Resolved, place: DataPath, found: 
     return False
 
 
-def _member_places(suite: Resolved, split: str | None) -> list[DataPath]:
+def _member_places(suite: ResolvedFile, split: str | None) -> list[DataPath]:
     """Where the members of a split are named."""
     written, swept = _part(suite.data, "members"), _mapping(suite.data, "sweep")
     own: list[DataPath] = (
@@ -144,7 +146,7 @@ def _member_places(suite: Resolved, split: str | None) -> list[DataPath]:
     return [("splits", split, "replace", names[place]) if names[place] in swapped else place for place in own]
 
 
-def _written_name(suite: Resolved, place: DataPath) -> str:
+def _written_name(suite: ResolvedFile, place: DataPath) -> str:
     """What the file calls a member: its text, or its name."""
     entry = place[-1] if place[0] == "sweep" else suite.part(place)
     return str(entry.get("name", entry.get("scenario")) if isinstance(entry, dict) else entry)
@@ -153,7 +155,7 @@ def _written_name(suite: Resolved, place: DataPath) -> str:
 # --- members that are swept over ---
 
 
-def _swept(suite: Resolved, place: DataPath, split: str | None, found: DiagnosticBag) -> Iterator[Member]:
+def _swept(suite: ResolvedFile, place: DataPath, split: str | None, found: DiagnosticBag) -> Iterator[Member]:
     """A member once for each combination of the values that are swept over; they share its weight."""
     member = _member(suite, place, found)
     if member is None:
@@ -189,10 +191,10 @@ def _listed(values: Data) -> list[Data]:
 # --- leaves ---
 
 
-def _leaf_members(suite: Resolved, split: str | None, found: DiagnosticBag) -> list[Member]:
+def _leaf_members(suite: ResolvedFile, split: str | None, found: DiagnosticBag) -> list[Member]:
     tree = _part(suite.data, "tree")
     leaves = leaves_of(tree, suite, found)
-    scenarios: dict[DataPath, Resolved | None] = {}
+    scenarios: dict[DataPath, ResolvedFile | None] = {}
     for leaf in leaves:
         if leaf.scenario is None:
             place = list(leaf.places.values())[-1] if leaf.places else ("tree",)
@@ -207,7 +209,7 @@ def _leaf_members(suite: Resolved, split: str | None, found: DiagnosticBag) -> l
     return [member for member in made if member is not None]
 
 
-def _included(suite: Resolved, place: DataPath, found: DiagnosticBag) -> Resolved | None:
+def _included(suite: ResolvedFile, place: DataPath, found: DiagnosticBag) -> ResolvedFile | None:
     try:
         scenario = suite.include(place)
     except ScenarioError as error:
@@ -217,7 +219,7 @@ def _included(suite: Resolved, place: DataPath, found: DiagnosticBag) -> Resolve
 
 
 def _leaf_member(
-    suite: Resolved, leaf: Leaf, scenario: Resolved | None, found: DiagnosticBag
+    suite: ResolvedFile, leaf: Leaf, scenario: ResolvedFile | None, found: DiagnosticBag
 ) -> Member | None:
     """A leaf as a member: its scenario, with the leaf's values for the parameters it declares, and its changes."""
     if scenario is None or leaf.scenario is None:
@@ -241,10 +243,10 @@ def _leaf_member(
 
 
 def _check_parameters(
-    suite: Resolved,
+    suite: ResolvedFile,
     tree: Data,
     leaves: Sequence[Leaf],
-    scenarios: Mapping[DataPath, Resolved | None],
+    scenarios: Mapping[DataPath, ResolvedFile | None],
     found: DiagnosticBag,
 ) -> None:
     """A parameter that no scenario below it declares, and whose values say nothing, is a mistake."""
@@ -270,7 +272,7 @@ def _check_parameters(
 
 
 def _split_leaves(
-    suite: Resolved, leaves: Sequence[Leaf], split: str, found: DiagnosticBag
+    suite: ResolvedFile, leaves: Sequence[Leaf], split: str, found: DiagnosticBag
 ) -> tuple[Leaf, ...]:
     """The leaves of a split: with all the values of `only`, and not with all the values of `without`."""
     chosen = _splits(suite).get(split)
@@ -304,7 +306,11 @@ def _labels(values: Data) -> list[str]:
 
 
 def _are_known(
-    suite: Resolved, leaves: Sequence[Leaf], wanted: Mapping[str, Data], place: DataPath, found: DiagnosticBag
+    suite: ResolvedFile,
+    leaves: Sequence[Leaf],
+    wanted: Mapping[str, Data],
+    place: DataPath,
+    found: DiagnosticBag,
 ) -> bool:
     """Whether the tree has these parameters with these values."""
     before = len(list(found))
@@ -330,11 +336,11 @@ def _are_known(
 # --- splits ---
 
 
-def _splits(suite: Resolved) -> dict[str, Data]:
+def _splits(suite: ResolvedFile) -> dict[str, Data]:
     return _mapping(suite.data, "splits") or {}
 
 
-def _chosen_split(suite: Resolved) -> str | None:
+def _chosen_split(suite: ResolvedFile) -> str | None:
     split, known = suite.given("split"), _splits(suite)
     if split is None or split.text in known:
         return split.text if split else None

@@ -347,7 +347,7 @@ def names_in(folder: Path) -> list[str]:
     return [name.rsplit(".", 1)[0] for name in yaml_files(folder) if not _is_of_any(folder / name)]
 
 
-class Resolved(PositionedData):
+class ResolvedFile(PositionedData):
     """A scenario (or suite, npc, library) with `extends` and variants applied.
 
     Behaves like a document; its parts know in which file they were written, patches included.
@@ -427,7 +427,7 @@ class Resolved(PositionedData):
         """Where the parameter was given a value, in the name of the scenario."""
         return self._given[name].span
 
-    def include(self, path: DataPath) -> Resolved:
+    def include(self, path: DataPath) -> ResolvedFile:
         """The scenario or npc that the text at `path` names, relative to the file that text stands in.
 
         Raises:
@@ -440,7 +440,7 @@ class Resolved(PositionedData):
             raise library.error("S104", "the name of a file is a text", document.value_span(there))
         return self._named(text, document.locate(there), _folder(document))
 
-    def include_key(self, path: DataPath) -> Resolved:
+    def include_key(self, path: DataPath) -> ResolvedFile:
         """The scenario that the key at `path` names, relative to the file that the key stands in.
 
         Raises:
@@ -449,7 +449,7 @@ class Resolved(PositionedData):
         document, there = self.find(path)
         return self._named(str(path[-1]), document.key_span(there), _folder(document))
 
-    def _named(self, text: str, start: Span, folder: Path) -> Resolved:
+    def _named(self, text: str, start: Span, folder: Path) -> ResolvedFile:
         """The file of a name that is written in a file."""
         library = self._builder.library
         found = DiagnosticBag()
@@ -458,7 +458,7 @@ class Resolved(PositionedData):
         file = library.find(name.base.text, folder, name.base.span)
         return _resolved(self._builder, file, name, name.base.span)
 
-    def include_all(self, path: DataPath) -> tuple[Resolved, ...]:
+    def include_all(self, path: DataPath) -> tuple[ResolvedFile, ...]:
         """The files that the text or list of texts at `path` names.
 
         A list keeps its order; a text with `*` in its last part stands for the matching files, sorted by name.
@@ -477,7 +477,7 @@ class Resolved(PositionedData):
         names = [ScenarioName(Part(file.name, span), (), {}) for file in files]
         return tuple(_resolved(self._builder, f, n, span) for f, n in zip(files, names, strict=True))
 
-    def with_drawn_files(self) -> Resolved:
+    def with_drawn_files(self) -> ResolvedFile:
         """This scenario with the npc files that each `one_of` of its cast names put in the place of their names.
 
         Raises:
@@ -497,11 +497,11 @@ class Resolved(PositionedData):
             node = build.tree.at(place)
             node.value, node.children = None, [file._build.tree for file in self._npc_files(place)]
         self._builder.check_depth(build.tree)
-        return Resolved(self._builder, build, self._given)
+        return ResolvedFile(self._builder, build, self._given)
 
-    def _npc_files(self, place: DataPath) -> list[Resolved]:
+    def _npc_files(self, place: DataPath) -> list[ResolvedFile]:
         """The npc files that are named at `place`; those that others build on are left out of a pattern."""
-        found: list[Resolved] = []
+        found: list[ResolvedFile] = []
         part = self.part(place)
         places = [(*place, i) for i in range(len(part))] if isinstance(part, list) else [place]
         for one in places:
@@ -522,7 +522,7 @@ class Resolved(PositionedData):
                     found.append(file)
         return found
 
-    def varied(self, variant: Part) -> Resolved | None:
+    def varied(self, variant: Part) -> ResolvedFile | None:
         """This scenario with a variant that a suite passes on; None if it has no such variant."""
         build = self._build.copy()
         try:
@@ -531,9 +531,9 @@ class Resolved(PositionedData):
             if any(d.code != "S503" for d in error.diagnostics):
                 raise
             return None
-        return Resolved(self._builder, build, self._given)
+        return ResolvedFile(self._builder, build, self._given)
 
-    def patched(self, holder: PositionedData, path: DataPath) -> Resolved:
+    def patched(self, holder: PositionedData, path: DataPath) -> ResolvedFile:
         """This scenario changed by the mapping (`remove`, `set`, `add`) at `path` of another file.
 
         Raises:
@@ -545,9 +545,9 @@ class Resolved(PositionedData):
         if isinstance(patch.children, dict):
             patch.children = {verb: part for verb, part in patch.children.items() if verb in PATCH_VERBS}
         self._builder.patch(build, patch)
-        return Resolved(self._builder, build, self._given)
+        return ResolvedFile(self._builder, build, self._given)
 
-    def with_value(self, path: str, holder: PositionedData, place: DataPath) -> Resolved:
+    def with_value(self, path: str, holder: PositionedData, place: DataPath) -> ResolvedFile:
         """This scenario with the value at `place` of another file set at a path of it.
 
         Raises:
@@ -559,15 +559,15 @@ class Resolved(PositionedData):
         values.children = {path: Node(document, there, document.part(there))}
         patch.children = {"set": values}
         self._builder.patch(build, patch)
-        return Resolved(self._builder, build, self._given)
+        return ResolvedFile(self._builder, build, self._given)
 
-    def with_params(self, values: Mapping[str, tuple[str, Span]]) -> Resolved:
+    def with_params(self, values: Mapping[str, tuple[str, Span]]) -> ResolvedFile:
         """This scenario with values for parameters, as if they were written behind `?`: name -> text and its place."""
         given = {name: Part(text, span) for name, (text, span) in values.items()}
-        return Resolved(self._builder, self._build.copy(), {**self._given, **given})
+        return ResolvedFile(self._builder, self._build.copy(), {**self._given, **given})
 
 
-def resolve(name: str, base: Path | None = None, texts: Mapping[Path, Source] | None = None) -> Resolved:
+def resolve(name: str, base: Path | None = None, texts: Mapping[Path, Source] | None = None) -> ResolvedFile:
     """The scenario of a name: `NAME(+VARIANT)*(?parameter=value(&parameter=value)*)?`.
 
     Args:
@@ -596,14 +596,14 @@ def shipped_names() -> list[str]:
     return names_in(shipped_folder())
 
 
-def _resolved(builder: Builder, path: Path, name: ScenarioName, asked: Span | None = None) -> Resolved:
+def _resolved(builder: Builder, path: Path, name: ScenarioName, asked: Span | None = None) -> ResolvedFile:
     build = builder.built(path, asked)
     if len(name.variants) > MAX_CHAIN:
         message = f"at most {MAX_CHAIN} variants can be combined"
         raise builder.library.error("S507", message, name.variants[-1].span)
     for variant in name.variants:
         vary(builder, build, variant)
-    return Resolved(builder, build, name.params)
+    return ResolvedFile(builder, build, name.params)
 
 
 def _folder(document: Document) -> Path:

@@ -109,7 +109,7 @@ class Settings(_RunOptions):
     )
     agent: Annotated[str, StringConstraints(min_length=1, max_length=1000)] | None = Field(
         None,
-        description="ppo (default), random, oracle, or a checkpoint or run folder, relative to this file",
+        description="ppo (default), random, oracle, shipped:NAME, or a checkpoint or run folder, relative to this file",
     )
     frames: int | None = Field(None, ge=1, description="frames to train for")
     seeds: (

@@ -353,7 +353,7 @@ M = TypeVar("M", bound=BaseModel)
 
 
 @dataclass(frozen=True)
-class Shaped(Generic[M]):
+class ShapedFile(Generic[M]):
     """A document as models.
 
     Attributes:
@@ -377,7 +377,7 @@ def model_of(
     *,
     partial: bool = False,
     parameters: bool = True,
-) -> Shaped[M]:
+) -> ShapedFile[M]:
     """The model of a document; `bag` says what is wrong with its shape.
 
     After mistakes that leave no doubt the model is made of what was meant, so that the rest can be checked.
@@ -399,7 +399,7 @@ def model_of(
     found: Positions = MovedPlaces(places, repaired.moved)
     fill_gaps(repaired, found, bag)
     if made is not None and len(bag) == known:
-        return Shaped(made, repaired.data, places, False)
+        return ShapedFile(made, repaired.data, places, False)
     try:
         made = _made(model, repaired.data)
     except ValidationError as error:
@@ -407,7 +407,7 @@ def model_of(
         made = _tried(model, repaired.data)
     lost = any(_matters(path) for path in repaired.lost)
     kept = found if repaired.moved else places
-    return Shaped(made, repaired.data, kept, lost)
+    return ShapedFile(made, repaired.data, kept, lost)
 
 
 def _made(model: type[M], data: object) -> M:

@@ -14,7 +14,7 @@ from socialai_dsl.semantics import behaviour, entities, groups, object_facts, po
 from socialai_dsl.semantics.entities import AGENT, Prelude, entities_of
 from socialai_dsl.semantics.free_cells import check_absences, check_placements
 from socialai_dsl.semantics.groups import performs
-from socialai_dsl.semantics.plans import Checked, Drawn, FramePlan, OutcomePlan, PropertyPlan
+from socialai_dsl.semantics.plans import CheckedScenario, Drawn, FramePlan, OutcomePlan, PropertyPlan
 from socialai_dsl.semantics.possible import check_possible
 from socialai_dsl.semantics.probes import probes
 from socialai_dsl.semantics.resolve import ScenarioResolver
@@ -353,7 +353,7 @@ def check_meaning(
     data: object,
     params: Mapping[str, Scalar] | None = None,
     substituted: frozenset[DataPath] = frozenset(),
-) -> Checked | None:
+) -> CheckedScenario | None:
     """What a scenario means; None if something is wrong with it, which `bag` then says.
 
     Types that follow from uses (`pick(left | right)`, registers that are set) are found by resolving again with
@@ -371,7 +371,7 @@ def check_meaning(
     """
     words: dict[str, Type] = {}
     ranges = Ranges(scenario)
-    checked: Checked | None = None
+    checked: CheckedScenario | None = None
     for _ in range(_MAX_ROUNDS):
         found = DiagnosticBag()
         findings = Findings(found, places, params or {}, substituted, data)
@@ -452,7 +452,7 @@ class _Run:
         self._played = entities.played_frames(self._symbols, findings)
         self.resolver = ScenarioResolver(self._symbols, findings, self._played, words, ranges)
 
-    def checked(self, name: str) -> Checked | None:
+    def checked(self, name: str) -> CheckedScenario | None:
         """The checked scenario; None if it cannot be put together."""
         scenario, resolver, findings = self._scenario, self.resolver, self._findings
         if self._symbols.entities > MAX_BODIES:
@@ -488,7 +488,7 @@ class _Run:
         self._report_unused()
         names = [resolver.registers.read(f"{member}.name") for member in self._symbols.cast]
         words = words_in_order(scenario.grammar, names, spoken.lines(self._symbols.cast))
-        return Checked(
+        return CheckedScenario(
             name=name,
             horizon=scenario.horizon,
             actions=tuple(action for action in PRIMITIVES if action in scenario.actions),

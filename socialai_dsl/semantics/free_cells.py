@@ -11,7 +11,7 @@ from random import Random
 from typing import Final
 
 from socialai_dsl.semantics import plans, terms
-from socialai_dsl.semantics.plans import Checked, Placing, Region
+from socialai_dsl.semantics.plans import CheckedScenario, Placing, Region
 from socialai_dsl.semantics.scope import Findings
 from socialai_dsl.semantics.terms import Const, Term, compute, walk
 
@@ -109,7 +109,7 @@ _TAKES_AWAY: Final = {"at": 1, "in_front_of": 1, "next_to": 4}
 """How many cells at most `not here.TEST(x)` excludes for each x."""
 
 
-def check_placements(checked: Checked, findings: Findings) -> frozenset[int]:
+def check_placements(checked: CheckedScenario, findings: Findings) -> frozenset[int]:
     """Report S601: an error where no room of a size has a cell for something, a warning where some may have none.
 
     Sizes are looked at from the smallest on, as far as a fixed effort goes. Returns the entities whose cells depend on
@@ -151,7 +151,7 @@ def _is_sure(placing: Placing) -> bool:
 
 
 def _report(
-    checked: Checked,
+    checked: CheckedScenario,
     findings: Findings,
     placing: Placing,
     size: Size,
@@ -182,7 +182,7 @@ def _named(keys: Sequence[str]) -> str:
     return f"{names} and {more} more" if more else names
 
 
-def _called(checked: Checked, number: int) -> str:
+def _called(checked: CheckedScenario, number: int) -> str:
     entity = checked.entities[number]
     return entity.key if entity.index is None else f"{entity.key}[{entity.index}]"
 
@@ -203,7 +203,7 @@ class _Effort:
 class _Room:
     """The rooms of one size; all that is found out is remembered, by the place where many things share one."""
 
-    def __init__(self, checked: Checked, size: Size, effort: _Effort) -> None:
+    def __init__(self, checked: CheckedScenario, size: Size, effort: _Effort) -> None:
         self.checked = checked
         self.size = size
         self._effort = effort
@@ -451,7 +451,7 @@ _EFFORT: Final = 300_000
 _SIDES: Final = ("top", "bottom", "left", "right")
 
 
-def check_absences(checked: Checked, findings: Findings, undecided: Collection[int]) -> None:
+def check_absences(checked: CheckedScenario, findings: Findings, undecided: Collection[int]) -> None:
     """Report who is put outside of the room (S602 in all rooms, W603 in some), and who of the `undecided` entities has
     no cell in rooms that are drawn (S601 in all, W603 in some).
     """
@@ -479,7 +479,7 @@ def check_absences(checked: Checked, findings: Findings, undecided: Collection[i
             findings.warning("W603", message, placing.span, hint=hint)
 
 
-def _outside(at: tuple[Term, Term], checked: Checked) -> float:
+def _outside(at: tuple[Term, Term], checked: CheckedScenario) -> float:
     """In what share of the sizes of a room a place lies outside of it; 0 if that is drawn."""
     sizes = _sizes(checked)
     try:
@@ -489,7 +489,7 @@ def _outside(at: tuple[Term, Term], checked: Checked) -> float:
     return sum(not (0 <= x < width and 0 <= y < height) for (width, height), x, y in spots) / len(sizes)
 
 
-def _report_outside(checked: Checked, findings: Findings, placing: Placing, share: float) -> None:
+def _report_outside(checked: CheckedScenario, findings: Findings, placing: Placing, share: float) -> None:
     key = checked.entities[placing.entity].key
     if share == 1:
         findings.error("S602", f"`{key}` is put outside of the room", placing.span, hint=_sizes_of(checked))
@@ -503,13 +503,13 @@ def _percent(share: float) -> str:
     return f"{max(1, round(100 * share))} %"
 
 
-def _sizes(checked: Checked) -> list[Size]:
+def _sizes(checked: CheckedScenario) -> list[Size]:
     """The sizes that a room can have."""
     (least_w, most_w), (least_h, most_h) = checked.room.width, checked.room.height
     return list(product(range(least_w, most_w + 1), range(least_h, most_h + 1)))
 
 
-def _sizes_of(checked: Checked) -> str:
+def _sizes_of(checked: CheckedScenario) -> str:
     """What the coordinates of a room can be."""
     (_, width), (_, height) = checked.room.width, checked.room.height
     return f"x goes from 0 to {width - 1} and y from 0 to {height - 1}, walls included"
@@ -532,7 +532,7 @@ class _Found:
     absent: Counter[int]
 
 
-def _tried(checked: Checked) -> _Found:
+def _tried(checked: CheckedScenario) -> _Found:
     found, generator, left = _Found(0, Counter()), Random(0), _EFFORT
     sizes = _sizes(checked)
     generator.shuffle(sizes)
@@ -553,7 +553,7 @@ def _tried(checked: Checked) -> _Found:
 _Known = Callable[[Region, Size, bool], frozenset[Cell]]
 
 
-def _cells(checked: Checked, region: Region, size: Size, overlap: bool) -> Iterator[Cell]:
+def _cells(checked: CheckedScenario, region: Region, size: Size, overlap: bool) -> Iterator[Cell]:
     """The cells of a region whose arguments are known."""
     if region.name == "wall":
         side = region.side or _SIDES[region.args[0].value]  # type: ignore[union-attr]

@@ -361,7 +361,7 @@ class ProbePlan:
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckedScenario:
     """A scenario in which everything is resolved and nothing is wrong: the compiler's input.
 
     Attributes:

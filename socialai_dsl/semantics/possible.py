@@ -12,7 +12,7 @@ from typing import Final
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.schema.scenario import Frame, Scenario, State
 from socialai_dsl.semantics import plans, terms
-from socialai_dsl.semantics.plans import Checked, Effect, FramePlan, RulePlan
+from socialai_dsl.semantics.plans import CheckedScenario, Effect, FramePlan, RulePlan
 from socialai_dsl.semantics.scope import Findings, frames_of
 from socialai_dsl.semantics.terms import (
     Chance,
@@ -274,7 +274,7 @@ _GIVES: Final = {"open": ("open", "opened"), "close": ("closed", "shut"), "lock"
 """Statuses that an effect may lead to, of those that a type has."""
 
 
-def check_possible(checked: Checked, findings: Findings) -> None:
+def check_possible(checked: CheckedScenario, findings: Findings) -> None:
     """Report conditions that can never hold: of rules (W311), of steps, outcomes and probes (W314), and S316 where
     nothing is left to be played: no success, or no room.
     """
@@ -317,7 +317,7 @@ def _by_place(found: Iterable[tuple[Span, Sited]]) -> Iterator[tuple[Span, list[
     yield from places.items()
 
 
-def _rules(checked: Checked) -> Iterator[tuple[Span, Sited]]:
+def _rules(checked: CheckedScenario) -> Iterator[tuple[Span, Sited]]:
     in_frames = (
         rule for frame in checked.frames for state in frame.states for rule in (*state.first, *state.then)
     )
@@ -326,7 +326,7 @@ def _rules(checked: Checked) -> Iterator[tuple[Span, Sited]]:
             yield rule.when.span, rule.when
 
 
-def _untils(checked: Checked) -> Iterator[tuple[Span, Sited]]:
+def _untils(checked: CheckedScenario) -> Iterator[tuple[Span, Sited]]:
     for frame in checked.frames:
         for step in frame.steps:
             if step.until is not None:
@@ -336,7 +336,7 @@ def _untils(checked: Checked) -> Iterator[tuple[Span, Sited]]:
 class Possible:
     """What the parts of a scenario can be, each looked at by itself."""
 
-    def __init__(self, checked: Checked) -> None:
+    def __init__(self, checked: CheckedScenario) -> None:
         self._checked = checked
         self._statuses = _Statuses(checked)
 
@@ -482,7 +482,7 @@ def _between(term: Term) -> str:
 class _Statuses:
     """The statuses that each object can ever have: at first, by being toggled or pushed, by links and effects."""
 
-    def __init__(self, checked: Checked) -> None:
+    def __init__(self, checked: CheckedScenario) -> None:
         self._checked = checked
         self._opened = {number for entity in checked.entities for number in entity.opens}
         self._unlocked = {number for entity in checked.entities for number in entity.unlocks}
@@ -553,7 +553,7 @@ class _Statuses:
         return None
 
 
-def _effects(checked: Checked) -> Iterator[Effect]:
+def _effects(checked: CheckedScenario) -> Iterator[Effect]:
     rules: list[RulePlan] = list(checked.rules)
     for frame in checked.frames:
         for step in frame.steps:

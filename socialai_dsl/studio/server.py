@@ -23,6 +23,7 @@ from socialai_dsl.replay.scripts import static_text
 from socialai_dsl.studio.engine import Engine, EngineLostError, start_worker, stop_process
 from socialai_dsl.studio.files import ConflictError, FileError, Folder
 from socialai_dsl.studio.session import ASKED
+from trainer.shipped import PREFIX, shipped_agents
 
 LARGEST_MESSAGE: Final = 2 << 20
 _SECONDS: Final = {"check": 90.0}
@@ -185,7 +186,7 @@ class Studio:
         if "path" in asked:
             asked["path"] = str(self._folder.path(str(asked["path"])))
         player = asked.get("player")
-        if player not in (None, "me", "script", "random"):
+        if player not in (None, "me", "script", "random", *_shipped_players()):
             if player not in self._folder.runs():
                 raise FileError(f"{player}: there is no such run in the folder")
             asked["player"] = str(self._folder.root / player)
@@ -250,10 +251,15 @@ async def _relay(stream: asyncio.StreamReader, socket: WebSocket) -> None:
 # -- files ------------------------------------------------------------------------------------------------------------
 
 
+def _shipped_players() -> list[str]:
+    """The trained agents that ship, as `Session.begin` knows them."""
+    return [PREFIX + name for name in shipped_agents()]
+
+
 def _list(folder: Folder) -> dict[str, Any]:
     return {
         "files": folder.scenarios(),
-        "runs": folder.runs(),
+        "runs": [*folder.runs(), *_shipped_players()],
         "shipped": shipped_scenarios(),
         "templates": TEMPLATES,
     }

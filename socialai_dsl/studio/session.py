@@ -81,7 +81,7 @@ class Session:
 
         Args:
             seed: of the room.
-            player: `me`, `script`, `random`, or the folder of a run.
+            player: `me`, `script`, `random`, `shipped:NAME`, or the folder of a run.
             layout: a known room.
         """
         if not self._texts:

@@ -25,6 +25,7 @@ from trainer import checkpoint as checkpoints
 from trainer.checkpoint import Checkpoint, read, restore_net, write
 from trainer.errors import CheckpointError
 from trainer.nets import NetSpec
+from trainer.play import CheckpointPolicy
 from trainer.ppo import update
 from trainer.rollout import collect
 from trainer.session import Session
@@ -182,6 +183,23 @@ def test_weights_that_do_not_fit_are_refused(session: Session, changes: Any, mes
     envs = session.envs
     with pytest.raises(CheckpointError, match=message):
         restore_net(tampered(session, **changes), NetSpec.of(envs))
+
+
+def test_weights_in_half_precision_are_played_in_single(session: Session, tmp_path: Path) -> None:
+    written = session.checkpoint()
+    halves = {name: value.half() for name, value in written.tensors.items() if name.startswith("net.")}
+    path = write(tmp_path, Checkpoint(written.meta, halves))
+    for name, value in restored(path, session.envs).state_dict().items():
+        assert value.dtype == torch.float32, name
+        assert torch.equal(value, written.tensors[f"net.{name}"].half().float()), name
+
+
+def test_an_agent_plays_what_it_was_trained_on_only_if_it_says_what_that_is(
+    session: Session, tmp_path: Path
+) -> None:
+    path = write(tmp_path, session.checkpoint())
+    with pytest.raises(CheckpointError, match="does not say which scenario it is for, expected envs"):
+        CheckpointPolicy.load(path)
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from trainer.config import RunConfig
 from trainer.guides import Lead, ScriptGuide
 from trainer.minibatch import Batch
 from trainer.play import CheckpointPolicy
-from trainer.ppo import estimate_advantages, imitation_loss, ppo_loss, train
+from trainer.ppo import estimate_advantages, ppo_loss, train
 from trainer.rollout import collect
 from trainer.session import Session
 
@@ -37,20 +37,6 @@ def mixed_batch() -> tuple[Batch, torch.Tensor]:
         lead=Lead(actions, torch.tensor([True, True, False]), torch.tensor([1.0, 0.5, 0.0])),
     )
     return batch, logits
-
-
-def test_what_is_imitated_well_enough_is_left_alone() -> None:
-    likely, unlikely = log(0.995), log(0.6)
-    logits = torch.tensor([[log(0.005), likely, 0, 0, 0, 0, 0, 0], [log(0.4), unlikely, 0, 0, 0, 0, 0, 0]])
-    logits.requires_grad_()
-    actions = torch.tensor([[1, 0, 0, 0], [1, 0, 0, 0]])  # silent
-    silent = log(0.5)
-    loss = imitation_loss(logits, actions, torch.ones(2), (2, 2, 2, 2), floor=0.01 - silent)
-    assert loss.item() == pytest.approx((0.01 - silent - unlikely - silent) / 2)
-    loss.backward()  # type: ignore[no-untyped-call]
-    assert logits.grad is not None
-    assert logits.grad[0].tolist() == [0] * 8
-    assert logits.grad[1, :2].tolist() == pytest.approx([0.4 / 2, -0.4 / 2])
 
 
 def test_the_loss_of_led_and_own_frames_together() -> None:

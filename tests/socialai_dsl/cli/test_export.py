@@ -136,7 +136,7 @@ def test_a_network_of_ones_own_goes_along(
     shutil.rmtree(project)
     there = evaluated(capsys, "given", "--net", "mine:Net")
     assert there["eval"]["success_rate"] == here["eval"]["success_rate"]
-    assert "net='mine:Net', folder=Path('scenario')" in (tmp_path / "given" / "README.md").read_text()
+    assert 'net="mine:Net", folder=Path("scenario")' in (tmp_path / "given" / "README.md").read_text()
 
 
 def test_what_cannot_be_exported_is_said(place: Path, tmp_path: Path, capsys: Capture) -> None:

@@ -83,7 +83,7 @@ def test_its_code_plays_an_episode(card: str) -> None:
 def test_its_command_trains_the_same_agent(card: str, tmp_path: Path) -> None:
     (command,) = re.findall(r"Trained again by `socialai-run ([^`]+)`", card)
     given = r"corridor\.yaml --recipe guided --frames 1500 --seed 3 --envs 32 --bonus lang"
-    given += r"( --threads \d)? --hyper lr=0\.0003 --hyper loss=per_head"
+    given += r" --threads \d --hyper lr=0\.0003 --hyper loss=per_head"
     assert re.fullmatch(given, command), "its bits depend on the threads, too"
     again = tmp_path / "again"
     options = ["--eval-episodes", "30", "--device", "cpu", "--out", str(again)]

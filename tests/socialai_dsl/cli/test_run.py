@@ -226,7 +226,7 @@ def test_a_trained_agent_is_evaluated_elsewhere(capsys: Capture) -> None:
     ("arguments", "message"),
     [
         ([], "expected a scenario"),
-        (["corridor.yaml", "--agent", "nobody"], "--agent: expected ppo, random, oracle, human or"),
+        (["corridor.yaml", "--agent", "nobody"], "--agent: expected ppo, random, oracle, human, shipped or"),
         (["corridor.yaml", "--agent", "random", "--frames", "10"], "is not trained"),
         (["corridor.yaml", "--net", "huge"], "net: got 'huge'"),
         (
@@ -246,7 +246,7 @@ def test_a_trained_agent_is_evaluated_elsewhere(capsys: Capture) -> None:
         (["corridor.yaml", "--hyper", "entropy_coeff=1"], "'entropy_coeff'; did you mean entropy_coef?"),
         (
             ["corridor.yaml", "--hyper", "banana=1"],
-            "'banana'; expected one of guide_share, imitation_coef, imitation_floor,",
+            "'banana'; expected one of guide_share, imitation_coef, horizon,",
         ),
         (["corridor.yaml", "--hyper", "envs=3"], "envs has an option of its own, --envs"),
         (["corridor.yaml", "--hyper", "lr=1", "--hyper", "lr=2"], "--hyper: lr is given twice"),

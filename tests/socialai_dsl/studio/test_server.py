@@ -109,7 +109,9 @@ def test_websockets_need_token_and_origin(client: Client, path: str, query: str,
 def test_a_window_reads_plays_and_saves(client: Client, tmp_path: Path) -> None:
     with client.window() as opened:
         window = Window(opened)
-        assert window.ask("list")["files"] == ["talkitout.yaml"]
+        listed = window.ask("list")
+        assert listed["files"] == ["talkitout.yaml"]
+        assert "shipped:talkitout" in listed["runs"], "a trained agent to watch"
         found = window.ask("read", name="talkitout.yaml")
         drawn = window.ask("draw", path="talkitout.yaml", text=found["text"], seed=3)
         assert drawn["trace"]["scenario"] == "talkitout"
@@ -127,6 +129,7 @@ def test_a_window_reads_plays_and_saves(client: Client, tmp_path: Path) -> None:
             window.ask("read", name="../x.yaml"),
             window.ask("draw", path="../x.yaml", text=""),
             window.ask("begin", player="../run"),
+            window.ask("begin", player="shipped:../run"),
             window.ask("save", name="x.yaml"),
             window.ask("nonsense"),
             window.ask("copy", shipped="../x"),

@@ -72,6 +72,16 @@ def test_the_script_plays_to_its_end_and_nothing_comes_after_it(session: Session
     assert page.startswith("<!doctype html>")
 
 
+def test_a_trained_agent_that_ships_plays_to_its_end(session: Session) -> None:
+    session.begin(3, "shipped:talkitout")
+    ended, moments = None, 0
+    while ended is None:
+        ended, moments = session.auto()["more"]["moments"][0].get("ended"), moments + 1
+    assert moments <= 100
+    with pytest.raises(RefusalError, match="no agent of this name ships"):
+        session.begin(3, "shipped:nobody")
+
+
 def test_it_says_what_was_probably_meant(session: Session) -> None:
     with pytest.raises(RefusalError, match="did you mean 'How are you'"):
         session.act(line="Howw are you")
