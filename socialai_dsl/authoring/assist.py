@@ -42,7 +42,7 @@ _TEXTS: Final = ("say", "ask", "answers")
 _NAMING_FILES: Final = ("extends", "of", "one_of", "members", "scenario")
 _EXPRESSIONS: Final = frozenset(
     "when until after for while success failure reward set let define state start range of with earshot locked tagged "
-    "pressed opened color facing at require reachable never width height size count tables name".split()
+    "pressed opened color facing at require reachable never width height size count tables name answer".split()
 )
 _WORDS: Final = {
     "agent": "the agent, whom a policy plays",
