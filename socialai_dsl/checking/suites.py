@@ -9,8 +9,7 @@ from math import gcd, lcm
 from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite, Start
 from socialai_dsl.checking.scenarios import Draft, draft_of, meaning_of, naming_the_patch
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
-from socialai_dsl.loader.leaves import NODE_KEYS, parameters_of
-from socialai_dsl.loader.members import Member, check_splits, members_of
+from socialai_dsl.loader.members import NODE_KEYS, Member, check_splits, members_of, parameters_of
 from socialai_dsl.loader.resolved import ResolvedFile
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.schema.suite import Entry, Split, Suite

@@ -1,4 +1,8 @@
-"""The last two passes: all tables of a program laid out, and the proof that no run of it leaves the engine's arrays."""
+"""The last two passes: all tables of a program laid out, and the proof that no run of it leaves the engine's arrays.
+
+Every address is in range, every skip goes forward, every path ends; each operand is followed as an interval of values,
+so an entity, a line, a status or a coordinate that could be out of range is found before the program runs.
+"""
 
 from __future__ import annotations
 

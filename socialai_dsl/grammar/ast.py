@@ -1,4 +1,8 @@
-"""The small language inside YAML strings: syntax trees, the visitor of trees, the parser, and trees as text again."""
+"""The small language inside YAML strings: syntax trees, the visitor of trees, the parser, and trees as text again.
+
+`at` is the 0-based offset of the node's first character (of its operator's first character for none of them:
+always the leftmost character of the node), so a loader can turn it into file:line:column.
+"""
 
 from __future__ import annotations
 

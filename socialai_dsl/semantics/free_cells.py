@@ -1,4 +1,8 @@
-"""Placements without a free cell: certain ones, those the least favourable room lacks, and absences in drawn rooms."""
+"""Placements without a free cell: certain ones, those the least favourable room lacks, and absences in drawn rooms.
+
+In drawn rooms, what cannot be told without the engine, such as what can be reached, counts as favourable, so that
+somebody who is found missing really is.
+"""
 
 from __future__ import annotations
 

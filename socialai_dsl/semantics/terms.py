@@ -1,4 +1,21 @@
-"""Typed trees: what an expression means once every name is resolved, how trees are made, and how each was written."""
+"""Typed trees: what an expression means once every name is resolved, how trees are made, and how each was written.
+
+Every value is a whole number at run time. A `Type` says which numbers, and which word each stands for:
+
+=========  =====================================================================================
+bool       0, 1
+int        low..high
+direction  0 right, 1 down, 2 left, 3 up (a turn added to a direction is taken modulo 4)
+color      0 red, 1 green, 2 blue, 3 purple, 4 yellow, 5 grey
+action     0 left, 1 right, 2 forward, 3 pickup, 4 drop, 5 toggle, 6 done, 7 none
+entity     number of the entity: 0 the agent, NPCs in cast order, then objects in file order
+text       index into `words`: the finite set of texts that the expression can be (names, kinds)
+noun       index into `words`, the nouns of the scenario's grammar
+status     index into `words`, the states of an object type
+utterance  0 silence, else 1 + template * nouns + noun; `words` are the texts
+cell       CELL + 32 * y + x (program); where an entity is asked for its place, a cell will do
+=========  =====================================================================================
+"""
 
 from __future__ import annotations
 

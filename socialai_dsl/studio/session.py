@@ -15,7 +15,7 @@ from socialai_dsl.cli.evaluation import about_of
 from socialai_dsl.cli.typed import Phrases, split_line
 from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity
-from socialai_dsl.engine.errors import RoomError
+from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.frontend import Loaded, check, load
 from socialai_dsl.library import prelude

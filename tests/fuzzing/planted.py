@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 from socialai_dsl.diagnostics import Diagnostic
-from socialai_dsl.loader import patch_paths, reader, resolved
+from socialai_dsl.loader import patches, reader, resolved
 from socialai_dsl.loader.library import Library, Node
 from socialai_dsl.loader.offsets import Style
-from socialai_dsl.loader.patch_paths import Miss
+from socialai_dsl.loader.patches import Miss
 from socialai_dsl.loader.reader import Plain
 from socialai_dsl.source import Source, Span
 
@@ -116,7 +116,7 @@ def escapes_are_not_looked_into(patch: Patch) -> None:
 
 def one_entry_too_many(patch: Patch) -> None:
     """A path of a patch may name the entry behind the last one of a list."""
-    step = patch_paths._list_step
+    step = patches._list_step
 
     def stepped(node: Node, path: str, begin: int) -> tuple[int, int] | Miss:
         match = re.match(r"\[(\d{1,4})\]", path[begin:])
@@ -124,7 +124,7 @@ def one_entry_too_many(patch: Patch) -> None:
             return int(match[1]), begin + match.end()
         return step(node, path, begin)
 
-    patch.setattr(patch_paths, "_list_step", stepped)
+    patch.setattr(patches, "_list_step", stepped)
 
 
 PLANTED: dict[str, tuple[str, Callable[[Patch], None]]] = {
