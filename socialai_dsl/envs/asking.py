@@ -19,7 +19,7 @@ from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.compilation import NotedText, ProbeNotes, compile_asking_loaded, scenarios_of
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
-from socialai_dsl.envs.recording import Recording
+from socialai_dsl.envs.explain import Recording
 from socialai_dsl.envs.table import Table
 from socialai_dsl.envs.values import shown
 from socialai_dsl.program import Program, Register, RegisterName
