@@ -1807,7 +1807,12 @@ def test_10_5_the_last_step_is_a_moment(play: Folder) -> None:
     assert _asked(play, probe, "stay", "done") == [[], [], [("given_up", "2")]]
 
 
-def test_10_6_asking_changes_nothing(play: Folder) -> None:
+def test_10_6_before_the_first_step(play: Folder) -> None:
+    probe = "start: {when: prev(agent.facing) == right, ask: Where, answer: prev(agent.facing)}"
+    assert _asked(play, probe, "left") == [[("start", "right")], []]
+
+
+def test_10_7_asking_changes_nothing(play: Folder) -> None:
     probe = "  first: {when: t == 0, ask: How many, answer: rounds}\n"
     plain, probed = play(PROBED.removesuffix("probes:\n")).env, play(PROBED + probe).env
     assert plain.program.sha256 == probed.program.sha256

@@ -19,10 +19,11 @@ from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.compilation import NotedText, ProbeNotes, compile_asking_loaded, scenarios_of
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
-from socialai_dsl.envs.explain import Recording
+from socialai_dsl.envs.explain import Recording, Start
 from socialai_dsl.envs.table import Table
 from socialai_dsl.envs.values import shown
 from socialai_dsl.program import Program, Register, RegisterName
+from socialai_dsl.semantics.terms import NOTED
 from socialai_dsl.vocabulary import TRUTHS, is_number, normal
 
 
@@ -95,7 +96,7 @@ class Asker:
         """
         self._table.reset(seed, options)
         self._asked, self._act = set(), self._table.state.keys.item(0, Key.ACT)
-        return self._questions(image, ended=False)
+        return self._questions(image, begins=True)
 
     def step(self, action: NDArray[np.int64], image: NDArray[np.uint8], ended: bool) -> list[Question]:
         """Take the environment's step; what is asked now.
@@ -106,13 +107,15 @@ class Asker:
             ended: whether the episode has ended.
         """
         self._table.step(Task.STEP_ONLY, action[None])
-        return self._questions(image, ended)
+        return self._questions(image, ended=ended)
 
-    def _questions(self, image: NDArray[np.uint8], ended: bool) -> list[Question]:
+    def _questions(
+        self, image: NDArray[np.uint8], begins: bool = False, ended: bool = False
+    ) -> list[Question]:
         table = self._table
         assert np.array_equal(table.image[0], image), "internal: the programs that ask went another way"
         if table.state.keys.item(0, Key.ACT) != self._act:
-            self._asked, self._act = set(), table.state.keys.item(0, Key.ACT)
+            self._asked, self._act, begins = set(), table.state.keys.item(0, Key.ACT), True
         number = table.number(0)
         looker = self._lookers[number]
         if looker is None:
@@ -124,7 +127,7 @@ class Asker:
         ]
         if not waiting:
             return []
-        looker.look(Recording.of(table, 0))
+        looker.look(Recording.of(table, 0).start, begins)
         questions = []
         for probe in waiting:
             if looker.is_set(probe.asked):
@@ -142,10 +145,16 @@ class _Looker:
         self._table = Table([program], 1, 1)
         self._table.batch.ports.actions[0] = len(program.actions), 0, 0, 0
         self._registers = self._table.state.registers[0]
+        self._remembered = [name.register for name in program.registers if name.path.startswith(NOTED)]
 
-    def look(self, moment: Recording) -> None:
-        """Let the program note what it asks about at the moment at which a recording begins."""
-        state, start = self._table.state, moment.start
+    def look(self, moment: Start, begins: bool) -> None:
+        """Let the program note what it asks about at a moment; before the first step `prev(e)` is what e is now."""
+        self._note(moment)
+        if begins and self._remembered:
+            self._note(moment, self._registers[self._remembered].copy())
+
+    def _note(self, start: Start, before: NDArray[np.int16] | None = None) -> None:
+        state = self._table.state
         own = [Key.PROGRAM, Key.POOL]
         key = start.key.copy()
         key[own] = state.keys[0, own]
@@ -153,6 +162,8 @@ class _Looker:
         self._registers[:] = start.registers[: len(self._registers)]
         state.boards[0] = start.board[: state.boards.shape[1]]
         self._registers[Register.ENDED], self._registers[Register.OUTCOME] = 0, -1
+        if before is not None:
+            self._registers[self._remembered] = before
         self._table.batch.step(Task.STEP_ONLY)
 
     def is_set(self, name: RegisterName) -> bool:

@@ -602,7 +602,9 @@ class Scenario(Model):
         (), description="properties that `socialai check` verifies; playing never reads them"
     )
     probes: dict[Word, Probe] = Field(
-        default_factory=dict, description="name: a question to language models; playing never reads them"
+        default_factory=dict,
+        max_length=64,
+        description="name: a question to language models; playing never reads them",
     )
 
     def members(self) -> dict[str, CastMember]:

@@ -480,7 +480,7 @@ class _Run:
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)
         room = room_plan(resolver)
         claimed = tuple(properties(resolver, outcomes, drawn))
-        asked = tuple(probes(resolver))
+        asked = probes(resolver)
         if findings.bag.has_errors:
             return None
         for plan in plans:

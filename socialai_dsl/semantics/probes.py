@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Final
 
+from socialai_dsl.grammar.ast import every
 from socialai_dsl.schema.scenario import Expression, Probe
 from socialai_dsl.semantics.groups import values_of
 from socialai_dsl.semantics.plans import Drawn, ProbePlan
@@ -17,17 +18,36 @@ from socialai_dsl.vocabulary import TRUTHS, normal
 
 _MOST: Final = 64
 """So many possible answers need not be written out."""
+_MOST_VALUES: Final = 1_000
+"""So many values the texts of all probes may have."""
 _LARGEST: Final = 32767
 _KNOWN_BEFOREHAND: Final = "what is known beforehand tells nothing of who is asked"
 
 Text = tuple[str | Drawn, ...]
 
 
-def probes(resolver: Resolver) -> Iterator[ProbePlan]:
+def probes(resolver: Resolver) -> tuple[ProbePlan, ...]:
     """The entries in the order written; those with a mistake are left out once it has been reported."""
+    remembered = resolver.registers.remembered
+    known = len(remembered)
+    try:
+        return tuple(_plans(resolver))
+    finally:
+        del remembered[
+            known:
+        ]  # what only probes ask about the step before is no part of the scenario's program
+
+
+def _plans(resolver: Resolver) -> Iterator[ProbePlan]:
+    left = _MOST_VALUES
     for name, entry in resolver.symbols.scenario.probes.items():
         with surviving():
-            yield _Entry(resolver, name, entry).plan()
+            plan = _Entry(resolver, name, entry).plan()
+            left -= len(list(every(Drawn, (plan.ask, plan.answer, plan.answers))))
+            if left < 0:
+                message = f"the probes of a scenario have at most {_MOST_VALUES} values in their texts"
+                raise resolver.findings.fail("S106", message, plan.span)
+            yield plan
 
 
 class _Entry:
@@ -41,15 +61,12 @@ class _Entry:
 
     def plan(self) -> ProbePlan:
         """The entry with everything resolved."""
-        remembered = self._resolver.registers.remembered
-        known = len(remembered)
-        try:
-            when, ask, answer, answers = self._parts()
-            terms = [sited.term for sited in (*([when] if when else []), *(v.value for v in self._values))]
-            used = {part.path for term in terms for part in walk(term) if hasattr(part, "path")}
-            own = tuple(item for item in remembered if item.path in used)
-        finally:
-            del remembered[known:]
+        when, ask, answer, answers = self._parts()
+        terms = [
+            sited.term for sited in (*([when] if when else []), *(value.value for value in self._values))
+        ]
+        used = {part.path for term in terms for part in walk(term) if hasattr(part, "path")}
+        own = tuple(item for item in self._resolver.registers.remembered if item.path in used)
         span = self._findings.places.key_span(self._path)
         return ProbePlan(self._name, span, when, ask, answer, answers, own)
 
@@ -125,7 +142,7 @@ class _Entry:
         term = answer.value.term
         if answer.type.kind == "bool":
             return [TRUTHS[value] for value in sorted(values_of(self._resolver, term), reverse=True)]
-        if answer.type.size > _LARGEST:
+        if answer.type.size > _MOST_VALUES:
             return None
         values = sorted(values_of(self._resolver, term))
         return list(dict.fromkeys(spoken(term.type, v) for v in values)) if len(values) <= _MOST else None

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from socialai_dsl.grammar import ast
 from tests.reference import bodies, chance, geometry, motion, rules, speech
 from tests.reference.effects import remember
 from tests.reference.evaluate import Context, NothingFoundError, evaluate, holds
@@ -292,7 +291,7 @@ class Reference:
 
     # -- questions -----------------------------------------------------------------------------------------
 
-    def probed(self, ended: bool) -> dict[str, tuple[str, list[str], str]]:
+    def probed(self, ended: bool) -> dict[str, tuple[str, list[str], str | None]]:
         """Of each probe whose moment is now, be it the first or not: question, written answers, right answer."""
         found = {}
         for name, probe in self.scenario.probes.items():
@@ -311,14 +310,12 @@ class Reference:
     def _probe_holds(self, name: str, key: str, source: Any) -> bool:
         return holds(self.sources.expression(f"probes.{name}.{key}", source), Context(self.world))
 
-    def _as_answer(self, value: Value) -> str:
-        """A value as a text, yes or no; a condition in which nothing is found is false."""
+    def _as_answer(self, value: Value) -> str | None:
+        """A value as a text, yes or no; None if nothing is found: no, if it is a condition, else it is not asked."""
         try:
             found = evaluate(value, Context(self.world))
         except NothingFoundError:
-            if not isinstance(value.tree, ast.Compare | ast.Logic | ast.Not | ast.Member):
-                raise
-            return "no"
+            return None
         return ("yes" if found else "no") if isinstance(found, bool) else str(found)
 
     def scripted_action(self) -> Action:

@@ -81,3 +81,11 @@ def test_a_draw_that_only_a_probe_uses_is_used(examine):
         codes(examine(let={"other": "pick(doors)"}, probes={"asked": {**DOOR, "answer": "other.color"}}))
         == []
     )
+
+
+def test_how_much_can_be_asked_is_bounded(examine):
+    asked = {"ask": "<W><W><W><W><W><W><W><W><W><W>" * 8, "answer": "exit.color"}
+    assert codes(examine(probes={f"q{k}": asked for k in range(12)})) == []
+    assert codes(examine(probes={f"q{k}": asked for k in range(13)})) == ["S106"]
+    assert codes(examine(probes={f"q{k}": DOOR for k in range(64)})) == []
+    assert codes(examine(probes={f"q{k}": DOOR for k in range(65)})) == ["S106"]
