@@ -172,31 +172,13 @@ class DiagnosticBag:
         """Add several findings."""
         self._found.update(dict.fromkeys(diagnostics))
 
-    def error(
-        self,
-        code: str,
-        message: str,
-        span: Span,
-        *,
-        hint: str | None = None,
-        suggestion: str | None = None,
-        suggestion_place: str | None = None,
-    ) -> None:
-        """Add an error."""
-        self.add(Diagnostic(code, message, span, Severity.ERROR, hint, suggestion, suggestion_place))
+    def error(self, code: str, message: str, span: Span, **more: str | None) -> None:
+        """Add an error; `more` has the hint and suggestion of the `Diagnostic`."""
+        self.add(Diagnostic(code, message, span, Severity.ERROR, **more))
 
-    def warning(
-        self,
-        code: str,
-        message: str,
-        span: Span,
-        *,
-        hint: str | None = None,
-        suggestion: str | None = None,
-        suggestion_place: str | None = None,
-    ) -> None:
-        """Add a warning."""
-        self.add(Diagnostic(code, message, span, Severity.WARNING, hint, suggestion, suggestion_place))
+    def warning(self, code: str, message: str, span: Span, **more: str | None) -> None:
+        """Add a warning; `more` as for an error."""
+        self.add(Diagnostic(code, message, span, Severity.WARNING, **more))
 
     @property
     def has_errors(self) -> bool:

@@ -3,32 +3,38 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Final
 
-from socialai_dsl.checking import (
-    Loaded,
-    LoadedExperiment,
-    LoadedScenario,
-    LoadedSuite,
-    check_experiment,
+from socialai_dsl.checking.experiments import LoadedExperiment, check_experiment
+from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
+from socialai_dsl.checking.scenarios import (
     check_library,
     check_npc,
     check_scenario,
-    check_suite,
     naming_the_patch,
     of_other_values,
-    said_once,
-    sift,
-    swallowed,
 )
-from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity, bounded_suggestions
-from socialai_dsl.loader import Resolved, resolve
-from socialai_dsl.loader.files import display_name
-from socialai_dsl.schema import Scenario
-from socialai_dsl.semantics.plans import Checked
-from socialai_dsl.source import Source, Span
+from socialai_dsl.checking.suites import check_suite
+from socialai_dsl.diagnostics import (
+    CODES,
+    Diagnostic,
+    DiagnosticBag,
+    ScenarioError,
+    Severity,
+    bounded_suggestions,
+    did_you_mean,
+)
+from socialai_dsl.loader.comments import comments_of
+from socialai_dsl.loader.offsets import Style
+from socialai_dsl.loader.reader import Data, display_name, read_document
+from socialai_dsl.loader.resolved import ResolvedFile, resolve
+from socialai_dsl.schema.scenario import Scenario
+from socialai_dsl.semantics.plans import CheckedScenario
+from socialai_dsl.source import DataPath, Source, Span
 
 __all__ = [
     "CheckResult",
@@ -41,6 +47,179 @@ __all__ = [
     "load",
     "load_experiment",
 ]
+
+UNUSED: Final = "W008"
+
+_IGNORE: Final = re.compile(r"#\s*socialai:\s*ignore\b(?:\s*=\s*(?P<codes>[^\s,]+(?:\s*,\s*[^\s,]+)*))?")
+"""Codes are divided by commas; what follows them is a reason for people."""
+
+_CODE: Final = re.compile(r"[^\s,]+")
+_WARNINGS: Final = [code for code in CODES if code.startswith("W") and code != UNUSED]
+
+
+@dataclass(frozen=True)
+class Ignore:
+    """One code that a comment names, and where."""
+
+    code: str
+    span: Span
+
+    @property
+    def key(self) -> tuple[str, int, str]:
+        """What tells which warnings it ignores."""
+        return self.span.file, self.span.line, self.code
+
+
+@dataclass(frozen=True)
+class Sifted:
+    """Findings, divided by what comments say.
+
+    Attributes:
+        kept: what is left, with what is wrong with the comments.
+        used: the places of the codes in comments that silenced a warning.
+    """
+
+    kept: tuple[Diagnostic, ...]
+    used: frozenset[Span]
+
+
+def sift(found: Iterable[Diagnostic], sources: Mapping[str, Source], judged: str | None) -> Sifted:
+    """Take out the warnings that comments ignore.
+
+    Args:
+        found: the findings of one scenario.
+        sources: the files they may point into.
+        judged: the file whose comments have to silence something; None if the warnings are not all known, as of a
+            file with mistakes or one that others build on.
+    """
+    found = tuple(found)
+    ignores = [ignore for source in sources.values() for ignore in ignores_in(source)]
+    if not ignores:
+        return Sifted(found, frozenset())
+    warned = {_key(d) for d in found if d.severity is Severity.WARNING}
+    used = [i for i in ignores if i.code in _WARNINGS and i.key in warned]
+    silenced = {ignore.key for ignore in used}
+    bag = DiagnosticBag(d for d in found if _key(d) not in silenced)
+    for ignore in ignores:
+        if ignore.code not in _WARNINGS:
+            bag.add(_no_warning(ignore))
+        elif ignore.span.file == judged and ignore not in used:
+            message = f"nothing on this line is warned of with `{ignore.code}`; delete the comment"
+            bag.warning(UNUSED, message, ignore.span)
+    return Sifted(tuple(bag), frozenset(ignore.span for ignore in used))
+
+
+def ignores_in(source: Source) -> Iterator[Ignore]:
+    """The codes that a file's comments ignore; none if the file is no YAML."""
+    if _IGNORE.search(source.text) is None:
+        return
+    try:
+        document = read_document(source)
+    except ScenarioError:
+        return
+    for comment in comments_of(document):
+        match = _IGNORE.match(comment.text)
+        if match is None:
+            continue
+        if match["codes"] is None:
+            yield Ignore("", comment.span)
+            continue
+        for code in _CODE.finditer(comment.text, match.start("codes"), match.end("codes")):
+            yield Ignore(code.group(), comment.span.shifted(code.start(), len(code.group())))
+
+
+def _key(finding: Diagnostic) -> tuple[str, int, str]:
+    return finding.span.file, finding.span.line, finding.code
+
+
+def _no_warning(ignore: Ignore) -> Diagnostic:
+    """The finding for a code that cannot be ignored."""
+    hint = "a comment ignores the warnings it names: `# socialai: ignore=" + ", ".join(_WARNINGS[:2]) + "`"
+    near = None
+    if not ignore.code:
+        message = "this comment names no warning to ignore"
+    elif ignore.code in CODES and ignore.code != UNUSED:
+        message = f"`{ignore.code}` is an error, and only warnings can be ignored"
+    elif ignore.code == UNUSED:
+        message = f"`{UNUSED}` cannot be ignored: delete the comment it points at"
+    else:
+        near = did_you_mean(ignore.code, _WARNINGS)
+        message = f"there is no warning `{ignore.code}`"
+    return Diagnostic(UNUSED, message, ignore.span, Severity.WARNING, hint if near is None else None, near)
+
+
+_OF_ONE_NAME: Final = frozenset({"S201", "S206", "S301", "S401"})
+"""What is wrong with a name or an utterance, wherever it is used."""
+
+
+_WORD: Final = re.compile(r"`[^`]+`")
+
+
+def said_once(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
+    """The findings, with what is unknown in many places shown at the first: mostly its declaration has the slip."""
+    everything = list(found)
+    alike: dict[tuple[str, ...], list[Diagnostic]] = {}
+    for d in everything:
+        alike.setdefault(_cause(d), []).append(d)
+    for d in everything:
+        first, *others = alike[_cause(d)]
+        if d.code not in _OF_ONE_NAME or not others:
+            yield d
+        elif d is first:
+            yield replace(d, hint="; ".join(filter(None, (d.hint, _repeated(d, others)))))
+
+
+def _cause(found: Diagnostic) -> tuple[str, ...]:
+    """What findings of one mistake have in common: an unknown name is one, whatever it was to stand for."""
+    word = _WORD.search(found.message)
+    if found.code == "S201" and found.suggestion is not None and word is not None:
+        return found.code, word[0], found.suggestion
+    return found.code, found.text
+
+
+def _repeated(first: Diagnostic, others: Sequence[Diagnostic]) -> str:
+    """Where else it is: lines of the same file, and other files."""
+    lines = sorted({d.span.line for d in others if d.span.file == first.span.file} - {first.span.line})
+    files = sorted({d.span.file for d in others} - {first.span.file})
+    where = ([f"line{'s' if len(lines) > 1 else ''} {', '.join(map(str, lines))}"] if lines else []) + files
+    return f"the same is in {' and in '.join(where)}" if where else "the same is in this line once more"
+
+
+_SPOKEN: Final = frozenset({"say", "hears", "templates", "nouns", "name"})
+_GLUED: Final = re.compile(r"[ \t]+(#\w\S*)")
+"""A comment whose text begins without a blank, as in `#1`."""
+
+
+def swallowed(resolved: ResolvedFile) -> Iterator[Diagnostic]:
+    """A warning for each text that is written without quotes and seems to go on behind a `#`."""
+    for path, text in _texts(resolved.data, ()):
+        node = resolved.node_span(path)
+        document, _ = resolved.find(path)
+        comment = _GLUED.match(document.source.text, node.end) if node.style is Style.PLAIN else None
+        if comment is None:
+            continue
+        width = len(comment[1])
+        place = Span(
+            node.value.file, node.value.line, node.value.column + comment.start(1) - node.start, width
+        )
+        message = f"`{comment[1]}` is a comment, so the text is only `{text}`"
+        hint = f'write "{text} {comment[1]}" if it belongs to the text, else a blank behind the `#`'
+        yield Diagnostic("W009", message, place, Severity.WARNING, hint)
+
+
+def _texts(part: Data, path: DataPath) -> Iterator[tuple[DataPath, str]]:
+    """What is said, heard or called, with its place."""
+    if isinstance(part, dict):
+        for key, value in part.items():
+            yield from _texts(value, (*path, key))
+    elif isinstance(part, list):
+        for i, value in enumerate(part):
+            yield from _texts(value, (*path, i))
+    elif isinstance(part, str):
+        key = next((step for step in reversed(path) if isinstance(step, str)), "")
+        if key in _SPOKEN or "with" in path[-2:-1]:
+            yield path, part
+
 
 SUFFIXES = (".yaml", ".yml")
 
@@ -61,11 +240,11 @@ class CheckResult:
     """
 
     name: str
-    checked: Checked | None
+    checked: CheckedScenario | None
     scenario: Scenario | None
     diagnostics: tuple[Diagnostic, ...]
     sources: dict[str, Source]
-    resolved: Resolved | None
+    resolved: ResolvedFile | None
     suite: LoadedSuite | None = None
     used: frozenset[Span] = frozenset()
     experiment: LoadedExperiment | None = None
@@ -202,7 +381,7 @@ def _files(path: Path) -> list[str]:
     return sorted(str(file) for file in path.rglob("*") if file.suffix in SUFFIXES and file.is_file())
 
 
-def _checked(resolved: Resolved, bag: DiagnosticBag) -> tuple[Checked | None, Scenario | None]:
+def _checked(resolved: ResolvedFile, bag: DiagnosticBag) -> tuple[CheckedScenario | None, Scenario | None]:
     """A file that is no suite; only a scenario has a meaning of its own."""
     match resolved.kind:
         case "scenario":

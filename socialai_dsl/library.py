@@ -8,9 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from socialai_dsl.loader import read_document
-from socialai_dsl.schema import UtteranceGrammar
-from socialai_dsl.schema.base import Model, Word
+from socialai_dsl.loader.reader import read_document
+from socialai_dsl.schema.scenario import Model, UtteranceGrammar, Word
 from socialai_dsl.semantics.entities import Prelude
 from socialai_dsl.semantics.terms import COLOR, ObjectType
 

@@ -1,4 +1,4 @@
-"""Text with a name, and places in it."""
+"""Text with a name, places in it, and where the parts of a document stand."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Protocol, TypeAlias
 
 _LINE_BREAK = re.compile(r"\r\n|\n|\r")
 
@@ -53,3 +54,23 @@ class Source:
     def span(self, line: int, column: int, width: int = 1) -> Span:
         """A place in this source."""
         return Span(self.name, line, column, width)
+
+
+DataPath: TypeAlias = tuple[str | int, ...]
+"""Keys and list indices from the root of a document to one of its parts; () is the root."""
+
+
+class Positions(Protocol):
+    """Path -> place; what does not exist is where its nearest ancestor is."""
+
+    def locate(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
+        """The place of the character `offset` (from 0) of the text at `path`."""
+
+    def value_span(self, path: DataPath) -> Span:
+        """The place of the value at `path`."""
+
+    def key_span(self, path: DataPath) -> Span:
+        """The place of the key at `path`; of the value, for an item of a list."""
+
+    def in_flow(self, path: DataPath) -> bool:
+        """Whether the part at `path` stands inside { } or [ ]."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from socialai_dsl.compiler import compile_scenario
+from socialai_dsl.compilation import compile_scenario
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.envs.asking import Asker
 from socialai_dsl.frontend import LoadedScenario, load

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.loader import resolve, shipped_names
+from socialai_dsl.loader.resolved import resolve, shipped_names
 from tests.agreement import agree
 
 SAMPLES = sorted(str(path) for path in (Path(__file__).parent / "data" / "agreement").glob("*.yaml"))

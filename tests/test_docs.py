@@ -16,8 +16,8 @@ from socialai_dsl.cli import main
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, ObjectTypeModel, prelude, shared_grammars
 from socialai_dsl.program import Field, Flag, FrameColumn, Header, Op, TypeColumn
 from socialai_dsl.schema.annotations import CALLED, keys_of
-from socialai_dsl.schema.behaviour import SlotType
 from socialai_dsl.schema.experiment import Experiment
+from socialai_dsl.schema.scenario import SlotType
 from socialai_dsl.semantics.signatures import SIGNATURES, WORDS
 from socialai_dsl.vocabulary import COLORS, DIRECTIONS, PRIMITIVES
 from tests.tiny import Folder

@@ -18,9 +18,9 @@ import socialai_dsl
 from socialai_dsl.cli.main import main
 from socialai_dsl.cli.reporters import REPORTERS
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.engine.errors import RoomError
+from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.frontend import check
-from socialai_dsl.grammar.parser import ParseProblem, parse_expression
+from socialai_dsl.grammar.ast import ParseProblem, parse_expression
 from socialai_dsl.loader.reader import read_document
 from socialai_dsl.source import Source
 from tests.fuzzing.targets import in_time

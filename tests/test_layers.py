@@ -16,13 +16,11 @@ TEXT_SIDE = {
     "diagnostics",
     "draws",
     "vocabulary",
-    "trees",
     "grammar",
     "schema",
     "semantics",
     "loader",
     "library",
-    "parameters",
     "checking",
     "frontend",
 }
@@ -40,23 +38,21 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "diagnostics": ({"source"}, set()),
     "draws": (set(), {"numpy", "numba"}),
     "vocabulary": (set(), set()),
-    "trees": (set(), set()),
-    "grammar": ({"source", "diagnostics", "vocabulary", "trees"}, {"lark"}),
+    "grammar": ({"source", "diagnostics", "vocabulary"}, {"lark"}),
     "schema": ({"source", "diagnostics", "vocabulary", "grammar"}, {"pydantic", "pydantic_core", CONFIG}),
-    "semantics": ({"source", "diagnostics", "draws", "vocabulary", "trees", "grammar", "schema"}, set()),
+    "semantics": ({"source", "diagnostics", "draws", "vocabulary", "grammar", "schema"}, set()),
     "loader": (
-        TEXT_SIDE - {"frontend", "checking", "library", "parameters"},
+        TEXT_SIDE - {"frontend", "checking", "library"},
         {"yaml", "pydantic", "pydantic_core"},
     ),
-    "library": (TEXT_SIDE - {"frontend", "checking", "parameters"}, {"pydantic"}),
-    "parameters": (TEXT_SIDE - {"frontend", "checking", "library"}, set()),
+    "library": (TEXT_SIDE - {"frontend", "checking"}, {"pydantic"}),
     "checking": (TEXT_SIDE - {"frontend"}, {SHIPPED}),
     "frontend": (TEXT_SIDE, set()),
     "authoring": (TEXT_SIDE, {"pydantic", "yaml", "pygls", "lsprotocol"}),
     "program": ({"source", "vocabulary"}, {"numpy"}),
     "program_suite": ({"program"}, set()),
     "compiler": (
-        TEXT_SIDE - {"loader", "library", "parameters", "checking", "frontend"} | {"program"},
+        TEXT_SIDE - {"loader", "library", "checking", "frontend"} | {"program"},
         {"numpy"},
     ),
     "compilation": (TEXT_SIDE - {"frontend"} | {"program", "program_suite", "compiler"}, set()),
@@ -222,3 +218,29 @@ def test_checking_a_file_loads_nothing_heavy(statement: str) -> None:
         [sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT, timeout=60
     )
     assert result.stdout.strip() == "[]"
+
+
+def test_a_scenario_goes_through_forty_files_at_most() -> None:
+    """From its file to its program: those of which a function is called, so that a reader can follow the way."""
+    script = """
+import sys
+from pathlib import Path
+from socialai_dsl.compilation import compile_loaded
+from socialai_dsl.frontend import load
+root, called = str(Path("socialai_dsl").resolve()), set()
+def note(frame, event, _):
+    if event == "call" and frame.f_code.co_filename.startswith(root):
+        called.add(frame.f_code.co_filename)
+sys.setprofile(note)
+compile_loaded(load("talkitout"))
+sys.setprofile(None)
+print(*sorted(called), sep="\\n")
+"""
+    result = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT, timeout=60
+    )
+    files = result.stdout.split()
+    assert files, "nothing was called"
+    assert len(files) <= 40, result.stdout
+    lengths = {file: len(Path(file).read_text(encoding="utf-8").splitlines()) for file in files}
+    assert max(lengths.values()) <= 770, max(lengths, key=lambda file: lengths[file])

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from socialai_dsl.compiler import compile_scenario
+from socialai_dsl.compilation import compile_scenario
 from socialai_dsl.frontend import load
 from socialai_dsl.program import FrameColumn, Header, Program
 from socialai_dsl.semantics import plans, terms
-from socialai_dsl.semantics.plans import Checked, FramePlan, RulePlan
+from socialai_dsl.semantics.plans import CheckedScenario, FramePlan, RulePlan
 from tests.agreement import Disagreement, Pair, agree
 from tests.reference import bodies
 from tests.reference.interpreter import Action, Reference, Result
@@ -29,7 +29,7 @@ WALKERS = str(SAMPLES / "walkers.yaml")
 PERILS = str(SAMPLES / "perils.yaml")
 EPISODES = 60
 
-Change = Callable[[Checked], Checked]
+Change = Callable[[CheckedScenario], CheckedScenario]
 
 
 def in_frames(change: Callable[[FramePlan], FramePlan]) -> Change:
@@ -78,11 +78,11 @@ def no_time_for_goto_now(rule: RulePlan) -> RulePlan:
     return replace(rule, goto=rule.goto_now, goto_now=None) if rule.goto_now else rule
 
 
-def everything_is_success(checked: Checked) -> Checked:
+def everything_is_success(checked: CheckedScenario) -> CheckedScenario:
     return replace(checked, outcomes=checked.outcomes[::-1])
 
 
-def farther(checked: Checked) -> Checked:
+def farther(checked: CheckedScenario) -> CheckedScenario:
     return replace(checked, entities=tuple(replace(e, near=e.near, far=e.far + 1) for e in checked.entities))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
-from socialai_dsl.compiler.intervals import Ranges
+from socialai_dsl.compiler.instruction_checks import Ranges
 from socialai_dsl.envs.asking import Asker
 from socialai_dsl.envs.audit import first_unsound
 from socialai_dsl.frontend import load

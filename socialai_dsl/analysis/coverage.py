@@ -13,12 +13,12 @@ from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.search import Search
 from socialai_dsl.analysis.search import Verdict as Searched
 from socialai_dsl.analysis.twins import random_actions
-from socialai_dsl.checking import LoadedScenario
+from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Program, Register
-from socialai_dsl.semantics.plans import Checked
+from socialai_dsl.semantics.plans import CheckedScenario
 from socialai_dsl.source import Span
 
 _STEPS: Final = 200
@@ -99,7 +99,7 @@ _Key = tuple[str, int] | str
 """What tells that a part has happened: a register of a frame with the number of the state, or a counter."""
 
 
-def _parts(checked: Checked) -> Iterator[tuple[_Key, Part]]:
+def _parts(checked: CheckedScenario) -> Iterator[tuple[_Key, Part]]:
     for frame in checked.frames:
         for number, step in enumerate(frame.steps):
             if step.duration != 0:  # else it is left out

@@ -9,7 +9,7 @@ from socialai_dsl.analysis.alone import Alone, success_alone
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.properties import Trial
 from socialai_dsl.analysis.search import Finding, Verdict
-from socialai_dsl.checking import LoadedScenario
+from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 
-from socialai_dsl.semantics.plans import Activity, Checked, FramePlan, RulePlan, StatePlan, StepPlan
+from socialai_dsl.semantics.plans import Activity, CheckedScenario, FramePlan, RulePlan, StatePlan, StepPlan
 
 
-def muted(checked: Checked, members: Collection[str]) -> Checked:
+def muted(checked: CheckedScenario, members: Collection[str]) -> CheckedScenario:
     """The scenario without anything these members do, say or cause.
 
     They stand where they would stand at the start. Their frames go on through their states and keep their registers,

@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.analysis.twins import pairs_alike
-from socialai_dsl.checking import LoadedScenario
+from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Program, Register
-from socialai_dsl.semantics.build import walk
-from socialai_dsl.semantics.plans import Checked, Placing
-from socialai_dsl.semantics.terms import Quantified
+from socialai_dsl.semantics.plans import CheckedScenario, Placing
+from socialai_dsl.semantics.terms import Quantified, walk
 
 _HAPPENING: Final = ("t", "memory", "last", "heard", "pending")
 _ATTEMPTS: Final = 4
@@ -214,7 +213,7 @@ def _parts_of(name: str, where: Path, entity: Mapping[str, Any]) -> list[_Part]:
     return [_Part(f"{name}.{said}", where, own) for said, own in keys if any(key in entity for key in own)]
 
 
-def _pairs(program: Program, checked: Checked, rooms: int, seed: int) -> Iterator[_Pair]:
+def _pairs(program: Program, checked: CheckedScenario, rooms: int, seed: int) -> Iterator[_Pair]:
     """For each room and each draw a twin, where the draw has another value that is possible."""
     table = Table([program], 1, 1)
     drawn = [room for k in range(rooms) if (room := _redrawn(table, seed, k, {})) is not None]
@@ -268,7 +267,7 @@ def _kept(described: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in described.items() if key not in _HAPPENING}
 
 
-def _order_of_places(checked: Checked) -> list[Path]:
+def _order_of_places(checked: CheckedScenario) -> list[Path]:
     """Where each entity stands in a layout, in the order in which they are put down."""
     entities = [checked.entities[item.entity] for item in checked.setup if isinstance(item, Placing)]
     return [(one.key,) if one.index is None else (one.key, one.index) for one in entities]
@@ -302,7 +301,7 @@ def _only(value: Mapping[str, Any]) -> Any:
     return next(iter(value.values())) if len(value) == 1 else dict(value)
 
 
-def _draws_itself(checked: Checked) -> bool:
+def _draws_itself(checked: CheckedScenario) -> bool:
     """Whether the script itself draws something, which then also differs when later draws do."""
     for frame in checked.frames:
         rules = [rule for state in frame.states for rule in (*state.first, *state.then)]

@@ -23,16 +23,23 @@ from socialai_dsl.analysis.perceiving import perceived
 from socialai_dsl.analysis.rooms import Rooms, name_of, wins_of
 from socialai_dsl.analysis.search import Finding, Search
 from socialai_dsl.analysis.search import Verdict as Searched
-from socialai_dsl.analysis.tellers import SOMEBODY, Tellers
-from socialai_dsl.analysis.twins import Compared, Script, Twins, alike, layouts, random_actions
-from socialai_dsl.checking import LoadedScenario
+from socialai_dsl.analysis.twins import (
+    SOMEBODY,
+    Compared,
+    Script,
+    Tellers,
+    Twins,
+    alike,
+    layouts,
+    random_actions,
+)
+from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Program, Register
-from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.plans import OutcomePlan, PropertyPlan
-from socialai_dsl.semantics.terms import Const, InState, SaidBy
+from socialai_dsl.semantics.terms import Const, InState, SaidBy, walk
 from socialai_dsl.source import Span
 
 _HOLDS: Final = "the property holds"

@@ -10,9 +10,8 @@ from typing import Final
 from socialai_dsl.draws import GOLDEN, mix
 from socialai_dsl.draws import site as number_of
 from socialai_dsl.program import Header, Program
-from socialai_dsl.semantics.build import walk
-from socialai_dsl.semantics.plans import Checked, Coloring, Drawn, Facing, Placing
-from socialai_dsl.semantics.terms import Chance, Quantified, Sited
+from socialai_dsl.semantics.plans import CheckedScenario, Coloring, Drawn, Facing, Placing
+from socialai_dsl.semantics.terms import Chance, Quantified, Sited, walk
 
 _SITE_MASK: Final = (1 << 31) - 1
 
@@ -41,13 +40,13 @@ def sites_of(program: Program) -> list[Site]:
     return [(number, member) for number, member in program.table(Header.SITE_AT).tolist()]
 
 
-def names_of_sites(checked: Checked, program: Program) -> dict[Site, str | None]:
+def names_of_sites(checked: CheckedScenario, program: Program) -> dict[Site, str | None]:
     """What is drawn at each site, in words: "`exit`"; None for what is not drawn at reset."""
     paths = {number_of(path): path for path in _paths(checked)}
     return {site: _said(paths[site[0]]) if site[0] in paths else None for site in sites_of(program)}
 
 
-def _paths(checked: Checked) -> Iterator[str]:
+def _paths(checked: CheckedScenario) -> Iterator[str]:
     """The sites of what a reset draws."""
     yield from ("room.width", "room.height")
     for item in checked.setup:

@@ -13,8 +13,8 @@ from socialai_dsl.analysis.search import Finding, Search, Verdict
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Field, Header, Program, Register
-from socialai_dsl.semantics.absence import asks_about_cells
-from socialai_dsl.semantics.plans import Checked, Placing
+from socialai_dsl.semantics.free_cells import asks_about_cells
+from socialai_dsl.semantics.plans import CheckedScenario, Placing
 
 Start = tuple[NDArray[np.int16], NDArray[np.uint32], NDArray[np.uint64]]
 """Registers, board and key of a room at its start."""
@@ -34,7 +34,7 @@ class Rooms:
         effort: which rooms, and how many states of each are searched.
     """
 
-    def __init__(self, checked: Checked, program: Program, effort: Effort) -> None:
+    def __init__(self, checked: CheckedScenario, program: Program, effort: Effort) -> None:
         self.checked, self.program = checked, program
         self._effort = effort
         self._table = Table([program], effort.rooms, 1)
@@ -96,7 +96,7 @@ class Rooms:
         return self._idle
 
 
-def name_of(checked: Checked, number: int) -> str:
+def name_of(checked: CheckedScenario, number: int) -> str:
     """What a scenario calls an entity: `people[0]`."""
     entity = checked.entities[number]
     return entity.key if entity.index is None else f"{entity.key}[{entity.index}]"

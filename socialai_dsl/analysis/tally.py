@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.vector_env import Observation, ScenarioVectorEnv
 from socialai_dsl.program import FrameColumn, Header, Program
-from socialai_dsl.semantics.plans import Checked, FramePlan
+from socialai_dsl.semantics.plans import CheckedScenario, FramePlan
 from socialai_dsl.source import Span
 
 
@@ -48,7 +48,7 @@ class Tally:
 
 def tally(
     envs: ScenarioVectorEnv,
-    scenarios: Sequence[Checked],
+    scenarios: Sequence[CheckedScenario],
     choose: Callable[[Observation], NDArray[np.int64]],
     begin: Callable[[NDArray[np.bool_], NDArray[np.int64]], None],
     episodes: int,
@@ -81,7 +81,7 @@ def tally(
     return watch.tally(episodes)
 
 
-def parts_of(checked: Checked) -> Iterator[Part]:
+def parts_of(checked: CheckedScenario) -> Iterator[Part]:
     """Everything in a scenario that can come about."""
     for frame in checked.frames:
         for number, step in enumerate(frame.steps):
@@ -111,7 +111,7 @@ def _rule(frame: FramePlan, rule: Any) -> Part:
 class _Watch:
     """Looks at the frames of environments while they are played, and at the engine's counters in the end."""
 
-    def __init__(self, envs: ScenarioVectorEnv, scenarios: Sequence[Checked]) -> None:
+    def __init__(self, envs: ScenarioVectorEnv, scenarios: Sequence[CheckedScenario]) -> None:
         self._table = envs._table
         self._programs = [
             _Frames(program, checked) for program, checked in zip(envs.programs, scenarios, strict=True)
@@ -156,7 +156,7 @@ class _Watch:
 class _Frames:
     """The frames of one program: which states they are in, and how often each was entered."""
 
-    def __init__(self, program: Program, checked: Checked) -> None:
+    def __init__(self, program: Program, checked: CheckedScenario) -> None:
         self.program, self.checked = program, checked
         table = program.table(Header.FRAME_AT)
         self._states = table[:, FrameColumn.STATE]

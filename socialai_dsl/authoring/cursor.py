@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.loader import Data, DataPath, Document, Style, read_document
-from socialai_dsl.source import Source, Span
+from socialai_dsl.loader.offsets import Style
+from socialai_dsl.loader.reader import Data, Document, read_document
+from socialai_dsl.source import DataPath, Source, Span
 
 _HERE: Final = "zzz_here_zzz"
 _WORD: Final = re.compile(r"\$?[A-Za-z_][A-Za-z0-9_]*")

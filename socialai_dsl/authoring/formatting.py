@@ -13,8 +13,8 @@ from typing import Any, Final
 
 import yaml
 
-from socialai_dsl.loader import Document, read_document
 from socialai_dsl.loader.comments import comments_of
+from socialai_dsl.loader.reader import Document, read_document
 from socialai_dsl.source import Source
 
 _INDENT: Final = 2

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
-from socialai_dsl.loader import Data, DataPath
+from socialai_dsl.loader.reader import Data
+from socialai_dsl.source import DataPath
 
 KINDS: Final = {
     "cast": "a member of the cast",

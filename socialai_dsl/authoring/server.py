@@ -16,8 +16,8 @@ from socialai_dsl import frontend
 from socialai_dsl.authoring import assist
 from socialai_dsl.authoring.formatting import formatted
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity
-from socialai_dsl.loader import Document, Resolved, read_document
-from socialai_dsl.loader.files import display_name
+from socialai_dsl.loader.reader import Document, display_name, read_document
+from socialai_dsl.loader.resolved import ResolvedFile
 from socialai_dsl.source import Source, Span
 
 _SEVERITIES: Final = {
@@ -38,7 +38,7 @@ class Server(LanguageServer):
 
     def __init__(self) -> None:
         super().__init__("socialai", version("socialai-dsl"))
-        self._resolved: dict[str, Resolved] = {}
+        self._resolved: dict[str, ResolvedFile] = {}
 
     # -- findings ----------------------------------------------------------------------------------------------
 
@@ -89,7 +89,7 @@ class Server(LanguageServer):
         except ScenarioError:
             return None
 
-    def resolved(self, uri: str) -> Resolved | None:
+    def resolved(self, uri: str) -> ResolvedFile | None:
         """The file with everything it builds on, as it last could be read."""
         return self._resolved.get(uri)
 

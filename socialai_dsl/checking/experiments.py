@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
-from socialai_dsl.loader import DataPath, Resolved
-from socialai_dsl.loader.files import display_name
-from socialai_dsl.loader.names import looks_like_path
+from socialai_dsl.loader.library import looks_like_path
+from socialai_dsl.loader.reader import display_name
+from socialai_dsl.loader.resolved import ResolvedFile
 from socialai_dsl.schema.experiment import AGENTS, NETS, Experiment
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.semantics.experiment import Cell, cells_of
+from socialai_dsl.source import DataPath
 from trainer.shipped import PREFIX, shipped_agents
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ class LoadedExperiment:
     """
 
     experiment: Experiment
-    resolved: Resolved
+    resolved: ResolvedFile
     cells: Mapping[str | None, tuple[Cell, ...]]
     played: Mapping[str, Loaded] = field(default_factory=dict)
 
@@ -70,7 +71,7 @@ def from_anywhere(name: str, folder: Path) -> str:
     return os.path.abspath(folder / base) + name[len(base) :]
 
 
-def check_experiment(resolved: Resolved, bag: DiagnosticBag) -> LoadedExperiment | None:
+def check_experiment(resolved: ResolvedFile, bag: DiagnosticBag) -> LoadedExperiment | None:
     """An experiment with those of its conditions that can be understood; None if there are none.
 
     `bag` takes the findings, after which the experiment serves only to check the rest of it.
@@ -94,7 +95,7 @@ def check_experiment(resolved: Resolved, bag: DiagnosticBag) -> LoadedExperiment
     return LoadedExperiment(experiment, resolved, cells)
 
 
-def _check_agents(cells: Sequence[Cell], resolved: Resolved, bag: DiagnosticBag) -> None:
+def _check_agents(cells: Sequence[Cell], resolved: ResolvedFile, bag: DiagnosticBag) -> None:
     shipped = [PREFIX + name for name in shipped_agents()]
     for cell in cells:
         if cell.agent in (*AGENTS, *shipped) or (resolved.path.parent / cell.agent).exists():
@@ -114,7 +115,7 @@ _NAMES: Final = {"net": NETS, "bonus": ("none", "auto", "lang", "cell"), "guide"
 """Options that name something shipped, or a class of the user's as `mine:Class`."""
 
 
-def _check_names(cells: Sequence[Cell], resolved: Resolved, bag: DiagnosticBag) -> None:
+def _check_names(cells: Sequence[Cell], resolved: ResolvedFile, bag: DiagnosticBag) -> None:
     for cell in cells:
         for option, shipped in _NAMES.items():
             name = cell.options.get(option, shipped[0])

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from socialai_dsl.diagnostics import Diagnostic
-from socialai_dsl.loader import DataPath, Resolved
-from socialai_dsl.schema import Scenario
+from socialai_dsl.loader.resolved import ResolvedFile
+from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.schema.suite import Suite
-from socialai_dsl.semantics.plans import Checked
+from socialai_dsl.semantics.plans import CheckedScenario
 from socialai_dsl.semantics.suite import SharedSpace
+from socialai_dsl.source import DataPath
 
 
 @dataclass(frozen=True)
@@ -25,9 +26,9 @@ class LoadedScenario:
     """
 
     name: str
-    checked: Checked
+    checked: CheckedScenario
     scenario: Scenario
-    resolved: Resolved
+    resolved: ResolvedFile
     warnings: tuple[Diagnostic, ...] = ()
 
     def __repr__(self) -> str:
@@ -71,7 +72,7 @@ class LoadedSuite:
     in_sequence: bool
     space: SharedSpace
     suite: Suite
-    resolved: Resolved
+    resolved: ResolvedFile
     warnings: tuple[Diagnostic, ...] = ()
 
     def __repr__(self) -> str:

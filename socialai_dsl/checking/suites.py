@@ -9,15 +9,14 @@ from math import gcd, lcm
 from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite, Start
 from socialai_dsl.checking.scenarios import Draft, draft_of, meaning_of, naming_the_patch
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
-from socialai_dsl.loader import Member, Resolved
-from socialai_dsl.loader.leaves import NODE_KEYS, parameters_of
-from socialai_dsl.loader.members import check_splits, members_of
+from socialai_dsl.loader.members import NODE_KEYS, Member, check_splits, members_of, parameters_of
+from socialai_dsl.loader.resolved import ResolvedFile
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.schema.suite import Entry, Split, Suite
 from socialai_dsl.semantics.suite import shared_actions, shared_space
 
 
-def check_suite(resolved: Resolved, bag: DiagnosticBag) -> LoadedSuite | None:
+def check_suite(resolved: ResolvedFile, bag: DiagnosticBag) -> LoadedSuite | None:
     """A suite with its members; None if something is wrong with it or with one of them. `bag` takes the findings."""
     own = DiagnosticBag()
     suite = _right_shape(resolved, own)
@@ -46,7 +45,7 @@ def check_suite(resolved: Resolved, bag: DiagnosticBag) -> LoadedSuite | None:
     return replace(made, warnings=tuple(bag)) if made is not None else None
 
 
-def _right_shape(resolved: Resolved, own: DiagnosticBag) -> Suite | None:
+def _right_shape(resolved: ResolvedFile, own: DiagnosticBag) -> Suite | None:
     """The suite's models; None if the members cannot be looked at."""
     if not _has_parameters(resolved, own):
         return None
@@ -59,7 +58,7 @@ def _right_shape(resolved: Resolved, own: DiagnosticBag) -> Suite | None:
     return shaped.model
 
 
-def _has_parameters(resolved: Resolved, own: DiagnosticBag) -> bool:
+def _has_parameters(resolved: ResolvedFile, own: DiagnosticBag) -> bool:
     """Whether every other key of a tree has values, so that it can be a parameter."""
     tree = resolved.data.get("tree") if isinstance(resolved.data, dict) else None
     wrong = [
@@ -73,7 +72,7 @@ def _has_parameters(resolved: Resolved, own: DiagnosticBag) -> bool:
     return not wrong
 
 
-def _is_of_one_kind(suite: Suite, resolved: Resolved, bag: DiagnosticBag) -> bool:
+def _is_of_one_kind(suite: Suite, resolved: ResolvedFile, bag: DiagnosticBag) -> bool:
     """Whether a suite has members (with or without a sweep over them) or a tree; `bag` says what is too much."""
     own = DiagnosticBag()
     if suite.members is None and suite.sweep is None and suite.tree is None:
@@ -90,7 +89,7 @@ def _is_of_one_kind(suite: Suite, resolved: Resolved, bag: DiagnosticBag) -> boo
     return not own.has_errors
 
 
-def _check_acts(suite: Suite, resolved: Resolved, own: DiagnosticBag) -> None:
+def _check_acts(suite: Suite, resolved: ResolvedFile, own: DiagnosticBag) -> None:
     """Acts are listed, and begin where the act before them ends."""
     for word in ("tree", "sweep"):
         if getattr(suite, word) is not None:
@@ -109,7 +108,7 @@ def _weights(members: Sequence[Member]) -> tuple[int, ...]:
     return tuple(weight // gcd(*whole) for weight in whole)
 
 
-def _start(member: Member, resolved: Resolved) -> Start | None:
+def _start(member: Member, resolved: ResolvedFile) -> Start | None:
     if member.layout is None:
         return None
     layout = resolved.part(member.layout)
@@ -156,7 +155,7 @@ class _Found:
         return LoadedScenario(checked.name, checked, draft.scenario, self.member.scenario, findings)
 
 
-def _members(suite: Suite, resolved: Resolved, own: DiagnosticBag) -> Sequence[Member]:
+def _members(suite: Suite, resolved: ResolvedFile, own: DiagnosticBag) -> Sequence[Member]:
     """The members, which `own` says what is wrong with, as with the splits and sweeps that name them."""
     about = DiagnosticBag()
     _check_splits(suite, resolved, about)
@@ -177,7 +176,7 @@ def _members(suite: Suite, resolved: Resolved, own: DiagnosticBag) -> Sequence[M
     return members
 
 
-def _check_parameters(resolved: Resolved, bag: DiagnosticBag) -> None:
+def _check_parameters(resolved: ResolvedFile, bag: DiagnosticBag) -> None:
     """A suite has no parameters but its split; members are given theirs in its file."""
     for name in resolved.params:
         if name != "split":
@@ -189,7 +188,7 @@ def _check_parameters(resolved: Resolved, bag: DiagnosticBag) -> None:
             bag.error("S206", message, resolved.param_span(name), suggestion=near, hint=hint)
 
 
-def _check_splits(suite: Suite, resolved: Resolved, bag: DiagnosticBag) -> None:
+def _check_splits(suite: Suite, resolved: ResolvedFile, bag: DiagnosticBag) -> None:
     before = len(list(bag))
     for name, split in suite.splits.items():
         _check_split(suite, name, split, resolved, bag)
@@ -209,7 +208,7 @@ def _check_splits(suite: Suite, resolved: Resolved, bag: DiagnosticBag) -> None:
         bag.extend(error.diagnostics)
 
 
-def _check_split(suite: Suite, name: str, split: Split, resolved: Resolved, bag: DiagnosticBag) -> None:
+def _check_split(suite: Suite, name: str, split: Split, resolved: ResolvedFile, bag: DiagnosticBag) -> None:
     of_trees, of_members = ("only", "without"), ("replace", "members")
     for word in of_members if suite.tree is not None else of_trees:
         if getattr(split, word):

@@ -19,7 +19,7 @@ from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, RunConfig
 from trainer.shipped import PREFIX, located, shipped_agents
 
 if TYPE_CHECKING:
-    from socialai_dsl.checking import Loaded
+    from socialai_dsl.checking.loaded import Loaded
     from socialai_dsl.program_suite import Playable
     from trainer.logging import WandbTracker
 
@@ -299,7 +299,7 @@ def named_agent(agent: str, scenario: str) -> str:
         UsageError: none ships for it.
     """
     import socialai_dsl
-    from socialai_dsl.loader import shipped_folder
+    from socialai_dsl.loader.library import shipped_folder
 
     if agent != "shipped":
         return agent

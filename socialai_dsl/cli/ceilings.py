@@ -9,7 +9,7 @@ from socialai_dsl.cli.errors import UsageError
 from socialai_dsl.cli.run_folder import read_json, write_json
 
 if TYPE_CHECKING:
-    from socialai_dsl.checking import Loaded
+    from socialai_dsl.checking.loaded import Loaded
     from socialai_dsl.reporting.analysis import Ceilings, Level
     from socialai_dsl.reporting.collect import Experiment
 
@@ -42,7 +42,7 @@ def measured_ceilings(scenario: str) -> "Ceilings":
         ScenarioError: the scenario has mistakes, or is no longer there.
     """
     import socialai_dsl
-    from socialai_dsl.checking import LoadedScenario
+    from socialai_dsl.checking.loaded import LoadedScenario
     from socialai_dsl.reporting.analysis import Ceilings
 
     loaded = socialai_dsl.load(scenario)
@@ -104,7 +104,7 @@ def _alone(loaded: "Loaded") -> "Level | None":
     """None where there is no NPC."""
     from socialai_dsl.analysis.depth import without_npcs
     from socialai_dsl.analysis.effort import Effort
-    from socialai_dsl.checking import LoadedScenario
+    from socialai_dsl.checking.loaded import LoadedScenario
     from socialai_dsl.reporting.analysis import Level
 
     assert isinstance(loaded, LoadedScenario), "internal: a suite is no room"

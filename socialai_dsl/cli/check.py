@@ -13,7 +13,7 @@ from socialai_dsl.cli.terminal import ProgressLine
 
 if TYPE_CHECKING:
     from socialai_dsl.analysis.effort import Effort
-    from socialai_dsl.checking import LoadedScenario
+    from socialai_dsl.checking.loaded import LoadedScenario
 
 SUMMARY: Final = "verify what scenarios claim in `check`, and that everything in them can happen and be known"
 
@@ -160,7 +160,7 @@ def check_scenario(
 
 def scenarios_of(name: str) -> "list[tuple[LoadedScenario, str]]":
     """The scenario of a name, or the members of a suite, each with its own."""
-    from socialai_dsl.checking import LoadedSuite
+    from socialai_dsl.checking.loaded import LoadedSuite
     from socialai_dsl.frontend import load
 
     loaded = load(name)
@@ -171,7 +171,7 @@ def scenarios_of(name: str) -> "list[tuple[LoadedScenario, str]]":
 
 def _scripted(loaded: "LoadedScenario", called: str) -> "LoadedScenario | None":
     """The scenario with a frame for the agent: itself, or its variant `oracle`; None without either."""
-    from socialai_dsl.checking import LoadedScenario
+    from socialai_dsl.checking.loaded import LoadedScenario
     from socialai_dsl.diagnostics import ScenarioError
     from socialai_dsl.frontend import load
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from socialai_dsl.analysis.tally import Part, Tally
-    from socialai_dsl.checking import Loaded
+    from socialai_dsl.checking.loaded import Loaded
 
 SUMMARY: Final = "count how often each rule, state and outcome came about, and say what never did"
 
@@ -67,7 +67,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
 def _add(report: "Report", name: str, arguments: argparse.Namespace) -> None:
     """Let the agents play one scenario."""
     from socialai_dsl.analysis.tally import parts_of
-    from socialai_dsl.checking import LoadedSuite
+    from socialai_dsl.checking.loaded import LoadedSuite
     from socialai_dsl.frontend import load
 
     loaded = load(name)

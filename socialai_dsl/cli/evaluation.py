@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from socialai_dsl.checking import Loaded
+    from socialai_dsl.checking.loaded import Loaded
     from socialai_dsl.cli.episode import Episode
     from socialai_dsl.cli.language_model import Played
     from socialai_dsl.evaluation import EvalResult, Policy

@@ -147,7 +147,7 @@ def _document(arguments: argparse.Namespace) -> tuple[dict[str, Any], Path]:
     """What is to be run, and the folder for it."""
     from socialai_dsl.experiments.document import document_of
     from socialai_dsl.frontend import load_experiment
-    from socialai_dsl.loader.names import looks_like_path, shipped_experiments
+    from socialai_dsl.loader.library import looks_like_path, shipped_experiments
 
     given = Path(arguments.file)
     if given.is_dir():

@@ -8,18 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from socialai_dsl.atomic import write_json, write_text
 from socialai_dsl.cli.errors import Exit, UsageError
-from socialai_dsl.cli.run_folder import (
-    RESULT,
-    SETTINGS,
-    read_json,
-    scenario_folder_name,
-    write_json,
-    write_text,
-)
+from socialai_dsl.cli.run_folder import RESULT, SETTINGS, read_json, scenario_folder_name
 
 if TYPE_CHECKING:
-    from socialai_dsl.checking import Loaded
+    from socialai_dsl.checking.loaded import Loaded
     from trainer.checkpoint import Checkpoint
     from trainer.config import RunConfig
 
@@ -165,8 +159,7 @@ class Moved:
             UsageError: one lies outside the scenario's folder and what ships.
         """
         from socialai_dsl.diagnostics import DiagnosticBag
-        from socialai_dsl.loader import shipped_folder
-        from socialai_dsl.loader.names import name_source, parse_name
+        from socialai_dsl.loader.library import name_source, parse_name, shipped_folder
 
         source = name_source(spec)
         start = source.span(0, 1)

@@ -33,7 +33,7 @@ def standard_input(name: str) -> Mapping[Path, "Source"]:
     Raises:
         ScenarioError: it is too large, or no text.
     """
-    from socialai_dsl.loader.files import display_name, read_stream
+    from socialai_dsl.loader.reader import display_name, read_stream
 
     path = Path(name)
     return {path.resolve(): read_stream(sys.stdin.buffer, display_name(path))}

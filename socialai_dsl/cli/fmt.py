@@ -73,7 +73,7 @@ def _format(name: str, check: bool, diff: bool) -> bool:
 
 def _read(name: str) -> tuple["Source", bytes]:
     """A file as text and as it is on the disk."""
-    from socialai_dsl.loader.files import decoded, display_name, read_source
+    from socialai_dsl.loader.reader import decoded, display_name, read_source
 
     if name == STDIN:
         (source,) = standard_input("stdin.yaml").values()

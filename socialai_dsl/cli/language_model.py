@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from socialai_dsl.checking import Loaded
+    from socialai_dsl.checking.loaded import Loaded
     from socialai_dsl.evaluation import EvalResult
     from socialai_dsl.llm.players import Budget, PlayedEpisode
     from socialai_dsl.program_suite import Playable

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from socialai_dsl.checking import Loaded, LoadedSuite
+from socialai_dsl.checking.loaded import Loaded, LoadedSuite
 from socialai_dsl.cli.endings import Ending
 
 _UTTERANCES_SHOWN: Final = 2

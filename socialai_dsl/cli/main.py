@@ -13,7 +13,7 @@ from typing import Final, NoReturn
 from socialai_dsl.cli.errors import Exit, RunFailed, UsageError, is_usage
 from socialai_dsl.cli.terminal import shows_color
 from socialai_dsl.diagnostics import ScenarioError, printable, render_text
-from socialai_dsl.engine.errors import RoomError
+from socialai_dsl.engine.calls import RoomError
 
 _NEW_OBJECTS_BETWEEN_COLLECTIONS: Final = 50_000
 """Importing makes many objects that stay; to look through them every 700 takes a tenth of a short command."""

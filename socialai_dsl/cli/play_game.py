@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import socialai_dsl
-from socialai_dsl.checking import Loaded, LoadedSuite
+from socialai_dsl.checking.loaded import Loaded, LoadedSuite
 from socialai_dsl.cli.endings import Ending, endings_of
 from socialai_dsl.cli.trace_text import present
 from socialai_dsl.cli.typed import Phrases

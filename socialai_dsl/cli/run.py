@@ -20,7 +20,7 @@ from socialai_dsl.cli.run_folder import (
 )
 
 if TYPE_CHECKING:
-    from socialai_dsl.checking import Loaded
+    from socialai_dsl.checking.loaded import Loaded
     from socialai_dsl.cli.evaluation import Evaluation
     from socialai_dsl.program_suite import Playable
     from trainer.config import RunConfig

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from socialai_dsl.checking import Loaded
+    from socialai_dsl.checking.loaded import Loaded
 
 SUMMARY: Final = "write the data sheets of the shipped scenarios, or check that they are up to date"
 

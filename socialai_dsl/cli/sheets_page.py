@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 from socialai_dsl.cli.sheets_text import code, entries, flow, frame, items, rule, table
 
 if TYPE_CHECKING:
-    from socialai_dsl.checking import Loaded, LoadedScenario, LoadedSuite
-    from socialai_dsl.schema.behaviour import CastMember
+    from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
+    from socialai_dsl.schema.scenario import CastMember
 
 _GENERATED: Final = "<!-- Written by `socialai sheets`; change the scenario's file and run it again. -->"
 _FILES: Final = "../../scenarios"
@@ -23,7 +23,7 @@ def page(name: str, loaded: "Loaded", measured: Mapping[str, Any] | None) -> str
         loaded: the scenario.
         measured: its entry among the measurements; None if there is none.
     """
-    from socialai_dsl.checking import LoadedSuite
+    from socialai_dsl.checking.loaded import LoadedSuite
 
     data = _data(loaded)
     lines = [f"# {name}", "", _GENERATED, "", _about(name, data), ""]

@@ -10,7 +10,7 @@ def _documents() -> dict[str, dict[str, Any]]:
     """Name (of the file, without its suffix) -> top level of each file in the folder of shipped scenarios."""
     import yaml
 
-    from socialai_dsl.loader import shipped_folder
+    from socialai_dsl.loader.library import shipped_folder
 
     files = sorted(shipped_folder().glob("*.yaml"))
     read = {path.stem: yaml.safe_load(path.read_text("utf-8")) for path in files}
@@ -65,7 +65,7 @@ def _stands_alone(content: dict[str, Any]) -> bool:
 
 def file_of(scenario: str, variant: str | None = None) -> Path:
     """The file of a shipped scenario, or of a variant that `variants_of` names."""
-    from socialai_dsl.loader import shipped_folder
+    from socialai_dsl.loader.library import shipped_folder
 
     names = [scenario]
     if variant is not None:

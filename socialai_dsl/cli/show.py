@@ -9,7 +9,7 @@ from socialai_dsl.cli.errors import Exit
 from socialai_dsl.diagnostics import printable
 
 if TYPE_CHECKING:
-    from socialai_dsl.loader import Resolved
+    from socialai_dsl.loader.resolved import ResolvedFile
 
 SUMMARY: Final = "print a scenario after extends and variants, or the program it compiles to"
 
@@ -44,7 +44,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     return Exit.GOOD
 
 
-def _resolved(name: str) -> "Resolved":
+def _resolved(name: str) -> "ResolvedFile":
     """What is written in a file, or under a name, of any kind.
 
     Raises:
@@ -60,7 +60,7 @@ def _resolved(name: str) -> "Resolved":
     return result.resolved
 
 
-def _origins(resolved: "Resolved") -> Iterator[str]:
+def _origins(resolved: "ResolvedFile") -> Iterator[str]:
     """One line for each value that is no container: its place, its path, itself; also in files that are drawn from."""
     whole = resolved.with_drawn_files() if resolved.kind == "scenario" else resolved
     for path, value in _leaves(whole.data, ()):

@@ -108,7 +108,7 @@ def _checked(name: str, stdin_filename: str) -> tuple[Checked, "CheckResult"]:
 
 def _without_used(results: Iterable[tuple[Checked, "CheckResult"]]) -> list[Checked]:
     """What was checked, where a comment that is idle in its own file but silences a warning in another's is fine."""
-    from socialai_dsl.checking.ignored import UNUSED
+    from socialai_dsl.frontend import UNUSED
 
     results = list(results)
     used = {span for _, result in results for span in result.used}

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from socialai_dsl.compiler.assembler import Label, constant
-from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.compiler.lines import Lines
-from socialai_dsl.compiler.registers import NOWHERE, entity_register, label
+from socialai_dsl.compiler.assembler import NOWHERE, Label, constant, entity_register, label
+from socialai_dsl.compiler.expressions import Expressions, Lines
 from socialai_dsl.program import MOST_CHOICES, Body, Field, Op
-from socialai_dsl.semantics.plans import Activity, Checked
+from socialai_dsl.semantics.plans import Activity, CheckedScenario
 from socialai_dsl.semantics.terms import BOOL, CellOf, Const, FieldOf, Measure, ObjectType, Read, Term
 
 _BODIES = {"left": Body.LEFT, "right": Body.RIGHT, "forward": Body.FORWARD, "toggle": Body.TOGGLE}
@@ -43,7 +41,7 @@ class Activities:
     def __init__(
         self,
         to: Expressions,
-        checked: Checked,
+        checked: CheckedScenario,
         lines: Lines,
         entity: int,
         clock: int,
@@ -364,7 +362,7 @@ def _elements(activity: Activity) -> list[tuple[Term, Term]]:
     return list(zip(activity.args[::2], activity.args[1::2], strict=True))
 
 
-def _kind_of(checked: Checked, goal: Term) -> ObjectType:
+def _kind_of(checked: CheckedScenario, goal: Term) -> ObjectType:
     """The object type of what a term can be; the resolver lets only objects of one type be entered or pushed."""
     number = goal.value if isinstance(goal, Const) else goal.type.low
     kind = checked.entities[number].type

@@ -1,19 +1,126 @@
-"""Cells to code: sets of cells that a condition picks out, one cell of such a set, and the coordinates of a cell."""
+"""Choices to code: sets of cells, quantifiers over things, and values selected by conditions."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Sequence, Set
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final
 
-from socialai_dsl.compiler.assembler import Block, Label, constant
-from socialai_dsl.compiler.emitter import Emitter, LoopCell
-from socialai_dsl.compiler.folding import TRUE, mentions
-from socialai_dsl.compiler.registers import NOWHERE
-from socialai_dsl.program import BOARDS, CELL, Counting, Field, Op
+from socialai_dsl.compiler.assembler import LARGEST, NOWHERE, Block, Label, Registers, Sites, constant
+from socialai_dsl.compiler.folding import TRUE, Classes, Facts, fold, leaving, mentions, substitute
+from socialai_dsl.program import BOARDS, CELL, Counting, Field, Op, Register
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.build import may_find_nothing
-from socialai_dsl.semantics.terms import Const, Term
+from socialai_dsl.semantics.plans import CheckedScenario
+from socialai_dsl.semantics.terms import Const, Read, Select, Term, may_find_nothing
+
+
+@dataclass(frozen=True, slots=True)
+class LoopCell:
+    """The cell that a loop is at: operands of its x, its y and itself. `name` is its variable; empty for `here`."""
+
+    name: str
+    x: int
+    y: int
+    cell: int
+
+
+class Emitter(ABC):
+    """Emits code into one block: what each kind of expression is emitted with; `Expressions` knows them all.
+
+    Attributes:
+        block: where to. site: path of the picks of the value being emitted. facts: what is known. inbox: first register
+        of the inbox of the member whose frame this is, or -1.
+        loop: the cell that the loop over cells is at, outside of loops None.
+        failed: label to skip to when a pick finds nothing; None: it takes the first item.
+        is_bare: whether the board does not show what stands in the room, as while a room is set up.
+        has_drawn: whether some of the code had to have it shown.
+    """
+
+    def __init__(
+        self,
+        block: Block,
+        checked: CheckedScenario,
+        registers: Registers,
+        classes: Classes,
+        sites: Sites,
+        inbox: int = -1,
+    ) -> None:
+        self.block, self.checked, self.registers = block, checked, registers
+        self.classes, self.sites, self.inbox = classes, sites, inbox
+        self.site = ""
+        self.facts = Facts()
+        self.loop: LoopCell | None = None
+        self.failed: Label | None = None
+        self.is_bare = False
+        self.has_drawn = False
+
+    @abstractmethod
+    def test(self, term: Term, otherwise: Label) -> None:
+        """Emit a condition; `condition` also gives back the temporaries that this takes."""
+
+    @abstractmethod
+    def value(self, term: Term) -> int:
+        """Emit what computes the term; the operand it is in afterwards."""
+
+    @cached_property
+    def leaving(self) -> frozenset[int]:
+        """The entities of which it is still written down where they were when they are out of the room."""
+        return leaving(self.checked)
+
+    def condition(self, term: Term, otherwise: Label) -> None:
+        """Fall through if `term` holds, else skip to `otherwise`."""
+        mark = self.block.taken
+        self.test(term, otherwise)
+        self.block.release(mark)
+
+    def one_of(self, op: Op, left: int, numbers: frozenset[int], otherwise: Label) -> None:
+        """Whether a class (or state) is among these numbers."""
+        if not numbers:
+            self.block.skip(otherwise)
+            return
+        found = Label()
+        *rest, last = (
+            n if op == Op.IF_HEARD else constant(n) for n in sorted(numbers)
+        )  # IF_HEARD takes the class itself
+        for number in rest:
+            following = Label()
+            self.block.test(op, left, number, following)
+            self.block.skip(found)
+            self.block.bind(following)
+        self.block.test(op, left, last, otherwise)
+        self.block.bind(found)
+
+    def saturated(self, term: Term) -> int:
+        """The operand of a value that is cut to its type: of things that are gone, places and distances are odd."""
+        value = self.value(term)
+        if term.type.kind != "int" or isinstance(term, Const | terms.Read | terms.World):
+            return value
+        value = self.into_temporary(Op.MAX, value, self.number(term.type.low))
+        return self.into_temporary(Op.MIN, value, self.number(term.type.high))
+
+    def number(self, value: int) -> int:
+        """The operand of a known value: a constant, or computed where it is too large for one."""
+        if -LARGEST <= value <= LARGEST:
+            return constant(value)
+        quotient, rest = divmod(value, LARGEST)
+        product = self.into_temporary(Op.MUL, self.number(quotient), constant(LARGEST))
+        return self.into_temporary(Op.ADD, product, constant(rest))
+
+    def into_temporary(self, op: Op, b: int, c: int = 0) -> int:
+        """A fresh temporary with the result of an instruction."""
+        result = self.block.temporary()
+        self.block.emit(op, result, b, c)
+        return result
+
+    def instance(self, term: terms.Quantified, item: Const) -> Term:
+        """The condition of a quantifier for one of its items."""
+        return fold(substitute(term.condition or TRUE, term.variable, item), self.facts, self.classes)
+
+
+# -- cells: sets of them, one of a set, and coordinates ------------------------------------------------------
+
 
 ROW = 32
 
@@ -263,3 +370,325 @@ def _fill_side(to: Emitter, board: int, name: str | None, op: str, end: int, bou
     if op == "==":
         bounds[first + _LEAST] = bounds[first + _GREATEST] = bound
     fill_rectangle(to.block, board, bounds, Counting.ALL)
+
+
+# -- things: one condition after the other, collected in a set of bits ---------------------------------------
+
+
+_SET = 32
+"""How many things a set of bits can tell apart."""
+
+_LAST_SITE = 65535
+_LAST_OTHER = 255
+_MOST_OTHERS = 127
+"""What `Op.DRAW_OTHER` has room for."""
+
+_LAST_NEAREST = 255
+"""What `Op.NEAREST` has room for."""
+
+
+def count_things(to: Emitter, term: terms.Quantified) -> int:
+    """A temporary with the number of things that the condition holds for."""
+    if len(term.items) > _SET:
+        return _count_one_by_one(to, term)
+    return to.into_temporary(Op.COUNT_BITS, _mask(to, term))
+
+
+def first_thing(to: Emitter, term: terms.Quantified) -> int:
+    """The operand of the first thing that the condition holds for."""
+    if len(term.items) > _SET:
+        return _nth(to, term, to.into_temporary(Op.LOAD, constant(0)))
+    return _chosen(to, term, Op.LOWEST_BIT)
+
+
+def _mask(to: Emitter, term: terms.Quantified) -> int:
+    """A temporary whose bit i says whether item i holds."""
+    mask = to.block.temporary()
+    to.block.emit(Op.LOAD, mask, constant(0))
+    for i, item in enumerate(term.items):
+        following = Label()
+        to.condition(to.instance(term, item), following)
+        to.block.emit(Op.SET_BIT, mask, constant(i))
+        to.block.bind(following)
+    return mask
+
+
+def picked_thing(to: Emitter, term: terms.Quantified) -> int:
+    """The operand of a drawn thing among those that the condition holds for."""
+    site = to.sites.row(term.site or to.site, term.ordinal)
+    if (other := _but_one(term)) is not None:
+        return _any_other(to, term, other, site)
+    if term.condition is not None and len(term.items) > _SET:
+        choices = to.into_temporary(Op.MAX, _count_one_by_one(to, term), constant(1))
+        return _nth(to, term, to.into_temporary(Op.DRAW, choices, site))
+    if term.condition is not None:
+        return _chosen(to, term, Op.PICK_BIT, site)
+    return _item(to, term.items, to.into_temporary(Op.DRAW, constant(len(term.items)), site))
+
+
+def _but_one(term: terms.Quantified) -> terms.Term | None:
+    """The one of its things that `pick(x in group where x != one)` leaves out, if that is what the term is."""
+    match term.condition:
+        case terms.Compare(
+            "!=",
+            terms.Variable(name=name),
+            (terms.Const() | terms.Read() | terms.FieldOf(entity=Const())) as one,
+        ):
+            first, last = term.items[0].value, term.items[-1].value
+            in_a_row = [item.value for item in term.items] == list(range(first, last + 1))
+            among = first <= one.type.low and one.type.high <= last
+            fits = first >= 0 and last <= _LAST_OTHER and 1 < len(term.items) <= _MOST_OTHERS
+            if name == term.variable and in_a_row and among and fits:
+                return one
+    return None
+
+
+def _any_other(to: Emitter, term: terms.Quantified, one: terms.Term, site: int) -> int:
+    """One of all of them less the one, without asking of each whether it is that."""
+    assert site <= _LAST_SITE, "internal: more draw sites than an instruction can name"
+    packed = site | term.items[0].value << 16 | len(term.items) << 24
+    return to.into_temporary(Op.DRAW_OTHER, to.value(one), packed)
+
+
+def _chosen(to: Emitter, term: terms.Quantified, op: Op, site: int = 0) -> int:
+    mask = _mask(to, term)
+    if to.failed is not None:
+        to.block.test(Op.IF_NE, mask, constant(0), to.failed)
+    return _item(to, term.items, to.into_temporary(op, mask, site))
+
+
+def _count_one_by_one(to: Emitter, term: terms.Quantified) -> int:
+    total = to.into_temporary(Op.LOAD, constant(0))
+    for item in term.items:
+        following = Label()
+        to.condition(to.instance(term, item), following)
+        to.block.emit(Op.ADD, total, total, constant(1))
+        to.block.bind(following)
+    return total
+
+
+def _nth(to: Emitter, term: terms.Quantified, left: int) -> int:
+    """The thing that comes after `left` others that the condition holds for as well; none: as for small groups."""
+    block = to.block
+    result = to.into_temporary(Op.LOAD, constant(term.items[0].value))
+    done = Label()
+    for item in term.items:
+        following, found = Label(), Label()
+        to.condition(to.instance(term, item), following)
+        block.test(Op.IF_NE, left, constant(0), found)
+        block.emit(Op.SUB, left, left, constant(1))
+        block.skip(following)
+        block.bind(found)
+        block.emit(Op.LOAD, result, constant(item.value))
+        block.skip(done)
+        block.bind(following)
+    if to.failed is not None:
+        block.skip(to.failed)
+    block.bind(done)
+    return result
+
+
+def _item(to: Emitter, items: tuple[Const, ...], position: int) -> int:
+    """The item at a position that is in a temporary."""
+    values = [item.value for item in items]
+    if values == list(range(values[0], values[0] + len(values))):
+        return to.into_temporary(Op.ADD, position, constant(values[0])) if values[0] else position
+    result = to.into_temporary(Op.LOAD, constant(values[0]))
+    for i, value in enumerate(values[1:], 1):
+        following = Label()
+        to.block.test(Op.IF_EQ, position, constant(i), following)
+        to.block.emit(Op.LOAD, result, constant(value))
+        to.block.bind(following)
+    return result
+
+
+def nearest_thing(to: Emitter, term: terms.Quantified) -> int:
+    """The operand of the nearest thing that the condition holds for."""
+    assert term.to is not None
+    block, items = to.block, term.items
+    first, last = items[0].value, items[-1].value
+    in_a_row = [item.value for item in items] == list(range(first, last + 1))
+    if term.condition is None and in_a_row and last <= _LAST_NEAREST:
+        found = to.into_temporary(Op.NEAREST, to.value(term.to), first << 8 | last)
+        if to.failed is not None:
+            block.test(Op.IF_LE, constant(0), found, to.failed)
+        block.emit(Op.MAX, found, found, constant(first))
+        return found
+    result = to.into_temporary(Op.LOAD, constant(items[0].value))
+    goal = to.value(term.to)
+    if term.condition is None:
+        least = to.into_temporary(Op.DISTANCE, constant(items[0].value), goal)
+        items = items[1:]
+    else:
+        least = _far(to)
+    for item in items:
+        following = Label()
+        mark = block.taken
+        to.condition(to.instance(term, item), following)
+        distance = to.into_temporary(Op.DISTANCE, constant(item.value), goal)
+        block.test(Op.IF_LT, distance, least, following)
+        block.emit(Op.LOAD, least, distance)
+        block.emit(Op.LOAD, result, constant(item.value))
+        block.bind(following)
+        block.release(mark)
+    if to.failed is not None:
+        block.test(Op.IF_LT, least, _far(to), to.failed)
+    return result
+
+
+def _far(to: Emitter) -> int:
+    """How far away what is not in the room is from everything."""
+    return to.into_temporary(Op.ADD, Register.WIDTH, Register.HEIGHT)
+
+
+# -- values: cheap where all conditions ask which number one register holds ----------------------------------
+
+
+_MASK_BITS = LARGEST.bit_length()
+"""How many numbers a set in one operand can tell apart."""
+_WORD_BITS = 63
+
+
+@dataclass(frozen=True)
+class _Switch:
+    """A Select that only depends on one register: for each value the numbers for which it is taken; all are covered."""
+
+    read: Read
+    cases: dict[Term, set[int]]
+
+
+def selected_value(to: Emitter, term: Select) -> int:
+    """The operand in which the selected value is."""
+    switch = _switch(term)
+    if switch is not None:
+        shift = _shift(switch)
+        if shift is not None:
+            register = to.value(switch.read)
+            return to.into_temporary(Op.ADD, register, constant(shift)) if shift else register
+    result = to.block.temporary()
+
+    def take(value: Term) -> None:
+        mark = to.block.taken
+        to.block.emit(Op.LOAD, result, to.value(value))
+        to.block.release(mark)
+
+    if switch is not None and all(isinstance(value, Const | Read) for value in switch.cases):
+        _overwrite(to, switch, take)
+    else:
+        _branches(to, term, switch, take)
+    return result
+
+
+def selected_condition(to: Emitter, term: Select, otherwise: Label) -> None:
+    """Fall through if the selected condition holds, else skip to `otherwise`."""
+    switch = _switch(term)
+    if switch is None or not all(isinstance(value, Const) for value in switch.cases):
+        _branches(to, term, switch, lambda value: to.condition(value, otherwise))
+        return
+    true = set[int]().union(
+        *(numbers for value, numbers in switch.cases.items() if isinstance(value, Const) and value.value)
+    )
+    among(to, switch.read, true, otherwise)
+
+
+def _overwrite(to: Emitter, switch: _Switch, take: Callable[[Term], None]) -> None:
+    """The commonest value, then each other one in its cases."""
+    commonest = _commonest(switch)
+    take(commonest)
+    for value, numbers in switch.cases.items():
+        if value != commonest:
+            following = Label()
+            among(to, switch.read, numbers, following)
+            take(value)
+            to.block.bind(following)
+
+
+def _commonest(switch: _Switch) -> Term:
+    return max(switch.cases, key=lambda value: len(switch.cases[value]))
+
+
+def _branches(to: Emitter, term: Select, switch: _Switch | None, take: Callable[[Term], None]) -> None:
+    """Test one condition after the other; what needs most words to ask for comes last and is not asked for."""
+    block = to.block
+    done = Label()
+    branches: list[tuple[Callable[[Label], None], Term]] = []
+    if switch is None:
+        last = term.default
+        for condition, value in zip(term.conditions, term.values, strict=True):
+            branches.append((lambda to_next, asked=condition: to.condition(asked, to_next), value))  # type: ignore[misc]
+    else:
+        last = _commonest(switch)
+        for value, numbers in switch.cases.items():
+            if value != last:
+                branches.append(
+                    (lambda to_next, taken=numbers: among(to, switch.read, taken, to_next), value)  # type: ignore[misc]
+                )
+    for ask, value in branches:
+        following = Label()
+        ask(following)
+        take(value)
+        block.skip(done)
+        block.bind(following)
+    take(last)
+    block.bind(done)
+
+
+def _switch(term: Select) -> _Switch | None:
+    asked = [asks(condition) for condition in term.conditions]
+    first = asked[0] if asked else None
+    if first is None:
+        return None
+    read = first[0]
+    left = set(range(read.type.low, read.type.high + 1))
+    cases: dict[Term, set[int]] = {}
+    for ask, value in zip(asked, term.values, strict=True):
+        if ask is None or ask[0] != read:
+            return None
+        if taken := ask[1] & left:
+            cases.setdefault(value, set()).update(taken)
+            left -= taken
+    if left:
+        cases.setdefault(term.default, set()).update(left)
+    return _Switch(read, cases)
+
+
+def asks(condition: Term) -> tuple[Read, frozenset[int]] | None:
+    """The register that a condition is about, and the numbers for which it holds."""
+    match condition:
+        case terms.Compare(op="==", left=Read() as read, right=Const(value=number)):
+            return read, frozenset((number,))
+        case terms.Compare(op="==", left=Const(value=number), right=Read() as read):
+            return read, frozenset((number,))
+        case terms.Logic(op="or", args=args):
+            parts = [asks(arg) for arg in args]
+            known = [part for part in parts if part is not None]
+            if len(known) == len(parts) and len({read for read, _ in known}) == 1:
+                return known[0][0], frozenset[int]().union(*(numbers for _, numbers in known))
+    return None
+
+
+def _shift(switch: _Switch) -> int | None:
+    """What is to be added to the register to get the value, if that is so for all numbers."""
+    shifts = {
+        value.value - number if isinstance(value, Const) else None
+        for value, numbers in switch.cases.items()
+        for number in numbers
+    }
+    return shifts.pop() if len(shifts) == 1 else None
+
+
+def among(to: Emitter, read: Read, numbers: Set[int], otherwise: Label) -> None:
+    """Fall through if the register holds one of these numbers."""
+    block, register, low, high = to.block, to.value(read), read.type.low, read.type.high
+    numbers = numbers & set(range(low, high + 1))
+    others = set(range(low, high + 1)) - numbers
+    if not numbers:
+        block.skip(otherwise)
+    elif len(numbers) == 1:
+        block.test(Op.IF_EQ, register, constant(min(numbers)), otherwise)
+    elif len(others) == 1:
+        block.test(Op.IF_NE, register, constant(min(others)), otherwise)
+    elif others and low >= 0 and high < _WORD_BITS and max(numbers) < _MASK_BITS:
+        block.test(Op.IF_BIT, constant(sum(1 << number for number in numbers)), register, otherwise)
+    elif others:
+        to.one_of(Op.IF_EQ, register, frozenset(numbers), otherwise)

@@ -1,19 +1,156 @@
-"""What a rule or step does to the world: count, set, cause, say; all values are computed before anything changes."""
+"""Effects to code, and what follows: what is remembered, put off and put back, links, computed statuses and timers."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from socialai_dsl.compiler.assembler import Label, constant
-from socialai_dsl.compiler.changes import numbers_of
-from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.compiler.homes import Homes
-from socialai_dsl.compiler.lines import Lines
-from socialai_dsl.compiler.registers import Registers, label
-from socialai_dsl.program import TEMPORARY, Field, Op
-from socialai_dsl.semantics.plans import Effect, Entity, RulePlan, StepPlan
-from socialai_dsl.semantics.terms import Term
+from socialai_dsl.compiler.assembler import (
+    NOWHERE,
+    Block,
+    Label,
+    Registers,
+    constant,
+    entity_register,
+    found_path,
+    label,
+    said_path,
+)
+from socialai_dsl.compiler.cells import ROW
+from socialai_dsl.compiler.expressions import Expressions, Lines
+from socialai_dsl.compiler.folding import Changes, Mobility, When, numbers_of, plans
+from socialai_dsl.program import CELL, TEMPORARY, Field, Op, Register
+from socialai_dsl.semantics import terms
+from socialai_dsl.semantics.plans import (
+    CheckedScenario,
+    Computed,
+    Drawn,
+    Effect,
+    Entity,
+    FramePlan,
+    MemoryPlan,
+    RulePlan,
+    StepPlan,
+)
+from socialai_dsl.semantics.terms import BOOL, Const, ObjectType, Sited, Term, Type
+
+# -- what the effect `reset` puts back -----------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Home:
+    """Registers that hold how a thing was at first; None of what cannot change."""
+
+    cell: int | None
+    gone: int | None
+    facing: int | None
+    inside: int | None
+
+
+class Homes:
+    """Makes room for what a `reset` may put back: `NAME.reset.home`, the cell, then `.gone`, `.facing`, `.inside`."""
+
+    def __init__(self, checked: CheckedScenario, registers: Registers) -> None:
+        self.checked = checked
+        mobility = Mobility(checked)
+        self.pointing = mobility.pointing
+        self.of = {
+            number: _reserve(checked.entities[number], mobility, registers, len(checked.entities))
+            for number in sorted(set(_named(checked)))
+        }
+
+    def save(self, to: Expressions) -> None:
+        """Emit, at the end of a reset, that everything is remembered as it is."""
+        block = to.block
+        for number, home in self.of.items():
+            if home.cell is not None:
+                _save_cell(block, number, home.cell)
+            for register, field in (
+                (home.gone, Field.GONE),
+                (home.facing, Field.DIR),
+                (home.inside, Field.INSIDE),
+            ):
+                if register is not None:
+                    block.emit(Op.LOAD, register, entity_register(number, field))
+
+    def is_fixed(self, thing: Entity) -> bool:
+        """Whether nothing but its status can change."""
+        points = thing.role == "npc" and self.pointing
+        return self.of[thing.number] == Home(None, None, None, None) and not thing.contains and not points
+
+    def put_back(self, block: Block, number: int) -> None:
+        """Emit that a thing is where and as it was, and what lay in it lies in it again; its status is left alone."""
+        thing, home = self.checked.entities[number], self.of[number]
+        own = constant(number)
+        if home.cell is not None:
+            block.emit(Op.PLACE, own, home.cell)
+        if home.gone is not None:
+            stays = Label()
+            block.test(Op.IF_NE, home.gone, constant(0), stays)
+            block.emit(Op.VANISH, own)
+            block.bind(stays)
+        if home.facing is not None:
+            block.emit(Op.SET_FIELD, own, Field.DIR, home.facing)
+        if home.inside is not None:
+            block.emit(Op.SET_FIELD, own, Field.INSIDE, home.inside)
+        if thing.role == "npc" and self.pointing:
+            block.emit(Op.SET_FIELD, own, Field.POINTING, constant(0))
+        for content in thing.contains:
+            self._put_back_into(block, content, number)
+
+    def _put_back_into(self, block: Block, number: int, holder: int) -> None:
+        """What lay in a thing at first lies in it again."""
+        home = self.of[number]
+        assert home.cell is not None, "internal: contents can move"
+        assert home.gone is not None, "internal: contents can vanish"
+        assert home.inside is not None, "internal: contents lie in something"
+        elsewhere = Label()
+        block.test(Op.IF_NE, home.gone, constant(0), elsewhere)
+        block.test(Op.IF_EQ, home.inside, constant(holder), elsewhere)
+        block.emit(Op.PLACE, constant(number), home.cell)
+        block.emit(Op.VANISH, constant(number))
+        block.emit(Op.SET_FIELD, constant(number), Field.INSIDE, constant(holder))
+        block.bind(elsewhere)
+
+
+def _named(checked: CheckedScenario) -> Iterator[int]:
+    """What a `reset` names, and what may lie in that."""
+    for plan in plans(checked):
+        for effect in plan.causes:
+            if effect.name == "reset":
+                for target in effect.entities:
+                    for number in numbers_of(target):
+                        yield number
+                        yield from checked.entities[number].contains
+
+
+def _reserve(thing: Entity, mobility: Mobility, registers: Registers, entities: int) -> Home:
+    number, path = thing.number, f"{label(thing)}.reset.home"
+
+    def room(suffix: str, type_: Type, changes: bool) -> int | None:
+        return registers.add(path + suffix, type_) if changes else None
+
+    return Home(
+        cell=room("", terms.CELL, number in mobility.walking | mobility.vanishing),
+        gone=room(".gone", BOOL, number in mobility.vanishing),
+        facing=room(".facing", terms.DIRECTION, number in mobility.turning),
+        inside=room(".inside", Type("entity", 0, entities - 1), number in mobility.contents),
+    )
+
+
+def _save_cell(block: Block, number: int, register: int) -> None:
+    """The cell, also of what is not in the room because it lies in something."""
+    mark = block.taken
+    cell = block.temporary()
+    block.emit(Op.MUL, cell, entity_register(number, Field.Y), constant(ROW))
+    block.emit(Op.ADD, cell, cell, entity_register(number, Field.X))
+    block.emit(Op.ADD, cell, cell, constant(CELL))
+    block.emit(Op.MAX, register, cell, constant(NOWHERE))
+    block.release(mark)
+
+
+# -- effects: all values are computed before anything changes ------------------------------------------------
+
 
 _TARGETS = {"open": "open", "close": "closed", "lock": "locked", "reveal": "opened"}
 
@@ -169,3 +306,428 @@ def store(registers: Registers, emit: Callable[..., None], path: str, value: int
         emit(Op.MAX, value, value, constant(name.low))
         emit(Op.MIN, value, value, constant(name.high))
     emit(Op.LOAD, name.register, value)
+
+
+# -- what is kept: `prev(...)` and open memories as a step begins, acts as it ends, beliefs at each turn -----
+
+
+def remember(to: Expressions) -> None:
+    """Before anything happens in a step: what rules will want to know about the state that the last step left.
+
+    Then nobody has said anything yet.
+    """
+    block = to.block
+    for item in to.checked.remembered:
+        _remember(to, item)
+    for memory in to.checked.memories:
+        _ask_whether_open(to, memory)
+    for entity in to.checked.entities:
+        said = to.registers.by_path.get(said_path(entity))
+        if said is not None:
+            block.emit(Op.LOAD, said, constant(0))
+
+
+def _remember(to: Expressions, item: Drawn) -> None:
+    """One value, and whether there is one, unless there always is."""
+    block = to.block
+    found, missing = to.registers.by_path.get(found_path(item.path)), Label()
+    if found is None and item.type.kind == "bool":
+        _note_whether(to, item.path, item.value)
+        return
+    mark = block.taken
+    if found is not None:
+        block.emit(Op.LOAD, found, constant(0))
+        to.failed = missing
+    value = to.sited_copy(item.value)
+    to.failed = None
+    store(to.registers, block.emit, item.path, value)
+    if found is not None:
+        block.emit(Op.LOAD, found, constant(1))
+    block.bind(missing)
+    block.release(mark)
+
+
+def _ask_whether_open(to: Expressions, memory: MemoryPlan) -> None:
+    if memory.open is not None:
+        _note_whether(to, f"{memory.path}.open", memory.open)
+
+
+def _note_whether(to: Expressions, path: str, condition: Sited) -> None:
+    """Let a register tell whether a condition holds."""
+    register, not_so = to.registers.by_path[path], Label()
+    to.block.span = condition.span
+    to.block.emit(Op.LOAD, register, constant(0))
+    to.sited_condition(condition, not_so)
+    to.block.emit(Op.LOAD, register, constant(1))
+    to.block.bind(not_so)
+
+
+def push_acts(to: Expressions) -> None:
+    """Each open memory takes in what the agent did in this step and forgets the oldest act."""
+    block, by_path = to.block, to.registers.by_path
+    for memory in to.checked.memories:
+        shut = Label()
+        if memory.open is not None:
+            block.span = memory.open.span
+            block.test(Op.IF_NE, by_path[f"{memory.path}.open"], constant(0), shut)
+        for part, newest in (("move", Register.ACTION), ("utterance", Register.UTTERANCE)):
+            places = [by_path[f"{memory.path}[{k}].{part}"] for k in range(memory.length)]
+            for place, newer in zip(places, (*places[1:], newest), strict=True):
+                block.emit(Op.LOAD, place, newer)
+        filled = by_path[f"{memory.path}.filled"]
+        mark = block.taken
+        more = to.into_temporary(Op.ADD, filled, constant(1))
+        block.emit(Op.MIN, filled, more, constant(memory.length))
+        block.release(mark)
+        block.bind(shut)
+
+
+# -- beliefs ---------------------------------------------------------------------------------------------------
+
+
+def perceive(to: Expressions, member: str) -> None:
+    """Emit the beliefs of a member, in order: each that it can make out takes its value."""
+    block = to.block
+    for belief in to.checked.beliefs:
+        if belief.member != member:
+            continue
+        unseen = Label()
+        mark = block.taken
+        if belief.when is not None:
+            to.sited_condition(belief.when, unseen)
+        to.failed = unseen
+        value = to.sited_copy(belief.value)
+        to.failed = None
+        store(to.registers, block.emit, belief.path, value)
+        block.bind(unseen)
+        block.release(mark)
+
+
+# -- rules of `first` with a body action of their own: the rest waits, with its values, until that is done ---
+
+
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """A register that keeps a value, and the range of the value; a known value needs no register (None)."""
+
+    register: int | None
+    low: int
+    high: int
+
+
+@dataclass(frozen=True, slots=True)
+class _KeptRule:
+    sets: tuple[_Kept, ...]
+    targets: tuple[tuple[_Kept, ...], ...]
+    values: tuple[_Kept | None, ...]
+    line: _Kept | None
+
+    def registers(self) -> Iterator[int]:
+        """Those that are in use."""
+        every = [*self.sets, *(kept for targets in self.targets for kept in targets), *self.values, self.line]
+        return (kept.register for kept in every if kept is not None and kept.register is not None)
+
+
+class Deferred:
+    """The rules of a frame that are done in two parts; `MEMBER.kept[k]` hold values, `MEMBER.pending` which rule.
+
+    Attributes:
+        rules: they, in the order of their numbers in `MEMBER.pending`, from 1; 0: none.
+    """
+
+    def __init__(self, frame: FramePlan, speaker: Entity, registers: Registers, lines: Lines) -> None:
+        self.member, self.speaker, self.registers, self.lines = frame.member, speaker, registers, lines
+        self.rules = [rule for state in frame.states for rule in state.first if _has_more(rule)]
+        self._count = 0
+        self._kept = [self._room(rule) for rule in self.rules]
+        self._pending = (
+            registers.add(f"{frame.member}.pending", Type("int", 0, len(self.rules)), fleeting=True)
+            if self.rules
+            else 0
+        )
+
+    def note(self, to: Expressions, rule: RulePlan, operands: Operands) -> None:
+        """Emit that the rest of a rule is to be carried out later, with these values."""
+        kept = self._kept[self.rules.index(rule)]
+        for part, operand in _pairs(kept, operands):
+            if part.register is not None:
+                _keep(to, part, operand)
+        to.block.emit(Op.LOAD, self._pending, constant(1 + self.rules.index(rule)))
+
+    def is_pending(self, rule: RulePlan) -> tuple[int, int]:
+        """The operands that are equal if this rule is to be carried out."""
+        return self._pending, constant(1 + self.rules.index(rule))
+
+    def recall(self, to: Expressions, rule: RulePlan) -> Operands:
+        """Emit that the values are fetched and forgotten."""
+        kept = self._kept[self.rules.index(rule)]
+
+        def fetched(parts: Sequence[_Kept]) -> tuple[int, ...]:
+            return tuple(_fetch(to, part) for part in parts)
+
+        operands = Operands(
+            tuple(to.into_temporary(Op.LOAD, operand) for operand in fetched(kept.sets)),
+            tuple(map(fetched, kept.targets)),
+            tuple(None if part is None else _fetch(to, part) for part in kept.values),
+            None if kept.line is None else _fetch(to, kept.line),
+        )
+        for register in (*kept.registers(), self._pending):
+            to.block.emit(Op.LOAD, register, constant(0))
+        return operands
+
+    def _room(self, rule: RulePlan) -> _KeptRule:
+        sets = []
+        for path, _ in rule.sets:
+            name = next(name for name in self.registers.names if name.path == path)
+            sets.append(self._kept_range(name.low, name.high))
+        line = None if rule.say is None else self._kept_range(*self.lines.bounds(self.speaker, rule.say))
+        return _KeptRule(
+            tuple(sets),
+            tuple(tuple(self._kept_term(entity) for entity in effect.entities) for effect in rule.causes),
+            tuple(None if e.value is None else self._kept_term(e.value) for e in rule.causes),
+            line,
+        )
+
+    def _kept_term(self, term: Term) -> _Kept:
+        if isinstance(term, Const):
+            return _Kept(None, term.value, term.value)
+        type_ = self.registers.cut(term.type)
+        return self._kept_range(type_.low, type_.high)
+
+    def _kept_range(self, low: int, high: int) -> _Kept:
+        if low == high:
+            return _Kept(None, low, high)
+        path = f"{self.member}.kept[{self._count}]"
+        self._count += 1
+        return _Kept(
+            self.registers.add(path, Type("int", min(0, low), max(0, high)), fleeting=True), low, high
+        )
+
+
+def _has_more(rule: RulePlan) -> bool:
+    more = rule.sets or rule.causes or rule.say is not None or rule.goto or rule.goto_now
+    return rule.do is not None and bool(more)
+
+
+def _pairs(kept: _KeptRule, operands: Operands) -> Iterator[tuple[_Kept, int]]:
+    yield from zip(kept.sets, operands.sets, strict=True)
+    for parts, targets in zip(kept.targets, operands.targets, strict=True):
+        yield from zip(parts, targets, strict=True)
+    for part, value in zip(kept.values, operands.values, strict=True):
+        if part is not None and value is not None:
+            yield part, value
+    if kept.line is not None and operands.line is not None:
+        yield kept.line, operands.line
+
+
+def _keep(to: Expressions, kept: _Kept, operand: int) -> None:
+    assert kept.register is not None, "internal: a known value is not kept"
+    mark = to.block.taken
+    to.block.emit(Op.LOAD, kept.register, _cut(to, operand, kept))
+    to.block.release(mark)
+
+
+def _fetch(to: Expressions, kept: _Kept) -> int:
+    return constant(kept.low) if kept.register is None else _cut(to, kept.register, kept)
+
+
+def _cut(to: Expressions, operand: int, kept: _Kept) -> int:
+    """A value within its range, also where a layout has written the register."""
+    least = to.into_temporary(Op.MAX, operand, constant(kept.low))
+    return to.into_temporary(Op.MIN, least, constant(kept.high))
+
+
+# -- links between objects, statuses that follow from conditions, timers that run out ------------------------
+
+
+def links(to: Expressions) -> None:
+    """Emit everything that follows directly from the statuses of objects."""
+    entities = to.checked.entities
+    for entity in entities:
+        _unlock(to, entity)
+    for entity in entities:
+        _open(to, entity, [other for other in entities if entity.number in other.opens])
+    for entity in entities:
+        _release(to, entity)
+    for entity in entities:
+        _hold_back(to, entity)
+
+
+def _unlock(to: Expressions, switch: Entity) -> None:
+    """While a switch is in the room and in an active status, what it unlocks is not locked."""
+    targets = [to.checked.entities[number] for number in switch.unlocks]
+    lockable = [target for target in targets if target.type and "locked" in target.type.states]
+    if not lockable:
+        return
+    to.block.span = switch.span
+    following = Label()
+    _works(to, switch, following)
+    for target in lockable:
+        left_alone = Label()
+        to.block.test(Op.IF_EQ, _status(target), constant(_state(target, "locked")), left_alone)
+        assert target.type is not None, "internal: only objects can be locked"
+        to.block.emit(Op.BECOME, constant(target.number), constant(target.type.unlocked))
+        to.block.bind(left_alone)
+    to.block.bind(following)
+
+
+def _open(to: Expressions, door: Entity, openers: Iterable[Entity]) -> None:
+    """A door is open exactly while one of what opens it is in the room and in an active status."""
+    block = to.block
+    opened, done = Label(), Label()
+    for opener in openers:
+        block.span = opener.span
+        idle = Label()
+        _works(to, opener, idle)
+        block.skip(opened)
+        block.bind(idle)
+    if not opened.uses:
+        return
+    _become(to, door, "closed", done)
+    block.skip(done)
+    block.bind(opened)
+    _become(to, door, "open", done)
+    block.bind(done)
+
+
+def _release(to: Expressions, holder: Entity) -> None:
+    """What is opened while something lies in it is replaced by that."""
+    if not holder.contains:
+        return
+    block = to.block
+    block.span = holder.span
+    shut = Label()
+    block.test(Op.IF_EQ, _status(holder), constant(_state(holder, "opened")), shut)
+    block.test(Op.IF_EQ, entity_register(holder.number, Field.GONE), constant(0), shut)
+    for content in holder.contains:
+        elsewhere = Label()
+        block.test(Op.IF_EQ, entity_register(content, Field.INSIDE), constant(holder.number), elsewhere)
+        block.test(Op.IF_EQ, entity_register(content, Field.GONE), constant(1), elsewhere)
+        block.emit(Op.VANISH, constant(holder.number))
+        block.emit(Op.PLACE, constant(content), constant(holder.number))
+        block.bind(elsewhere)
+    block.bind(shut)
+
+
+def _hold_back(to: Expressions, thing: Entity) -> None:
+    """While another of its group is not as it was at first, a thing reacts to nothing."""
+    others = [to.checked.entities[number] for number in thing.exclusive if number != thing.number]
+    if not others:
+        return
+    block = to.block
+    block.span = thing.span
+    mark = block.taken
+    held = block.temporary()
+    block.emit(Op.LOAD, held, constant(0))
+    for other in others:
+        initial = constant(other.status) if other.initial is None else to.value(other.initial)
+        unchanged = Label()
+        block.test(Op.IF_NE, _status(other), initial, unchanged)
+        block.emit(Op.LOAD, held, constant(1))
+        block.bind(unchanged)
+    block.emit(Op.SET_FIELD, constant(thing.number), Field.POKED, held)
+    block.release(mark)
+
+
+def _works(to: Expressions, switch: Entity, otherwise: Label) -> None:
+    to.one_of(Op.IF_EQ, _status(switch), _type(switch).active, otherwise)
+    to.block.test(Op.IF_EQ, entity_register(switch.number, Field.GONE), constant(0), otherwise)
+
+
+def _become(to: Expressions, thing: Entity, state: str, unless: Label) -> None:
+    """Take a status, or go on to `unless` if it has it."""
+    status = constant(_state(thing, state))
+    to.block.test(Op.IF_NE, _status(thing), status, unless)
+    to.block.emit(Op.BECOME, constant(thing.number), status)
+
+
+def _status(thing: Entity) -> int:
+    return entity_register(thing.number, Field.STATUS)
+
+
+def _state(thing: Entity, name: str) -> int:
+    return _type(thing).states.index(name)
+
+
+def _type(thing: Entity) -> ObjectType:
+    assert thing.type is not None, "internal: only objects are linked"
+    return thing.type
+
+
+# -- statuses that follow from conditions ----------------------------------------------------------------------
+
+
+class ComputedStatuses:
+    """The computed statuses of a scenario: those that a reset decides for good, and those that are settled."""
+
+    def __init__(self, checked: CheckedScenario) -> None:
+        changes = Changes(checked)
+        whens = [(item, changes.of(item.condition.term)) for item in checked.computed]
+        for_good = [when == When.NEVER and not changes.touched(item.entity) for item, when in whens]
+        self.fixed = tuple(item for (item, _), fixed in zip(whens, for_good, strict=True) if fixed)
+        self.settled = tuple(item for (item, _), fixed in zip(whens, for_good, strict=True) if not fixed)
+        self.settle_always = any(when == When.ANY_TIME for _, when in whens)
+
+    def fix(self, to: Expressions) -> None:
+        """Emit those that never change, each unless a layout gives the status."""
+        for item in self.fixed:
+            pinned = Label()
+            to.block.span = item.condition.span
+            to.block.test(Op.IF_UNPINNED, entity_register(item.entity, Field.STATUS), 0, pinned)
+            _settle(to, item)
+            to.block.bind(pinned)
+
+    def settle(self, to: Expressions) -> None:
+        """Emit those that can change, each after those it reads."""
+        for item in self.settled:
+            _settle(to, item)
+
+
+def _settle(to: Expressions, item: Computed) -> None:
+    """On while the condition holds; off where it was on and the condition does not hold; else left alone."""
+    block = to.block
+    status = entity_register(item.entity, Field.STATUS)
+    entity, on, off = (constant(number) for number in (item.entity, item.on, item.off))
+    false, done = Label(), Label()
+    to.sited_condition(item.condition, false)
+    block.test(Op.IF_NE, status, on, done)
+    block.emit(Op.BECOME, entity, on)
+    block.skip(done)
+    block.bind(false)
+    block.test(Op.IF_EQ, status, on, done)
+    block.emit(Op.BECOME, entity, off)
+    block.bind(done)
+
+
+# -- timers ----------------------------------------------------------------------------------------------------
+
+
+def tick(to: Expressions) -> None:
+    """Each timer counts the steps in an active status; when it is full the status expires. Else it is empty."""
+    for entity in to.checked.entities:
+        if entity.timer:
+            _tick(to, entity)
+
+
+def _tick(to: Expressions, entity: Entity) -> None:
+    assert entity.type is not None, "internal: only objects have timers"
+    block = to.block
+    block.span = entity.span
+    timer = to.registers.by_path[f"{label(entity)}.timer"]
+    status = entity_register(entity.number, Field.STATUS)
+    idle, done = Label(), Label()
+    mark = block.taken
+    to.one_of(Op.IF_EQ, status, entity.type.active, idle)
+    count = to.into_temporary(Op.ADD, timer, constant(1))
+    block.emit(Op.MIN, timer, count, constant(entity.timer))
+    block.test(Op.IF_EQ, timer, constant(entity.timer), done)
+    for before, after in sorted(entity.type.expired.items()):
+        following = Label()
+        block.test(Op.IF_EQ, status, constant(before), following)
+        block.emit(Op.BECOME, constant(entity.number), constant(after))
+        block.skip(idle)
+        block.bind(following)
+    block.bind(idle)
+    block.emit(Op.LOAD, timer, constant(0))
+    block.bind(done)
+    block.release(mark)

@@ -1,30 +1,184 @@
-"""Checks one instruction against its entry in the instruction table, and notes the ranges of what it writes."""
+"""Checks one instruction against its entry in the instruction table, and keeps the ranges of what it writes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import Final
 
-from socialai_dsl.compiler.intervals import Known, inbox_registers
 from socialai_dsl.program import (
     BOARDS,
     CELL,
+    CONSTANT,
     ENTITY_FIELDS,
     FIRST_ENTITY,
     MOST_CHOICES,
     TEMPORARIES,
     TEMPORARY,
     Body,
+    EntityColumn,
     Field,
     Flag,
     FrameColumn,
     Header,
     Op,
     Program,
+    Register,
     room_words,
 )
-from socialai_dsl.program.instructions import TABLE, Instruction, Kind, Operand
-from socialai_dsl.program.ranges import ANYTHING, Interval
+from socialai_dsl.program.instructions import ANYTHING, TABLE, Instruction, Interval, Kind, Operand, hull
+
+WHOLE_REGISTER: Interval = (-32768, 32767)
+LAST_BODY = Body.STOP_POINTING
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """What every register may hold at any time, which each write is proven to keep; the `Bounds` of a program."""
+
+    of_register: tuple[Interval, ...]
+    width: int
+    height: int
+    npcs: int
+    nouns: int
+    first_cell: int = CELL
+
+    @property
+    def last_cell(self) -> int:
+        """The last cell of the canvas as an operand."""
+        return CELL + 32 * (self.height - 1) + self.width - 1
+
+    @classmethod
+    def of(cls, program: Program) -> Ranges:
+        """Ranges that follow from the header, the entities and the names of the program's own registers."""
+        header = program.header
+        ranges = [WHOLE_REGISTER] * header(Header.REGISTERS)
+        width, height = header(Header.CANVAS_WIDTH), header(Header.CANVAS_HEIGHT)
+        least = header(Header.MIN_HEIGHT)
+        ranges[Register.T] = (0, header(Header.HORIZON))
+        ranges[Register.WIDTH] = (header(Header.MIN_WIDTH), width)
+        ranges[Register.HEIGHT] = (least, least + header(Header.HEIGHTS) - 1)
+        ranges[Register.ACTION] = (0, 7)
+        ranges[Register.LAST_TURN] = (-1, LAST_BODY)
+        ranges[Register.CLASS] = (0, header(Header.CLASSES) - 1)
+        ranges[Register.TEMPLATE] = (-1, header(Header.TEMPLATES) - 1)
+        ranges[Register.NOUN] = (-1, header(Header.NOUNS) - 1)
+        ranges[Register.UTTERANCE] = (0, header(Header.TEMPLATES) * header(Header.NOUNS))
+        ranges[Register.CHANGED] = ranges[Register.ACCEPTED] = (0, 1)
+        ranges[Register.POKED] = (-1, header(Header.ENTITIES) - 1)
+        for entity in range(header(Header.ENTITIES)):
+            for which, interval in _field_ranges(program, entity, width, height).items():
+                ranges[FIRST_ENTITY + ENTITY_FIELDS * entity + which] = interval
+        for name in program.registers:
+            ranges[name.register] = (name.low, name.high)
+        return cls(tuple(ranges), width, height, header(Header.NPCS), header(Header.NOUNS))
+
+    def field(self, things: Interval, which: int) -> Interval:
+        """The range of a field over several entities, or over cells."""
+        if things[0] >= self.first_cell - 1:
+            return -1, max(self.width, self.height, 32) - 1
+        first, last = (FIRST_ENTITY + ENTITY_FIELDS * entity + which for entity in things)
+        result = self.of_register[first]
+        for register in range(first, last + 1, ENTITY_FIELDS):
+            result = hull(result, self.of_register[register])
+        return result
+
+
+def _field_ranges(program: Program, entity: int, width: int, height: int) -> dict[Field, Interval]:
+    return {
+        Field.X: (-1, width - 1),
+        Field.Y: (-1, height - 1),
+        Field.DIR: (0, 3),
+        Field.COLOR: (0, 5),
+        Field.STATUS: (0, greatest_status(program, entity)),
+        Field.GONE: (0, 1),
+        Field.POKED: (0, 1),
+        Field.LAST: (-1, LAST_BODY),
+        Field.POINTING: (0, 4),
+        Field.INSIDE: (0, program.header(Header.ENTITIES) - 1),
+    }
+
+
+class Known:
+    """What is known on a path: ranges of temporaries, boards that are filled (what is absent was never written), and
+    whether the room has its size.
+    """
+
+    def __init__(self, ranges: Ranges, has_room: bool) -> None:
+        self.ranges = ranges
+        self.has_room = has_room
+        self.temporaries: dict[int, Interval] = {}
+        self.boards: set[int] = set()
+
+    def copy(self) -> Known:
+        """The same, to be changed by itself."""
+        known = Known(self.ranges, self.has_room)
+        known.temporaries, known.boards = dict(self.temporaries), set(self.boards)
+        return known
+
+    def value(self, operand: int) -> Interval | None:
+        """The range of an operand; None if it is nothing that can be read."""
+        if operand >= CONSTANT // 2:
+            return operand - CONSTANT, operand - CONSTANT
+        if operand >= TEMPORARY:
+            return self.temporaries.get(operand - TEMPORARY)
+        if operand in (Register.WIDTH, Register.HEIGHT) and not self.has_room:
+            return WHOLE_REGISTER
+        if 0 <= operand < len(self.ranges.of_register):
+            return self.ranges.of_register[operand]
+        return None
+
+    def write(self, target: int, interval: Interval) -> str | None:
+        """Note a write; what is wrong with it, or None."""
+        if TEMPORARY <= target < TEMPORARY + TEMPORARIES:
+            self.temporaries[target - TEMPORARY] = interval
+            return None
+        if not 0 <= target < len(self.ranges.of_register):
+            return f"writes to {target}, which is neither a register nor a temporary"
+        low, high = self.ranges.of_register[target]
+        if interval[0] < low or interval[1] > high:
+            return f"may write {interval[0]}..{interval[1]} to register {target}, which holds {low}..{high}"
+        return None
+
+    def joined(self, other: Known | None) -> Known:
+        """What is known where two paths meet."""
+        known = self.copy()
+        if other is not None:
+            both = self.temporaries.keys() & other.temporaries.keys()
+            known.temporaries = {k: hull(self.temporaries[k], other.temporaries[k]) for k in both}
+            known.boards &= other.boards
+            known.has_room &= other.has_room
+        return known
+
+    def after_loop(self, written: Iterable[int], before: Known) -> Known:
+        """What is left of it behind a loop that ran any number of times, none included.
+
+        A temporary that was written inside may hold anything, or was never written unless it was before the loop.
+        """
+        known = self.copy()
+        known.boards &= before.boards
+        for temporary in written:
+            known.temporaries.pop(temporary, None)
+            if temporary in before.temporaries:
+                known.temporaries[temporary] = ANYTHING
+        return known
+
+
+def inbox_registers(program: Program) -> int:
+    """Registers of an inbox: a count, then entries of a class each, or of class, speaker and noun."""
+    entry = 3 if program.header(Header.FLAGS) & Flag.HEARD_BY else 1
+    return 1 + entry * program.header(Header.INBOX_SIZE)
+
+
+def greatest_status(program: Program, entity: int) -> int:
+    """The last status of an object; the greatest status code of an NPC."""
+    if program.entities[entity].role == "object":
+        return max(1, len(program.entities[entity].states)) - 1
+    return int(program.table(Header.ENTITY_AT)[entity, EntityColumn.KIND])
+
+
+# -- one instruction -----------------------------------------------------------------------------------------
+
 
 _SETTABLE: Final = (Field.DIR, Field.COLOR, Field.POKED, Field.LAST, Field.POINTING, Field.INSIDE)
 _FREE: Final = frozenset((Kind.UNUSED, Kind.SKIP, Kind.TARGET))
@@ -46,7 +200,7 @@ def problem_of(
     entry = TABLE.get(op)  # type: ignore[call-overload]
     if entry is None:
         return "the instruction table has no such op"
-    return _Checked(entry, words, program, known, writable, is_agents).problem()
+    return _Check(entry, words, program, known, writable, is_agents).problem()
 
 
 def written_temporaries(op: int, a: int, b: int, c: int) -> range:
@@ -57,7 +211,7 @@ def written_temporaries(op: int, a: int, b: int, c: int) -> range:
     return range(written.start - TEMPORARY, written.stop - TEMPORARY)
 
 
-class _Checked:
+class _Check:
     """One instruction where so much is known."""
 
     def __init__(
@@ -287,44 +441,44 @@ class _Checked:
         return None if self.known.has_room else "there is no room yet"
 
 
-_KINDS: Final[dict[Kind, Callable[[_Checked, Operand, int], str | None]]] = {
-    Kind.VALUE: _Checked._value,
-    Kind.ENTITY: _Checked._entity,
-    Kind.PLACE: _Checked._place,
-    Kind.UPDATED: _Checked._updated,
-    Kind.TEMPORARIES: _Checked._temporaries,
-    Kind.COORDINATES: _Checked._coordinates,
-    Kind.BOARD: _Checked._board,
-    Kind.FILLED: _Checked._board,
-    Kind.CHANGED: _Checked._board,
-    Kind.SITE: _Checked._site,
-    Kind.INBOX: _Checked._inbox,
-    Kind.REGISTER: _Checked._register,
-    Kind.LITERAL: _Checked._literal,
+_KINDS: Final[dict[Kind, Callable[[_Check, Operand, int], str | None]]] = {
+    Kind.VALUE: _Check._value,
+    Kind.ENTITY: _Check._entity,
+    Kind.PLACE: _Check._place,
+    Kind.UPDATED: _Check._updated,
+    Kind.TEMPORARIES: _Check._temporaries,
+    Kind.COORDINATES: _Check._coordinates,
+    Kind.BOARD: _Check._board,
+    Kind.FILLED: _Check._board,
+    Kind.CHANGED: _Check._board,
+    Kind.SITE: _Check._site,
+    Kind.INBOX: _Check._inbox,
+    Kind.REGISTER: _Check._register,
+    Kind.LITERAL: _Check._literal,
 }
 
-_OWN_CHECKS: Final[dict[Op, Callable[[_Checked], str | None]]] = {
-    Op.IF_HEARD: _Checked._if_heard,
-    Op.FIELD: _Checked._field,
-    Op.NEAREST: _Checked._nearest,
-    Op.DRAW_OTHER: _Checked._draw_other,
-    Op.LOWEST_BIT: _Checked._not_negative,
-    Op.PICK_BIT: _Checked._not_negative,
-    Op.HEARD_FROM: _Checked._heard,
-    Op.HEARD_NOUN: _Checked._heard,
-    Op.SET_FIELD: _Checked._set_field,
-    Op.BECOME: _Checked._become,
-    Op.SAY: _Checked._line,
-    Op.GOTO: _Checked._goto,
-    Op.COUNT: _Checked._count,
-    Op.ANSWER: _Checked._answer,
-    Op.END: _Checked._outcome,
-    Op.END_GRADED: _Checked._outcome,
-    Op.BODY: _Checked._body,
-    Op.CHOOSE: _Checked._choose,
-    Op.POINT: _Checked._point,
-    Op.PUT: _Checked._put,
-    Op.MAKE_ROOM: _Checked._make_room,
-    Op.DRAW_ROOM: _Checked._draw_room,
+_OWN_CHECKS: Final[dict[Op, Callable[[_Check], str | None]]] = {
+    Op.IF_HEARD: _Check._if_heard,
+    Op.FIELD: _Check._field,
+    Op.NEAREST: _Check._nearest,
+    Op.DRAW_OTHER: _Check._draw_other,
+    Op.LOWEST_BIT: _Check._not_negative,
+    Op.PICK_BIT: _Check._not_negative,
+    Op.HEARD_FROM: _Check._heard,
+    Op.HEARD_NOUN: _Check._heard,
+    Op.SET_FIELD: _Check._set_field,
+    Op.BECOME: _Check._become,
+    Op.SAY: _Check._line,
+    Op.GOTO: _Check._goto,
+    Op.COUNT: _Check._count,
+    Op.ANSWER: _Check._answer,
+    Op.END: _Check._outcome,
+    Op.END_GRADED: _Check._outcome,
+    Op.BODY: _Check._body,
+    Op.CHOOSE: _Check._choose,
+    Op.POINT: _Check._point,
+    Op.PUT: _Check._put,
+    Op.MAKE_ROOM: _Check._make_room,
+    Op.DRAW_ROOM: _Check._draw_room,
 }
 """What the kinds of an instruction's operands do not say."""

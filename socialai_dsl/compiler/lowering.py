@@ -1,25 +1,567 @@
-"""The second pass: every part of a scenario to code, each once."""
+"""The first two passes: where everything of a scenario is, then every part of it to code, each once."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import product
 
-from socialai_dsl.compiler.allocation import Allocation
-from socialai_dsl.compiler.behaviour import FrameCode, frame_code
-from socialai_dsl.compiler.consequences import links, tick
-from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.compiler.memories import push_acts, remember
-from socialai_dsl.compiler.outcomes import outcome_table
-from socialai_dsl.compiler.probes import Recorder
+from socialai_dsl.compiler.activities import ACTING, ACTS, GOING, NOTHING, Activities, has_aim
+from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Registers, Sites, constant, state_names
+from socialai_dsl.compiler.effects import (
+    ComputedStatuses,
+    Deferred,
+    Effects,
+    Homes,
+    links,
+    perceive,
+    push_acts,
+    remember,
+    tick,
+)
+from socialai_dsl.compiler.expressions import Expressions, Lines, chance_word, note_what_is_said
+from socialai_dsl.compiler.folding import FALSE, SEVERAL, Classes, Facts, fold, fold_whole
 from socialai_dsl.compiler.questions import ask
 from socialai_dsl.compiler.setup import require, reset
-from socialai_dsl.compiler.world_rules import world_rules
-from socialai_dsl.program import Header
+from socialai_dsl.program import Body, Header, Op
+from socialai_dsl.semantics import plans, terms
+from socialai_dsl.semantics.plans import FOR_EVER, CheckedScenario, FramePlan, OutcomePlan, RulePlan, StepPlan
+from socialai_dsl.semantics.terms import BOOL, Type
+
+
+class Asked:
+    """What a rule asks, while its code is emitted. This one notes nothing."""
+
+    def unless(self, key: str, otherwise: Label) -> Label:
+        """Where to skip to if what is written under a key does not hold; `otherwise` is where the rule ends."""
+        return otherwise
+
+    def nothing(self, key: str, otherwise: Label) -> Label:
+        """Where to skip to if a value finds nothing."""
+        return otherwise
+
+    def condition(self, to: Expressions, key: str, sited: terms.Sited, otherwise: Label) -> None:
+        """Emit a condition."""
+        to.sited_condition(sited, otherwise)
+
+    def report(self, to: Expressions, otherwise: Label) -> None:
+        """Emit what notes the parts that are false, right before `otherwise`."""
+
+
+class Probes:
+    """Gives out what notes the rules. This one notes nothing, so that a program is what it would be without."""
+
+    recording = False
+    """Whether every rule is asked, also one that cannot hold."""
+
+    def rule(self, to: Expressions, counter: int, plan: RulePlan | StepPlan, entity: int | None) -> Asked:
+        """For the code of a rule or an entry of `steps` of a member of the cast; None: of the world."""
+        return _NOTHING_NOTED
+
+    def outcome(self, to: Expressions, number: int, plan: OutcomePlan) -> Asked:
+        """For the code of an outcome."""
+        return _NOTHING_NOTED
+
+    def declare(self, registers: Registers) -> None:
+        """Let a program have the registers that this takes."""
+
+
+_NOTHING_NOTED = Asked()
+NO_PROBES = Probes()
 
 
 @dataclass(frozen=True)
-class Lowered:
+class Allocation:
+    """What code of one scenario is emitted with; lowering adds registers of its own, sites, lines and code.
+
+    Attributes:
+        inbox: the first register of the inboxes. inbox_of: that of the inbox of each member with a frame.
+        inbox_size: entries of an inbox.
+        rules: name of each counted rule, in the order of their counters.
+    """
+
+    checked: CheckedScenario
+    probes: Probes
+    registers: Registers
+    classes: Classes
+    lines: Lines
+    homes: Homes
+    computed: ComputedStatuses
+    inbox: int
+    inbox_of: dict[str, int]
+    inbox_size: int
+    sites: Sites = field(default_factory=Sites)
+    code: CodeTable = field(default_factory=CodeTable)
+    rules: list[str] = field(default_factory=list)
+
+    def expressions(self, facts: Facts | None = None, inbox: int = -1) -> Expressions:
+        """What emits into a fresh block, given these facts."""
+        to = Expressions(Block(), self.checked, self.registers, self.classes, self.sites, inbox)
+        to.facts = facts or to.facts
+        return to
+
+
+def allocate(checked: CheckedScenario, probes: Probes, numbered: Lines | None) -> Allocation:
+    """Where everything of a scenario is; lines are numbered as in `numbered`, if that is given."""
+    registers = Registers.of(checked)
+    classes = Classes(checked)
+    lines = Lines(checked, classes)
+    if numbered is not None:
+        lines.adopt(numbered)
+    note_what_is_said(checked, lines, registers)
+    homes = Homes(checked, registers)
+    # A member hears each of the others at most once between two of its turns.
+    inbox_size, entry_size = 1 + len(checked.frames), 3 if classes.speakers_matter else 1
+    inbox = registers.reserve(0)
+    inbox_of = {frame.member: registers.reserve(1 + entry_size * inbox_size) for frame in checked.frames}
+    computed = ComputedStatuses(checked)
+    return Allocation(
+        checked, probes, registers, classes, lines, homes, computed, inbox, inbox_of, inbox_size
+    )
+
+
+# -- frames: for each state and each class of utterance heard, only the rules that can then fire -------------
+
+
+AGENT = 0
+
+
+@dataclass(frozen=True, slots=True)
+class FrameCode:
+    """Where the code of a frame instance is.
+
+    Attributes:
+        rows: of the state table: activity, `first` by class, `then` by class. perceive: of beliefs. deferred: of what
+        rules of `first` do after the body action.
+    """
+
+    rows: list[list[int]]
+    perceive: int
+    deferred: int
+
+
+def frame_code(allocation: Allocation, number: int, frame: FramePlan) -> FrameCode:
+    """The code of frame instance `number`: rows of the state table, and what is shared by its states."""
+    compiler = _FrameCompiler(allocation, number, frame)
+    return FrameCode(compiler.rows(), compiler.perceive(), compiler.deferred())
+
+
+class _FrameCompiler:
+    """One frame as one member plays it."""
+
+    def __init__(self, shared: Allocation, number: int, frame: FramePlan) -> None:
+        self.shared, self.number, self.frame = shared, number, frame
+        self.states = state_names(frame)
+        self.clock = shared.registers.by_path[f"{frame.member}.clock"]
+        self.counters = {name: self._counter(name) for name in self._names()}
+        self.once = {
+            rule.name: shared.registers.add(f"{frame.member}.fired.{rule.name}", BOOL)
+            for state in frame.states
+            for rule in (*state.first, *state.then)
+            if rule.once
+        }
+        self.aims = {
+            k: shared.registers.add(
+                f"{frame.member}.aim[{k}]", self._range_of_aim(step.activity), fleeting=True
+            )
+            for k, step in enumerate(frame.steps)
+            if has_aim(step.activity) and step.ends_with_its_activity
+        }
+        self.speaker = shared.checked.entities[frame.entity]
+        self._is_agents = frame.entity == AGENT
+        self.later = Deferred(frame, self.speaker, shared.registers, shared.lines)
+
+    def _range_of_aim(self, activity: plans.Activity) -> Type:
+        highest = self.shared.registers.cut(activity.args[0].type).high
+        return Type("int", NOTHING, ACTING if activity.name in ACTS else highest)
+
+    def _names(self) -> list[str]:
+        if self.frame.steps:
+            return [step.name for step in self.frame.steps]
+        return [rule.name for state in self.frame.states for rule in (*state.first, *state.then)]
+
+    def _counter(self, name: str) -> int:
+        self.shared.rules.append(name)
+        return len(self.shared.rules) - 1
+
+    def rows(self) -> list[list[int]]:
+        if self.frame.steps:
+            return [self._step_row(k) for k in range(len(self.frame.steps))] + [self._idle_row()]
+        return [self._state_row(k) for k in range(len(self.frame.states))]
+
+    def perceive(self) -> int:
+        """The address of what is done at the start of a turn."""
+        to = self._expressions(Facts())
+        perceive(to, self.frame.member)
+        return self.shared.code.add(to.block, f"{self.frame.member}.believes")
+
+    def deferred(self) -> int:
+        """The address of what rules of `first` do after the body action that they have chosen."""
+        to = self._expressions(Facts())
+        for rule in self.later.rules:
+            following = Label()
+            mark = to.block.taken
+            to.block.span = rule.span
+            to.block.test(Op.IF_EQ, *self.later.is_pending(rule), following)
+            self._effects(to).carry_out(rule, self.later.recall(to, rule), self.speaker)
+            to.block.span = rule.span
+            self._go(to, rule, follow=False)
+            to.block.bind(following)
+            to.block.release(mark)
+        if self.later.rules:
+            to.block.halt()  # where none of them is pending
+        return self.shared.code.add(to.block, f"{self.frame.member}.{self.frame.frame}.deferred")
+
+    # --- shared by both forms ---
+
+    def _row(
+        self,
+        k: int,
+        activity: plans.Activity | None,
+        first: Callable[[Expressions], None],
+        then: Callable[[Expressions], None],
+    ) -> list[int]:
+        where = f"{self.frame.member}.{self.frame.frame}.{self.states[k]}"
+        return [
+            self._activity(activity, where, None if self._is_agents else self.aims.get(k)),
+            *self._by_class(first, f"{where}.first"),
+            *self._by_class(then, f"{where}.then"),
+        ]
+
+    def _by_class(self, emit: Callable[[Expressions], None], label: str) -> list[int]:
+        if self.shared.probes.recording:
+            to = self._expressions(Facts(heard=SEVERAL))
+            emit(to)
+            return [self.shared.code.add(to.block, label)] * (self.shared.classes.count + 1)
+        addresses = []
+        for heard in (*range(self.shared.classes.count), SEVERAL):
+            to = self._expressions(Facts(heard=heard))
+            emit(to)
+            addresses.append(self.shared.code.add(to.block, label))
+        return addresses
+
+    def _expressions(self, facts: Facts) -> Expressions:
+        return self.shared.expressions(facts, self.shared.inbox_of[self.frame.member])
+
+    def _activity(self, activity: plans.Activity | None, label: str, aim: int | None) -> int:
+        if activity is None or activity.name == "stay":
+            return 0
+        to = self._expressions(Facts())
+        self._activities(to, aim).emit(activity)
+        return self.shared.code.add(to.block, f"{label}.do")
+
+    def _activities(self, to: Expressions, aim: int | None = None) -> Activities:
+        shared = self.shared
+        return Activities(to, shared.checked, shared.lines, self.frame.entity, self.clock, aim)
+
+    def _idle_row(self) -> list[int]:
+        return [0] * (1 + 2 * (self.shared.classes.count + 1))
+
+    def _effects(self, to: Expressions) -> Effects:
+        return Effects(to, self.shared.lines, self.shared.homes)
+
+    # --- frames by states ---
+
+    def _state_row(self, k: int) -> list[int]:
+        state = self.frame.states[k]
+        return self._row(
+            k,
+            state.activity,
+            lambda to: self._rules(to, state.first, follow=False),
+            lambda to: self._rules(to, state.then, follow=True),
+        )
+
+    def _rules(
+        self, to: Expressions, rules: tuple[RulePlan, ...], follow: bool, clock: int | None = None
+    ) -> None:
+        """Rules top to bottom; the first that holds fires. `clock` is known right after a goto_now."""
+        for rule in rules:
+            heard = fold(terms.Heard(rule.hears), to.facts, self.shared.classes) if rule.hears else None
+            when = fold_whole(rule.when.term, to.facts, self.shared.classes) if rule.when else None
+            if FALSE not in (heard, when) and (clock is None or rule.after <= clock):
+                self._rule(to, rule, follow)
+            elif self.shared.probes.recording:
+                self._ask_in_vain(to, rule)
+        to.block.halt()
+
+    def _ask_in_vain(self, to: Expressions, rule: RulePlan) -> None:
+        """Only note what keeps a rule from firing here."""
+        following = Label()
+        asked = self._asked(to, rule)
+        self._conditions(to, rule, asked, following)
+        asked.report(to, following)
+        to.block.bind(following)
+
+    def _asked(self, to: Expressions, what: RulePlan | StepPlan) -> Asked:
+        return self.shared.probes.rule(to, self.counters[what.name], what, self.frame.entity)
+
+    def _conditions(self, to: Expressions, rule: RulePlan, asked: Asked, following: Label) -> None:
+        """Fall through if all conditions of a rule hold, else skip to `following`."""
+        block = to.block
+        block.span = rule.span
+        if rule.hears:
+            heard = fold(terms.Heard(rule.hears), to.facts, self.shared.classes)
+            to.condition(heard, asked.unless("hears", following))
+        if rule.once:
+            block.test(Op.IF_EQ, self.once[rule.name], constant(0), asked.unless("once", following))
+        if rule.after:
+            block.test(Op.IF_LE, constant(rule.after), self.clock, asked.unless("after", following))
+        if rule.when is not None:
+            asked.condition(to, "when", rule.when, following)
+        block.span = rule.span
+        if rule.chance is not None:
+            site = self.shared.sites.row(f"{rule.site}.chance")
+            block.test(Op.IF_CHANCE, chance_word(rule.chance), site, asked.unless("chance", following))
+
+    def _rule(self, to: Expressions, rule: RulePlan, follow: bool) -> None:
+        block = to.block
+        following = Label()
+        mark = block.taken
+        asked = self._asked(to, rule)
+        self._conditions(to, rule, asked, following)
+        operands = self._effects(to).compute(rule, asked.nothing("values", following), self.speaker)
+        start = len(block.instructions)
+        block.emit(Op.COUNT, self.counters[rule.name])
+        if rule.do is None:
+            self._effects(to).carry_out(rule, operands, self.speaker)
+        elif rule in self.later.rules:
+            self.later.note(to, rule, operands)
+        if rule.once:
+            block.emit(Op.LOAD, self.once[rule.name], constant(1))
+        block.span = rule.span
+        if rule.do is None:
+            self._go(to, rule, follow)
+            block.fuse_answer(start)
+        else:
+            self._activities(to).emit(rule.do)
+            block.halt()
+        asked.report(to, following)
+        block.bind(following)
+        block.release(mark)
+
+    def _go(self, to: Expressions, rule: RulePlan, follow: bool) -> None:
+        """Enter the next state; after goto_now in `then`, look at the new state's `then` at once."""
+        target = rule.goto or rule.goto_now
+        if target is None:
+            to.block.halt()
+            return
+        number = self.states.index(target)
+        to.block.emit(Op.GOTO, self.number, number)
+        if rule.goto_now is not None and follow:
+            self._rules(to, self.frame.states[number].then, follow=True, clock=0)
+        else:
+            to.block.halt()
+
+    # --- frames by steps ---
+
+    def _step_row(self, k: int) -> list[int]:
+        step = self.frame.steps[k]
+        return self._row(
+            k, step.activity, lambda to: self._skip_fulfilled(to, k), lambda to: self._end_step(to, k)
+        )
+
+    def _next(self, k: int) -> int:
+        """The state after entry k: entries with `for: 0` are left out."""
+        k += 1
+        while k < len(self.frame.steps) and self.frame.steps[k].duration == 0:
+            k += 1
+        return k
+
+    def _skip_fulfilled(self, to: Expressions, k: int) -> None:
+        """Entries that are fulfilled before they begin are skipped without taking the step."""
+        block = to.block
+        entry = k
+        while entry < len(self.frame.steps) and self._skippable(self.frame.steps[entry]):
+            stop, leave = Label(), Label()
+            activities = self._noting_of_agent(to, entry)
+            activities.unless_finished(self.frame.steps[entry].activity, stop, stop)
+            block.skip(leave)
+            block.bind(stop)
+            self._stay_in(to, k, entry)
+            block.bind(leave)
+            entry = self._next(entry)
+        if entry < len(self.frame.steps):
+            self._noting_of_agent(to, entry)
+        self._stay_in(to, k, entry)
+
+    def _noting_of_agent(self, to: Expressions, entry: int) -> Activities:
+        """Whoever plays a scripted agent may not do what its entry says, so what that notes is noted before it acts."""
+        aim = self.aims.get(entry) if self._is_agents else None
+        activities = self._activities(to, aim)
+        if aim is not None:
+            activities.note(self.frame.steps[entry].activity)
+        return activities
+
+    def _stay_in(self, to: Expressions, k: int, entry: int) -> None:
+        """Take this turn in an entry, where the frame was in entry k."""
+        if entry != k:
+            to.block.emit(Op.GOTO, self.number, entry)
+        to.block.halt()
+
+    @staticmethod
+    def _skippable(step: StepPlan) -> bool:
+        has_effects = step.sets or step.causes or step.say is not None
+        return step.activity.name in GOING and not has_effects and step.ends_with_its_activity
+
+    def _end_step(self, to: Expressions, k: int) -> None:
+        """The entry's effects and the next entry, once it has ended."""
+        step = self.frame.steps[k]
+        block = to.block
+        running, ended = Label(), Label()
+        block.span = step.span
+        asked = self._asked(to, step)
+        if step.duration is not None and step.duration > 0:
+            unless = asked.unless("for", running) if step.until is None else None
+            self._after(step.duration, to, ended, unless)
+        if step.lasted is not None:
+            not_yet = Label()
+            last = step.until is None
+            to.sited_condition(step.lasted, asked.unless("for", running) if last else not_yet)
+            block.skip(ended)
+            block.bind(not_yet)
+        if step.until is not None:
+            asked.condition(to, "until", step.until, running)
+        elif step.duration == FOR_EVER:
+            block.halt()
+            return
+        elif step.ends_with_its_activity:
+            unfinished = asked.unless("do", running)
+            self._activities(to, self.aims.get(k)).unless_finished(step.activity, unfinished, ended)
+        block.bind(ended)
+        failed = asked.nothing("values", running)
+        operands = self._effects(to).compute(step, failed, self.speaker)
+        start = len(block.instructions)
+        block.emit(Op.COUNT, self.counters[step.name])
+        self._effects(to).carry_out(step, operands, self.speaker)
+        block.emit(Op.GOTO, self.number, self._next(k))
+        block.halt()
+        block.fuse_answer(start)
+        asked.report(to, running)
+        block.bind(running)
+        block.halt()
+
+    def _after(self, duration: int, to: Expressions, ended: Label, running: Label | None) -> None:
+        """Skip to `ended` once the entry has lasted long enough, else to `running` (None: fall through)."""
+        not_yet = Label()
+        to.block.test(Op.IF_LE, constant(duration), self.clock, running or not_yet)
+        to.block.skip(ended)
+        to.block.bind(not_yet)
+
+
+# -- rules of the world: once a step, after all turns, each that holds fires ---------------------------------
+
+
+def world_rules(
+    to: Expressions,
+    lines: Lines,
+    homes: Homes,
+    counted: list[str],
+    probes: Probes = NO_PROBES,
+) -> None:
+    """Emit the rules top to bottom, and add their names to those that are counted."""
+    for rule in to.checked.rules:
+        counted.append(rule.name)
+        if rule.when is not None and fold(rule.when.term, to.facts, to.classes) == FALSE:
+            if probes.recording:
+                _ask_in_vain(to, rule, len(counted) - 1, probes)
+            continue
+        _world_rule(to, lines, homes, rule, len(counted) - 1, probes)
+
+
+def _ask_in_vain(to: Expressions, rule: RulePlan, counter: int, probes: Probes) -> None:
+    """Only note what keeps a rule from ever firing."""
+    assert rule.when is not None, "internal: a rule without a condition can fire"
+    following = Label()
+    asked = probes.rule(to, counter, rule, None)
+    asked.condition(to, "when", rule.when, following)
+    asked.report(to, following)
+    to.block.bind(following)
+
+
+def _world_rule(
+    to: Expressions,
+    lines: Lines,
+    homes: Homes,
+    rule: RulePlan,
+    counter: int,
+    probes: Probes,
+) -> None:
+    assert not rule.hears, "internal: the world has no ears"
+    assert rule.say is None, "internal: the world has no voice"
+    assert rule.do is None, "internal: the world has no body"
+    block = to.block
+    following = Label()
+    mark = block.taken
+    fired = to.registers.add(f"world.fired.{rule.name}", BOOL) if rule.once else None
+    block.span = rule.span
+    asked = probes.rule(to, counter, rule, None)
+    if fired is not None:
+        block.test(Op.IF_EQ, fired, constant(0), asked.unless("once", following))
+    if rule.when is not None:
+        asked.condition(to, "when", rule.when, following)
+    block.span = rule.span
+    if rule.chance is not None:
+        site = to.sites.row(f"{rule.site}.chance")
+        block.test(Op.IF_CHANCE, chance_word(rule.chance), site, asked.unless("chance", following))
+    Effects(to, lines, homes).emit(rule, counter, asked.nothing("values", following))
+    if fired is not None:
+        block.emit(Op.LOAD, fired, constant(1))
+    asked.report(to, following)
+    block.bind(following)
+    block.release(mark)
+
+
+# -- outcomes: one block for each pair of utterance class and body action, most of them empty ----------------
+
+
+_BODIES = range(Body.NONE + 1)
+"""What the agent can do."""
+
+
+def outcome_table(allocation: Allocation) -> list[int]:
+    """Addresses by (class, action), row by row."""
+    checked, probes, code = allocation.checked, allocation.probes, allocation.code
+    classes = range(allocation.classes.count)
+    if probes.recording:
+        to = allocation.expressions()
+        _first_that_holds(to, checked, probes)
+        return [code.add(to.block, "outcome")] * (len(classes) * len(_BODIES))
+    table = []
+    for said, action in product(classes, map(Body, _BODIES)):
+        to = allocation.expressions(Facts(said=said, action=action))
+        _first_that_holds(to, checked, probes)
+        table.append(code.add(to.block, f"outcome after class {said}, {action.name.lower()}"))
+    return table
+
+
+def _first_that_holds(to: Expressions, checked: CheckedScenario, probes: Probes) -> None:
+    block = to.block
+    for number, outcome in enumerate(checked.outcomes):
+        never = fold_whole(outcome.condition.term, to.facts, to.classes) == FALSE
+        if never and not probes.recording:
+            continue
+        following = Label()
+        asked = probes.outcome(to, number, outcome)
+        asked.condition(to, "outcome", outcome.condition, following)
+        if outcome.graded is not None and outcome.success:
+            mark = block.taken
+            to.failed = asked.nothing("values", following)
+            block.emit(Op.END_GRADED, number, to.sited_value(outcome.graded))
+            to.failed = None
+            block.release(mark)
+        else:
+            block.emit(Op.END, number, outcome.percent if outcome.success else 0)
+        block.halt()
+        asked.report(to, following)
+        block.bind(following)
+    block.halt()
+
+
+# -- the whole scenario --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class LoweredCode:
     """Where the code of a scenario begins.
 
     Attributes:
@@ -31,7 +573,7 @@ class Lowered:
     outcomes: list[int]
 
 
-def lower(allocation: Allocation) -> Lowered:
+def lower(allocation: Allocation) -> LoweredCode:
     """The code of a scenario, collected in the allocation's table."""
 
     def entry(label: str, *emitters: Callable[[Expressions], None]) -> int:
@@ -45,7 +587,7 @@ def lower(allocation: Allocation) -> Lowered:
     frames = [frame_code(allocation, number, frame) for number, frame in enumerate(allocation.checked.frames)]
     entries |= {
         Header.REQUIRE_PC: entry("require", require),
-        Header.BEFORE_PC: entry("before", ask, remember),
+        Header.BEFORE_PC: entry("before", *((ask,) if allocation.checked.probes else ()), remember),
         Header.LINKS_PC: entry("links", links),
         Header.SETTLE_PC: entry("settle", computed.settle),
         Header.RULES_PC: entry(
@@ -56,6 +598,5 @@ def lower(allocation: Allocation) -> Lowered:
         Header.TICK_PC: entry("tick", tick),
     }
     outcomes = outcome_table(allocation)
-    if isinstance(probes, Recorder):
-        probes.declare(allocation.registers)
-    return Lowered(entries, frames, outcomes)
+    probes.declare(allocation.registers)
+    return LoweredCode(entries, frames, outcomes)

@@ -11,17 +11,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from socialai_dsl.compiler.assembler import Label, constant
+from socialai_dsl.compiler.assembler import Label, Registers, constant, label, state_names
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import fold, mentions
-from socialai_dsl.compiler.registers import Registers, label, state_names
-from socialai_dsl.grammar import unparse
+from socialai_dsl.compiler.lowering import Asked, Probes
+from socialai_dsl.grammar.ast import unparse
 from socialai_dsl.program import Op, Program, RegisterName
 from socialai_dsl.semantics import terms
-from socialai_dsl.semantics.build import all_of
-from socialai_dsl.semantics.plans import Checked, OutcomePlan, RulePlan, StepPlan
-from socialai_dsl.semantics.readings import Reading, Readings
-from socialai_dsl.semantics.terms import BOOL, Const, Term, Type
+from socialai_dsl.semantics.plans import CheckedScenario, OutcomePlan, RulePlan, StepPlan
+from socialai_dsl.semantics.terms import BOOL, Const, Reading, Readings, Term, Type, all_of
 
 _LEAST, _GREATEST = -32768, 32767
 _MOST_VALUES = 6
@@ -70,7 +68,7 @@ class Probe:
 
 
 @dataclass(frozen=True)
-class Probed:
+class ProbedProgram:
     """A probed program, its first register that the program explained does not have, and its probes.
 
     Attributes:
@@ -83,50 +81,12 @@ class Probed:
     outcomes: dict[int, Probe]
 
 
-class Asked:
-    """What a rule asks, while its code is emitted. This one notes nothing."""
-
-    def unless(self, key: str, otherwise: Label) -> Label:
-        """Where to skip to if what is written under a key does not hold; `otherwise` is where the rule ends."""
-        return otherwise
-
-    def nothing(self, key: str, otherwise: Label) -> Label:
-        """Where to skip to if a value finds nothing."""
-        return otherwise
-
-    def condition(self, to: Expressions, key: str, sited: terms.Sited, otherwise: Label) -> None:
-        """Emit a condition."""
-        to.sited_condition(sited, otherwise)
-
-    def report(self, to: Expressions, otherwise: Label) -> None:
-        """Emit what notes the parts that are false, right before `otherwise`."""
-
-
-class Probes:
-    """Gives out what notes the rules. This one notes nothing, so that a program is what it would be without."""
-
-    recording = False
-    """Whether every rule is asked, also one that cannot hold."""
-
-    def rule(self, to: Expressions, counter: int, plan: RulePlan | StepPlan, entity: int | None) -> Asked:
-        """For the code of a rule or an entry of `steps` of a member of the cast; None: of the world."""
-        return _NOTHING_NOTED
-
-    def outcome(self, to: Expressions, number: int, plan: OutcomePlan) -> Asked:
-        """For the code of an outcome."""
-        return _NOTHING_NOTED
-
-
-_NOTHING_NOTED = Asked()
-NO_PROBES = Probes()
-
-
 class Recorder(Probes):
     """Notes everything, in registers from `first` on."""
 
     recording = True
 
-    def __init__(self, checked: Checked, first: int) -> None:
+    def __init__(self, checked: CheckedScenario, first: int) -> None:
         self.checked, self.readings = checked, checked.readings or Readings()
         self.first = self.next = first
         self.rules: dict[int, Probe] = {}
@@ -285,7 +245,7 @@ def _conjuncts(sited: terms.Sited, readings: Readings) -> list[tuple[Term, Readi
     return [(arg, next((one for one in known if one.term == arg), None)) for arg in args]
 
 
-def _asked_about(term: Term, reading: Reading | None, checked: Checked) -> Iterator[_Shown]:
+def _asked_about(term: Term, reading: Reading | None, checked: CheckedScenario) -> Iterator[_Shown]:
     """The values that a condition is about, each once, with how they were written; what is known tells nothing."""
     if reading is None:
         return
@@ -323,7 +283,7 @@ def _values(term: Term, outermost: bool) -> Iterator[Term]:
             yield term
 
 
-def _unwritten(term: Term, checked: Checked) -> _Shown | None:
+def _unwritten(term: Term, checked: CheckedScenario) -> _Shown | None:
     """What `x.is(state)` asks about, of an object or a member of the cast."""
     if isinstance(term, terms.InState):
         return _state_of(term, checked)
@@ -332,7 +292,7 @@ def _unwritten(term: Term, checked: Checked) -> _Shown | None:
     return None
 
 
-def _state_of(term: terms.InState, checked: Checked) -> _Shown:
+def _state_of(term: terms.InState, checked: CheckedScenario) -> _Shown:
     frame = next(f for f in checked.frames if f.member == term.member and f.frame == term.frame)
     names = state_names(frame)
     return _Shown(

@@ -8,8 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.engine.calls import BAD_ACTION, Task
-from socialai_dsl.engine.errors import RoomError
+from socialai_dsl.engine.calls import BAD_ACTION, RoomError, Task
 from socialai_dsl.engine.jit import load
 from socialai_dsl.engine.kernel import serve
 from socialai_dsl.engine.pointers import make_book, replace_in

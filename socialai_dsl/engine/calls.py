@@ -1,6 +1,13 @@
 """What the engine can be asked for, and what it answers: numbers that its callers share with the compiled code."""
 
+from __future__ import annotations
+
 from enum import IntEnum
+
+
+class RoomError(RuntimeError):
+    """No room that was drawn for an episode is as the scenario's `require` asks."""
+
 
 TERMINATED = 1
 TRUNCATED = 2

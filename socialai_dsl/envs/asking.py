@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.checking import Loaded
+from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.compilation import NotedText, ProbeNotes, compile_asking_loaded, scenarios_of
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
-from socialai_dsl.envs.recording import Recording, Start
+from socialai_dsl.envs.explain import Recording, Start
 from socialai_dsl.envs.table import Table
 from socialai_dsl.envs.values import shown
 from socialai_dsl.program import Program, Register, RegisterName
-from socialai_dsl.semantics.build import NOTED
+from socialai_dsl.semantics.terms import NOTED
 from socialai_dsl.vocabulary import TRUTHS, is_number, normal
 
 

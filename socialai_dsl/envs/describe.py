@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.envs.addresses import Acts, Addresses, addresses_of
-from socialai_dsl.envs.values import entry_words, shown, utterance_text
+from socialai_dsl.envs.values import Acts, Addresses, addresses_of, entry_words, shown, utterance_text
 from socialai_dsl.program import (
     ENTITY_FIELDS,
     FIRST_ENTITY,

@@ -8,7 +8,7 @@ from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
-from socialai_dsl.checking import Loaded, LoadedSuite
+from socialai_dsl.checking.loaded import Loaded, LoadedSuite
 from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.envs.scenario_env import ScenarioEnv
 from socialai_dsl.envs.starts import check_starts

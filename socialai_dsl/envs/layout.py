@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.engine.state import PIN_NONE
-from socialai_dsl.envs.addresses import Acts, addresses_of
-from socialai_dsl.envs.sharing import may_lie_over
 from socialai_dsl.envs.values import (
+    Acts,
+    addresses_of,
     cell_pair,
     entry_words,
     meant,
@@ -21,16 +22,59 @@ from socialai_dsl.envs.values import (
     word,
 )
 from socialai_dsl.program import (
+    CONSTANT,
     ENTITY_FIELDS,
     FIRST_ENTITY,
+    EntityColumn,
     Field,
+    Flag,
     FrameColumn,
     Header,
+    Op,
     Program,
     Register,
     RegisterName,
+    TypeColumn,
 )
 from socialai_dsl.vocabulary import ACTIONS, COLORS, DIRECTIONS, TURN_WORDS
+
+
+@lru_cache(maxsize=256)
+def may_lie_over(program: Program) -> frozenset[int]:
+    """Numbers of the objects that other objects may lie on or under.
+
+    Those are the ones that can be walked on, what is put where something may be already, and, where things roll or are
+    put somewhere in the course of an episode, all of them.
+    """
+    objects = {number for number, entity in enumerate(program.entities) if entity.role == "object"}
+    ops = program.code[:, 0]
+    if program.header(Header.FLAGS) & Flag.ROLLS or (ops == Op.PLACE).any():
+        return frozenset(objects)
+    return frozenset(number for number in objects if _is_walkable(program, number)) | _put_anywhere(program)
+
+
+def _is_walkable(program: Program, number: int) -> bool:
+    """Whether an object can be walked on in one of its statuses."""
+    first = int(program.table(Header.ENTITY_AT)[number, EntityColumn.TYPE])
+    statuses = slice(first, first + len(program.entities[number].states))
+    return bool(program.table(Header.TYPE_AT)[statuses, TypeColumn.WALKABLE].any())
+
+
+def _put_anywhere(program: Program) -> frozenset[int]:
+    """What is put on a drawn cell that need not be free."""
+    found: set[int] = set()
+    drawn = free = False
+    for op, entity, _, _ in program.code.tolist():
+        if op == Op.B_FREE:
+            free = True
+        elif op == Op.PICK_CELL:
+            drawn = True
+        elif op == Op.PUT:
+            if drawn and not free and entity >= CONSTANT // 2:
+                found.add(entity - CONSTANT)
+            drawn = free = False
+    return frozenset(found)
+
 
 _WORDS: dict[str, tuple[Field, Sequence[str]]] = {
     "facing": (Field.DIR, DIRECTIONS),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gymnasium
 
-from socialai_dsl.loader import shipped_folder
+from socialai_dsl.loader.library import shipped_folder
 
 # What the paper calls them; the file says the rest.
 IDS = {

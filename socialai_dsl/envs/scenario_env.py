@@ -1,25 +1,103 @@
-"""One scenario as a Gymnasium environment."""
+"""One scenario as a Gymnasium environment, and an action as people write it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.engine.calls import BAD_ACTION, TRUNCATED, Task
 from socialai_dsl.engine.state import Key
-from socialai_dsl.envs.actions import encode_action
+from socialai_dsl.envs.explain import Recording
 from socialai_dsl.envs.picture import Scene, cast_of, coloured_text, frame, looks_of_npcs, plain_text, scene
-from socialai_dsl.envs.recording import Recording
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import EntityName, Register
 from socialai_dsl.program_suite import Playable, ProgramSuite
 from socialai_dsl.render.panel import Face
 from socialai_dsl.render.tiles import Code
-from socialai_dsl.semantics.plans import Checked
+from socialai_dsl.semantics.plans import CheckedScenario
+
+FORMS = "(body action, template, noun) or (body action, sentence), each part a word, a number or None"
+
+
+Live = tuple[frozenset[int], frozenset[int]]
+"""Indices of templates and nouns that are meant, where a word stands for several."""
+
+
+def encode_action(
+    action: Sequence[Any],
+    actions: Sequence[str],
+    templates: Sequence[str],
+    nouns: Sequence[str],
+    live: Live | None = None,
+) -> NDArray[np.int64]:
+    """The action of the space, int64 (4,), for the paper's notation or words.
+
+    `(1, None, None)` turns right, `(None, 1, 5)` says template 1 with noun 5 and stays, `("forward", "Open sesame")`
+    does both.
+
+    Args:
+        action: what is meant.
+        actions: words for body actions.
+        templates: what can be said, each with its <noun>.
+        nouns: what the <noun> can be.
+        live: which of equal templates and nouns are meant; None: the first.
+
+    Raises:
+        ValueError: what was given is none of these; the message says what was got and what was expected.
+    """
+    if isinstance(action, str) or not isinstance(action, Sequence | np.ndarray) or len(action) not in (2, 3):
+        raise ValueError(f"got the action {action!r}; expected {FORMS}")
+    live_templates, live_nouns = live or (frozenset(), frozenset())
+    primitive = len(actions) if action[0] is None else _index(action[0], actions, "body action")
+    if len(action) == 2:
+        spoken = (
+            None
+            if action[1] is None
+            else _sentence(action[1], templates, nouns, (live_templates, live_nouns))
+        )
+    elif (action[1] is None) != (action[2] is None):
+        raise ValueError(f"got template {action[1]!r} and noun {action[2]!r}; expected both or neither")
+    elif action[1] is None:
+        spoken = None
+    else:
+        template = _index(action[1], templates, "template", live_templates)
+        spoken = template, _index(action[2], nouns, "noun", live_nouns)
+    return np.array([primitive, 0, 0, 0] if spoken is None else [primitive, 1, *spoken], np.int64)
+
+
+def _index(given: Any, words: Sequence[str], what: str, live: frozenset[int] = frozenset()) -> int:
+    if isinstance(given, str):
+        if given in words:
+            return min((i for i in live if words[i] == given), default=words.index(given))
+        near = did_you_mean(given, words)
+        hint = f"; did you mean {near!r}?" if near else ""
+        raise ValueError(f"got the {what} {given!r}; expected one of {', '.join(map(repr, words))}{hint}")
+    if isinstance(given, int | np.integer) and not isinstance(given, bool) and 0 <= given < len(words):
+        return int(given)
+    raise ValueError(
+        f"got the {what} {given!r}; expected a number from 0 to {len(words) - 1}, a word, or None"
+    )
+
+
+def _sentence(given: Any, templates: Sequence[str], nouns: Sequence[str], live: Live) -> tuple[int, int]:
+    pairs = product(range(len(templates)), range(len(nouns)))
+    # Of equal sentences the last is kept: a live one if there is one, else the first.
+    ordered = sorted(pairs, key=lambda pair: (pair[0] in live[0] and pair[1] in live[1], -pair[0], -pair[1]))
+    sentences = {templates[t].replace("<noun>", nouns[n]): (t, n) for t, n in ordered}
+    if isinstance(given, str):
+        if given in sentences:
+            return sentences[given]
+        near = did_you_mean(given, sentences)
+        hint = f"; did you mean {near!r}?" if near else ""
+        raise ValueError(f"got the sentence {given!r}, which the grammar cannot say{hint}")
+    raise ValueError(f"got the sentence {given!r}; expected a text such as {next(iter(sentences))!r}")
+
 
 Observation = dict[str, NDArray[Any]]
 
@@ -45,7 +123,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
     metadata = {"render_modes": ["rgb_array", "ansi", "human"], "render_fps": 4}  # noqa: RUF012 - Gymnasium's protocol
 
     def __init__(
-        self, program: Playable, render_mode: str | None = None, scenarios: Sequence[Checked] = ()
+        self, program: Playable, render_mode: str | None = None, scenarios: Sequence[CheckedScenario] = ()
     ) -> None:
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             modes = ", ".join(self.metadata["render_modes"])
@@ -176,7 +254,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         return self._table.describe(0)
 
     @property
-    def scenario(self) -> Checked:
+    def scenario(self) -> CheckedScenario:
         """What the program of this episode was compiled from.
 
         Raises:
@@ -184,7 +262,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         """
         return self._scenario(self._table.number(0))
 
-    def _scenario(self, number: int) -> Checked:
+    def _scenario(self, number: int) -> CheckedScenario:
         if not self._scenarios:
             raise ValueError(f"got an environment of a program; expected make({self.program.name!r})")
         return self._scenarios[number]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.checking import LoadedSuite
+from socialai_dsl.checking.loaded import LoadedSuite
 from socialai_dsl.diagnostics import DiagnosticBag
 from socialai_dsl.engine.state import PIN_NONE
 from socialai_dsl.envs.layout import pins_of

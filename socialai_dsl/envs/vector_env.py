@@ -11,9 +11,8 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from socialai_dsl.engine.calls import Task
-from socialai_dsl.envs.channels import joined
 from socialai_dsl.envs.picture import frame
-from socialai_dsl.envs.table import Table
+from socialai_dsl.envs.table import Table, joined
 from socialai_dsl.program import Program
 from socialai_dsl.program_suite import Playable
 

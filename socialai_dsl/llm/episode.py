@@ -9,7 +9,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.checking import Loaded
+from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs import make
 from socialai_dsl.envs.asking import Asker, Question
 from socialai_dsl.envs.factory import Scenario

@@ -14,7 +14,7 @@ import httpx
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.checking import Loaded
+from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs.asking import Question
 from socialai_dsl.llm.actions import Mode, ToolCall
 from socialai_dsl.llm.endpoint import Answer, Endpoint, EndpointError, Usage

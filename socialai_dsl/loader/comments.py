@@ -6,8 +6,8 @@ import re
 from bisect import bisect_right
 from dataclasses import dataclass
 
-from socialai_dsl.loader.document import Document
 from socialai_dsl.loader.offsets import Style
+from socialai_dsl.loader.reader import Document
 from socialai_dsl.source import Span
 
 _LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n|$)")

@@ -1,18 +1,259 @@
-"""The files one scenario may be made of: found by name, kept inside their folders, read once, counted."""
+"""The files one scenario may be made of: found by name, read once, counted, and kept as trees that know places."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Final, TypeAlias
 
-from socialai_dsl.diagnostics import Diagnostic, ScenarioError, did_you_mean
-from socialai_dsl.loader.document import Document
-from socialai_dsl.loader.files import display_name, is_file, read_source
-from socialai_dsl.loader.limits import MAX_FILES, MAX_TOTAL_BYTES
-from socialai_dsl.loader.names import SUFFIXES, shipped_folder
-from socialai_dsl.loader.reader import read_document
-from socialai_dsl.source import Source, Span
+from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, did_you_mean
+from socialai_dsl.loader.reader import (
+    MAX_FILES,
+    MAX_NAME,
+    MAX_TOTAL_BYTES,
+    Data,
+    Document,
+    display_name,
+    is_file,
+    read_document,
+    read_source,
+)
+from socialai_dsl.source import DataPath, Source, Span
+
+SUFFIXES: Final = (".yaml", ".yml")
+
+_VARIANT: Final = re.compile(r"[A-Za-z0-9_-]{1,80}")
+_PARAMETER: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,79}")
+
+
+@dataclass(frozen=True)
+class Part:
+    """A piece of a name and where it stands."""
+
+    text: str
+    span: Span
+
+
+@dataclass(frozen=True)
+class ScenarioName:
+    """A scenario's name, taken apart.
+
+    Attributes:
+        base: a path or the name of a shipped scenario.
+        variants: the variants to apply, in order.
+        params: parameter -> value as written.
+    """
+
+    base: Part
+    variants: tuple[Part, ...]
+    params: dict[str, Part]
+
+
+def shipped_folder() -> Path:
+    """The folder of the scenarios that come with the product, in a checkout as well as installed."""
+    package = Path(__file__).resolve().parent.parent
+    installed = package / "scenarios"
+    return installed if installed.is_dir() else package.parent / "scenarios"
+
+
+def shipped_experiments() -> dict[str, Path]:
+    """The files of the experiments that come with the product, by name."""
+    package = Path(__file__).resolve().parent.parent
+    installed = package / "experiments" / "shipped"
+    folder = installed if installed.is_dir() else package.parent / "experiments"
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+
+
+def looks_like_path(text: str) -> bool:
+    """Whether a name is meant as a file rather than as a shipped scenario."""
+    return "/" in text or "\\" in text or text.endswith(SUFFIXES)
+
+
+def name_source(text: str) -> Source:
+    """A name from outside any file (a command line, a call) as a source that findings can point into."""
+    return Source("scenario name", text)
+
+
+def parse_name(text: str, start: Span, found: DiagnosticBag, folder: Path | None = None) -> ScenarioName:
+    """Take a name apart; what cannot be understood is added to `found` as S508.
+
+    Args:
+        text: the name.
+        start: where its first character stands.
+        found: takes the findings.
+        folder: where relative paths start, if a file whose name holds `+` or `?` shall be recognised.
+    """
+    if not text.strip() or len(text) > MAX_NAME or not text.isprintable():
+        found.add(Diagnostic("S508", "a scenario's name is one line of visible characters", start))
+        return ScenarioName(Part("", start), (), {})
+
+    question = len(text) if _is_file(text, folder) else _index(text, "?", 0)
+    plus = question if _is_file(text[:question], folder) else _plus(text, question)
+    variants = _pieces(text, "+", plus + 1, question, start)
+    for variant in variants:
+        if not _VARIANT.fullmatch(variant.text):
+            found.add(Diagnostic("S508", "a variant's name is made of letters, digits and `_`", variant.span))
+    params = {}
+    for piece in _pieces(text, "&", question + 1, len(text), start):
+        key, equals, value = piece.text.partition("=")
+        if not equals or not _PARAMETER.fullmatch(key):
+            found.add(Diagnostic("S508", f"`{piece.text}` is not of the form parameter=value", piece.span))
+        elif key in params:
+            found.add(Diagnostic("S508", f"the parameter `{key}` is given twice", piece.span))
+        else:
+            params[key] = Part(value, piece.span)
+    return ScenarioName(_part(text, 0, plus, start), variants, params)
+
+
+def _is_file(text: str, folder: Path | None) -> bool:
+    return folder is not None and is_file(folder / text)
+
+
+def _index(text: str, character: str, begin: int) -> int:
+    found = text.find(character, begin)
+    return len(text) if found < 0 else found
+
+
+def _plus(text: str, question: int) -> int:
+    """The first `+` of the last part of the path."""
+    return min(question, _index(text, "+", text.rfind("/", 0, question) + 1))
+
+
+def _pieces(text: str, separator: str, begin: int, end: int, start: Span) -> tuple[Part, ...]:
+    """`text[begin:end]` split at the separator; nothing if `begin` lies behind `end`."""
+    pieces = []
+    while begin <= end:
+        stop = min(end, _index(text, separator, begin))
+        pieces.append(_part(text, begin, stop, start))
+        begin = stop + 1
+    return tuple(pieces)
+
+
+def _part(text: str, begin: int, end: int, start: Span) -> Part:
+    return Part(text[begin:end], start.shifted(begin, max(1, end - begin)))
+
+
+Children: TypeAlias = "dict[str, Node] | list[Node] | None"
+
+
+class Node:
+    """A part of a document.
+
+    Attributes:
+        document: the file it was written in.
+        path: where in that file.
+        children: the entries of a mapping or list; None for a scalar.
+        value: the scalar's value; None for a mapping or list.
+    """
+
+    __slots__ = ("children", "document", "path", "value")
+
+    def __init__(self, document: Document, path: DataPath, data: Data) -> None:
+        self.document = document
+        self.path = path
+        self.value: str | int | float | bool | None = None
+        self.children: Children = None
+        if isinstance(data, dict):
+            self.children = {key: Node(document, (*path, key), part) for key, part in data.items()}
+        elif isinstance(data, list):
+            self.children = [Node(document, (*path, i), part) for i, part in enumerate(data)]
+        else:
+            self.value = data
+
+    @property
+    def file(self) -> str:
+        """How messages call the file this part was written in."""
+        return self.document.source.name
+
+    @property
+    def kind(self) -> str:
+        """What this part is, for messages."""
+        if isinstance(self.children, dict):
+            return "a mapping"
+        if isinstance(self.children, list):
+            return "a list"
+        if self.value is None:
+            return "empty"
+        if isinstance(self.value, bool):
+            return "`true` or `false`"
+        return "a text" if isinstance(self.value, str) else "a number"
+
+    def value_span(self) -> Span:
+        """Where the part stands."""
+        return self.document.value_span(self.path)
+
+    def key_span(self) -> Span:
+        """Where its key stands."""
+        return self.document.key_span(self.path)
+
+    def items(self) -> Iterator[tuple[str | int, Node]]:
+        """Key or index and part, for each child."""
+        if isinstance(self.children, dict):
+            yield from self.children.items()
+        elif self.children is not None:
+            yield from enumerate(self.children)
+
+    def entry(self, key: str) -> Node | None:
+        """The entry of a mapping; None if there is none or this is no mapping."""
+        return self.children.get(key) if isinstance(self.children, dict) else None
+
+    def at(self, path: DataPath) -> Node:
+        """The part at a path below this one, which must exist."""
+        part = self
+        for step in path:
+            assert part.children is not None, "internal: the path leads into a scalar"
+            part = part.children[step]  # type: ignore[index]
+        return part
+
+    def text(self, key: str) -> str | None:
+        """The text at a key of a mapping; None for anything else."""
+        entry = self.entry(key)
+        return entry.value if entry is not None and isinstance(entry.value, str) else None
+
+    def data(self) -> Data:
+        """The part as plain data."""
+        if isinstance(self.children, dict):
+            return {key: part.data() for key, part in self.children.items()}
+        if isinstance(self.children, list):
+            return [part.data() for part in self.children]
+        return self.value
+
+    def copy(self) -> Node:
+        """This part with all below it, free to be changed."""
+        copied = Node(self.document, self.path, self.value)
+        if isinstance(self.children, dict):
+            copied.children = {key: part.copy() for key, part in self.children.items()}
+        elif isinstance(self.children, list):
+            copied.children = [part.copy() for part in self.children]
+        return copied
+
+    def walk(self, path: DataPath = ()) -> Iterator[tuple[DataPath, Node]]:
+        """This part and all below it with their paths, parents first."""
+        yield path, self
+        for key, part in self.items():
+            yield from part.walk((*path, key))
+
+
+def tree_of(document: Document) -> Node:
+    """A document as a tree of its own, free to be changed."""
+    return Node(document, (), document.data)
+
+
+def merge(base: Node, over: Node) -> Node:
+    """`base` overlaid with `over`: mappings are merged key by key, all else is replaced.
+
+    Keys of the base keep their place, those that only `over` has follow in its order. Both trees are used up.
+    """
+    if not isinstance(base.children, dict) or not isinstance(over.children, dict):
+        return over
+    for key, part in over.children.items():
+        below = base.children.get(key)
+        base.children[key] = part if below is None else merge(below, part)
+    over.children = base.children
+    return over
 
 
 class Library:

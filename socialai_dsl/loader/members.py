@@ -6,11 +6,157 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
+from typing import Final
 
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
-from socialai_dsl.loader.document import Data, DataPath
-from socialai_dsl.loader.leaves import MAX_LEAVES, Leaf, label_of, leaves_of, parameters_of
-from socialai_dsl.loader.resolved import Resolved
+from socialai_dsl.loader.reader import Data, PositionedData
+from socialai_dsl.loader.resolved import ResolvedFile
+from socialai_dsl.source import DataPath
+
+NODE_KEYS: Final = ("about", "scenario", "set", "remove", "add", "layout")
+"""Keys of a value in a tree; every other key is a parameter below it."""
+
+MAX_LEAVES: Final = 512
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """One way to give every parameter of a tree a value.
+
+    Attributes:
+        labels: parameter -> the value's label, in reading order. places: parameter -> where the value stands.
+        weight: how likely an episode plays it, if every value of a parameter is equally likely.
+        nodes: the mappings on its way, from the root on: each may change the scenario.
+        scenario, layout: where they are named; None if nowhere.
+    """
+
+    labels: Mapping[str, str] = field(default_factory=dict)
+    places: Mapping[str, DataPath] = field(default_factory=dict)
+    weight: Fraction = Fraction(1)
+    nodes: tuple[DataPath, ...] = ()
+    scenario: DataPath | None = None
+    layout: DataPath | None = None
+
+    @property
+    def name(self) -> str:
+        """What people call it: `introduction=ask,problem=boxes`."""
+        return ",".join(f"{parameter}={label}" for parameter, label in self.labels.items())
+
+
+def label_of(value: Data) -> str:
+    """How a value of a list is called, and written behind `?`."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def leaves_of(tree: Data, places: PositionedData, found: DiagnosticBag) -> tuple[Leaf, ...]:
+    """The leaves of a tree of the right shape, in reading order; reports S004, S107 and S213.
+
+    Args:
+        tree: the data at `tree`.
+        places: where the parts of the suite's file stand.
+        found: takes the findings.
+    """
+    count = _count(tree)
+    if count > MAX_LEAVES:
+        message = f"this tree has {count} leaves; at most {MAX_LEAVES} are played"
+        found.error("S004", message, places.key_span(("tree",)))
+        return ()
+    return tuple(_below(tree, ("tree",), places, found))
+
+
+def parameters_of(tree: Data, path: DataPath = ("tree",)) -> Iterator[tuple[str, DataPath, Data]]:
+    """Every parameter of a tree with its place and its values."""
+    for parameter, values in tree.items() if isinstance(tree, dict) else ():
+        if parameter in NODE_KEYS:
+            continue
+        yield parameter, (*path, parameter), values
+        for label, node in values.items() if isinstance(values, dict) else ():
+            yield from parameters_of(node, (*path, parameter, label))
+
+
+def _count(node: Data) -> int:
+    count = 1
+    for parameter, values in node.items() if isinstance(node, dict) else ():
+        if parameter not in NODE_KEYS:
+            below = map(_count, values.values()) if isinstance(values, dict) else [1] * len(_listed(values))
+            count *= sum(below)
+    return count
+
+
+def _listed(values: Data) -> list[Data]:
+    return values if isinstance(values, list) else []
+
+
+def _below(node: Data, path: DataPath, places: PositionedData, found: DiagnosticBag) -> list[Leaf]:
+    """The leaves at and below a value."""
+    assert isinstance(node, dict), "internal: a value of a tree that is no mapping has no keys"
+    own = Leaf(
+        nodes=(path,),
+        scenario=(*path, "scenario") if "scenario" in node else None,
+        layout=(*path, "layout") if "layout" in node else None,
+    )
+    leaves = [own]
+    for parameter, values in node.items():
+        if parameter not in NODE_KEYS:
+            chosen = _values(parameter, values, (*path, parameter), places, found)
+            leaves = [_joined(own, one, other, places, found) for one in leaves for other in chosen]
+    return leaves
+
+
+def _values(
+    parameter: str, values: Data, path: DataPath, places: PositionedData, found: DiagnosticBag
+) -> list[Leaf]:
+    """The leaves of one parameter: of each of its values."""
+    made: list[Leaf] = []
+    labels: list[tuple[str, DataPath, Data]] = (
+        [(label, (*path, label), node) for label, node in values.items()]
+        if isinstance(values, dict)
+        else [(label_of(value), (*path, i), {}) for i, value in enumerate(_listed(values))]
+    )
+    seen: set[str] = set()
+    for label, place, node in labels:
+        if label in seen:
+            found.error("S213", f"`{label}` is a value of `{parameter}` already", places.value_span(place))
+            continue
+        seen.add(label)
+        below = _below(node, place, places, found) if node else [Leaf()]
+        for leaf in below:
+            if parameter in leaf.labels:
+                message = f"`{parameter}` has a value already on the way to here"
+                found.error("S213", message, places.key_span(leaf.places[parameter][:-1]))
+            made.append(
+                replace(
+                    leaf,
+                    labels={parameter: label} | dict(leaf.labels),
+                    places={parameter: place} | dict(leaf.places),
+                    weight=leaf.weight / len(labels),
+                )
+            )
+    return made
+
+
+def _joined(own: Leaf, one: Leaf, other: Leaf, places: PositionedData, found: DiagnosticBag) -> Leaf:
+    """Two values that are drawn together below `own`; what is said deeper replaces what `own` says."""
+    for word in ("scenario", "layout"):
+        before, after = getattr(one, word), getattr(other, word)
+        if after is not None and before not in (None, getattr(own, word)):
+            first = places.key_span(before)
+            message = f"two values of this leaf name a {word}; the other one stands in line {first.line}"
+            found.error("S107", message, places.key_span(after))
+    for parameter in one.labels.keys() & other.labels.keys():
+        message = f"`{parameter}` has a value already in this leaf"
+        found.error("S213", message, places.key_span(other.places[parameter][:-1]))
+    return Leaf(
+        {**one.labels, **other.labels},
+        {**one.places, **other.places},
+        one.weight * other.weight,
+        (*one.nodes, *other.nodes),
+        other.scenario or one.scenario,
+        other.layout or one.layout,
+    )
+
+
+# -- members -------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -27,14 +173,14 @@ class Member:
     """
 
     name: str
-    scenario: Resolved
+    scenario: ResolvedFile
     place: DataPath
     weight: Fraction = Fraction(1)
     labels: Mapping[str, str] = field(default_factory=dict)
     layout: DataPath | None = None
 
 
-def members_of(suite: Resolved) -> tuple[Member, ...]:
+def members_of(suite: ResolvedFile) -> tuple[Member, ...]:
     """The members in order: of the split that `?split=` chooses, with the variants passed on.
 
     Raises:
@@ -53,7 +199,7 @@ def members_of(suite: Resolved) -> tuple[Member, ...]:
     return tuple(_with_variants(suite, members))
 
 
-def check_splits(suite: Resolved) -> None:
+def check_splits(suite: ResolvedFile) -> None:
     """Whether every split names members, also those that are not chosen.
 
     Raises:
@@ -72,7 +218,7 @@ def check_splits(suite: Resolved) -> None:
     found.raise_errors(suite.files)
 
 
-def _with_variants(suite: Resolved, members: Sequence[Member]) -> Sequence[Member]:
+def _with_variants(suite: ResolvedFile, members: Sequence[Member]) -> Sequence[Member]:
     for variant in suite.passed_on:
         changed = [member.scenario.varied(variant) for member in members]
         if not any(changed) and variant.text not in suite.own_variants:
@@ -88,7 +234,7 @@ def _with_variants(suite: Resolved, members: Sequence[Member]) -> Sequence[Membe
 # --- members that are listed ---
 
 
-def _member(suite: Resolved, place: DataPath, found: DiagnosticBag) -> Member | None:
+def _member(suite: ResolvedFile, place: DataPath, found: DiagnosticBag) -> Member | None:
     """The scenario that is named at a place; None if something is wrong with it."""
     entry = suite.part(place) if place[0] != "sweep" else None
     try:
@@ -107,12 +253,14 @@ def _member(suite: Resolved, place: DataPath, found: DiagnosticBag) -> Member | 
     return member if _can_be_played(suite, member.scenario, member.place, found) else None
 
 
-def _called(scenario: Resolved) -> str:
+def _called(scenario: ResolvedFile) -> str:
     given = "&".join(f"{name}={value}" for name, value in scenario.params.items())
     return f"{scenario.name}?{given}" if given else scenario.name
 
 
-def _can_be_played(suite: Resolved, scenario: Resolved, place: DataPath, found: DiagnosticBag) -> bool:
+def _can_be_played(
+    suite: ResolvedFile, scenario: ResolvedFile, place: DataPath, found: DiagnosticBag
+) -> bool:
     abstract = isinstance(scenario.data, dict) and scenario.data.get("abstract") is True
     if scenario.kind == "scenario" and not abstract:
         return True
@@ -123,7 +271,7 @@ def _can_be_played(suite: Resolved, scenario: Resolved, place: DataPath, found: 
     return False
 
 
-def _member_places(suite: Resolved, split: str | None) -> list[DataPath]:
+def _member_places(suite: ResolvedFile, split: str | None) -> list[DataPath]:
     """Where the members of a split are named."""
     written, swept = _part(suite.data, "members"), _mapping(suite.data, "sweep")
     own: list[DataPath] = (
@@ -143,7 +291,7 @@ def _member_places(suite: Resolved, split: str | None) -> list[DataPath]:
     return [("splits", split, "replace", names[place]) if names[place] in swapped else place for place in own]
 
 
-def _written_name(suite: Resolved, place: DataPath) -> str:
+def _written_name(suite: ResolvedFile, place: DataPath) -> str:
     """What the file calls a member: its text, or its name."""
     entry = place[-1] if place[0] == "sweep" else suite.part(place)
     return str(entry.get("name", entry.get("scenario")) if isinstance(entry, dict) else entry)
@@ -152,7 +300,7 @@ def _written_name(suite: Resolved, place: DataPath) -> str:
 # --- members that are swept over ---
 
 
-def _swept(suite: Resolved, place: DataPath, split: str | None, found: DiagnosticBag) -> Iterator[Member]:
+def _swept(suite: ResolvedFile, place: DataPath, split: str | None, found: DiagnosticBag) -> Iterator[Member]:
     """A member once for each combination of the values that are swept over; they share its weight."""
     member = _member(suite, place, found)
     if member is None:
@@ -181,17 +329,13 @@ def _swept(suite: Resolved, place: DataPath, split: str | None, found: Diagnosti
         yield replace(member, name=f"{member.name}[{text}]", scenario=scenario, weight=weight, labels=labels)
 
 
-def _listed(values: Data) -> list[Data]:
-    return values if isinstance(values, list) else []
-
-
 # --- leaves ---
 
 
-def _leaf_members(suite: Resolved, split: str | None, found: DiagnosticBag) -> list[Member]:
+def _leaf_members(suite: ResolvedFile, split: str | None, found: DiagnosticBag) -> list[Member]:
     tree = _part(suite.data, "tree")
     leaves = leaves_of(tree, suite, found)
-    scenarios: dict[DataPath, Resolved | None] = {}
+    scenarios: dict[DataPath, ResolvedFile | None] = {}
     for leaf in leaves:
         if leaf.scenario is None:
             place = list(leaf.places.values())[-1] if leaf.places else ("tree",)
@@ -206,7 +350,7 @@ def _leaf_members(suite: Resolved, split: str | None, found: DiagnosticBag) -> l
     return [member for member in made if member is not None]
 
 
-def _included(suite: Resolved, place: DataPath, found: DiagnosticBag) -> Resolved | None:
+def _included(suite: ResolvedFile, place: DataPath, found: DiagnosticBag) -> ResolvedFile | None:
     try:
         scenario = suite.include(place)
     except ScenarioError as error:
@@ -216,7 +360,7 @@ def _included(suite: Resolved, place: DataPath, found: DiagnosticBag) -> Resolve
 
 
 def _leaf_member(
-    suite: Resolved, leaf: Leaf, scenario: Resolved | None, found: DiagnosticBag
+    suite: ResolvedFile, leaf: Leaf, scenario: ResolvedFile | None, found: DiagnosticBag
 ) -> Member | None:
     """A leaf as a member: its scenario, with the leaf's values for the parameters it declares, and its changes."""
     if scenario is None or leaf.scenario is None:
@@ -240,10 +384,10 @@ def _leaf_member(
 
 
 def _check_parameters(
-    suite: Resolved,
+    suite: ResolvedFile,
     tree: Data,
     leaves: Sequence[Leaf],
-    scenarios: Mapping[DataPath, Resolved | None],
+    scenarios: Mapping[DataPath, ResolvedFile | None],
     found: DiagnosticBag,
 ) -> None:
     """A parameter that no scenario below it declares, and whose values say nothing, is a mistake."""
@@ -269,7 +413,7 @@ def _check_parameters(
 
 
 def _split_leaves(
-    suite: Resolved, leaves: Sequence[Leaf], split: str, found: DiagnosticBag
+    suite: ResolvedFile, leaves: Sequence[Leaf], split: str, found: DiagnosticBag
 ) -> tuple[Leaf, ...]:
     """The leaves of a split: with all the values of `only`, and not with all the values of `without`."""
     chosen = _splits(suite).get(split)
@@ -303,7 +447,11 @@ def _labels(values: Data) -> list[str]:
 
 
 def _are_known(
-    suite: Resolved, leaves: Sequence[Leaf], wanted: Mapping[str, Data], place: DataPath, found: DiagnosticBag
+    suite: ResolvedFile,
+    leaves: Sequence[Leaf],
+    wanted: Mapping[str, Data],
+    place: DataPath,
+    found: DiagnosticBag,
 ) -> bool:
     """Whether the tree has these parameters with these values."""
     before = len(list(found))
@@ -329,11 +477,11 @@ def _are_known(
 # --- splits ---
 
 
-def _splits(suite: Resolved) -> dict[str, Data]:
+def _splits(suite: ResolvedFile) -> dict[str, Data]:
     return _mapping(suite.data, "splits") or {}
 
 
-def _chosen_split(suite: Resolved) -> str | None:
+def _chosen_split(suite: ResolvedFile) -> str | None:
     split, known = suite.given("split"), _splits(suite)
     if split is None or split.text in known:
         return split.text if split else None

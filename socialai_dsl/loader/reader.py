@@ -1,24 +1,444 @@
-"""YAML text to plain data with positions, from the parser's events and within fixed limits."""
+"""Files as text, and YAML text to plain data with positions, from the parser's events and within fixed limits."""
 
 from __future__ import annotations
 
+import math
+import os
 import re
+import stat
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import IO, Any, Final, NamedTuple, TypeAlias
 
 import yaml
 
-from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag
-from socialai_dsl.loader.document import Data, DataPath, Document, NodeSpan
-from socialai_dsl.loader.files import FORBIDDEN, checked, display_name, forbidden_character, read_source
-from socialai_dsl.loader.limits import MAX_DEPTH, MAX_EVENTS, MAX_SCALAR
-from socialai_dsl.loader.offsets import Style
-from socialai_dsl.loader.scalars import read_plain
-from socialai_dsl.loader.texts import value_at
+from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError
+from socialai_dsl.loader.offsets import Style, source_indices
 from socialai_dsl.loader.yaml_errors import explain
-from socialai_dsl.source import Source, Span
+from socialai_dsl.source import DataPath, Source, Span
+
+MAX_FILE_BYTES: Final = 1 << 20
+MAX_DEPTH: Final = 32
+MAX_EVENTS: Final = 50_000
+MAX_SCALAR: Final = 10_000
+MAX_INT_DIGITS: Final = 10
+MAX_FLOAT_LENGTH: Final = 30
+
+MAX_FILES: Final = 64
+MAX_TOTAL_BYTES: Final = 4 << 20
+MAX_CHAIN: Final = 8
+MAX_NAME: Final = 4_000
+MAX_PATCH_PATH: Final = 500
+
+
+FORBIDDEN: Final = re.compile(
+    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f"
+    "\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufeff\ufffe\uffff]"
+)
+"""Characters no text may hold: control, line separators, bidirectional, surrogates, byte order marks."""
+
+_MOST_REPORTED: Final = 20
+
+
+def display_name(path: Path) -> str:
+    """How messages call a file: relative to the working directory if it is in there, else absolute."""
+    absolute = Path(os.path.abspath(path))
+    try:
+        return str(absolute.relative_to(Path.cwd()))
+    except (ValueError, OSError):
+        return str(absolute)
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is a regular file that may be looked at; links are followed."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def read_source(path: Path, name: str | None = None) -> Source:
+    """The text of a file, called `name` (by default its path) in messages.
+
+    Raises:
+        ScenarioError: S007 if it cannot be read (missing, a folder, a device, binary), S004 if it is too
+            large, S006 if it is not UTF-8 or holds control characters.
+    """
+    name = str(path) if name is None else name
+    return decoded(_read_bytes(path, name), name)
+
+
+def read_stream(stream: IO[bytes], name: str) -> Source:
+    """The text of a stream, called `name` in messages.
+
+    Raises:
+        ScenarioError: S004 if it is too large, S006 and S007 if it is no text.
+    """
+    content = stream.read(MAX_FILE_BYTES + 1)
+    if len(content) > MAX_FILE_BYTES:
+        raise ScenarioError([_too_large(name)])
+    return decoded(content, name)
+
+
+def _read_bytes(path: Path, name: str) -> bytes:
+    start = Span(name, 1, 1)
+    try:
+        # Opening a pipe would wait for a writer for ever, but for O_NONBLOCK.
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
+    except FileNotFoundError:
+        raise ScenarioError([Diagnostic("S007", "there is no such file", start)]) from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        message = f"the file cannot be opened: {reason[:1].lower()}{reason[1:]}"
+        raise ScenarioError([Diagnostic("S007", message, start)]) from None
+    try:
+        mode = os.fstat(descriptor).st_mode
+        if not stat.S_ISREG(mode):
+            raise ScenarioError([Diagnostic("S007", f"this is {_kind(mode)}, not a file", start)])
+        with os.fdopen(descriptor, "rb", closefd=False) as file:
+            content = file.read(MAX_FILE_BYTES + 1)
+    except OSError as error:
+        message = f"the file cannot be read: {error.strerror}"
+        raise ScenarioError([Diagnostic("S007", message, start)]) from None
+    finally:
+        os.close(descriptor)
+    if len(content) > MAX_FILE_BYTES:
+        raise ScenarioError([_too_large(name)])
+    return content
+
+
+def _too_large(name: str) -> Diagnostic:
+    return Diagnostic("S004", f"the file is larger than {MAX_FILE_BYTES // 1024} KiB", Span(name, 1, 1))
+
+
+def _kind(mode: int) -> str:
+    if stat.S_ISDIR(mode):
+        return "a folder"
+    if stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode):
+        return "a pipe"
+    return "a device"
+
+
+def decoded(content: bytes, name: str) -> Source:
+    """UTF-8 bytes as a source, without a leading byte order mark.
+
+    Raises:
+        ScenarioError: S006 or, for what is no text at all, S007.
+    """
+    start = Span(name, 1, 1)
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff") or content.count(0) * 3 > len(content) > 0:
+        message = "the file is UTF-16 or UTF-32; save it as UTF-8"
+        raise ScenarioError([Diagnostic("S006", message, start)])
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        if b"\0" in content:
+            raise ScenarioError([Diagnostic("S007", "this is a binary file, not text", start)]) from None
+        before = Source(name, content[: error.start].decode("utf-8"))
+        *_, last = enumerate(before.lines(), 1)
+        span = Span(name, last[0], len(last[1]) + 1)
+        message = f"the byte 0x{content[error.start]:02x} is not UTF-8; save the file as UTF-8"
+        raise ScenarioError([Diagnostic("S006", message, span)], {name: before}) from None
+    return checked(Source(name, text.removeprefix("\ufeff")))
+
+
+def checked(source: Source) -> Source:
+    """The source itself, if it is small enough and holds no forbidden character.
+
+    Raises:
+        ScenarioError: S004 or S006.
+    """
+    if len(source.text) > MAX_FILE_BYTES:
+        message = f"the text is longer than {MAX_FILE_BYTES} characters"
+        raise ScenarioError([Diagnostic("S004", message, source.span(1, 1))])
+    if not FORBIDDEN.search(source.text):
+        return source
+    found = DiagnosticBag()
+    for number, line in enumerate(source.lines(), 1):
+        for match in FORBIDDEN.finditer(line):
+            if len(found) == _MOST_REPORTED:
+                break
+            found.add(forbidden_character(match.group(), source.span(number, match.start() + 1)))
+    raise ScenarioError(found, {source.name: source})
+
+
+def forbidden_character(character: str, span: Span) -> Diagnostic:
+    """The finding for a character that no text may hold."""
+    message = f"the invisible character U+{ord(character):04X} may not be used; delete it"
+    return Diagnostic("S006", message, span)
+
+
+Data: TypeAlias = "str | int | float | bool | list[Data] | dict[str, Data] | None"
+
+
+@dataclass(frozen=True, slots=True)
+class NodeSpan:
+    """Where one part of a document stands.
+
+    Attributes:
+        key: place of the key, for an entry of a mapping.
+        value: place of the value; as wide as a scalar on one line, else of width 1.
+        style: how the value is written.
+        flow: whether the value stands inside `{ }` or `[ ]`.
+        start: index in the source's text of a scalar's first character, quotes and block header included.
+        end: index behind its last character.
+    """
+
+    key: Span | None
+    value: Span
+    style: Style
+    flow: bool
+    start: int
+    end: int
+
+
+class PositionedData(ABC):
+    """Data whose parts know where they come from; what does not exist is where its nearest ancestor is."""
+
+    data: Data
+
+    @abstractmethod
+    def find(self, path: DataPath) -> tuple[Document, DataPath]:
+        """The document in which the part at `path` was written, and its path there."""
+
+    def part(self, path: DataPath) -> Data:
+        """The part of the data at `path`, which exists."""
+        part: Data = self.data
+        for step in path:
+            part = part[step]  # type: ignore[index]
+        return part
+
+    def locate(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
+        """The place of the character `offset` (from 0) of the text at `path`."""
+        document, there = self.find(path)
+        return document.place_in_scalar(there, offset, width)
+
+    def value_span(self, path: DataPath) -> Span:
+        """The place of the value at `path`."""
+        document, there = self.find(path)
+        return document.node(there).value
+
+    def key_span(self, path: DataPath) -> Span:
+        """The place of the key at `path`; of the value, for an item of a list and for the root."""
+        document, there = self.find(path)
+        node = document.node(there)
+        return node.key or node.value
+
+    def in_flow(self, path: DataPath) -> bool:
+        """Whether the part at `path` stands inside { } or [ ]."""
+        return self.node_span(path).flow
+
+    def node_span(self, path: DataPath) -> NodeSpan:
+        """All that is known about the place of the part at `path`."""
+        document, there = self.find(path)
+        return document.node(there)
+
+
+@dataclass(frozen=True, eq=False)
+class Document(PositionedData):
+    """One YAML file as plain data.
+
+    Attributes:
+        source: its text.
+        data: dicts (keys are always text), lists, str, int, float, bool and None.
+        spans: path -> place, for every part.
+        path: the file itself, resolved; None if the text did not come from a file.
+    """
+
+    source: Source
+    data: Data
+    spans: dict[DataPath, NodeSpan] = field(repr=False)
+    path: Path | None = None
+
+    def find(self, path: DataPath) -> tuple[Document, DataPath]:
+        """This document and `path`, shortened until it exists."""
+        path = tuple(path)
+        while path and path not in self.spans:
+            path = path[:-1]
+        return self, path
+
+    def node(self, path: DataPath) -> NodeSpan:
+        """The place of an existing part."""
+        return self.spans[path]
+
+    def place_in_scalar(self, path: DataPath, offset: int, width: int) -> Span:
+        """The place of one character of an existing scalar; the start of anything else."""
+        node = self.node(path)
+        place = node.value
+        if node.style in (Style.MAPPING, Style.SEQUENCE):
+            return place.shifted(0, width)
+        text = self.source.text
+        raw = text[node.start : node.end]
+        if node.style is Style.PLAIN and "\n" not in raw and "\r" not in raw:
+            return place.shifted(min(max(offset, 0), len(raw)), width)
+        value = self.part(path)
+        assert isinstance(value, str), "internal: what is written as a text is read as one"
+        indices = source_indices(text, node.start, node.end, node.style, value)
+        index = indices[min(max(offset, 0), len(indices) - 1)]
+        return self._span_of(node, index, width)
+
+    def _span_of(self, node: NodeSpan, index: int, width: int) -> Span:
+        before = Source("", self.source.text[node.start : index])
+        *_, (breaks, last) = enumerate(before.lines())
+        column = len(last) + (1 if breaks else node.value.column)
+        return Span(node.value.file, node.value.line + breaks, column, width)
+
+
+Scalar: TypeAlias = str | int | float | bool | None
+
+
+class Plain(NamedTuple):
+    """The value of a plain word and, if it is refused, the code, message and help line."""
+
+    value: Scalar
+    code: str | None = None
+    message: str = ""
+    hint: str | None = None
+
+
+_INT: Final = re.compile(r"[-+]?(0|[1-9][0-9]*)")
+_FLOAT: Final = re.compile(r"[-+]?((0|[1-9][0-9]*)\.[0-9]+([eE][-+][0-9]+)?|\.[0-9]+)")
+
+_TRUE: Final = frozenset({"y", "yes", "true", "on"})
+_FALSE: Final = frozenset({"n", "no", "false", "off"})
+_NUMBER_LIKE: Final = re.compile(
+    r"""[-+]?(?:
+          0[0-9_]+                                          # octal for some
+        | 0x[0-9a-fA-F_]+ | 0o[0-7_]+ | 0b[01_]+
+        | [0-9][0-9_]*(?::[0-5]?[0-9])+(?:\.[0-9_]*)?       # base 60
+        | (?:[0-9][0-9_]*(?:\.[0-9_]*)?|\.[0-9][0-9_]*)(?:[eE][-+]?[0-9]+)?
+        | \.(?:inf|Inf|INF)
+        ) | \.(?:nan|NaN|NAN)""",
+    re.VERBOSE,
+)
+_DATE: Final = re.compile(r"[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}(?:[Tt \t].*)?", re.DOTALL)
+_MAY_BE_SPECIAL: Final = frozenset("-+.0123456789~=<ynotfYNOTF")
+
+
+def read_plain(text: str) -> Plain:
+    """The value of a plain word.
+
+    Only the readings on which YAML 1.1 and YAML 1.2 tools agree are accepted; words that some tools take
+    for something else (`yes`, `010`, `1:30`, `~`, dates) are refused with S003, so that a file means the
+    same everywhere.
+    """
+    if text in ("", "null"):
+        return Plain(None)
+    if text == "true":
+        return Plain(True)
+    if text == "false":
+        return Plain(False)
+    if text[0] not in _MAY_BE_SPECIAL:
+        return Plain(text)
+    if _INT.fullmatch(text):
+        return _int(text)
+    if _FLOAT.fullmatch(text):
+        return _float(text)
+    return _ambiguous(text) or Plain(text)
+
+
+def _int(text: str) -> Plain:
+    if len(text.lstrip("+-")) > MAX_INT_DIGITS:
+        return Plain(text, "S004", f"a whole number has at most {MAX_INT_DIGITS} digits")
+    return Plain(int(text))
+
+
+def _float(text: str) -> Plain:
+    value = float(text) if len(text) <= MAX_FLOAT_LENGTH else math.inf
+    if not math.isfinite(value):
+        return Plain(text, "S004", f"a number is finite and has at most {MAX_FLOAT_LENGTH} characters")
+    return Plain(value)
+
+
+def _ambiguous(text: str) -> Plain | None:
+    folded = text.lower()
+    if folded in _TRUE | _FALSE and text in (folded, folded.capitalize(), folded.upper()):
+        truth = "true" if folded in _TRUE else "false"
+        return _refused(text, f"`{truth}` for some YAML tools and text for others", f"write `{truth}`")
+    if text == "~" or folded == "null":
+        return _refused(text, "nothing for some YAML tools and text for others", "leave the value out")
+    if text in ("=", "<<"):
+        return _refused(text, "a special word for some YAML tools")
+    if _NUMBER_LIKE.fullmatch(text):
+        return _refused(text, "not the same number for all YAML tools", "write a plain decimal number")
+    if _DATE.fullmatch(text):
+        return _refused(text, "a date for some YAML tools and text for others")
+    return None
+
+
+def _refused(text: str, reading: str, otherwise: str | None = None) -> Plain:
+    hint = f'if you mean the text, quote it: "{text}"'
+    hint = f"{otherwise}; {hint}" if otherwise else hint
+    return Plain(text, "S003", f"`{text}` is {reading}", hint)
+
+
+_TEXTS: Final = frozenset("say hears templates about notes note skills name state goto goto_now".split())
+"""Keys of the language whose values are texts or names of states."""
+
+_PROSE: Final = frozenset("about notes note skills".split())
+"""Texts for people, for which `null` says that there is none."""
+
+_AUTHORS: Final = frozenset(
+    "objects let define state tables memory params frames slots states roles cast set beliefs".split()
+)
+"""Keys of the language below which the keys are words of the author."""
+
+_NOTHING: Final = ("", "~")
+_STEP: Final = re.compile(r"[^.\[\]]+")
+
+
+def value_at(path: DataPath, text: str) -> Data | None:
+    """What a plain word means where a text may stand; None where YAML's own reading holds.
+
+    Args:
+        path: where in its file it stands.
+        text: the word as it is written.
+    """
+    if text in _NOTHING:
+        return None
+    keys = _keys(path)
+    if _is_text(keys):
+        return None if text == "null" and keys[-1] in _PROSE else text
+    kept = _kept(keys)
+    if kept:
+        value = read_plain(text).value
+        return value if type(value) in kept else text
+    return None
+
+
+def _keys(path: DataPath) -> list[str]:
+    """The keys on the way to a value, from the root of the scenario; the key of a patch is such a way itself."""
+    keys: list[str] = []
+    for step in path:
+        if isinstance(step, str):
+            keys = _STEP.findall(step) if "." in step else [*keys, step]
+    return keys
+
+
+def _is_text(keys: list[str]) -> bool:
+    """Whether nothing but a text, or a name, can stand there."""
+    match keys:
+        case [*_, "frames", _, "start"] | [*_, "probes", _, "ask" | "answers"]:
+            return True
+        case [*_, parent, _] if parent in _AUTHORS:
+            return False
+        case [*_, key]:
+            return key in _TEXTS
+    return False
+
+
+def _kept(keys: list[str]) -> tuple[type, ...]:
+    """Kinds of values that can stand there beside texts; none where no text can."""
+    match keys:
+        case [*_, "with", _] | [*_, "tables", _, _]:
+            return (bool, int)
+        case [*_, "grammar", "nouns"] | [*_, "grammars", _, "nouns"]:
+            return (int,)
+    return ()
+
 
 # Only the event stream of libyaml is used: its composer and PyYAML's are recursive and can be made to crash.
 _EventParser: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader

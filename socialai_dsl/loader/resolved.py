@@ -1,32 +1,353 @@
-"""From a scenario's name to its data, with `extends`, variants, and the files it names."""
+"""From a scenario's name to its data: `extends`, variants and the files it names, put together as one tree."""
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Final
 
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, did_you_mean
-from socialai_dsl.loader.build import Build, Builder
-from socialai_dsl.loader.document import DataPath, Document, Positions
-from socialai_dsl.loader.files import is_file
-from socialai_dsl.loader.library import Library, yaml_files
-from socialai_dsl.loader.limits import MAX_CHAIN
-from socialai_dsl.loader.names import (
+from socialai_dsl.loader.library import (
+    Library,
+    Node,
     Part,
     ScenarioName,
     looks_like_path,
+    merge,
     name_source,
     parse_name,
     shipped_folder,
+    tree_of,
+    yaml_files,
 )
-from socialai_dsl.loader.patches import PATCH_VERBS
-from socialai_dsl.loader.tree import Node
-from socialai_dsl.loader.variants import names_in, vary
-from socialai_dsl.source import Source, Span
+from socialai_dsl.loader.patches import PATCH_VERBS, Edit, apply_patch, check_variant
+from socialai_dsl.loader.reader import MAX_CHAIN, MAX_DEPTH, Document, PositionedData, display_name, is_file
+from socialai_dsl.source import DataPath, Source, Span
+
+KINDS: Final = ("scenario", "npc", "variant", "suite", "library", "experiment")
+"""The kinds of file; exactly one of these keys is present."""
+
+ANY: Final = "any"
+"""What a variant that fits every scenario is `of`."""
+
+_DECLARED_NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,80}")
 
 
-class Resolved(Positions):
+@dataclass
+class Ancestor:
+    """What a scenario is, or is a variant of: variants are looked for by folder and stem.
+
+    Attributes:
+        folder: where its variants are.
+        stem: what the names of their files begin with.
+        path: its own file, resolved; None for a combination that has none.
+    """
+
+    folder: Path
+    stem: str
+    path: Path | None = None
+
+
+@dataclass
+class Build:
+    """A scenario while it is put together.
+
+    Attributes:
+        tree: its data; changed in place.
+        kind: one of `KINDS`.
+        name: canonical name, with the variants applied so far.
+        path: the file that was named, resolved.
+        lineage: itself and what it is a variant of, nearest first.
+        edits: what patches changed, in order.
+        passed_on: the variants that a suite passes on to its members.
+        own_variants: those for which there was a file of its own.
+    """
+
+    tree: Node
+    kind: str
+    name: str
+    path: Path
+    lineage: list[Ancestor]
+    edits: list[Edit] = field(default_factory=list)
+    passed_on: list[Part] = field(default_factory=list)
+    own_variants: list[str] = field(default_factory=list)
+
+    def copy(self) -> Build:
+        """The same, free to be changed further."""
+        return Build(
+            self.tree.copy(),
+            self.kind,
+            self.name,
+            self.path,
+            list(self.lineage),
+            list(self.edits),
+            list(self.passed_on),
+            list(self.own_variants),
+        )
+
+
+class Builder:
+    """Puts scenarios together from the files of one library."""
+
+    def __init__(self, library: Library) -> None:
+        self.library = library
+
+    def built(self, path: Path, asked: Span | None = None, chain: tuple[Path, ...] = ()) -> Build:
+        """A file with `extends` and, for a variant, with what it is a variant of.
+
+        Args:
+            path: the file, resolved.
+            asked: where its name is written; None if it was given from outside.
+            chain: the files that build on it.
+
+        Raises:
+            ScenarioError: what is wrong with it or with a file it builds on.
+        """
+        if asked is not None:
+            self.check_chain(path, chain, asked)
+        root, kind = self.read(path, asked)
+        declared = root.text(kind) or ""
+        name = declared if _DECLARED_NAME.fullmatch(declared) else path.stem
+        lineage = [Ancestor(path.parent, path.stem, path)]
+        if kind == "variant" and root.text("of") != ANY:
+            base = self._base(root, "of", path, chain)
+            self.patch(base, root)
+            built = Build(base.tree, base.kind, name, path, lineage + base.lineage, base.edits)
+            if base.kind == "suite":
+                self._pass_on(built, base, root)
+            return built
+        if root.entry("extends") is not None:
+            root = self._extended(root, kind, path, chain)
+        return Build(root, kind, name, path, lineage)
+
+    @staticmethod
+    def _pass_on(built: Build, base: Build, root: Node) -> None:
+        """A suite's variant that is named directly is passed on to the members like one that is named by `+`."""
+        built.passed_on, built.own_variants = list(base.passed_on), list(base.own_variants)
+        stem = base.lineage[0].stem + "_"
+        declared = root.entry("variant")
+        if declared is not None and built.path.stem.startswith(stem):
+            variant = Part(built.path.stem.removeprefix(stem), declared.value_span())
+            built.passed_on.append(variant)
+            built.own_variants.append(variant.text)
+
+    def read(self, path: Path, asked: Span | None) -> tuple[Node, str]:
+        """A file as a tree of its own, and its kind; a variant's shape is checked, since no model sees it."""
+        root = tree_of(self.library.read(path, asked))
+        kind = self._kind(root)
+        if kind == "variant":
+            found = DiagnosticBag()
+            check_variant(root, found)
+            found.raise_errors(self.library.sources)
+        return root, kind
+
+    def patch(self, build: Build, patch: Node) -> None:
+        """Apply a patch.
+
+        Raises:
+            ScenarioError: with everything that is wrong with it.
+        """
+        found = DiagnosticBag()
+        build.edits += apply_patch(build.tree, patch, found)
+        found.raise_errors(self.library.sources)
+        self.check_depth(build.tree)
+
+    def check_chain(self, path: Path, chain: tuple[Path, ...], asked: Span) -> None:
+        """Whether `path` may be built on by the files of `chain`.
+
+        Raises:
+            ScenarioError: S506 if it is one of them, S507 if they are too many.
+        """
+        if path in chain:
+            circle = " → ".join(p.name for p in (*chain[chain.index(path) :], path))
+            raise self.library.error("S506", f"these files build on each other in a circle: {circle}", asked)
+        if len(chain) >= MAX_CHAIN:
+            raise self.library.error("S507", f"more than {MAX_CHAIN} files build on each other", asked)
+
+    def _base(self, root: Node, key: str, path: Path, chain: tuple[Path, ...]) -> Build:
+        """What the file named at `key` (`of` or `extends`) is."""
+        entry = root.entry(key)
+        assert entry is not None, "internal: the key was looked at before"
+        span = entry.value_span()
+        if not isinstance(entry.value, str):
+            raise self.library.error("S104", f"`{key}` names one file, it is not {entry.kind}", span)
+        build = self.built(self.library.find(entry.value, path.parent, span), span, (*chain, path))
+        if build.kind == "variant":
+            message = f"`{entry.value}` is a variant of any scenario; nothing can be built on it"
+            raise self.library.error("S108", message, span)
+        return build
+
+    def _extended(self, root: Node, kind: str, path: Path, chain: tuple[Path, ...]) -> Node:
+        base = self._base(root, "extends", path, chain)
+        entry = root.entry("extends")
+        assert entry is not None, "internal: the key was looked at before"
+        if base.kind != kind:
+            message = f"`{entry.value}` is a file of kind `{base.kind}`, this one is of kind `{kind}`"
+            raise self.library.error("S108", message, entry.value_span())
+        assert isinstance(base.tree.children, dict), "internal: a file is a mapping"
+        assert isinstance(root.children, dict), "internal: a file is a mapping"
+        base.tree.children.pop("abstract", None)
+        del root.children["extends"]
+        merged = merge(base.tree, root)
+        self.check_depth(merged)
+        return merged
+
+    def _kind(self, root: Node) -> str:
+        if not isinstance(root.children, dict):
+            message = f"a scenario file is a mapping of keys; this one is {root.kind}"
+            hint = "it starts with a key such as `scenario: name`"
+            raise self.library.error("S108", message, root.value_span(), hint=hint)
+        kinds = [key for key in root.children if key in KINDS]
+        if len(kinds) == 1:
+            return kinds[0]
+        if kinds:
+            message = f"a file has only one of `{kinds[0]}` and `{kinds[1]}`"
+            raise self.library.error("S107", message, root.children[kinds[1]].key_span())
+        for key, part in root.children.items():
+            near = did_you_mean(key, KINDS)
+            if near:
+                message = f"unknown key `{key}`, and no key says what this file is"
+                raise self.library.error("S108", message, part.key_span(), suggestion=near)
+        hint = "give one of " + ", ".join(f"`{kind}: name`" for kind in KINDS)
+        raise self.library.error("S108", "no key says what this file is", root.value_span(), hint=hint)
+
+    def check_depth(self, tree: Node) -> None:
+        """Whether a tree that was put together is shallow enough.
+
+        Raises:
+            ScenarioError: S004.
+        """
+        for path, node in tree.walk():
+            if len(path) > MAX_DEPTH:
+                message = f"put together, the scenario is nested more than {MAX_DEPTH} levels deep"
+                raise self.library.error("S004", message, node.value_span())
+
+
+_OF_ANY: Final = re.compile(r"^of: *any\b", re.MULTILINE)
+
+
+def vary(builder: Builder, build: Build, variant: Part) -> None:
+    """Apply a variant to what is built: the nearest file of that name, else one for any scenario.
+
+    `<X>_V.yaml` comes first, then `<R>_V.yaml` of each scenario R that X is a variant of, then `V.yaml` with
+    `of: any`; each beside the scenario, then among the shipped ones. A suite is changed only by a variant of its own,
+    and passes every variant on. What has the variant already stays as it is.
+
+    Raises:
+        ScenarioError: S503 if there is no such variant; what is wrong with its file.
+    """
+    if variant.text in build.name.split("+")[1:]:
+        return
+    direct = _direct(builder, build, variant)
+    if direct is not None:
+        build.own_variants.append(variant.text)
+        patches = _down_to(builder, build, direct, variant)
+        if not patches and build.kind != "suite":
+            return
+        for patch in patches:
+            builder.patch(build, patch)
+    if build.kind == "suite":
+        build.passed_on.append(variant)
+    elif direct is None:
+        builder.patch(build, _of_any(builder, build, variant))
+    _name(build, variant.text, direct)
+
+
+def _name(build: Build, variant: str, file: Path | None) -> None:
+    """Let what is built be known as a variant, for the variants that follow."""
+    nearest = build.lineage[0]
+    stem = f"{nearest.stem}_{variant}"
+    if file is not None and file.stem != stem:
+        build.lineage.insert(0, Ancestor(file.parent, file.stem, file))
+    build.lineage.insert(0, Ancestor(nearest.folder, stem, file))
+    build.name = f"{build.name}+{variant}"
+
+
+def _direct(builder: Builder, build: Build, variant: Part) -> Path | None:
+    library = builder.library
+    for ancestor in build.lineage:
+        for folder in dict.fromkeys((ancestor.folder, library.shipped)):
+            path = library.resolved(folder / f"{ancestor.stem}_{variant.text}.yaml", variant.span)
+            if is_file(path):
+                return path
+    return None
+
+
+def _down_to(builder: Builder, build: Build, path: Path, variant: Part) -> list[Node]:
+    """The patches that lead from what is built to the variant in a file, in the order to apply them."""
+    known = {ancestor.path for ancestor in build.lineage}
+    patches: list[Node] = []
+    seen: tuple[Path, ...] = ()
+    asked = variant.span
+    while path not in known:
+        builder.check_chain(path, seen, asked)
+        seen = (*seen, path)
+        patch = _variant_file(builder, build, path, variant)
+        patches.insert(0, patch)
+        base = patch.text("of")
+        if base is None or base == ANY:
+            break
+        asked = patch.document.value_span(("of",))
+        path = builder.library.find(base, path.parent, asked)
+    return patches
+
+
+def _of_any(builder: Builder, build: Build, variant: Part) -> Node:
+    for folder in _folders(builder, build):
+        path = builder.library.resolved(folder / f"{variant.text}.yaml", variant.span)
+        if _is_of_any(path):
+            return _variant_file(builder, build, path, variant)
+    known = _known(builder, build)
+    near = did_you_mean(variant.text, known)
+    listed = "it has " + ", ".join(f"`{name}`" for name in known) if known else "it has none"
+    message = f"`{build.name}` has no variant `{variant.text}`"
+    raise builder.library.error("S503", message, variant.span, None if near else listed, near)
+
+
+def _variant_file(builder: Builder, build: Build, path: Path, variant: Part) -> Node:
+    root, kind = builder.read(path, variant.span)
+    if kind != "variant":
+        message = f"`{variant.text}` is no variant of `{build.name}`: {display_name(path)} is a {kind}"
+        raise builder.library.error("S503", message, variant.span)
+    return root
+
+
+def _folders(builder: Builder, build: Build) -> list[Path]:
+    return list(dict.fromkeys([*(ancestor.folder for ancestor in build.lineage), builder.library.shipped]))
+
+
+def _known(builder: Builder, build: Build) -> list[str]:
+    """The variants that what is built has, sorted."""
+    names: set[str] = set()
+    for folder in _folders(builder, build):
+        stems = [name.removesuffix(".yaml") for name in yaml_files(folder) if name.endswith(".yaml")]
+        names.update(stem for stem in stems if _is_of_any(folder / f"{stem}.yaml"))
+        for ancestor in build.lineage:
+            prefix = ancestor.stem + "_"
+            names.update(stem.removeprefix(prefix) for stem in stems if stem.startswith(prefix))
+    return sorted(names)
+
+
+def _is_of_any(path: Path) -> bool:
+    """Whether a file looks like a variant of any scenario; links are not followed."""
+    try:
+        if path.is_symlink() or not path.is_file():
+            return False
+        with path.open(encoding="utf-8", errors="replace") as file:
+            return _OF_ANY.search(file.read(4096)) is not None
+    except OSError:
+        return False
+
+
+def names_in(folder: Path) -> list[str]:
+    """The names of the files in a folder that can stand for themselves, variants of any scenario left out."""
+    return [name.rsplit(".", 1)[0] for name in yaml_files(folder) if not _is_of_any(folder / name)]
+
+
+class ResolvedFile(PositionedData):
     """A scenario (or suite, npc, library) with `extends` and variants applied.
 
     Behaves like a document; its parts know in which file they were written, patches included.
@@ -51,7 +372,7 @@ class Resolved(Positions):
         self._parts = dict(build.tree.walk())
 
     @property
-    def document(self) -> Positions:
+    def document(self) -> PositionedData:
         """The data with its positions, which is this object itself."""
         return self
 
@@ -90,10 +411,6 @@ class Resolved(Positions):
         """The exception for one finding, with the sources read so far."""
         return self._builder.library.error(code, message, span, hint, suggestion)
 
-    def with_parameter(self, name: str, text: str, span: Span) -> Resolved:
-        """The same with a parameter given as behind `?`; `span` is the place of the value."""
-        return Resolved(self._builder, self._build, {**self._given, name: Part(text, span)})
-
     def find(self, path: DataPath) -> tuple[Document, DataPath]:
         """The file and the path in it where the part at `path`, or its nearest ancestor, was written."""
         path = tuple(path)
@@ -110,7 +427,7 @@ class Resolved(Positions):
         """Where the parameter was given a value, in the name of the scenario."""
         return self._given[name].span
 
-    def include(self, path: DataPath) -> Resolved:
+    def include(self, path: DataPath) -> ResolvedFile:
         """The scenario or npc that the text at `path` names, relative to the file that text stands in.
 
         Raises:
@@ -123,7 +440,7 @@ class Resolved(Positions):
             raise library.error("S104", "the name of a file is a text", document.value_span(there))
         return self._named(text, document.locate(there), _folder(document))
 
-    def include_key(self, path: DataPath) -> Resolved:
+    def include_key(self, path: DataPath) -> ResolvedFile:
         """The scenario that the key at `path` names, relative to the file that the key stands in.
 
         Raises:
@@ -132,7 +449,7 @@ class Resolved(Positions):
         document, there = self.find(path)
         return self._named(str(path[-1]), document.key_span(there), _folder(document))
 
-    def _named(self, text: str, start: Span, folder: Path) -> Resolved:
+    def _named(self, text: str, start: Span, folder: Path) -> ResolvedFile:
         """The file of a name that is written in a file."""
         library = self._builder.library
         found = DiagnosticBag()
@@ -141,7 +458,7 @@ class Resolved(Positions):
         file = library.find(name.base.text, folder, name.base.span)
         return _resolved(self._builder, file, name, name.base.span)
 
-    def include_all(self, path: DataPath) -> tuple[Resolved, ...]:
+    def include_all(self, path: DataPath) -> tuple[ResolvedFile, ...]:
         """The files that the text or list of texts at `path` names.
 
         A list keeps its order; a text with `*` in its last part stands for the matching files, sorted by name.
@@ -160,7 +477,7 @@ class Resolved(Positions):
         names = [ScenarioName(Part(file.name, span), (), {}) for file in files]
         return tuple(_resolved(self._builder, f, n, span) for f, n in zip(files, names, strict=True))
 
-    def with_drawn_files(self) -> Resolved:
+    def with_drawn_files(self) -> ResolvedFile:
         """This scenario with the npc files that each `one_of` of its cast names put in the place of their names.
 
         Raises:
@@ -180,11 +497,11 @@ class Resolved(Positions):
             node = build.tree.at(place)
             node.value, node.children = None, [file._build.tree for file in self._npc_files(place)]
         self._builder.check_depth(build.tree)
-        return Resolved(self._builder, build, self._given)
+        return ResolvedFile(self._builder, build, self._given)
 
-    def _npc_files(self, place: DataPath) -> list[Resolved]:
+    def _npc_files(self, place: DataPath) -> list[ResolvedFile]:
         """The npc files that are named at `place`; those that others build on are left out of a pattern."""
-        found: list[Resolved] = []
+        found: list[ResolvedFile] = []
         part = self.part(place)
         places = [(*place, i) for i in range(len(part))] if isinstance(part, list) else [place]
         for one in places:
@@ -205,7 +522,7 @@ class Resolved(Positions):
                     found.append(file)
         return found
 
-    def varied(self, variant: Part) -> Resolved | None:
+    def varied(self, variant: Part) -> ResolvedFile | None:
         """This scenario with a variant that a suite passes on; None if it has no such variant."""
         build = self._build.copy()
         try:
@@ -214,9 +531,9 @@ class Resolved(Positions):
             if any(d.code != "S503" for d in error.diagnostics):
                 raise
             return None
-        return Resolved(self._builder, build, self._given)
+        return ResolvedFile(self._builder, build, self._given)
 
-    def patched(self, holder: Positions, path: DataPath) -> Resolved:
+    def patched(self, holder: PositionedData, path: DataPath) -> ResolvedFile:
         """This scenario changed by the mapping (`remove`, `set`, `add`) at `path` of another file.
 
         Raises:
@@ -228,9 +545,9 @@ class Resolved(Positions):
         if isinstance(patch.children, dict):
             patch.children = {verb: part for verb, part in patch.children.items() if verb in PATCH_VERBS}
         self._builder.patch(build, patch)
-        return Resolved(self._builder, build, self._given)
+        return ResolvedFile(self._builder, build, self._given)
 
-    def with_value(self, path: str, holder: Positions, place: DataPath) -> Resolved:
+    def with_value(self, path: str, holder: PositionedData, place: DataPath) -> ResolvedFile:
         """This scenario with the value at `place` of another file set at a path of it.
 
         Raises:
@@ -242,15 +559,15 @@ class Resolved(Positions):
         values.children = {path: Node(document, there, document.part(there))}
         patch.children = {"set": values}
         self._builder.patch(build, patch)
-        return Resolved(self._builder, build, self._given)
+        return ResolvedFile(self._builder, build, self._given)
 
-    def with_params(self, values: Mapping[str, tuple[str, Span]]) -> Resolved:
+    def with_params(self, values: Mapping[str, tuple[str, Span]]) -> ResolvedFile:
         """This scenario with values for parameters, as if they were written behind `?`: name -> text and its place."""
         given = {name: Part(text, span) for name, (text, span) in values.items()}
-        return Resolved(self._builder, self._build.copy(), {**self._given, **given})
+        return ResolvedFile(self._builder, self._build.copy(), {**self._given, **given})
 
 
-def resolve(name: str, base: Path | None = None, texts: Mapping[Path, Source] | None = None) -> Resolved:
+def resolve(name: str, base: Path | None = None, texts: Mapping[Path, Source] | None = None) -> ResolvedFile:
     """The scenario of a name: `NAME(+VARIANT)*(?parameter=value(&parameter=value)*)?`.
 
     Args:
@@ -279,14 +596,14 @@ def shipped_names() -> list[str]:
     return names_in(shipped_folder())
 
 
-def _resolved(builder: Builder, path: Path, name: ScenarioName, asked: Span | None = None) -> Resolved:
+def _resolved(builder: Builder, path: Path, name: ScenarioName, asked: Span | None = None) -> ResolvedFile:
     build = builder.built(path, asked)
     if len(name.variants) > MAX_CHAIN:
         message = f"at most {MAX_CHAIN} variants can be combined"
         raise builder.library.error("S507", message, name.variants[-1].span)
     for variant in name.variants:
         vary(builder, build, variant)
-    return Resolved(builder, build, name.params)
+    return ResolvedFile(builder, build, name.params)
 
 
 def _folder(document: Document) -> Path:

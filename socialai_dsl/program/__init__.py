@@ -56,18 +56,14 @@ from socialai_dsl.program.format import (
     Side,
     TypeColumn,
     pack_cell,
-    room_words,
 )
-from socialai_dsl.program.instructions import (
-    CLASS_BITS,
-    Op,
-    OpClass,
-)
+from socialai_dsl.program.instructions import CLASS_BITS, Op, OpClass
 from socialai_dsl.program.program import (
     EntityName,
     Outcome,
     Program,
     RegisterName,
+    room_words,
 )
 
 __all__ = [

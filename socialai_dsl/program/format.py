@@ -214,14 +214,6 @@ MOST_CHOICES = 7
 """So many actions fit into the operand of `Op.CHOOSE`, which is a positive int32."""
 
 
-def room_words(width: int, height: int) -> int:
-    """Words of one room template on a canvas: its cells, one cell off the canvas, rows and columns of bits.
-
-    For each line which cells are solid, then which are floor, then which are opaque; for each column which are opaque.
-    """
-    return width * height + 1 + 3 * height + width
-
-
 class LineColumn(IntEnum):
     """Columns of the line table: one row for each thing that may be heard."""
 

@@ -3,19 +3,242 @@
 An instruction is four words: op, a, b, c. The interpreter, the verifier, the listing, the liveness of registers and
 `docs/instructions.md` are made from this table or checked against it; an op without an entry can neither be assembled
 nor verified. An op's number is its class and its place in the class, so a new one renumbers nothing.
+
+An interval is sound: whatever the operands are within theirs, the engine's result lies within that of the result. The
+engine computes with 64 bits and wraps around, so a result that may leave them may be anything.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 from functools import cached_property
 from types import MappingProxyType
-from typing import Final
+from typing import Final, Protocol
 
-from socialai_dsl.program import ranges
-from socialai_dsl.program.ranges import ANYTHING, Rule
+Interval = tuple[int, int]
+
+ANYTHING: Interval = (-(1 << 63), (1 << 63) - 1)
+"""What 64 bits hold."""
+
+_BITS_OF_A_SET = 32
+
+
+class Bounds(Protocol):
+    """What the range of a result may depend on besides its operands."""
+
+    @property
+    def first_cell(self) -> int:
+        """The first cell as an operand; the number before it is no cell."""
+
+    @property
+    def last_cell(self) -> int:
+        """The last cell of the canvas as an operand."""
+
+    @property
+    def width(self) -> int:
+        """Columns of the canvas."""
+
+    @property
+    def height(self) -> int:
+        """Lines of the canvas."""
+
+    @property
+    def npcs(self) -> int:
+        """The greatest number of an NPC."""
+
+    @property
+    def nouns(self) -> int:
+        """How many nouns there are."""
+
+    def field(self, things: Interval, which: int) -> Interval:
+        """The range of a field over several entities, or over cells."""
+
+
+Operands = Sequence[Interval]
+"""Ranges of an instruction's three operands; a literal's holds it alone, and that of an unused one 0."""
+
+Rule = Callable[[Bounds, Operands], Interval]
+"""The range of what an instruction writes."""
+
+
+def hull(a: Interval, b: Interval) -> Interval:
+    """The least interval around both."""
+    return min(a[0], b[0]), max(a[1], b[1])
+
+
+def within_64_bits(low: int, high: int) -> Interval:
+    """The interval, or everything if it leaves 64 bits."""
+    return (low, high) if low >= ANYTHING[0] and high <= ANYTHING[1] else ANYTHING
+
+
+def same(_: Bounds, operands: Operands) -> Interval:
+    """Of LOAD."""
+    return operands[1]
+
+
+def total(_: Bounds, operands: Operands) -> Interval:
+    """Of ADD."""
+    a, b = operands[1:]
+    return within_64_bits(a[0] + b[0], a[1] + b[1])
+
+
+def difference(_: Bounds, operands: Operands) -> Interval:
+    """Of SUB."""
+    a, b = operands[1:]
+    return within_64_bits(a[0] - b[1], a[1] - b[0])
+
+
+def product(_: Bounds, operands: Operands) -> Interval:
+    """Of MUL."""
+    a, b = operands[1:]
+    corners = [x * y for x in a for y in b]
+    return within_64_bits(min(corners), max(corners))
+
+
+def quotient(_: Bounds, operands: Operands) -> Interval:
+    """Of DIV, which is floored, and 0 for the divisor 0."""
+    a, b = operands[1:]
+    divisors = [d for d in (b[0], b[1], -1, 1) if d != 0 and b[0] <= d <= b[1]]
+    corners = [x // y for x in a for y in divisors]
+    if b[0] <= 0 <= b[1]:
+        corners.append(0)
+    return within_64_bits(min(corners), max(corners))
+
+
+def remainder(_: Bounds, operands: Operands) -> Interval:
+    """Of MOD, which has the sign of the divisor, and is 0 for the divisor 0."""
+    a, b = operands[1:]
+    if b[0] > 0 and a[0] >= 0 and a[1] < b[0]:
+        return a
+    return min(0, b[0] + 1), max(0, b[1] - 1)
+
+
+def least(_: Bounds, operands: Operands) -> Interval:
+    """Of MIN."""
+    a, b = operands[1:]
+    return min(a[0], b[0]), min(a[1], b[1])
+
+
+def greatest(_: Bounds, operands: Operands) -> Interval:
+    """Of MAX."""
+    a, b = operands[1:]
+    return max(a[0], b[0]), max(a[1], b[1])
+
+
+def magnitude(_: Bounds, operands: Operands) -> Interval:
+    """Of ABS."""
+    low, high = operands[1]
+    nearest = 0 if low <= 0 <= high else min(abs(low), abs(high))
+    return within_64_bits(nearest, max(abs(low), abs(high)))
+
+
+def field(bounds: Bounds, operands: Operands) -> Interval:
+    """Of FIELD."""
+    things, which = operands[1:]
+    return bounds.field(things, which[0])
+
+
+def distance(bounds: Bounds, _: Operands) -> Interval:
+    """Of DISTANCE: from cell to cell, or to what is not in the room the sum of its sides.
+
+    The number of a cell holds 32 columns, on however narrow a canvas.
+    """
+    return 0, 32 + bounds.height
+
+
+def one_of_those(_: Bounds, operands: Operands) -> Interval:
+    """Of NEAREST: one of the entities, or -1."""
+    return -1, operands[2][0] & 255
+
+
+def direction(_: Bounds, __: Operands) -> Interval:
+    """Of QUADRANT."""
+    return 0, 3
+
+
+def truth(_: Bounds, __: Operands) -> Interval:
+    """Of SEES."""
+    return 0, 1
+
+
+def drawn(_: Bounds, operands: Operands) -> Interval:
+    """Of DRAW: below a number that is at least 1."""
+    return 0, operands[1][1] - 1
+
+
+def drawn_other(_: Bounds, operands: Operands) -> Interval:
+    """Of DRAW_OTHER."""
+    first, count = operands[2][0] >> 16 & 255, operands[2][0] >> 24
+    return first, first + count - 1
+
+
+def with_bit(_: Bounds, operands: Operands) -> Interval:
+    """Of SET_BIT, for a set that is not negative and a bit from 0 to 62."""
+    bits = max(operands[0][1].bit_length(), operands[1][1] + 1)
+    return 0, (1 << bits) - 1
+
+
+def bits_set(_: Bounds, operands: Operands) -> Interval:
+    """Of COUNT_BITS, which looks at 32 bits; a negative number has all its upper ones set."""
+    low, high = operands[1]
+    return 0, min(high.bit_length(), _BITS_OF_A_SET) if low >= 0 else _BITS_OF_A_SET
+
+
+def a_bit(_: Bounds, operands: Operands) -> Interval:
+    """Of LOWEST_BIT and PICK_BIT: the position of a set bit of the lower 32, or 0."""
+    low, high = operands[1]
+    return 0, max(0, min(high.bit_length(), _BITS_OF_A_SET) - 1) if low >= 0 else _BITS_OF_A_SET - 1
+
+
+def a_cell(bounds: Bounds, _: Operands) -> Interval:
+    """Of CELL_OF and CELL_BESIDE: a cell, or none."""
+    return bounds.first_cell - 1, bounds.last_cell
+
+
+def a_speaker(bounds: Bounds, _: Operands) -> Interval:
+    """Of HEARD_FROM."""
+    return -1, bounds.npcs
+
+
+def a_noun(bounds: Bounds, _: Operands) -> Interval:
+    """Of HEARD_NOUN."""
+    return -1, bounds.nouns - 1
+
+
+def a_column(bounds: Bounds, _: Operands) -> Interval:
+    """The x of a cell, or -1."""
+    return -1, bounds.width - 1
+
+
+def a_line(bounds: Bounds, _: Operands) -> Interval:
+    """The y of a cell, or -1."""
+    return -1, bounds.height - 1
+
+
+def column_of_loop(bounds: Bounds, _: Operands) -> Interval:
+    """The x of the cell that a loop is at."""
+    return 0, bounds.width - 1
+
+
+def line_of_loop(bounds: Bounds, _: Operands) -> Interval:
+    """The y of the cell that a loop is at."""
+    return 0, bounds.height - 1
+
+
+def cell_of_loop(bounds: Bounds, _: Operands) -> Interval:
+    """The cell that a loop is at."""
+    return bounds.first_cell, bounds.last_cell
+
+
+def how_many_cells(bounds: Bounds, _: Operands) -> Interval:
+    """Of B_COUNT."""
+    return 0, bounds.width * bounds.height
+
+
+# -- ops and their entries -----------------------------------------------------------------------------------
+
 
 CLASS_BITS: Final = 6
 """Bits of an op's number within its class: op >> CLASS_BITS is the class."""
@@ -256,7 +479,7 @@ def _plain(
     return Instruction(op, says, (a, b, c), setup=setup)
 
 
-_CELL_FOUND: Final = (ranges.a_column, ranges.a_line)
+_CELL_FOUND: Final = (a_column, a_line)
 
 _ALL: Final = (
     _plain(Op.HALT, "This code ends."),
@@ -266,7 +489,7 @@ _ALL: Final = (
         "Run the c instructions up to END_EACH for each cell of board a, row by row; b, b + 1 and b + 2 are its x, its "
         "y and the cell as an operand.",
         (_BOARD, _WRITTEN_HERE, _SKIP),
-        (ranges.column_of_loop, ranges.line_of_loop, ranges.cell_of_loop),
+        (column_of_loop, line_of_loop, cell_of_loop),
     ),
     _plain(Op.DROP_CELL, "Take the current cell out of the board of the loop."),
     _plain(Op.END_EACH, "The end of a loop."),
@@ -299,99 +522,99 @@ _ALL: Final = (
     _test(Op.IF_REACHES, "a has a path to the cell of b, or next to it."),
     _test(Op.IF_LOOKS_AT, "b lies straight ahead of a, within its view, with nothing opaque between."),
     _test(Op.IF_UNOBSTRUCTED, "Both are in one row or column with nothing opaque between."),
-    _value(Op.LOAD, "a = v(b).", ranges.same),
-    _value(Op.ADD, "a = v(b) + v(c).", ranges.total, c=_VALUE),
-    _value(Op.SUB, "a = v(b) - v(c).", ranges.difference, c=_VALUE),
-    _value(Op.MUL, "a = v(b) * v(c).", ranges.product, c=_VALUE),
-    _value(Op.DIV, "a = v(b) // v(c), floored; 0 if v(c) is 0.", ranges.quotient, c=_VALUE),
-    _value(Op.MOD, "a = v(b) % v(c), with the sign of v(c); 0 if that is 0.", ranges.remainder, c=_VALUE),
-    _value(Op.MIN, "a = the lesser of v(b) and v(c).", ranges.least, c=_VALUE),
-    _value(Op.MAX, "a = the greater of v(b) and v(c).", ranges.greatest, c=_VALUE),
-    _value(Op.ABS, "a = |v(b)|.", ranges.magnitude),
+    _value(Op.LOAD, "a = v(b).", same),
+    _value(Op.ADD, "a = v(b) + v(c).", total, c=_VALUE),
+    _value(Op.SUB, "a = v(b) - v(c).", difference, c=_VALUE),
+    _value(Op.MUL, "a = v(b) * v(c).", product, c=_VALUE),
+    _value(Op.DIV, "a = v(b) // v(c), floored; 0 if v(c) is 0.", quotient, c=_VALUE),
+    _value(Op.MOD, "a = v(b) % v(c), with the sign of v(c); 0 if that is 0.", remainder, c=_VALUE),
+    _value(Op.MIN, "a = the lesser of v(b) and v(c).", least, c=_VALUE),
+    _value(Op.MAX, "a = the greater of v(b) and v(c).", greatest, c=_VALUE),
+    _value(Op.ABS, "a = |v(b)|.", magnitude),
     _value(
         Op.FIELD,
         "a = field c of b; x and y are -1 of what is not in the room.",
-        ranges.field,
+        field,
         _PLACE,
         _literal("field"),
     ),
     _value(
         Op.DISTANCE,
         "a = the Manhattan distance of b and c; width and height together if one is not in the room.",
-        ranges.distance,
+        distance,
         _PLACE,
         _PLACE,
     ),
     _value(
         Op.NEAREST,
         "a = the entity nearest to b of those from c >> 8 to c & 255, ties: the first; -1 if none is in the room.",
-        ranges.one_of_those,
+        one_of_those,
         _PLACE,
         _literal("first and last entity"),
     ),
     _value(
         Op.QUADRANT,
         "a = the direction of c seen from b; on diagonals SE is right, NE up, NW left, SW down.",
-        ranges.direction,
+        direction,
         _PLACE,
         _PLACE,
     ),
     _value(
         Op.DRAW,
         "a = a uniform number below v(b), drawn at site c.",
-        ranges.drawn,
+        drawn,
         Operand(Kind.VALUE, 1, 1 << 30),
         _SITE,
     ),
     _value(
         Op.DRAW_OTHER,
         "a = a uniform number other than v(b), drawn at site c & 65535, of the c >> 24 numbers from c >> 16 & 255 on.",
-        ranges.drawn_other,
+        drawn_other,
         _VALUE,
         Operand(Kind.SITE, meaning="packed"),
     ),
     _value(
         Op.SET_BIT,
         "Bit v(b) of v(a) is set.",
-        ranges.with_bit,
+        with_bit,
         Operand(Kind.VALUE, 0, 62),
         a=Operand(Kind.UPDATED, 0),
     ),
-    _value(Op.COUNT_BITS, "a = how many of the lower 32 bits of v(b) are set.", ranges.bits_set),
-    _value(Op.LOWEST_BIT, "a = the position of the lowest set bit of v(b), of 32; 0 if none.", ranges.a_bit),
+    _value(Op.COUNT_BITS, "a = how many of the lower 32 bits of v(b) are set.", bits_set),
+    _value(Op.LOWEST_BIT, "a = the position of the lowest set bit of v(b), of 32; 0 if none.", a_bit),
     _value(
         Op.PICK_BIT,
         "a = the position of a uniformly drawn set bit of v(b), of 32, at site c; 0 if none.",
-        ranges.a_bit,
+        a_bit,
         c=_SITE,
     ),
     _value(
         Op.SEES,
         "a = 1 if c would be in the view square of b if b faced direction v(a), else 0.",
-        ranges.truth,
+        truth,
         _ENTITY,
         _PLACE,
         Operand(Kind.UPDATED, 0, 3),
     ),
-    _value(Op.CELL_OF, "a = the cell of b; no cell if it is not in the room.", ranges.a_cell, _PLACE),
+    _value(Op.CELL_OF, "a = the cell of b; no cell if it is not in the room.", a_cell, _PLACE),
     _value(
         Op.CELL_BESIDE,
         "a = the cell beside b in direction v(c); no cell if that is off the canvas.",
-        ranges.a_cell,
+        a_cell,
         _PLACE,
         _DIRECTION,
     ),
     _value(
         Op.HEARD_FROM,
         "a = who said the first entry of inbox b whose class is in class set c; -1 if there is none.",
-        ranges.a_speaker,
+        a_speaker,
         _INBOX,
         _literal("class set"),
     ),
     _value(
         Op.HEARD_NOUN,
         "a = the noun of the first entry of inbox b whose class is in class set c; -1 if there is none.",
-        ranges.a_noun,
+        a_noun,
         _INBOX,
         _literal("class set"),
     ),
@@ -498,7 +721,7 @@ _ALL: Final = (
         Op.B_COUNT,
         "a = how many cells board b has.",
         (_WRITTEN_HERE, _BOARD, _NONE),
-        (ranges.how_many_cells,),
+        (how_many_cells,),
     ),
     Instruction(
         Op.PICK_CELL,

@@ -23,7 +23,6 @@ from socialai_dsl.program.format import (
     LineColumn,
     Register,
     TypeColumn,
-    room_words,
 )
 from socialai_dsl.program.instructions import TABLE, Kind, Op
 from socialai_dsl.source import Span
@@ -90,6 +89,14 @@ class Outcome:
     name: str
     success: bool
     span: Span | None = None
+
+
+def room_words(width: int, height: int) -> int:
+    """Words of one room template on a canvas: its cells, one cell off the canvas, rows and columns of bits.
+
+    For each line which cells are solid, then which are floor, then which are opaque; for each column which are opaque.
+    """
+    return width * height + 1 + 3 * height + width
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,20 +8,6 @@ from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 
-from socialai_dsl.schema.behaviour import (
-    Belief,
-    CastMember,
-    Character,
-    FirstRule,
-    Frame,
-    Npc,
-    Ranged,
-    Role,
-    State,
-    Step,
-    ThenRule,
-    WorldRule,
-)
 from socialai_dsl.schema.experiment import (
     Condition,
     Experiment,
@@ -32,11 +18,36 @@ from socialai_dsl.schema.experiment import (
     Settings,
     Tested,
 )
-from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.schema.properties import OnlyThrough, Probe, Property
-from socialai_dsl.schema.scenario import Memory, Outcome, Parameter, Reward, Scenario, Sequence, SungWith
+from socialai_dsl.schema.scenario import (
+    Belief,
+    CastMember,
+    Character,
+    FirstRule,
+    Frame,
+    Memory,
+    Npc,
+    ObjectGroup,
+    Observe,
+    OnlyThrough,
+    Outcome,
+    Parameter,
+    Probe,
+    Property,
+    Ranged,
+    Reward,
+    Role,
+    Room,
+    Scenario,
+    Sequence,
+    State,
+    Step,
+    SungWith,
+    ThenRule,
+    UtteranceGrammar,
+    WorldRule,
+)
 from socialai_dsl.schema.suite import Entry, Split, Suite, Value, Values
-from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
+from socialai_dsl.source import DataPath
 
 CALLED: Final[dict[type, str]] = {
     Scenario: "a scenario",

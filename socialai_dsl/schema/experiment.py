@@ -15,7 +15,7 @@ from pydantic import (
     create_model,
 )
 
-from socialai_dsl.schema.base import Model, Prose, Word, _as_tuple, _one_or_many
+from socialai_dsl.schema.scenario import Model, Prose, Word, _as_tuple, _one_or_many
 from socialai_dsl.schema.suite import MemberName
 from trainer.config import FLAGS, HYPER, RunConfig
 

@@ -6,10 +6,8 @@ from typing import Any, Final
 
 from pydantic import Field, JsonValue
 
-from socialai_dsl.schema.base import Model, Prose
-from socialai_dsl.schema.behaviour import Npc
 from socialai_dsl.schema.experiment import Experiment
-from socialai_dsl.schema.scenario import Scenario
+from socialai_dsl.schema.scenario import Model, Npc, Prose, Scenario
 from socialai_dsl.schema.suite import Suite
 
 _EXTENDS: Final[Any] = Field(

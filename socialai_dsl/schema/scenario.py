@@ -2,24 +2,473 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import BeforeValidator, Field, StringConstraints
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, WithJsonSchema
+from pydantic.config import JsonDict
 
-from socialai_dsl.schema.base import Expression, ExpressionOrText, Model, Prose, Word, _as_tuple, as_written
-from socialai_dsl.schema.behaviour import (
-    CastMember,
-    Character,
-    Frame,
-    Probability,
-    Ranged,
-    Role,
-    WorldRule,
-    WrittenCast,
-)
-from socialai_dsl.schema.properties import Probe, Property
-from socialai_dsl.schema.world import ObjectGroup, Observe, Room, UtteranceGrammar
 from socialai_dsl.vocabulary import PRIMITIVES, Primitive
+
+
+def as_written(form: Any) -> BeforeValidator:
+    """What authors may write where the model holds what the loader makes of it; only the JSON Schema tells."""
+    return BeforeValidator(_unchanged, json_schema_input_type=form)
+
+
+def _unchanged(value: Any) -> Any:
+    return value
+
+
+Word = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max_length=40)]
+"""A name that an author declares: letters, digits and underscores, not starting with a digit."""
+
+WORD_SCHEMA: Final[JsonDict] = {"pattern": "^[A-Za-z_][A-Za-z0-9_]*$", "maxLength": 40}
+"""The same for keys of a mapping whose known keys have fields; pydantic leaves their names out."""
+
+Expression = int | bool | str
+"""The source of an expression; a bare number or truth value may be written without quotes."""
+
+_Text = Annotated[str, StringConstraints(min_length=1, max_length=500)]
+
+# The loader makes texts of plain numbers, `true` and `null` where a text is expected.
+_Null = Annotated[None, WithJsonSchema({"enum": [None]})]
+TextLine = Annotated[_Text, as_written(_Text | float | bool | _Null)]
+"""A text that somebody can say, possibly with <...> parts."""
+
+Prose = Annotated[str, as_written(str | float | bool)]
+"""A text for people."""
+
+StateName = Annotated[Word, as_written(Word | bool | _Null)]
+"""The name of a state."""
+
+ExpressionOrText = Annotated[Expression, as_written(Expression | float | _Null)]
+"""The source of an expression, or a text."""
+
+
+def _one_or_many(value: Any) -> Any:
+    return value if isinstance(value, list) else [value]
+
+
+def _as_tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+Expressions = Annotated[
+    tuple[Expression, ...],
+    BeforeValidator(_as_tuple),
+    BeforeValidator(_one_or_many, json_schema_input_type=Expression | tuple[Expression, ...]),
+]
+"""One expression, or a list of them."""
+
+Texts = Annotated[
+    tuple[TextLine, ...],
+    BeforeValidator(_as_tuple),
+    BeforeValidator(_one_or_many, json_schema_input_type=TextLine | tuple[TextLine, ...]),
+]
+"""One text, or a list of them."""
+
+
+class Model(BaseModel):
+    """Base of all models: unknown keys are errors, nothing is coerced, nothing changes after loading."""
+
+    model_config = ConfigDict(
+        strict=True,
+        extra="forbid",
+        frozen=True,
+        allow_inf_nan=False,
+        populate_by_name=True,  # for us, who make models of models; files are read by the alias alone
+        protected_namespaces=(),
+        # Only the root is ever validated; building every model by itself would triple the time to start.
+        defer_build=True,
+    )
+
+
+# -- who acts and how ----------------------------------------------------------------------------------------
+
+
+SlotType = Literal[
+    "text", "utterance", "object", "npc", "direction", "color", "int", "bool", "noun", "cell", "sequence"
+]
+
+Probability = Annotated[
+    float, BeforeValidator(lambda v: float(v) if type(v) is int else v), Field(ge=0, le=1)
+]
+
+
+class Effects(Model):
+    """What a rule or a step does, in this order whatever the order in the file: do, set, cause, say, goto."""
+
+    set: dict[Word, Expression] = Field(default_factory=dict, description="registers of the frame's `let`")
+    cause: Expressions = Field((), description="effects on objects and on oneself, in order")
+    say: TextLine | None = Field(
+        None, description="a text to say; <...> puts a value in", examples=["The <exit.color> door"]
+    )
+
+
+class Rule(Effects):
+    """Conditions, all of which must hold, and effects."""
+
+    id: Word | None = Field(None, description="names the rule in coverage, traces and patches")
+    hears: Texts = Field((), description="an utterance, or a list of alternatives")
+    when: Expression | None = Field(None, description="a condition", examples=["eye_contact(agent)"])
+    after: Expression | None = Field(None, description="holds from this turn in the state on")
+    chance: Probability | None = Field(None, description="drawn anew each turn if everything else holds")
+    once: bool = Field(False, description="once per episode and NPC")
+
+
+class WorldRule(Model):
+    """A rule about the world, read once a step after everybody has moved; each that holds takes effect."""
+
+    id: Word | None = Field(None, description="names the rule in coverage, traces and patches")
+    when: Expression | None = Field(None, description="a condition", examples=["eye_contact(agent)"])
+    chance: Probability | None = Field(None, description="drawn anew each step if everything else holds")
+    once: bool = Field(False, description="once per episode")
+    set: dict[Word, Expression] = Field(default_factory=dict, description="registers of `state`")
+    cause: Expressions = Field((), description="effects on objects and NPCs, in order")
+    reward: int = Field(
+        0, ge=-100, le=100, description="per cent of the success reward, added to the reward of the step"
+    )
+
+
+class ThenRule(Rule):
+    """A rule read after the body action."""
+
+    goto: StateName | None = Field(None, description="the state from the next step on")
+    goto_now: StateName | None = Field(
+        None, description="the state from now on: its `then` is still read in this step"
+    )
+
+
+class FirstRule(ThenRule):
+    """A rule read before the body action, which it may choose itself."""
+
+    do: str | None = Field(
+        None, description="an activity, in place of the state's", examples=["go_next_to(agent)"]
+    )
+
+
+class State(Model):
+    """One state of a frame: what is noticed before moving, one body action, what is noticed after it."""
+
+    first: Annotated[tuple[FirstRule, ...], BeforeValidator(_as_tuple)] = Field(
+        (), description="rules read before moving; the first that holds takes effect"
+    )
+    do: str | None = Field(None, description="an activity; default stay", examples=["face(agent)"])
+    then: Annotated[tuple[ThenRule, ...], BeforeValidator(_as_tuple)] = Field(
+        (), description="rules read after moving; the first that holds takes effect"
+    )
+
+
+class Step(Effects):
+    """One entry of `steps`: an activity until it is finished, then its effects."""
+
+    state: StateName | None = Field(None, description="a name for npc.is(name)")
+    do: str | None = Field(None, description="an activity, until it is finished", examples=["go_to(exit)"])
+    until: Expression | None = Field(None, description="a condition that finishes the step")
+    for_: Expression | None = Field(None, alias="for", description="number of steps, or `ever`")
+
+
+class Ranged(Model):
+    """A register with a range, in which it stays whatever it is set to."""
+
+    start: Expression = Field(description="its value at first")
+    range: Expression = Field(description="a..b", examples=["0..10"])
+
+
+class Frame(Model):
+    """A pragmatic frame: a protocol of interaction with slots for what varies."""
+
+    slots: dict[Word, SlotType] = Field(
+        default_factory=dict,
+        description="name: type of what varies; members of the cast fill it by `with`",
+        examples=[{"lesson": "object"}],
+    )
+    let: dict[Word, Expression | Ranged] = Field(
+        default_factory=dict, description="registers, one copy per NPC"
+    )
+    define: dict[str, Expression] = Field(default_factory=dict, description="recomputed at every use")
+    start: StateName | None = Field(None, description="the first state; default the first written")
+    states: dict[Word, State] | None = Field(
+        None, description="name: what is noticed and done in this state of the interaction"
+    )
+    steps: Annotated[tuple[Step, ...], BeforeValidator(_as_tuple)] | None = Field(
+        None, description="in place of states: activities in a row, each until it is finished"
+    )
+
+
+class Role(Model):
+    """A part that a member of the cast plays: where it is put, and what drives it if it is an NPC."""
+
+    place: str | None = Field(None, description="default anywhere")
+    at: Annotated[tuple[Expression, ...], BeforeValidator(_as_tuple)] | None = Field(
+        None, description="[x, y] in place of `place`", examples=[[1, "H - 2"]]
+    )
+    facing: Expression | None = Field(None, description="a direction, random, or toward(x); default random")
+    frame: Word | None = Field(None, description="the frame an NPC in this role follows")
+
+
+class Belief(Model):
+    """What a member of the cast takes for true: what it saw last."""
+
+    of: Expression = Field(description="what it is about, such as toy.inside")
+    when: Expression | None = Field(None, description="when it is looked at; default always")
+
+
+class Character(Model):
+    """What an inhabitant of the room is: how it looks, where it is put, what it does."""
+
+    role: Word | None = Field(None, description="the part it plays")
+    kind: Word | None = Field(None, description="what it looks like; default peer")
+    name: ExpressionOrText | None = Field(
+        None, description="what precedes its lines; default its key, capitalised"
+    )
+    color: Expression | None = Field(None, description="default random")
+    place: str | None = Field(None, description="default anywhere")
+    at: Annotated[tuple[Expression, ...], BeforeValidator(_as_tuple)] | None = Field(
+        None, description="[x, y] in place of `place`", examples=[[1, "H - 2"]]
+    )
+    facing: Expression | None = Field(None, description="a direction, random, or toward(x); default random")
+    view: int | None = Field(None, ge=1, le=15, description="side of the square it sees; default 7")
+    earshot: Expression | None = Field(None, description="how far its voice carries")
+    frame: Word | None = Field(None, description="the frame it follows; default none: it stays")
+    with_: dict[Word, ExpressionOrText] = Field(
+        default_factory=dict, alias="with", description="fills the slots"
+    )
+    beliefs: dict[Word, Belief] = Field(default_factory=dict, description="what it takes for true")
+    audible: Literal["always"] | None = Field(None, description="heard even while NPCs are hidden")
+    kind_code: int | None = Field(None, ge=0, le=255, description="status code in the image")
+
+
+class Npc(Character):
+    """A file of its own for one NPC: what it is, with its frames; `one_of` draws it."""
+
+    npc: Word = Field(description="the name of this file's NPC")
+    abstract: bool = Field(False, description="others build on it by `extends`; nobody can be it")
+    about: Prose | None = Field(None, description="one sentence for people")
+    notes: Prose | None = Field(None, description="more for people")
+    frames: dict[Word, Frame] = Field(default_factory=dict, description="the frames it brings along")
+
+
+class CastMember(Character):
+    """The agent or an NPC. Keys left out come from its role, from the file that `one_of` draws, from `npc_defaults`,
+    then from the defaults of the language.
+    """
+
+    one_of: Annotated[tuple[Npc, ...] | None, BeforeValidator(_as_tuple), as_written(str | list[str])] = (
+        Field(
+            None,
+            description="files of NPCs, one of which is drawn for each episode: a list, or a pattern with *",
+        )
+    )
+
+    def over(self, defaults: Character | Role) -> CastMember:
+        """This member with what it leaves out taken from `defaults`; `with` is merged key by key."""
+        given: dict[str, Any] = {name: getattr(self, name) for name in self.model_fields_set}
+        known = defaults.model_fields_set & CastMember.model_fields.keys()
+        base: dict[str, Any] = {name: getattr(defaults, name) for name in known}
+        if "place" in given or "at" in given:
+            base.pop("place", None), base.pop("at", None)
+        given["with_"] = {**(defaults.with_ if isinstance(defaults, Character) else {}), **self.with_}
+        return CastMember.model_construct(**{**base, **given})
+
+
+class CastGroup(CastMember):
+    """A group in the cast as authors write it: so many alike members, of which a list gives one value each.
+
+    The loader makes members `name[0]`, `name[1]`, ... of it, so that no scenario holds one.
+    """
+
+    count: int = Field(ge=1, le=16, description="a group of so many")
+    name: Annotated[Expression | None, as_written(ExpressionOrText | None | list[ExpressionOrText])] = Field(
+        None, description="what precedes its lines; a list gives one each"
+    )
+    color: Annotated[Expression | None, as_written(Expression | list[Expression])] = Field(
+        None, description="default random; a list gives one each"
+    )
+    place: Annotated[str | None, as_written(str | list[str])] = Field(
+        None, description="default anywhere; a list gives one each"
+    )
+    facing: Annotated[Expression | None, as_written(Expression | list[Expression])] = Field(
+        None, description="a direction, random, or toward(x); a list gives one each"
+    )
+    at: Annotated[
+        tuple[Expression, ...] | None,
+        BeforeValidator(_as_tuple),
+        as_written(list[Expression] | list[list[Expression]]),
+    ] = Field(None, description="[x, y], or a list of them: one each")
+
+
+class WrittenCast(Model):
+    """The cast as authors write it: the agent, and anybody else, alone or in a group."""
+
+    model_config = ConfigDict(extra="allow", json_schema_extra={"propertyNames": WORD_SCHEMA})
+    __pydantic_extra__: dict[Word, CastMember | CastGroup]
+
+    agent: CastMember | None = Field(None, description="whom a policy plays")
+
+
+# -- room, objects, and what the agent perceives -------------------------------------------------------------
+
+
+class Room(Model):
+    """A walled rectangle; sizes count the walls. Width and height are drawn independently from `size`."""
+
+    size: Expression | None = Field(
+        None, description="n, or a..b: both width and height", examples=["5..8", 8]
+    )
+    width: Expression | None = Field(None, description="width in cells, walls included")
+    height: Expression | None = Field(None, description="height in cells, walls included")
+    build: Annotated[tuple[dict[Word, str], ...], BeforeValidator(_as_tuple)] = Field(
+        (),
+        description="fixed things in place of floor, as {type: place}",
+        examples=[[{"lava": "column(W // 2)"}]],
+    )
+    occlusion: bool = Field(False, description="what is not transparent hides what lies behind it")
+    canvas: (
+        Annotated[tuple[int, ...], BeforeValidator(_as_tuple), Field(min_length=2, max_length=2)] | None
+    ) = Field(None, description="[width, height] of the grid the room lies on; default the largest room")
+
+
+class ObjectGroup(Model):
+    """An object, or with `count` (or a list in `at`) a group of them."""
+
+    type: Word = Field(description="an object type of the prelude", examples=["door"])
+    count: int | None = Field(None, ge=1, le=16, description="a group of so many")
+    place: Expressions | None = Field(None, description="where it is drawn; a list gives one each")
+    at: (
+        Annotated[
+            tuple[Expression, ...] | tuple[tuple[Expression, ...], ...],
+            BeforeValidator(lambda v: tuple(_as_tuple(item) for item in v) if isinstance(v, list) else v),
+        ]
+        | None
+    ) = Field(None, description="[x, y], or a list of them: a group")
+    color: Expressions | None = Field(None, description="a colour, `random`, `distinct`, or one each")
+    state: StateName | None = Field(None, description="initial status; default the type's")
+    pressed: Expression | None = Field(None, description="whether it is pressed at first")
+    opened: Expression | None = Field(None, description="whether it is opened at first")
+    locked: Expression | None = Field(None, description="computed: it is locked while this holds")
+    tagged: Expression | None = Field(None, description="computed: it is tagged while this holds")
+    one_way: bool = Field(False, description="a toggle only leads away from the initial status, never back")
+    dark: bool = Field(False, description="the agent sees no difference between its statuses")
+    inside: str | None = Field(None, description="the object it lies in, unseen until that is opened")
+    exclusive: bool = Field(
+        False, description="of a group: once one of them is used, the others react to nothing"
+    )
+    overlap: bool = Field(False, description="it may be put on a cell that is taken")
+    timer: int | None = Field(
+        None, ge=1, le=10_000, description="steps after which its active status expires"
+    )
+    opens: str | None = Field(
+        None, description="what is open while this is active: one object, or a group in the same order"
+    )
+    pushed_by: Word | None = Field(None, description="the only type of object that can push it")
+    unlocks: str | None = Field(
+        None, description="what is unlocked while this is pressed: one object, or a group in the same order"
+    )
+
+
+Channel = Literal["type", "color", "status", "orientation", "pointing", "last_act"]
+CHANNELS: tuple[Channel, ...] = ("type", "color", "status", "orientation", "pointing", "last_act")
+
+
+class Observe(Model):
+    """What the agent perceives; it never changes what happens."""
+
+    npcs: Literal["shown", "hidden"] = Field(
+        "shown", description="hidden: NPCs are neither seen nor heard nor in the way"
+    )
+    image: Literal["end", "before_npcs"] = Field("end", description="when in the step the picture is taken")
+    names: Literal["shown", "hidden"] = Field("shown", description="speaker names in what is heard")
+    own_voice: bool = Field(False, description="whether the agent hears itself")
+    channels: Annotated[tuple[Channel, ...], BeforeValidator(_as_tuple)] = Field(
+        CHANNELS[:4], description="of the image: the first four, or all six"
+    )
+    directions: Literal["absolute", "egocentric"] = Field(
+        "absolute",
+        description="how the image shows the directions of NPCs; egocentric: as seen from the agent",
+    )
+
+
+class UtteranceGrammar(Model):
+    """What the agent can say: every template with every noun."""
+
+    templates: Annotated[tuple[TextLine, ...], BeforeValidator(_as_tuple)] = Field(
+        min_length=1,
+        max_length=64,
+        description="texts; <noun> stands for each noun",
+        examples=[["Where is <noun>"]],
+    )
+    nouns: Annotated[tuple[TextLine | int, ...], BeforeValidator(_as_tuple)] = Field(
+        min_length=1, max_length=256, description="what <noun> can be", examples=[["the exit", "the wall"]]
+    )
+
+    def utterance(self, template: int, noun: int) -> str:
+        """The text of a pair: the template with its <noun> filled."""
+        return self.templates[template].replace("<noun>", str(self.nouns[noun]))
+
+
+# -- claims and probes, which playing never reads ------------------------------------------------------------
+
+
+_Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\[[0-9]+\])?$", max_length=40)]
+Names = Annotated[
+    tuple[_Name, ...],
+    BeforeValidator(_as_tuple),
+    Field(min_length=1),
+    BeforeValidator(
+        _one_or_many, json_schema_input_type=_Name | Annotated[tuple[_Name, ...], Field(min_length=1)]
+    ),
+]
+"""One member or group of the cast, or a list of them."""
+
+
+class OnlyThrough(Model):
+    """What was drawn shows only through these members."""
+
+    draw: Word = Field(description="a `let` whose values are tried against each other")
+    by: Names = Field(description="members of the cast whose cues may tell what was drawn")
+
+
+class Property(Model):
+    """A property: one of `reachable`, `never`, `within`, `oracle`, `script`, `needs`, `only_through` and `knowable`."""
+
+    reachable: Expression | None = Field(None, description="a condition, or the name of an outcome")
+    never: Expression | None = Field(None, description="a condition, or the name of an outcome")
+    within: int | None = Field(None, ge=1, le=10_000, description="steps of a shortest success")
+    oracle: Probability | None = Field(None, description="share of rooms that the variant `oracle` solves")
+    script: Literal["perceives"] | None = Field(
+        None, description="the variant `oracle` acts on what it has perceived alone"
+    )
+    needs: Names | None = Field(None, description="members without whom one can only guess")
+    only_through: OnlyThrough | None = Field(None, description="whose cues alone may show what was drawn")
+    knowable: bool | None = Field(
+        None,
+        description="whether an agent can perceive in time what its success depends on (tried by default)",
+    )
+    share: Probability | None = Field(
+        None, description="least share of rooms, for `reachable`, `within`, `script`, `needs` and `knowable`"
+    )
+    draw: Word | None = Field(None, description="for `needs`: the `let` that has to be guessed")
+
+
+class Probe(Model):
+    """A question to a language model about the present moment, whose right answer the engine computes."""
+
+    when: Expression | None = Field(
+        None, description="asked at the first moment at which this holds; default: when the episode has ended"
+    )
+    ask: TextLine = Field(description="the question; <...> is a value", examples=["Where will Sally look?"])
+    answer: Expression = Field(
+        description="what is right at that moment: a value, or a condition for yes or no",
+        examples=["sally.believes.toy_in.color"],
+    )
+    answers: Texts = Field(
+        (), description="what can be answered; <...> is a value (default: all that the answer can be)"
+    )
+
+
+# -- the file ------------------------------------------------------------------------------------------------
+
 
 """The agent's body actions in the order of the paper (appendix, action space)."""
 

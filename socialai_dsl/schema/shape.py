@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
-from typing import Any, Final, Generic, TypeVar
+from dataclasses import dataclass, field
+from typing import Any, Final, Generic, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -14,24 +14,346 @@ from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.schema.annotations import (
     CALLED,
     annotation_at,
+    branches,
     expectation,
     home_of,
     keys_of,
     literals,
     model_at,
 )
-from socialai_dsl.schema.behaviour import Npc, Ranged, State, ThenRule
-from socialai_dsl.schema.indentation import mend_indentation
-from socialai_dsl.schema.positions import DataPath, Positions
-from socialai_dsl.schema.repair import MovedPlaces, Repaired, copied, fill_gaps, part_at
-from socialai_dsl.schema.scenario import Scenario
-from socialai_dsl.source import Span
+from socialai_dsl.schema.scenario import FirstRule, Npc, Ranged, Scenario, State, Step, ThenRule, WorldRule
+from socialai_dsl.source import DataPath, Positions, Span
+
+_KEYS = {key for model in (FirstRule, ThenRule, Step, WorldRule) for key in model.model_fields}
+"""Keys of rules, which are mostly written inside { }."""
+
+
+@dataclass
+class Repaired:
+    """A document that has been changed into what was probably meant.
+
+    Attributes:
+        data: the document, changed.
+        moved: path as it is now -> where it is written.
+        lost: paths of parts that were left out although they may have meant something.
+    """
+
+    data: Any
+    moved: dict[DataPath, DataPath] = field(default_factory=dict)
+    lost: list[DataPath] = field(default_factory=list)
+
+    def rename(self, path: DataPath, key: str) -> bool:
+        """Read the entry at `path` under another key; whether that key was free."""
+        parent = self._parent(path)
+        if parent is None or key in parent:
+            return False
+        entries = [(key if k == path[-1] else k, value) for k, value in parent.items()]
+        parent.clear()
+        parent.update(entries)
+        self.moved[(*path[:-1], key)] = written(path, self.moved)
+        return True
+
+    def move(self, path: DataPath, to: DataPath) -> None:
+        """Read the entry at `path` as if it were written at `to`, in a mapping that has no such key."""
+        part_at(self.data, to[:-1])[to[-1]] = part_at(self.data, path[:-1]).pop(path[-1])
+        self.moved[to] = written(path, self.moved)
+
+    def leave_out(self, path: DataPath) -> None:
+        """Go on without the entry at `path`; an item of a list stays, since the others are known by their number."""
+        parent = self._parent(path)
+        if parent is not None:
+            del parent[path[-1]]
+        self.lost.append(path)
+
+    def _parent(self, path: DataPath) -> dict[str | int, Any] | None:
+        """The mapping that holds the entry at `path`; None if there is no such entry, or not any more."""
+        part = self.data
+        for step in path[:-1]:
+            known = range(len(part)) if isinstance(part, list) else part if isinstance(part, dict) else ()
+            if step not in known:
+                return None
+            part = part[step]
+        return part if isinstance(part, dict) and path[-1] in part else None
+
+
+def part_at(data: Any, path: DataPath) -> Any:
+    """The part of a document at a path that exists."""
+    for step in path:
+        data = data[step]
+    return data
+
+
+def copied(data: Any) -> Any:
+    """A copy whose mappings and lists are free to be changed."""
+    if isinstance(data, Mapping):
+        return {key: copied(value) for key, value in data.items()}
+    return [copied(value) for value in data] if isinstance(data, list) else data
+
+
+def fill_gaps(repaired: Repaired, places: Positions, bag: DiagnosticBag, path: DataPath = ()) -> None:
+    """Report every key and list item without a value, and what a comma inside { } has cut off."""
+    part = part_at(repaired.data, path)
+    if isinstance(part, list):
+        for i, item in enumerate(part):
+            if item is None:
+                _report_nothing((*path, i), places, bag)
+                part[i] = ""
+        children: list[str | int] = list(range(len(part)))
+    elif isinstance(part, dict):
+        _join_cut_values(repaired, part, path, places, bag)
+        children = list(part)
+    else:
+        return
+    for child in children:
+        fill_gaps(repaired, places, bag, (*path, child))
+
+
+def _join_cut_values(
+    repaired: Repaired, part: dict[str, Any], path: DataPath, places: Positions, bag: DiagnosticBag
+) -> None:
+    before: str | None = None
+    cut: dict[str, list[str]] = {}
+    for key, value in list(part.items()):
+        if value is not None:
+            before = key
+        elif (
+            before is not None
+            and isinstance(part[before], str)
+            and _looks_cut(key, part[before], path, places)
+        ):
+            cut.setdefault(before, []).append(key)
+            del part[key]
+        else:
+            _report_nothing((*path, key), places, bag)
+            repaired.leave_out((*path, key))
+    for key, pieces in cut.items():
+        head = part[key]
+        part[key] = ", ".join([head, *pieces])
+        hint = f'write `{key}: "{part[key]}"`, or put every key on a line of its own'
+        word, space, rest = pieces[0].partition(" ")
+        if space and word in _KEYS:
+            hint = f"a colon is missing: write `{word}: {rest}`"
+        message = (
+            f"unknown key `{pieces[0]}`: inside {{ }} a comma ends the value, so `{key}` is only `{head}`"
+        )
+        bag.error("S102", message, places.key_span((*path, pieces[0])), hint=hint)
+
+
+def _looks_cut(key: str, before: str, path: DataPath, places: Positions) -> bool:
+    """Whether a key without a value is the rest of the value before it."""
+    if not places.in_flow((*path, key)):
+        return False
+    in_text = path[-1:] == ("with",) or (isinstance(path[-1], int) and key not in _KEYS) if path else False
+    return in_text or not key.isidentifier() or before.count("(") > before.count(")")
+
+
+def _report_nothing(path: DataPath, places: Positions, bag: DiagnosticBag) -> None:
+    key = path[-1]
+    what = "an item of this list is empty" if isinstance(key, int) else f"nothing is given for `{key}`"
+    bag.error("S104", what, places.key_span(path), hint="write a value, or leave the key out")
+
+
+def written(path: DataPath, moved: Mapping[DataPath, DataPath]) -> DataPath:
+    """Where the part that is now at a path is written."""
+    for length in range(len(path), 0, -1):
+        if path[:length] in moved:
+            return (*moved[path[:length]], *path[length:])
+    return path
+
+
+@dataclass(frozen=True)
+class MovedPlaces:
+    """Positions of a document some of whose entries are written elsewhere: path as it is now -> where it is written."""
+
+    places: Positions
+    moved: Mapping[DataPath, DataPath]
+
+    def locate(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
+        """The place of a character of the text at `path`."""
+        return self.places.locate(written(path, self.moved), offset, width)
+
+    def value_span(self, path: DataPath) -> Span:
+        """The place of the value at `path`."""
+        return self.places.value_span(written(path, self.moved))
+
+    def key_span(self, path: DataPath) -> Span:
+        """The place of the key at `path`."""
+        return self.places.key_span(written(path, self.moved))
+
+    def in_flow(self, path: DataPath) -> bool:
+        """Whether the part at `path` stands inside { } or [ ]."""
+        return self.places.in_flow(written(path, self.moved))
+
+
+# -- keys that stand one level too far left or right ---------------------------------------------------------
+
+
+_EXTENDS = "extends"
+"""A key that is gone when the models see a file."""
+
+
+def mend_indentation(
+    model: type[BaseModel], repaired: Repaired, places: Positions, bag: DiagnosticBag
+) -> None:
+    """Move keys that are indented one level too little or too much; reports S101 once for keys that follow each other.
+
+    Args:
+        model: what the document should be.
+        repaired: the document; changed.
+        places: where its parts stand.
+        bag: takes the findings.
+    """
+    _Mender(model, repaired, places, bag).mend(())
+
+
+class _Mender:
+    def __init__(
+        self, model: type[BaseModel], repaired: Repaired, places: Positions, bag: DiagnosticBag
+    ) -> None:
+        self._model = model
+        self._repaired = repaired
+        self._places = MovedPlaces(places, repaired.moved)
+        self._bag = bag
+        self._quiet = False
+
+    def mend(self, path: DataPath) -> None:
+        """Mend what stands at and below a path, the outermost first."""
+        part = part_at(self._repaired.data, path)
+        if isinstance(part, list):
+            for i in range(len(part)):
+                self.mend((*path, i))
+        if not isinstance(part, dict) or self._places.in_flow((*path, next(iter(part), ""))):
+            return
+        self._indent(path, part)
+        self._dedent(path, part)
+        for key in list(part):
+            if key in part:
+                self.mend((*path, key))
+
+    def _indent(self, path: DataPath, part: dict[str, Any]) -> None:
+        """Move keys that belong into the entry above them."""
+        above: str | None = None
+        moving = False
+        for key in list(part):
+            emptied = above is not None and part[above] is None and key in self._words_of((*path, above))
+            if self._fits(path, key, part[key]) and not emptied:
+                above, moving = key, False
+            elif above is not None and self._takes((*path, above), part[above], key, part[key]):
+                if not moving:
+                    message = f"`{key}` belongs to `{above}`, but is not indented further than it"
+                    self._report((*path, key), message, "indent it one level further")
+                moving = True
+                part[above] = {} if part[above] is None else part[above]
+                self._move((*path, key), (*path, above, key))
+
+    def _dedent(self, path: DataPath, part: dict[str, Any]) -> None:
+        """Move keys that belong beside the entry that they stand in, or further out."""
+        known = model_at(self._model, path)
+        moving = False
+        for key in list(part):
+            home = None if self._fits(path, key, part[key]) else self._home(path, known, key, part[key])
+            if home is None:
+                moving = False
+                continue
+            if not moving:
+                owner = model_at(self._model, home)
+                where = CALLED[owner] if owner in CALLED else f"`{home[-1]}`"
+                inside = f"`{path[-1]}`" if isinstance(path[-1], str) else "an item of a list"
+                message = f"`{key}` stands in {inside}, but belongs to {where}"
+                self._report((*path, key), message, "indent it less")
+            moving = True
+            self._move((*path, key), (*home, key))
+
+    def _move(self, path: DataPath, to: DataPath) -> None:
+        """Move an entry; what stands wrong in it does so for the same reason."""
+        self._repaired.move(path, to)
+        quiet, self._quiet = self._quiet, True
+        self.mend(to)
+        self._quiet = quiet
+
+    def _home(self, path: DataPath, known: type[BaseModel] | None, key: str, value: Any) -> DataPath | None:
+        """The mapping further out that lacks a key which does not fit at `path`."""
+        for length in range(len(path) - 1, -1, -1):
+            outer = path[:length]
+            around = part_at(self._repaired.data, outer)
+            if not isinstance(around, dict) or key in around:
+                continue
+            owner = model_at(self._model, outer)
+            if owner is not None and key in keys_of(owner):
+                return outer
+            elements = _elements(annotation_at(self._model, outer))
+            if owner is None and known in elements and (value == {} or _looks_like(value, elements)):
+                return outer
+        return None
+
+    def _fits(self, path: DataPath, key: str, value: Any) -> bool:
+        """Whether a key may stand where it stands, also if it is misspelt."""
+        known = model_at(self._model, path)
+        if known is not None:
+            keys = [*keys_of(known), *([_EXTENDS] if not path else [])]
+            return key in keys or did_you_mean(key, keys) is not None
+        annotation = annotation_at(self._model, path)
+        elements = _elements(annotation)
+        held = _held(annotation)
+        if value == {} or _looks_like(value, elements) or any(get_origin(part) is dict for part in held):
+            return True
+        if not isinstance(value, dict | list) and len(elements) < len(held):
+            return True  # an expression, say
+        return not held or not self._is_word_of(path, elements, key)
+
+    def _is_word_of(self, path: DataPath, elements: list[type[BaseModel]], key: str) -> bool:
+        """Whether a key is a word of what is in a mapping of names, or of what is around it."""
+        owners = [*elements, *(model_at(self._model, path[:length]) for length in range(len(path)))]
+        return any(owner is not None and key in keys_of(owner) for owner in owners)
+
+    def _words_of(self, path: DataPath) -> list[str]:
+        """The keys of the model at a path, if there is one."""
+        owner = model_at(self._model, path)
+        return keys_of(owner) if owner is not None else []
+
+    def _takes(self, above: DataPath, value: Any, key: str, given: Any) -> bool:
+        """Whether the entry above can have the key."""
+        if value is not None and (not isinstance(value, dict) or key in value or self._closed(above, value)):
+            return False
+        owner = model_at(self._model, above)
+        if owner is not None:
+            return key in keys_of(owner)
+        annotation = annotation_at(self._model, above)
+        return _looks_like(given, _elements(annotation)) or (value is None and bool(_held(annotation)))
+
+    def _closed(self, path: DataPath, value: dict[str, Any]) -> bool:
+        """Whether a mapping is written in braces, so that nothing on other lines can belong to it."""
+        return not value or self._places.in_flow((*path, next(iter(value))))
+
+    def _report(self, path: DataPath, message: str, hint: str) -> None:
+        if not self._quiet:
+            self._bag.error("S101", message, self._places.key_span(path), hint=hint)
+
+
+def _held(annotation: Any) -> list[Any]:
+    """What an entry of a mapping of names can be; nothing for anything else."""
+    names = (get_args(part)[1] for part in branches(annotation) if get_origin(part) is dict)
+    return [held for entry in names for held in branches(entry)]
+
+
+def _elements(annotation: Any) -> list[type[BaseModel]]:
+    """The models that an entry of a mapping of names can be."""
+    return [held for held in _held(annotation) if isinstance(held, type) and issubclass(held, BaseModel)]
+
+
+def _looks_like(value: Any, models: list[type[BaseModel]]) -> bool:
+    """Whether a mapping has keys of one of some models."""
+    return isinstance(value, dict) and any(key in keys_of(model) for model in models for key in value)
+
+
+# -- models --------------------------------------------------------------------------------------------------
+
 
 M = TypeVar("M", bound=BaseModel)
 
 
 @dataclass(frozen=True)
-class Shaped(Generic[M]):
+class ShapedFile(Generic[M]):
     """A document as models.
 
     Attributes:
@@ -55,7 +377,7 @@ def model_of(
     *,
     partial: bool = False,
     parameters: bool = True,
-) -> Shaped[M]:
+) -> ShapedFile[M]:
     """The model of a document; `bag` says what is wrong with its shape.
 
     After mistakes that leave no doubt the model is made of what was meant, so that the rest can be checked.
@@ -77,7 +399,7 @@ def model_of(
     found: Positions = MovedPlaces(places, repaired.moved)
     fill_gaps(repaired, found, bag)
     if made is not None and len(bag) == known:
-        return Shaped(made, repaired.data, places, False)
+        return ShapedFile(made, repaired.data, places, False)
     try:
         made = _made(model, repaired.data)
     except ValidationError as error:
@@ -85,7 +407,7 @@ def model_of(
         made = _tried(model, repaired.data)
     lost = any(_matters(path) for path in repaired.lost)
     kept = found if repaired.moved else places
-    return Shaped(made, repaired.data, kept, lost)
+    return ShapedFile(made, repaired.data, kept, lost)
 
 
 def _made(model: type[M], data: object) -> M:

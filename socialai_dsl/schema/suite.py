@@ -6,8 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, JsonValue, StringConstraints, Tag
 
-from socialai_dsl.schema.base import WORD_SCHEMA, Model, Prose, Word, _as_tuple
-from socialai_dsl.schema.world import UtteranceGrammar
+from socialai_dsl.schema.scenario import WORD_SCHEMA, Model, Prose, UtteranceGrammar, Word, _as_tuple
 from socialai_dsl.vocabulary import Primitive
 
 MemberName = Annotated[str, Field(min_length=1, max_length=200)]

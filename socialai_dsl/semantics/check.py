@@ -3,45 +3,340 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from operator import itemgetter
-from typing import Final
+from typing import Final, Literal, get_args
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, did_you_mean
-from socialai_dsl.schema import Scenario, Sequence
-from socialai_dsl.schema.base import Expression
-from socialai_dsl.schema.positions import DataPath, Positions
-from socialai_dsl.schema.world import CHANNELS
-from socialai_dsl.semantics import (
-    behaviour,
-    beliefs,
-    checks,
-    entities,
-    sequences,
-    setup,
-    statuses,
-    tables,
-    world,
-)
-from socialai_dsl.semantics.absence import check_absences
-from socialai_dsl.semantics.emptiness import check_placements
-from socialai_dsl.semantics.entities import AGENT, Prelude
-from socialai_dsl.semantics.findings import Findings, Scalar, surviving
-from socialai_dsl.semantics.inhabitants import entities_of
-from socialai_dsl.semantics.plans import Checked, FramePlan, OutcomePlan
+from socialai_dsl.schema.scenario import CHANNELS, Expression, Property, Scenario, Sequence
+from socialai_dsl.semantics import behaviour, entities, groups, object_facts, possible, setup
+from socialai_dsl.semantics.entities import AGENT, Prelude, entities_of
+from socialai_dsl.semantics.free_cells import check_absences, check_placements
+from socialai_dsl.semantics.groups import performs
+from socialai_dsl.semantics.plans import CheckedScenario, Drawn, FramePlan, OutcomePlan, PropertyPlan
 from socialai_dsl.semantics.possible import check_possible
 from socialai_dsl.semantics.probes import probes
-from socialai_dsl.semantics.properties import properties
-from socialai_dsl.semantics.registers import Ranges
 from socialai_dsl.semantics.resolve import ScenarioResolver
-from socialai_dsl.semantics.resolver import INT
-from socialai_dsl.semantics.room import room_plan, room_sizes
-from socialai_dsl.semantics.scope import PlayedFrame, at_every_step, frames_of, reset_scope
-from socialai_dsl.semantics.sequences import performs
-from socialai_dsl.semantics.terms import BOOL, Const, Line, Sited, Type
-from socialai_dsl.semantics.utterances import MAX_TEXTS, number_of_texts, texts_of, words_in_order
+from socialai_dsl.semantics.resolver import (
+    INT,
+    MAX_TEXTS,
+    Resolver,
+    number_of_texts,
+    texts_of,
+    words_in_order,
+)
+from socialai_dsl.semantics.scope import (
+    FailedError,
+    Findings,
+    PlayedFrame,
+    Scalar,
+    at_every_step,
+    dotted,
+    frames_of,
+    reset_scope,
+    surviving,
+)
+from socialai_dsl.semantics.setup import room_plan, room_sizes
+from socialai_dsl.semantics.terms import (
+    BOOL,
+    Chance,
+    Compare,
+    Const,
+    Line,
+    Logic,
+    Not,
+    Quantified,
+    Sited,
+    Term,
+    Type,
+    Variable,
+    draws,
+    walk,
+)
+from socialai_dsl.source import DataPath, Positions
 from socialai_dsl.vocabulary import PRIMITIVES
+
+_Kind = Literal["reachable", "never", "within", "oracle", "script", "needs", "only_through", "knowable"]
+KINDS: tuple[_Kind, ...] = get_args(_Kind)
+DEADLY = "deadly"
+
+_WITH = {"share": ("reachable", "within", "script", "needs", "knowable"), "draw": ("needs",)}
+"""Keys that say more, and what they can be said about."""
+
+Draw = tuple[str, tuple[int, ...]]
+"""A register, and its values; one that is drawn with a greater chance is there several times."""
+
+
+def properties(
+    resolver: Resolver, outcomes: tuple[OutcomePlan, ...], drawn: Iterable[Drawn]
+) -> Iterator[PropertyPlan]:
+    """The entries of `check`, in the order written; those with a mistake are left out once it has been reported."""
+    lets = {item.path: item for item in drawn if item.path.startswith("let.")}
+    for i, entry in enumerate(resolver.symbols.scenario.check):
+        with surviving():
+            yield _Entry(resolver, entry, ("check", i)).plan(outcomes, lets)
+
+
+class _Entry:
+    """One entry, and where it stands."""
+
+    def __init__(self, resolver: Resolver, entry: Property, path: DataPath) -> None:
+        self._resolver, self._findings = resolver, resolver.findings
+        self._entry, self._path = entry, path
+
+    def plan(self, outcomes: tuple[OutcomePlan, ...], lets: dict[str, Drawn]) -> PropertyPlan:
+        """The entry with everything resolved."""
+        kind, entry = self._kind(), self._entry
+        place = (*self._path, kind)
+        plan = PropertyPlan(
+            kind, "", dotted(self._path), self._findings.places.key_span(place), share=entry.share
+        )
+        match kind:
+            case "reachable" | "never":
+                raw = entry.reachable if kind == "reachable" else entry.never
+                assert raw is not None, "internal: there is a value for this key"
+                goals = _outcomes_called(str(raw), outcomes)
+                if goals:
+                    return replace(plan, text=f"{kind}: {raw}", goals=goals)
+                condition, remembered = self._condition(place, raw)
+                return replace(
+                    plan, text=f"{kind}: {raw}", condition=condition, remembered=remembered, share=entry.share
+                )
+            case "within":
+                return replace(
+                    plan, text=f"within: {entry.within}", steps=entry.within or 0, share=entry.share
+                )
+            case "oracle":
+                return replace(plan, text=f"oracle: {entry.oracle:g}", share=entry.oracle)
+            case "knowable":
+                text = f"knowable: {str(entry.knowable).lower()}"
+                return replace(plan, text=text, expected=bool(entry.knowable))
+            case "script":
+                return replace(plan, text=f"script: {entry.script}")
+            case "needs":
+                members = self._members(place, entry.needs or ())
+                tried = (
+                    list(lets) if entry.draw is None else [self._let((*self._path, "draw"), entry.draw, lets)]
+                )
+                found = tuple((path, values) for path in tried if len(set(values := _values(lets[path]))) > 1)
+                if entry.draw is not None and not found:
+                    raise self._not_a_pick((*self._path, "draw"), entry.draw)
+                return replace(
+                    plan, text=f"needs: {', '.join(members)}", members=members, draws=found, share=entry.share
+                )
+            case "only_through":
+                assert entry.only_through is not None, "internal: there is a value for this key"
+                word, by = entry.only_through.draw, entry.only_through.by
+                path = self._let((*place, "draw"), word, lets)
+                members = self._members((*place, "by"), by)
+                if len(set(values := _values(lets[path]))) < 2:
+                    raise self._not_a_pick((*place, "draw"), word)
+                text = f"only_through: {word} by {', '.join(members)}"
+                return replace(plan, text=text, members=members, draws=((path, values),))
+
+    def _kind(self) -> _Kind:
+        given = [kind for kind in KINDS if getattr(self._entry, kind) is not None]
+        if len(given) != 1:
+            listed = ", ".join(f"`{kind}`" for kind in KINDS)
+            message = f"a property has {'only one' if given else 'one'} of {listed}"
+            span = self._findings.places.value_span(self._path)
+            raise self._findings.fail("S107" if given else "S105", message, span)
+        for key, kinds in _WITH.items():
+            if getattr(self._entry, key) is not None and given[0] not in kinds:
+                listed = ", ".join(f"`{kind}`" for kind in kinds)
+                message = f"`{key}` says nothing about `{given[0]}`; it goes with {listed}"
+                raise self._findings.fail("S107", message, self._findings.places.key_span((*self._path, key)))
+        return given[0]
+
+    def _condition(self, path: DataPath, raw: Expression) -> tuple[Sited, tuple[Drawn, ...]]:
+        """A condition, and what it alone asks about the step before."""
+        remembered = self._resolver.registers.remembered
+        asked = len(remembered)
+        scope = at_every_step(reset_scope(path))
+        try:
+            term = self._resolver.written(path, raw, BOOL, scope)
+            used = {part.path for part in walk(term) if hasattr(part, "path")}
+            own = tuple(drawn for drawn in remembered if drawn.path in used)
+        finally:
+            del remembered[asked:]
+        if draws(term) or any(isinstance(part, Chance) for part in walk(term)):
+            message = "a property draws nothing itself"
+            hint = "draw it in `let`, and use that"
+            raise self._findings.fail("S204", message, self._findings.at(path), hint=hint)
+        return Sited(term, scope.draws.site, self._findings.at(path)), own
+
+    def _members(self, path: DataPath, names: tuple[str, ...]) -> tuple[str, ...]:
+        symbols = self._resolver.symbols
+        npcs = [name for name in symbols.cast if name != "agent"]
+        members: list[str] = []
+        for i, name in enumerate(names):
+            if name not in npcs and name not in symbols.groups:
+                place = (*path, i) if self._findings.is_list(path) else path
+                near = did_you_mean(name, [*npcs, *symbols.groups])
+                message = f"`{name}` is no NPC of the cast"
+                raise self._findings.fail(
+                    "S201", message, self._findings.at(place, width=len(name)), suggestion=near
+                )
+            members += symbols.groups.get(name, (name,))
+        return tuple(dict.fromkeys(members))
+
+    def _let(self, path: DataPath, word: str, lets: dict[str, Drawn]) -> str:
+        if f"let.{word}" not in lets:
+            if word in self._resolver.symbols.scenario.let and self._findings.bag.has_errors:
+                raise FailedError  # its value means nothing, which has been reported
+            near = did_you_mean(word, [known.removeprefix("let.") for known in lets])
+            message = f"`{word}` is not drawn in `let`"
+            raise self._findings.fail(
+                "S201", message, self._findings.at(path, width=len(word)), suggestion=near
+            )
+        self._resolver.used.add(("let", word))
+        return f"let.{word}"
+
+    def _not_a_pick(self, path: DataPath, word: str) -> Exception:
+        message = f"`{word}` is no free choice of several values"
+        hint = "name a `let` that is a pick whose condition, if any, reads nothing that is drawn"
+        return self._findings.fail("S204", message, self._findings.at(path, width=len(word)), hint=hint)
+
+
+def _outcomes_called(word: str, outcomes: tuple[OutcomePlan, ...]) -> tuple[str, ...]:
+    """The ways to end that a word names: `success`, `failure`, `deadly`, or an outcome's id."""
+    match word.strip():
+        case "success":
+            return tuple(outcome.name for outcome in outcomes if outcome.success)
+        case "failure":
+            return (*(outcome.name for outcome in outcomes if not outcome.success), DEADLY)
+        case "deadly":
+            return (DEADLY,)
+        case name:
+            return tuple(outcome.name for outcome in outcomes if outcome.name == name)
+
+
+def _values(drawn: Drawn) -> tuple[int, ...]:
+    """The values that a draw has in every room, as often as they weigh; none if that depends on other draws."""
+    term = drawn.value.term
+    if not isinstance(term, Quantified) or term.op != "pick" or term.cells:
+        return ()
+    found = []
+    for item in term.items:
+        kept = 1 if term.condition is None else _constant(term.condition, {term.variable: item.value})
+        if kept is None:
+            return ()
+        found += [item.value] * bool(kept)
+    return tuple(found)
+
+
+def _constant(term: Term, variables: dict[str, int]) -> int | None:
+    """The value of a term that depends on nothing but variables; None if it depends on more."""
+    match term:
+        case Const(value=value):
+            return value
+        case Variable(name=name):
+            return variables.get(name)
+        case Not(arg=arg):
+            truth = _constant(arg, variables)
+            return None if truth is None else int(not truth)
+        case Logic(op=op, args=args):
+            values = [_constant(arg, variables) for arg in args]
+            if None in values:
+                return None
+            return int(all(values) if op == "and" else any(values))
+        case Compare(op=op, left=left, right=right):
+            a, b = _constant(left, variables), _constant(right, variables)
+            if a is None or b is None:
+                return None
+            return int({"==": a == b, "!=": a != b, "<": a < b, "<=": a <= b}[op])
+    return None
+
+
+# -- ranges of registers that are set --------------------------------------------------------------------------
+
+
+_WIDEN_AFTER = 12
+_MOST_ROUNDS = 20
+
+
+class Ranges:
+    """Finds, over repeated resolutions, ranges that hold whatever is set.
+
+    Attributes:
+        now: register -> the range to resolve with.
+        unbounded: registers whose growth depends on their size, so that no range can be given.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.now: dict[str, Type] = {}
+        self.unbounded: list[str] = []
+        self._growth: dict[str, int] = {}
+        self._rounds = 0
+        self._wide: dict[str, Type] | None = None
+        self._steps = scenario.horizon * _setters(scenario)
+
+    def settled(self, needed: Mapping[str, Type]) -> bool:
+        """Take note of the ranges that a resolution asked for; whether it had them already."""
+        self._rounds += 1
+        fits = all(_within(type_, self.now.get(path)) for path, type_ in needed.items())
+        if self._wide is not None and (not fits or self.now is self._wide):
+            return self._back()
+        if fits:
+            return self._rounds <= _WIDEN_AFTER + 1 or not self._narrow(needed)
+        if self._rounds <= _WIDEN_AFTER:
+            self._growth = {path: _excess(type_, self.now.get(path)) for path, type_ in needed.items()}
+            self.now = dict(needed)
+            return False
+        if self._rounds == _WIDEN_AFTER + 1:
+            self.now = {path: self._widened(type_, self.now[path]) for path, type_ in needed.items()}
+            return False
+        self.unbounded = [p for p, t in needed.items() if _excess(t, self.now[p]) > self._growth[p]]
+        return True
+
+    def _narrow(self, needed: Mapping[str, Type]) -> bool:
+        """After widening, try what is really needed: `min(asked + 1, 9)` never leaves 0..9. Whether that is less."""
+        if self._rounds > _MOST_ROUNDS or needed == self.now:
+            return False
+        self._wide, self.now = self.now, dict(needed)
+        return True
+
+    def _back(self) -> bool:
+        """The narrower ranges do not hold: the last ones that did are taken. Whether they are taken already."""
+        assert self._wide is not None, "internal: nothing was narrowed"
+        done = self.now is self._wide
+        self.now = self._wide
+        return done
+
+    def _widened(self, needed: Type, now: Type) -> Type:
+        """A range that still grows, by as much as it can in a whole episode."""
+        low = needed.low - (now.low - needed.low) * self._steps if needed.low < now.low else needed.low
+        high = needed.high + (needed.high - now.high) * self._steps if needed.high > now.high else needed.high
+        return replace(needed, low=low, high=high)
+
+
+def _within(type_: Type, range_: Type | None) -> bool:
+    return range_ is not None and range_.low <= type_.low and type_.high <= range_.high
+
+
+def _excess(type_: Type, range_: Type | None) -> int:
+    """By how much a type goes beyond a range."""
+    if range_ is None:
+        return 0
+    return max(0, range_.low - type_.low) + max(0, type_.high - range_.high)
+
+
+def _setters(scenario: Scenario) -> int:
+    """How many rules and steps set something."""
+    rules = [
+        rule
+        for frame in scenario.frames.values()
+        for state in (frame.states or {}).values()
+        for rule in (*state.first, *state.then)
+    ]
+    steps = [step for frame in scenario.frames.values() for step in frame.steps or ()]
+    own = sum(bool(entry.set) for entry in (*rules, *steps))
+    return own + sum(bool(rule.set) for rule in scenario.rules)
+
+
+# -- the whole scenario --------------------------------------------------------------------------------------
+
 
 _MAX_ROUNDS = 24
 
@@ -58,7 +353,7 @@ def check_meaning(
     data: object,
     params: Mapping[str, Scalar] | None = None,
     substituted: frozenset[DataPath] = frozenset(),
-) -> Checked | None:
+) -> CheckedScenario | None:
     """What a scenario means; None if something is wrong with it, which `bag` then says.
 
     Types that follow from uses (`pick(left | right)`, registers that are set) are found by resolving again with
@@ -76,7 +371,7 @@ def check_meaning(
     """
     words: dict[str, Type] = {}
     ranges = Ranges(scenario)
-    checked: Checked | None = None
+    checked: CheckedScenario | None = None
     for _ in range(_MAX_ROUNDS):
         found = DiagnosticBag()
         findings = Findings(found, places, params or {}, substituted, data)
@@ -114,7 +409,7 @@ def _without_consequences(found: DiagnosticBag, scenario: Scenario) -> Iterator[
     an expression senseless; that need not be said as well.
     """
     follow: set[str] = set()
-    if any(d.code == checks.GRAMMAR_CODE for d in found):
+    if any(d.code == possible.GRAMMAR_CODE for d in found):
         follow |= {"S401", "S402"}
     if entities.mean_two_things(scenario):
         follow |= {"S204", "S211"}
@@ -157,7 +452,7 @@ class _Run:
         self._played = entities.played_frames(self._symbols, findings)
         self.resolver = ScenarioResolver(self._symbols, findings, self._played, words, ranges)
 
-    def checked(self, name: str) -> Checked | None:
+    def checked(self, name: str) -> CheckedScenario | None:
         """The checked scenario; None if it cannot be put together."""
         scenario, resolver, findings = self._scenario, self.resolver, self._findings
         if self._symbols.entities > MAX_BODIES:
@@ -166,21 +461,21 @@ class _Run:
             message = f"a room holds at most {MAX_BODIES} objects and members of the cast, this one {found}"
             findings.error("S106", message, findings.places.key_span((part,)))
             return None
-        checks.check_grammar(scenario, findings)
+        possible.check_grammar(scenario, findings)
         entities.declare_registers(resolver)
         entities.check_slots(resolver)
-        checks.check_flow(scenario, findings)
+        possible.check_flow(scenario, findings)
         spoken = self._spoken()
         outcomes = tuple(self._outcomes())
         plans = tuple(self._plans(spoken))
         self._look_at_unused()
-        tables.look_at_all(resolver)
+        groups.look_at_all(resolver)
         placed = setup.placings(resolver)
         colors, turned = list(setup.colorings(resolver)), list(setup.facings(resolver))
-        computed, rules = statuses.computed(resolver), tuple(world.rules(resolver))
-        remembered, required = tuple(sequences.memories(resolver)), tuple(world.requirements(resolver))
+        computed, rules = object_facts.computed(resolver), tuple(behaviour.rules(resolver))
+        remembered, required = tuple(groups.memories(resolver)), tuple(behaviour.requirements(resolver))
         inhabitants = tuple(entities_of(resolver))
-        believed = tuple(beliefs.beliefs(resolver))
+        believed = tuple(object_facts.beliefs(resolver))
         drawn = resolver.registers.drawn()
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)
         room = room_plan(resolver)
@@ -189,11 +484,11 @@ class _Run:
         if findings.bag.has_errors:
             return None
         for plan in plans:
-            checks.check_shadowed(plan, findings)
+            possible.check_shadowed(plan, findings)
         self._report_unused()
         names = [resolver.registers.read(f"{member}.name") for member in self._symbols.cast]
         words = words_in_order(scenario.grammar, names, spoken.lines(self._symbols.cast))
-        return Checked(
+        return CheckedScenario(
             name=name,
             horizon=scenario.horizon,
             actions=tuple(action for action in PRIMITIVES if action in scenario.actions),
@@ -246,7 +541,7 @@ class _Run:
                 yield behaviour.plan(self.resolver, self._played[member], spoken.frames[member])
             elif self._symbols.cast[member].beliefs:
                 span = self._findings.places.key_span(("cast", member))
-                yield beliefs.watching(member, number, span)
+                yield object_facts.watching(member, number, span)
 
     def _look_at_unused(self) -> None:
         """Frames that nobody plays are checked as if somebody did, so that no mistake waits for its first use."""

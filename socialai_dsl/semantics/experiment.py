@@ -23,7 +23,7 @@ from socialai_dsl.schema.experiment import (
     Tested,
     one_setting,
 )
-from socialai_dsl.schema.positions import DataPath, Positions
+from socialai_dsl.source import DataPath, Positions
 
 MAX_RUNS: Final = 10_000
 """How many runs an experiment may have."""

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Final, Literal
 
-from socialai_dsl.semantics.readings import Readings
-from socialai_dsl.semantics.terms import Line, ObjectType, Pattern, Read, Sited, Term, Type
+from socialai_dsl.semantics.terms import Line, ObjectType, Pattern, Read, Readings, Sited, Term, Type
 from socialai_dsl.source import Span
+
+FOR_EVER: Final = -1
+"""The duration of a step that never ends."""
 
 # --- places -----------------------------------------------------------------------------------------------------
 
@@ -134,7 +136,7 @@ class StepPlan:
 
     Attributes:
         state: its name, if any. until: what ends it.
-        duration: for how many turns; -1: for ever.
+        duration: for how many turns, or FOR_EVER.
         lasted: whether it has lasted for as many turns as a value that is computed says.
     """
 
@@ -359,7 +361,7 @@ class ProbePlan:
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckedScenario:
     """A scenario in which everything is resolved and nothing is wrong: the compiler's input.
 
     Attributes:

@@ -5,19 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Final
 
-from socialai_dsl.schema import Probe
-from socialai_dsl.schema.base import Expression
-from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.semantics.build import draws, walk
-from socialai_dsl.semantics.findings import FailedError, surviving
+from socialai_dsl.grammar.ast import every
+from socialai_dsl.schema.scenario import Expression, Probe
+from socialai_dsl.semantics.groups import values_of
 from socialai_dsl.semantics.plans import Drawn, ProbePlan
-from socialai_dsl.semantics.possible_values import values_of
 from socialai_dsl.semantics.resolver import Resolver
-from socialai_dsl.semantics.scope import Scope, at_every_step, reset_scope
-from socialai_dsl.semantics.terms import BOOL, Chance, Sited, Term
+from socialai_dsl.semantics.scope import FailedError, Scope, at_every_step, reset_scope, spoken, surviving
+from socialai_dsl.semantics.terms import BOOL, Chance, Sited, Term, draws, walk
 from socialai_dsl.semantics.texts import parts, sayable
-from socialai_dsl.semantics.wording import spoken
-from socialai_dsl.trees import every
+from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import TRUTHS, normal
 
 _MOST: Final = 64

@@ -1,18 +1,272 @@
-"""The symbol table of a scenario, and what a name can mean at one place of it."""
+"""What surrounds an expression: where its mistakes are reported and in which words, and what a name means there."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any, Final, TypeVar
 
+from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.schema import CastMember, Frame, Scenario
-from socialai_dsl.schema.base import Expression
-from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.semantics.findings import dotted
-from socialai_dsl.semantics.terms import Const, ObjectType, Term, Type
+from socialai_dsl.grammar.ast import ParseProblem, parse_expression, parse_text, rebuilt, unparse
+from socialai_dsl.schema.scenario import CastMember, Expression, Frame, Scenario
+from socialai_dsl.semantics.signatures import Signature
+from socialai_dsl.semantics.terms import (
+    SIDE,
+    TURN,
+    Compare,
+    Const,
+    ObjectType,
+    Select,
+    Term,
+    Type,
+    all_of,
+    one_of,
+)
+from socialai_dsl.source import DataPath, Positions, Span
+
+Scalar = int | bool | float | str
+
+
+_NO_TEXTS = frozenset({"cause", "do", "place"})
+"""Keys whose values have no texts in them."""
+
+
+class FailedError(Exception):
+    """A value that means nothing; the reason has been reported."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Where findings go, and where the parts of the file stand.
+
+    Attributes:
+        bag: takes the findings.
+        places: path -> place in the file.
+        params: the file's parameters with their values, for `$name`.
+        substituted: paths whose whole value was a parameter; places inside them mean nothing.
+        data: the document, to tell one value from a list of one.
+    """
+
+    bag: DiagnosticBag
+    places: Positions
+    params: Mapping[str, Scalar] = field(default_factory=dict)
+    substituted: frozenset[DataPath] = frozenset()
+    data: object = None
+
+    def part(self, path: DataPath) -> object:
+        """What is written at `path`; None if nothing is."""
+        part: Any = self.data
+        for step in path:
+            known = range(len(part)) if isinstance(part, list) else part if isinstance(part, dict) else ()
+            if step not in known:
+                return None
+            part = part[step]
+        return part
+
+    def is_list(self, path: DataPath) -> bool:
+        """Whether a list is written at `path`."""
+        return isinstance(self.part(path), list)
+
+    def at(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
+        """The place of a character of the text at `path`."""
+        return self.places.locate(path, 0 if path in self.substituted else offset, width)
+
+    def node(self, path: DataPath, node: ast.Expr) -> Span:
+        """The place of a part of the expression at `path`."""
+        return self.at(path, *_extent(node))
+
+    def error(self, code: str, message: str, span: Span, **more: str | None) -> None:
+        """Report an error."""
+        self.bag.error(code, message, span, **more)
+
+    def warning(self, code: str, message: str, span: Span, **more: str | None) -> None:
+        """Report a warning."""
+        self.bag.warning(code, message, span, **more)
+
+    def fail(self, code: str, message: str, span: Span, **more: str | None) -> FailedError:
+        """Report an error; raising the result gives up the value it is in."""
+        self.bag.error(code, message, span, **more)
+        return FailedError()
+
+    def expression(self, path: DataPath, raw: Scalar) -> ast.Expr:
+        """The tree of the expression at `path`, its parameters replaced by their values."""
+        if isinstance(raw, bool):
+            return ast.Truth(raw)
+        if isinstance(raw, float):
+            raise self.fail("S204", f"`{raw:g}` is not a whole number", self.at(path))
+        if isinstance(raw, int):
+            return ast.Number(raw) if raw >= 0 else ast.Negative(ast.Number(-raw))
+        try:
+            return self._filled(parse_expression(raw), path)
+        except ParseProblem as problem:
+            raise self._problem(problem, path) from None
+
+    def text(self, path: DataPath, raw: str) -> ast.Text:
+        """The tree of the text at `path`, its parameters replaced by their values."""
+        try:
+            filled = self._filled(parse_text(raw), path)
+        except ParseProblem as problem:
+            raise self._problem(problem, path) from None
+        assert isinstance(filled, ast.Text), "internal: a text became something else"
+        return filled
+
+    def _problem(self, problem: ParseProblem, path: DataPath) -> FailedError:
+        code = "S212" if problem.code == "S004" else problem.code
+        hint = problem.hint if problem.hint and problem.hint not in str(problem) else None
+        if problem.words and not _NO_TEXTS & {*path}:
+            hint = f"{hint}; a text is quoted: {as_text(problem.words, self.part(path))}"
+        return self.fail(code, str(problem), self.at(path, problem.offset), hint=hint)
+
+    def _filled(self, tree: ast.Expr, path: DataPath) -> ast.Expr:
+        if not any(isinstance(node, ast.Parameter) for node in tree.walk()):
+            return tree
+        return self._replaced(tree, path)
+
+    def _replaced(self, node: ast.Expr, path: DataPath) -> ast.Expr:
+        if isinstance(node, ast.Parameter):
+            return self._parameter(node, path)
+        replaced: ast.Expr = rebuilt(node, lambda part: self._replaced(part, path))
+        return replaced
+
+    def _parameter(self, node: ast.Parameter, path: DataPath) -> ast.Expr:
+        span = self.at(path, node.at, len(node.id) + 1)
+        if node.id not in self.params:
+            raise self.fail(
+                "S206", f"unknown parameter `{node.id}`", span, suggestion=did_you_mean(node.id, self.params)
+            )
+        value = self.params[node.id]
+        if isinstance(value, str):
+            try:
+                return ast.moved(parse_expression(value), lambda _: node.at)
+            except ParseProblem as problem:
+                message = f"the value `{value}` of `{node.id}` is not an expression: {problem}"
+                raise self.fail("S206", message, span) from None
+        if isinstance(value, float):
+            raise self.fail("S204", f"the parameter `{node.id}` is {value:g}, not a whole number", span)
+        return ast.moved(self.expression((), value), lambda _: node.at)
+
+
+def _extent(node: ast.Expr) -> tuple[int, int]:
+    """Offset and width of what a caret should mark."""
+    match node:
+        case ast.Name(id=word):
+            return node.at, len(word)
+        case ast.Attribute(name=word) | ast.Call(name=word):
+            return node.name_at, len(word)
+        case ast.Parameter(id=word):
+            return node.at, len(word) + 1
+        case ast.Number(value=value):
+            return node.at, len(str(value))
+        case _:
+            return node.at, 1
+
+
+def as_text(text: str, whole: object) -> str:
+    """How a text is written in an expression: where that is the whole value, YAML takes the outer quotes away."""
+    return f"""'"{text}"'""" if text == whole else f'"{text}"'
+
+
+def surviving() -> suppress:
+    """Go on after a value that failed; its reason has been reported."""
+    return suppress(FailedError)
+
+
+def dotted(path: DataPath) -> str:
+    """`("outcome", 0, "success")` as `outcome[0].success`."""
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+# -- words of messages ---------------------------------------------------------------------------------------
+
+
+_KINDS: Final = {
+    "bool": "a condition",
+    "int": "a number",
+    "direction": "a direction",
+    "color": "a colour",
+    "action": "an action",
+    "entity": "an object or a member of the cast",
+    "text": "a text",
+    "noun": "a noun",
+    "status": "a status",
+    "utterance": "an utterance",
+    "cell": "a cell",
+}
+
+
+_PLACEHOLDERS: Final = {
+    "entity": "x",
+    "entities": "x",
+    "int": "n",
+    "direction": "up",
+    "turn": "left",
+    "utterance": '"..."',
+    "state": "state",
+    "status": "status",
+    "action": "action",
+    "side": "top",
+    "group": "group",
+    "actions": "a | b",
+    "any": "x",
+    "sequence": "dance",
+}
+
+
+def usage(signature: Signature) -> str:
+    """How an instruction is written: `next_to(x)`."""
+    if not signature.takes:
+        return signature.name
+    least = len(signature.takes) - signature.optional
+    return f"{signature.name}({', '.join(_PLACEHOLDERS[kind] for kind in signature.takes[: least or None])})"
+
+
+def wrong_count(signature: Signature, given: int) -> str:
+    """What to say when an instruction has too few or too many values in brackets."""
+    many, least = len(signature.takes), len(signature.takes) - signature.optional
+    number = f"{least} or {many}" if least < many else f"{many}"
+    takes = "nothing in brackets" if not many else f"{number} value{'s' if many > 1 else ''} in brackets"
+    return f"`{signature.name}` takes {takes}: `{usage(signature)}`; {given} given"
+
+
+def with_article(name: str) -> str:
+    """What something is called, with its article: `an apple`, `a remote door`."""
+    return f"{'an' if name[:1] in 'aeiou' else 'a'} {name.replace('_', ' ')}"
+
+
+def described(type_: Type) -> str:
+    """A type with its article: `a colour`, `a number`."""
+    if type_.words == TURN.words and type_.kind == "int":
+        return "a turn (left or right)"
+    if type_.words == SIDE.words and type_.kind == "int":
+        return "a wall (top, bottom, left or right)"
+    return _KINDS[type_.kind]
+
+
+def words_of(type_: Type) -> str:
+    """The words of a type for a help line."""
+    return ", ".join(type_.words)
+
+
+def spoken(type_: Type, value: int) -> str:
+    """A value as it is said in a text."""
+    return type_.words[value - type_.low] if type_.words else str(value)
+
+
+def quoted(node: ast.Expr) -> str:
+    """An expression as an author would write it, with `...` for conditions of quantifiers and places."""
+    return unparse(node, shortened=True)
+
+
+# -- names: the symbol table of a scenario, and what is known at one place of it -----------------------------
+
 
 DEFINE = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\(\s*([A-Za-z_]\w*(?:\s*,\s*[A-Za-z_]\w*)*)\s*\))?\s*")
 
@@ -277,3 +531,105 @@ def frames_of(scenario: Scenario) -> Iterator[tuple[DataPath, Frame]]:
     for member, described in scenario.cast.items():
         for name, frame in described.one_of[0].frames.items() if described.one_of else ():
             yield ("cast", member, "one_of", 0, "frames", name), frame
+
+
+# -- what differs between the files of a `one_of`, as values that depend on which was drawn ------------------
+
+
+V = TypeVar("V")
+
+
+def drawn(which: Term | None, among: Iterable[int]) -> Term | None:
+    """Whether the file that was drawn, whose number `which` is, is one of these; None if that is certain."""
+    numbers = sorted(set(among))
+    if which is None or len(numbers) == which.type.size:
+        return None
+    return one_of(which, [Const(which.type, number) for number in numbers])
+
+
+def by_value(values: Sequence[V]) -> dict[V, list[int]]:
+    """Value -> the alternatives that have it, in order of appearance."""
+    found: dict[V, list[int]] = {}
+    for number, value in enumerate(values):
+        found.setdefault(value, []).append(number)
+    return found
+
+
+def select(which: Term | None, terms: Sequence[Term]) -> Term:
+    """The value that belongs to the file that was drawn, whose number `which` is."""
+    kinds = {term.type.kind for term in terms}
+    assert len(kinds) == 1, "internal: alternatives of different kinds"
+    if len(set(terms)) == 1:
+        return terms[0]
+    assert which is not None, "internal: nothing is drawn, and the values differ"
+    if kinds == {"text"}:
+        return _text(which, terms)
+    type_ = terms[0].type
+    for term in terms[1:]:
+        type_ = replace(type_, low=min(type_.low, term.type.low), high=max(type_.high, term.type.high))
+    return _cases(which, [_of_type(term, type_) for term in terms], type_)
+
+
+def _of_type(term: Term, type_: Type) -> Term:
+    return replace(term, type=type_) if isinstance(term, Const) else term
+
+
+def _cases(which: Term, terms: Sequence[Term], type_: Type) -> Term:
+    default = Counter(terms).most_common(1)[0][0]
+    cases = [
+        (Compare("==", which, Const(which.type, number)), term)
+        for number, term in enumerate(terms)
+        if term != default
+    ]
+    return Select(type_, tuple(case for case, _ in cases), tuple(term for _, term in cases), default)
+
+
+def _text(which: Term, terms: Sequence[Term]) -> Term:
+    """Texts have words of their own, so the result has the words of all."""
+    return text_of(
+        [(Compare("==", which, Const(which.type, number)), term) for number, term in enumerate(terms)]
+    )
+
+
+def of_each(who: Term, values: Sequence[Term]) -> Term:
+    """The value that belongs to whichever entity is meant; `values` in the order of those it can be."""
+    numbers = [who.value] if isinstance(who, Const) else range(who.type.low, who.type.high + 1)
+    cases = [
+        (Compare("==", who, Const(who.type, number)), value)
+        for number, value in zip(numbers, values, strict=True)
+    ]
+    if len(set(values)) == 1:
+        return values[0]
+    if values[0].type.kind == "text":
+        return text_of(cases)
+    low, high = min(v.type.low for v in values), max(v.type.high for v in values)
+    *others, (_, last) = cases
+    conditions, chosen = tuple(c for c, _ in others), tuple(v for _, v in others)
+    return Select(replace(last.type, low=low, high=high), conditions, chosen, last)
+
+
+def text_of(cases: Sequence[tuple[Term, Term]]) -> Term:
+    """The text beside the condition that holds (one does), of one type that has the words of all."""
+    words: dict[str, None] = {}
+    for _, term in cases:
+        values = [term.value] if isinstance(term, Const) else range(term.type.low, term.type.high + 1)
+        words |= {spoken(term.type, value): None for value in values}
+    type_ = Type("text", 0, len(words) - 1, tuple(words))
+    if len(words) == 1:
+        return Const(type_, 0)
+    if len(cases) == 1:
+        return cases[0][1]
+    choices = [case for condition, term in cases for case in _words_of(condition, term, type_)]
+    default = Counter(value for _, value in choices).most_common(1)[0][0]
+    kept = [(condition, value) for condition, value in choices if value != default]
+    return Select(type_, tuple(c for c, _ in kept), tuple(v for _, v in kept), default)
+
+
+def _words_of(condition: Term, term: Term, type_: Type) -> Iterator[tuple[Term, Const]]:
+    """Each word that a text can be, with the condition that it is."""
+    if isinstance(term, Const):
+        yield condition, Const(type_, type_.words.index(spoken(term.type, term.value)))
+        return
+    for value in range(term.type.low, term.type.high + 1):
+        equal = Compare("==", term, Const(term.type, value))
+        yield all_of([condition, equal]), Const(type_, type_.words.index(spoken(term.type, value)))

@@ -1,40 +1,305 @@
-"""What is drawn at reset, in the order it is done: what something needs comes before it."""
+"""What a reset makes: the room, where things are put, and every draw in the order it is done."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import chain, pairwise
+from typing import Literal
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.schema import CastMember, ObjectGroup
-from socialai_dsl.schema.positions import DataPath
-from socialai_dsl.semantics import contents, places, resolve_groups, tables
-from socialai_dsl.semantics.alternatives import by_value, drawn
-from socialai_dsl.semantics.build import walk
+from socialai_dsl.schema.scenario import CastMember, Expression, ObjectGroup, Scenario
+from socialai_dsl.semantics import groups, object_facts
 from socialai_dsl.semantics.entities import AGENT
-from socialai_dsl.semantics.findings import FailedError, surviving
-from socialai_dsl.semantics.plans import Coloring, Drawn, Facing, Placing, Setup
-from socialai_dsl.semantics.resolver import ENTITY, Resolver
-from socialai_dsl.semantics.scope import Objects, Scope, object_scope, reset_scope
+from socialai_dsl.semantics.plans import Coloring, Drawn, Facing, Placing, Region, RoomPlan, Setup
+from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
+from socialai_dsl.semantics.scope import (
+    FailedError,
+    Findings,
+    Objects,
+    Scope,
+    by_value,
+    drawn,
+    object_scope,
+    quoted,
+    reset_scope,
+    surviving,
+)
+from socialai_dsl.semantics.signatures import PLACES
 from socialai_dsl.semantics.terms import (
+    BOOL,
     COLOR,
     DIRECTION,
+    SIDE,
     CellBeside,
     CellOf,
     Compare,
     Const,
     FieldOf,
     Measure,
+    ObjectType,
     Read,
     Sees,
     Select,
     Sited,
     Term,
     Test,
+    Type,
+    World,
+    walk,
 )
-from socialai_dsl.semantics.wording import quoted
+from socialai_dsl.source import DataPath, Span
+
+_SIDES: tuple[Literal["top", "bottom", "left", "right"], ...] = ("top", "bottom", "left", "right")
+
+
+@dataclass(frozen=True)
+class Spot:
+    """Whom a place is for: its entity, where its text stands, the site and number of its draw.
+
+    `index` and `count`: which member of its group it is, and how many there are.
+    """
+
+    entity: int
+    path: DataPath
+    site: str
+    number: int
+    index: int = 0
+    count: int = 1
+
+
+def at(resolver: Resolver, spot: Spot, pair: Sequence[Expression], scope: Scope) -> Placing:
+    """An exact cell, `at: [x, y]`."""
+    findings = resolver.findings
+    if len(pair) != 2:
+        raise findings.fail(
+            "S104", f"`at` is a cell [x, y]; {len(pair)} numbers given", findings.at(spot.path)
+        )
+    x, y = (
+        resolver.written((*spot.path, i), raw, INT, _coordinate(scope, spot.path, i))
+        for i, raw in enumerate(pair)
+    )
+    span = findings.at(spot.path)
+    return Placing(spot.entity, spot.site, spot.number, span, at=(x, y), where_site=scope.draws.site)
+
+
+def _coordinate(scope: Scope, path: DataPath, index: int) -> Scope:
+    return replace(scope, path=(*path, index))
+
+
+def place(resolver: Resolver, spot: Spot, raw: str, scope: Scope) -> Placing:
+    """A drawn cell, `place: region where condition`."""
+    node = resolver.findings.expression(spot.path, raw)
+    span = resolver.findings.at(spot.path)
+    where: Term | None = None
+    if isinstance(node, ast.Placed):
+        region, condition = node.region, node.where
+    else:
+        region, condition = node, None
+    if isinstance(region, ast.Name) and region.id == "nowhere":
+        return Placing(spot.entity, spot.site, spot.number, span, nowhere=True)
+    regions = _regions(resolver, region, spot, scope)
+    if condition is not None:
+        where = resolver.value(condition, BOOL, replace(scope, here=True))
+    return Placing(
+        spot.entity, spot.site, spot.number, span, regions=regions, where=where, where_site=scope.draws.site
+    )  # fmt: skip
+
+
+def _regions(resolver: Resolver, node: ast.Expr, spot: Spot, scope: Scope) -> tuple[Region, ...]:
+    options = node.options if isinstance(node, ast.Alternatives) else (node,)
+    return tuple(r for option in options for r in region(resolver, option, scope, spot))
+
+
+def region(resolver: Resolver, node: ast.Expr, scope: Scope, spot: Spot | None = None) -> tuple[Region, ...]:
+    """The regions that one place word stands for."""
+    name, args = _head(resolver, node, scope)
+    define = resolver.symbols.defines.get(name)
+    if define is not None and not args and not define.parameters:
+        if name in scope.within:
+            raise resolver.fail("S208", f"`{name}` needs itself", node, scope)
+        resolver.used.add(define.path)
+        body = resolver.findings.expression(define.path, define.raw)
+        inner = replace(scope, path=define.path, within=(*scope.within, name))
+        options = body.options if isinstance(body, ast.Alternatives) else (body,)
+        return tuple(r for option in options for r in region(resolver, option, inner, spot))
+    match name:
+        case "anywhere" | "left_half" | "right_half" | "top_half" | "bottom_half":
+            _takes(resolver, node, args, 0, scope)
+            return (Region(name),)
+        case "column" | "row":
+            _takes(resolver, node, args, 1, scope)
+            return (Region(name, (resolver.value(args[0], INT, scope),)),)
+        case "rect":
+            _takes(resolver, node, args, 4, scope)
+            return (Region(name, tuple(resolver.value(arg, INT, scope) for arg in args)),)
+        case "next_to" | "in_front_of":
+            _takes(resolver, node, args, 1, scope)
+            return tuple(Region(name, (target,)) for target in _targets(resolver, args[0], scope))
+        case "wall":
+            _takes(resolver, node, args, 1, scope)
+            side = resolver.value(args[0], SIDE, scope)
+            if isinstance(side, Const):
+                return (Region("wall", side=_SIDES[side.value]),)
+            return (Region("wall", (side,)),)
+        case "each_wall":
+            return (_each_wall(resolver, node, args, scope, spot),)
+    raise _unknown(resolver, name, node, scope)
+
+
+def _head(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[str, tuple[ast.Expr, ...]]:
+    match node:
+        case ast.Name(id=name):
+            return name, ()
+        case ast.Call(name=name, args=args, subject=None):
+            return name, args
+    raise resolver.fail(
+        "S204", f"`{quoted(node)}` is not a place", node, scope, hint="places are " + ", ".join(PLACES)
+    )
+
+
+def _takes(resolver: Resolver, node: ast.Expr, args: tuple[ast.Expr, ...], count: int, scope: Scope) -> None:
+    if len(args) != count:
+        name = node.id if isinstance(node, ast.Name) else node.name if isinstance(node, ast.Call) else ""
+        takes = ", ".join(PLACES[name].takes) if name in PLACES and count else "nothing" if not count else "x"
+        raise resolver.fail("S211", f"`{name}` takes {takes} in brackets; {len(args)} given", node, scope)
+
+
+def _targets(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[Term, ...]:
+    if groups.is_group(resolver, node, scope):
+        return groups.group(resolver, node, None, scope).items
+    return (resolver.value(node, ENTITY, scope),)
+
+
+def _each_wall(
+    resolver: Resolver, node: ast.Expr, args: tuple[ast.Expr, ...], scope: Scope, spot: Spot | None
+) -> Region:
+    """The wall of this member of the group: top, bottom, left, right in turn."""
+    margin = resolver.value(args[0], INT, scope) if args else Const(Type("int", 1, 1), 1)
+    if len(args) > 1 or not isinstance(margin, Const) or margin.value < 1:
+        raise resolver.fail(
+            "S211", "`each_wall` takes a number, at least 1: cells from the corners", node, scope
+        )
+    if spot is None or spot.count > len(_SIDES) or spot.count < 2:
+        message = "`each_wall` is for a group of two to four, one in each wall"
+        raise resolver.fail(
+            "S204", message, node, scope, hint="give `count: 4`; for one thing write `wall(top)`"
+        )
+    return Region("wall", side=_SIDES[spot.index], margin=margin.value)
+
+
+def _unknown(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> FailedError:
+    near = did_you_mean(name, [*PLACES, "next_to", "in_front_of"])
+    hint = None if near else "places are " + ", ".join([*PLACES, "next_to", "in_front_of"])
+    return resolver.fail("S205", f"unknown place `{name}`", node, scope, suggestion=near, hint=hint)
+
+
+# -- the room: its sizes, its canvas, and what is built into it ----------------------------------------------
+
+
+SMALLEST, LARGEST = 3, 30
+"""Cells each way: a line of a room and its neighbours are one word of 32 bits."""
+
+_ASSUMED = (5, 8)
+"""Sizes to go on with after a mistake in them."""
+
+Sizes = tuple[int, int]
+
+
+def room_sizes(scenario: Scenario, findings: Findings) -> tuple[Sizes, Sizes]:
+    """Least and greatest width and height, walls included."""
+    room = scenario.room
+    if room.size is not None:
+        for key, other in (("width", room.width), ("height", room.height)):
+            if other is not None:
+                span = findings.places.key_span(("room", key))
+                findings.error("S107", f"`size` gives width and height already; leave out `{key}`", span)
+        size = _range(findings, ("room", "size"), room.size)
+        return size, size
+    if room.width is None or room.height is None:
+        missing = "`size`, or `width` and `height`" if room.width is None and room.height is None else \
+            "`width`" if room.width is None else "`height`"  # fmt: skip
+        findings.error("S105", f"the room needs {missing}", findings.places.key_span(("room",)))
+        return _ASSUMED, _ASSUMED
+    return _range(findings, ("room", "width"), room.width), _range(findings, ("room", "height"), room.height)
+
+
+def _range(findings: Findings, path: DataPath, raw: Expression) -> Sizes:
+    try:
+        low, high = _bounds(findings.expression(path, raw))
+    except FailedError:
+        return _ASSUMED
+    except ValueError:
+        findings.error(
+            "S204", f"`{path[-1]}` is a number of cells such as 8, or a range such as 5..8", findings.at(path)
+        )
+        return _ASSUMED
+    if not SMALLEST <= low <= high <= LARGEST:
+        message = f"a room has {SMALLEST} to {LARGEST} cells each way, walls included; {low}..{high} given"
+        findings.error("S106", message, findings.at(path))
+        return _ASSUMED
+    return low, high
+
+
+def _bounds(node: ast.Expr) -> Sizes:
+    match node:
+        case ast.Number(value=value):
+            return value, value
+        case ast.Interval(low=ast.Number(value=low), high=ast.Number(value=high)):
+            return low, high
+    raise ValueError
+
+
+def room_plan(resolver: Resolver) -> RoomPlan:
+    """The room with its canvas and what is built into it."""
+    symbols, findings = resolver.symbols, resolver.findings
+    room = symbols.scenario.room
+    (_, width), (_, height) = symbols.width, symbols.height
+    columns, rows = room.canvas or (width, height)
+    canvas = columns, rows
+    if canvas[0] < width or canvas[1] < height:
+        message = f"the canvas of {canvas[0]}x{canvas[1]} is smaller than the largest room, {width}x{height}"
+        findings.error("S106", message, findings.at(("room", "canvas")))
+    if max(canvas) > LARGEST:
+        message = f"a canvas has at most {LARGEST} cells each way, this one {canvas[0]}x{canvas[1]}"
+        findings.error("S106", message, findings.at(("room", "canvas")))
+    return RoomPlan(symbols.width, symbols.height, canvas, tuple(_built(resolver)), room.occlusion)
+
+
+def _built(resolver: Resolver) -> Iterator[tuple[ObjectType, Region, Span]]:
+    findings = resolver.findings
+    for i, entry in enumerate(resolver.symbols.scenario.room.build):
+        for name, raw in entry.items():
+            path: DataPath = ("room", "build", i, name)
+            type_ = resolver.symbols.types.get(name)
+            if type_ is None:
+                near = did_you_mean(name, resolver.symbols.types)
+                span = findings.places.key_span(path)
+                findings.error("S309", f"unknown object type `{name}`", span, suggestion=near)
+                continue
+            with surviving():
+                yield from _built_regions(resolver, path, raw, type_)
+
+
+def _built_regions(
+    resolver: Resolver, path: DataPath, raw: str, type_: ObjectType
+) -> Iterator[tuple[ObjectType, Region, Span]]:
+    findings, scope = resolver.findings, reset_scope(path)
+    node = findings.expression(path, raw)
+    for option in node.options if isinstance(node, ast.Alternatives) else (node,):
+        for part in region(resolver, option, scope):
+            reads = [t for t in walk(part.args) if not isinstance(t, World) and hasattr(t, "path")]
+            if reads or part.name in ("next_to", "in_front_of") or (part.name == "wall" and part.args):
+                message = "what is built into the room depends on its size alone"
+                raise findings.fail(
+                    "S204", message, findings.at(path), hint="use W and H, and put what is drawn in `objects`"
+                )
+            yield type_, part, findings.at(path)
+
+
+# -- the order: what something needs comes before it ---------------------------------------------------------
+
 
 _FACING_TESTS = frozenset({"faces", "faces_toward", "eye_contact", "looks_at"})
 
@@ -71,13 +336,13 @@ def _distinct(
 def _member_placing(resolver: Resolver, name: str, member: CastMember, which: int) -> Placing:
     key = "at" if member.at is not None else "place"
     path = resolver.symbols.member_path(name, key, which)
-    spot = places.Spot(resolver.symbols.numbers[name], path, f"cast.{name}.cell", 0)
+    spot = Spot(resolver.symbols.numbers[name], path, f"cast.{name}.cell", 0)
     scope = reset_scope(path, f"cast.{name}.{key}", name)
     if member.at is not None:
         if member.place is not None:
             _both_places(resolver, path)
-        return places.at(resolver, spot, member.at, scope)
-    placing = places.place(resolver, spot, member.place or "anywhere", scope)
+        return at(resolver, spot, member.at, scope)
+    placing = place(resolver, spot, member.place or "anywhere", scope)
     if placing.nowhere and name == AGENT:
         raise resolver.findings.fail("S204", "the agent has to be somewhere in the room", placing.span)
     return placing
@@ -104,7 +369,7 @@ def _object_placings(resolver: Resolver, objects: Objects) -> Iterator[Placing]:
         for i, cell in enumerate(cells):
             path = (*base, "at", i) if nested else (*base, "at")
             spot = _spot(objects, i, path, count)
-            yield places.at(resolver, spot, cell, object_scope(objects, i, path, "at", at_reset=True))  # type: ignore[arg-type]
+            yield at(resolver, spot, cell, object_scope(objects, i, path, "at", at_reset=True))  # type: ignore[arg-type]
         return
     listed = group.place or ("anywhere",)
     single = not (group.place and resolver.findings.is_list((*base, "place")))
@@ -114,7 +379,7 @@ def _object_placings(resolver: Resolver, objects: Objects) -> Iterator[Placing]:
         path = (*base, "place") if single else (*base, "place", i)
         raw = listed[0 if single else i]
         scope = object_scope(objects, i, path, "place", at_reset=True)
-        placing = places.place(resolver, _spot(objects, i, path, count), str(raw), scope)
+        placing = place(resolver, _spot(objects, i, path, count), str(raw), scope)
         yield replace(placing, overlap=group.overlap)
 
 
@@ -128,14 +393,14 @@ def _inside(resolver: Resolver, objects: Objects, group: ObjectGroup) -> Iterato
     path = (*base, "inside")
     for i in range(len(objects.numbers)):
         spot = _spot(objects, i, path, len(objects.numbers))
-        holder = contents.inside_of(resolver, objects, i, path, str(group.inside))
+        holder = object_facts.inside_of(resolver, objects, i, path, str(group.inside))
         span = resolver.findings.at(path)
         site = f"objects.{objects.called(i)}.inside"
         yield Placing(spot.entity, spot.site, spot.number, span, inside=holder, where_site=site)
 
 
-def _spot(objects: Objects, index: int, path: DataPath, count: int) -> places.Spot:
-    return places.Spot(objects.numbers[index], path, f"objects.{objects.name}.cell", index, index, count)
+def _spot(objects: Objects, index: int, path: DataPath, count: int) -> Spot:
+    return Spot(objects.numbers[index], path, f"objects.{objects.name}.cell", index, index, count)
 
 
 def _check_length(resolver: Resolver, given: int, count: int, path: DataPath) -> None:
@@ -223,9 +488,9 @@ def _of_group(
     match node:
         case ast.Call(name="permuted", args=(ast.Attribute(name="color") as colors,), subject=None):
             return _permuted(resolver, path, colors, index, count, scope)
-    if not isinstance(node, ast.Attribute) or not resolve_groups.is_group(resolver, node.subject, scope):
+    if not isinstance(node, ast.Attribute) or not groups.is_group(resolver, node.subject, scope):
         return None
-    others = resolve_groups.group(resolver, node.subject, None, scope)
+    others = groups.group(resolver, node.subject, None, scope)
     if node.name != "color":
         message = f"`{node.name}` gives no colours; write `{quoted(node.subject)}.color`"
         raise resolver.fail("S205", message, node, scope)
@@ -239,11 +504,11 @@ def _permuted(
     resolver: Resolver, path: DataPath, node: ast.Attribute, index: int, count: int, scope: Scope
 ) -> Sited:
     """The colour of one of a group, another one for each, in an order that is drawn."""
-    others = resolve_groups.group(resolver, node.subject, None, scope)
+    others = groups.group(resolver, node.subject, None, scope)
     if len(others.items) != count:
         message = f"`{quoted(node)}` gives {len(others.items)} values for {count}"
         raise resolver.fail("S106", message, node, scope)
-    place = tables.permutation(resolver, f"{path[0]}.{path[1]}.order", count, path)[index]
+    place = groups.permutation(resolver, f"{path[0]}.{path[1]}.order", count, path)[index]
     colors = tuple(FieldOf(COLOR, other, "color") for other in others.items)
     cases = tuple(Compare("==", place, Const(place.type, i)) for i in range(count - 1))
     value = Select(COLOR, cases, colors[:-1], colors[-1])

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from itertools import product
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
-from socialai_dsl.schema import Scenario
-from socialai_dsl.schema.positions import Positions
+from socialai_dsl.grammar.ast import every
+from socialai_dsl.schema.scenario import Scenario
 from socialai_dsl.schema.suite import Suite
-from socialai_dsl.semantics.plans import Checked, FramePlan
+from socialai_dsl.semantics.plans import CheckedScenario, FramePlan
+from socialai_dsl.semantics.resolver import texts_of
 from socialai_dsl.semantics.terms import Line, Pattern
-from socialai_dsl.semantics.utterances import texts_of
-from socialai_dsl.trees import every
+from socialai_dsl.source import Positions
 from socialai_dsl.vocabulary import PRIMITIVES, normal
 
 
@@ -46,7 +46,7 @@ def shared_actions(suite: Suite, scenarios: Sequence[Scenario]) -> tuple[str, ..
 def shared_space(
     suite: Suite,
     names: Sequence[str],
-    members: Sequence[Checked],
+    members: Sequence[CheckedScenario],
     actions: tuple[str, ...],
     places: Positions,
     bag: DiagnosticBag,
@@ -98,7 +98,7 @@ def _concatenated(
 
 
 def _check_sayable(
-    space: SharedSpace, number: int, name: str, member: Checked, places: Positions, bag: DiagnosticBag
+    space: SharedSpace, number: int, name: str, member: CheckedScenario, places: Positions, bag: DiagnosticBag
 ) -> None:
     live = set(product(space.template_maps[number], space.noun_maps[number]))
     sayable = {_text(member, pair): pair for pair in live if min(pair) >= 0}
@@ -117,11 +117,11 @@ def _check_sayable(
         )
 
 
-def _text(member: Checked, pair: tuple[int, int]) -> str:
+def _text(member: CheckedScenario, pair: tuple[int, int]) -> str:
     return member.templates[pair[0]].replace("<noun>", member.nouns[pair[1]])
 
 
-def _scripted(member: Checked) -> Iterator[str]:
+def _scripted(member: CheckedScenario) -> Iterator[str]:
     """What the agent's own frame says."""
     for frame in member.frames:
         if frame.entity == 0:

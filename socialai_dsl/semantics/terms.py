@@ -1,4 +1,4 @@
-"""Typed trees: what an expression means once every name is resolved; `plans` are made of them.
+"""Typed trees: what an expression means once every name is resolved, how trees are made, and how each was written.
 
 Every value is a whole number at run time. A `Type` says which numbers, and which word each stands for:
 
@@ -19,11 +19,14 @@ cell       CELL + 32 * y + x (program); where an entity is asked for its place, 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
+from socialai_dsl.grammar import ast
+from socialai_dsl.grammar.ast import Leaf
+from socialai_dsl.schema.scenario import Outcome, Rule, Step, WorldRule
 from socialai_dsl.source import Span
-from socialai_dsl.trees import Leaf
 from socialai_dsl.vocabulary import ACTIONS, COLORS, DIRECTIONS, SIDES, TURNS
 
 Kind = Literal[
@@ -412,3 +415,232 @@ TURN = Type("int", -1, 1, TURNS)
 
 SIDE = Type("int", 0, len(SIDES) - 1, SIDES)
 """A wall. A region `wall` whose side is drawn has `side` None and the side as its only argument."""
+
+
+# -- constructors, which simplify where the result is plain --------------------------------------------------
+
+
+TRUE = Const(BOOL, 1)
+FALSE = Const(BOOL, 0)
+NOTED = "prev."
+"""How the registers begin that `prev` notes values in."""
+LARGEST = 1 << 62
+"""Greatest magnitude of a number in an expression: what 64 bits hold, with room for things that are out of the room."""
+
+
+def integer(low: int, high: int | None = None) -> Type:
+    """The numbers from low to high."""
+    return Type("int", low, low if high is None else high)
+
+
+def entity(number: int) -> Const:
+    """An inhabitant of the room as a known value."""
+    return Const(Type("entity", number, number), number)
+
+
+def number(value: int) -> Const:
+    """A known number."""
+    return Const(integer(value), value)
+
+
+def any_of(conditions: Iterable[Term]) -> Term:
+    """Whether one of them holds."""
+    return _joined("or", FALSE, TRUE, conditions)
+
+
+def all_of(conditions: Iterable[Term]) -> Term:
+    """Whether each of them holds."""
+    return _joined("and", TRUE, FALSE, conditions)
+
+
+def _joined(op: Any, neutral: Const, final: Const, conditions: Iterable[Term]) -> Term:
+    kept: list[Term] = []
+    for condition in conditions:
+        if condition == neutral:
+            continue
+        if condition == final and not kept:
+            return final
+        kept += condition.args if isinstance(condition, Logic) and condition.op == op else [condition]
+    if not kept:
+        return neutral
+    return kept[0] if len(kept) == 1 else Logic(op, tuple(kept))
+
+
+def between(term: Term, low: Term, high: Term) -> Term:
+    """Low <= term <= high."""
+    return all_of([Compare("<=", low, term), Compare("<=", term, high)])
+
+
+def one_of(term: Term, values: Sequence[Const]) -> Term:
+    """Whether a term is one of some known values of its type."""
+    numbers = sorted({v.value for v in values})
+    if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
+        return between(term, Const(term.type, numbers[0]), Const(term.type, numbers[-1]))
+    return any_of(Compare("==", term, value) for value in values)
+
+
+def arithmetic(op: Any, *args: Term) -> Term:
+    """An operation on numbers with the range of its result; known values are computed."""
+    if all(isinstance(arg, Const) for arg in args):
+        return number(compute(op, *(arg.value for arg in args if isinstance(arg, Const))))
+    return Operation(_range(op, *(arg.type for arg in args)), op, args)
+
+
+def compute(op: str, *values: int) -> int:
+    """The result of an operation on numbers that are known."""
+    a, b = values[0], values[-1]
+    match op:
+        case "+":
+            return a + b
+        case "-":
+            return a - b
+        case "*":
+            return a * b
+        case "//":
+            return a // b
+        case "%":
+            return a % b
+        case "min":
+            return min(values)
+        case "max":
+            return max(values)
+        case "abs":
+            return abs(a)
+        case "neg":
+            return -a
+    raise AssertionError(f"internal: unknown operation {op}")
+
+
+def _range(op: str, *types: Type) -> Type:
+    a, b = types[0], types[-1]
+    if op == "%":
+        low, high = (0, b.high - 1) if b.low > 0 else (b.low + 1, 0)
+        return integer(low, high)
+    if op == "abs":
+        return integer(
+            0 if a.low <= 0 <= a.high else min(abs(a.low), abs(a.high)), max(abs(a.low), abs(a.high))
+        )
+    if op == "//":
+        divisors = [d for d in (b.low, b.high, -1, 1) if b.low <= d <= b.high and d != 0]
+        results = [n // d for n in (a.low, a.high) for d in divisors]
+    elif op == "neg":
+        results = [-a.low, -a.high]
+    else:
+        results = [compute(op, x, y) for x in (a.low, a.high) for y in (b.low, b.high)]
+    return integer(min(results), max(results))
+
+
+def changed(value: Any, change: Callable[[Term], Term | None]) -> Any:
+    """A copy of a term, plan or tuple with every term replaced for which `change` gives another."""
+    if isinstance(value, tuple):
+        return tuple(changed(part, change) for part in value)
+    other = change(value) if isinstance(value, Term) else None
+    return other if other is not None else ast.rebuilt(value, lambda part: changed(part, change))
+
+
+def walk(tree: Any) -> Iterator[Term]:
+    """All terms in a term, a plan or a tuple of them, depth first."""
+    return (node for node in ast.walk(tree) if isinstance(node, Term))
+
+
+def draws(term: Term) -> bool:
+    """Whether something is drawn anew wherever a term is evaluated."""
+    return any(isinstance(part, Quantified) and part.op == "pick" for part in walk(term))
+
+
+def may_find_nothing(term: Term) -> bool:
+    """Whether a term may need one of a group when none is what is wanted, or the noun of somebody who is silent.
+
+    What `prev` noted may have found nothing then.
+    """
+    for part in walk(term):
+        if isinstance(part, HeardNoun) or is_own_noun(part):
+            return True
+        if isinstance(part, Quantified) and part.op in ("first", "pick", "nearest"):
+            return True
+        if isinstance(part, Read) and part.path.startswith(NOTED):
+            return True
+    return False
+
+
+def is_own_noun(term: Term) -> bool:
+    """Whether a term is `agent.noun`: while the agent is silent, that is unlike any noun."""
+    return isinstance(term, World) and term.name == "noun"
+
+
+# -- how conditions were written, for explanations of why one is false ---------------------------------------
+
+
+Entry = Rule | Step | WorldRule | Outcome
+
+
+@dataclass(eq=False, slots=True)
+class Reading:
+    """A part of an expression: how it was written, what it means, and the parts it is made of.
+
+    What a definition or a slot stands for is a part of its name.
+    """
+
+    node: ast.Expr
+    term: Term | None = None
+    parts: list[Reading] = field(default_factory=list)
+
+    def walk(self) -> Iterator[Reading]:
+        """This part, then those it is made of."""
+        yield self
+        for part in self.parts:
+            yield from part.walk()
+
+    def conjuncts(self) -> Iterator[Reading]:
+        """The conditions that must all hold for this one to hold, in the order in which they are asked."""
+        operands: tuple[ast.Expr, ...] = ()
+        if isinstance(self.node, ast.Logic) and self.node.op == "and":
+            operands = self.node.operands
+        elif isinstance(self.node, ast.Name | ast.Call) and self._stands_for_its_part():
+            yield from self.parts[-1].conjuncts()
+            return
+        if len(operands) != len(self.parts) or not operands:
+            yield self
+            return
+        for part in self.parts:
+            yield from part.conjuncts()
+
+    def _stands_for_its_part(self) -> bool:
+        """Whether this is the name of a condition that is written elsewhere."""
+        return bool(self.parts) and self.parts[-1].term == self.term and not isinstance(self.term, Const)
+
+
+class Readings:
+    """How the expressions of a scenario were written.
+
+    Attributes:
+        roots: site of a value (draws.py) -> its reading. entries: site of a rule, step or outcome -> itself.
+    """
+
+    def __init__(self) -> None:
+        self.roots: dict[str, Reading] = {}
+        self.entries: dict[str, Entry] = {}
+        self._open: list[Reading] = []
+
+    def begin(self, node: ast.Expr) -> Reading:
+        """A part of an expression is going to be read."""
+        reading = Reading(node)
+        self._open.append(reading)
+        return reading
+
+    def end(self, reading: Reading, term: Term | None, site: str) -> None:
+        """It has been read; `term` is None if it means nothing. A whole value is kept by its site."""
+        self._open.pop()
+        reading.term = term
+        if term is None:
+            return
+        if self._open:
+            self._open[-1].parts.append(reading)
+        else:
+            self.roots[site] = reading
+
+    def change(self, site: str, change: Callable[[Term], Term | None]) -> None:
+        """Replace terms in what was read for a site, as `build.changed` does."""
+        root = self.roots.get(site)
+        for reading in root.walk() if root is not None else ():
+            reading.term = changed(reading.term, change)

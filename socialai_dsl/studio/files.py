@@ -13,8 +13,7 @@ from urllib.parse import quote
 from socialai_dsl.atomic import write_text
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import SUFFIXES
-from socialai_dsl.loader.files import read_source
-from socialai_dsl.loader.limits import MAX_FILE_BYTES
+from socialai_dsl.loader.reader import MAX_FILE_BYTES, read_source
 
 _DRAFTS: Final = ".studio"
 _MOST_FILES: Final = 500

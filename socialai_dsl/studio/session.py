@@ -11,17 +11,17 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.checking import LoadedScenario, LoadedSuite
+from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite
 from socialai_dsl.cli.endings import endings_of
 from socialai_dsl.cli.evaluation import about_of
 from socialai_dsl.cli.typed import Phrases, split_line
 from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity
-from socialai_dsl.engine.errors import RoomError
+from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.frontend import Loaded, check, load
 from socialai_dsl.library import prelude
-from socialai_dsl.loader.files import display_name
+from socialai_dsl.loader.reader import display_name
 from socialai_dsl.program_suite import unscripted
 from socialai_dsl.replay import Thought, Tracer
 from socialai_dsl.replay.page import replay_page

@@ -11,12 +11,11 @@ from typing import Any
 import pytest
 
 from socialai_dsl.diagnostics import Diagnostic
-from socialai_dsl.loader import build, patch_paths, reader, scalars
-from socialai_dsl.loader.library import Library
+from socialai_dsl.loader import patches, reader, resolved
+from socialai_dsl.loader.library import Library, Node
 from socialai_dsl.loader.offsets import Style
-from socialai_dsl.loader.patch_paths import Miss
-from socialai_dsl.loader.scalars import Plain
-from socialai_dsl.loader.tree import Node
+from socialai_dsl.loader.patches import Miss
+from socialai_dsl.loader.reader import Plain
 from socialai_dsl.source import Source, Span
 
 Patch = pytest.MonkeyPatch
@@ -25,13 +24,13 @@ Patch = pytest.MonkeyPatch
 def depth_off_by_one(patch: Patch) -> None:
     """One level more than the language allows is read."""
     patch.setattr(reader, "MAX_DEPTH", reader.MAX_DEPTH + 1)
-    patch.setattr(build, "MAX_DEPTH", build.MAX_DEPTH + 1)
+    patch.setattr(resolved, "MAX_DEPTH", resolved.MAX_DEPTH + 1)
 
 
 def depth_unlimited(patch: Patch) -> None:
     """Nesting is not counted, so that everything after the reader recurses as deep as a file likes."""
     patch.setattr(reader, "MAX_DEPTH", 10**9)
-    patch.setattr(build, "MAX_DEPTH", 10**9)
+    patch.setattr(resolved, "MAX_DEPTH", 10**9)
 
 
 def index_error_on_a_rare_token(patch: Patch) -> None:
@@ -77,7 +76,7 @@ def folders_are_prefixes(patch: Patch) -> None:
 
 def numbers_of_any_length(patch: Patch) -> None:
     """A whole number may have as many digits as it likes."""
-    patch.setattr(scalars, "_int", lambda text: Plain(int(text)))
+    patch.setattr(reader, "_int", lambda text: Plain(int(text)))
 
 
 def columns_in_bytes(patch: Patch) -> None:
@@ -117,7 +116,7 @@ def escapes_are_not_looked_into(patch: Patch) -> None:
 
 def one_entry_too_many(patch: Patch) -> None:
     """A path of a patch may name the entry behind the last one of a list."""
-    step = patch_paths._list_step
+    step = patches._list_step
 
     def stepped(node: Node, path: str, begin: int) -> tuple[int, int] | Miss:
         match = re.match(r"\[(\d{1,4})\]", path[begin:])
@@ -125,7 +124,7 @@ def one_entry_too_many(patch: Patch) -> None:
             return int(match[1]), begin + match.end()
         return step(node, path, begin)
 
-    patch.setattr(patch_paths, "_list_step", stepped)
+    patch.setattr(patches, "_list_step", stepped)
 
 
 PLANTED: dict[str, tuple[str, Callable[[Patch], None]]] = {

@@ -13,9 +13,8 @@ from typing import Any
 
 from socialai_dsl.diagnostics import ScenarioError, render_text
 from socialai_dsl.frontend import check
-from socialai_dsl.grammar.parser import parse_expression, parse_text
-from socialai_dsl.loader.files import decoded
-from socialai_dsl.loader.reader import read_document
+from socialai_dsl.grammar.ast import parse_expression, parse_text
+from socialai_dsl.loader.reader import decoded, read_document
 from tests.fuzzing.bombs import DOCUMENTS, SCENARIOS
 from tests.fuzzing.playground import Playground
 

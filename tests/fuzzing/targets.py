@@ -13,11 +13,10 @@ import yaml
 
 from socialai_dsl.diagnostics import CODES, Diagnostic, ScenarioError, Severity, render_text, to_json
 from socialai_dsl.frontend import check
-from socialai_dsl.grammar.parser import MAX_LENGTH, ParseProblem, parse_expression, parse_text
-from socialai_dsl.loader import Document, limits
-from socialai_dsl.loader.files import FORBIDDEN, decoded
+from socialai_dsl.grammar.ast import MAX_LENGTH, ParseProblem, parse_expression, parse_text
+from socialai_dsl.loader import reader
 from socialai_dsl.loader.offsets import Style
-from socialai_dsl.loader.reader import read_document
+from socialai_dsl.loader.reader import FORBIDDEN, Document, decoded, read_document
 from socialai_dsl.source import Source
 from tests.fuzzing.playground import SECRET, Playground, listening
 
@@ -134,7 +133,7 @@ def _judge_positions(read: Document) -> None:
     for found in re.finditer(r"\r\n|\n|\r", read.source.text):
         starts.append(found.end())
     for path, node in read.spans.items():
-        if len(path) > limits.MAX_DEPTH:
+        if len(path) > reader.MAX_DEPTH:
             raise Violation(f"nested {len(path)} deep")
         if node.style in (Style.PLAIN, Style.SINGLE, Style.DOUBLE) and node.end > node.start:
             counted = starts[node.value.line - 1] + node.value.column - 1
@@ -152,11 +151,11 @@ def _judge_data(data: Any, depth: int) -> None:
         for value in data:
             _judge_data(value, depth + 1)
     elif isinstance(data, str):
-        if FORBIDDEN.search(data) or len(data) > limits.MAX_SCALAR:
+        if FORBIDDEN.search(data) or len(data) > reader.MAX_SCALAR:
             raise Violation(f"the text {data[:40]!r}")
-    elif isinstance(data, int) and abs(data) >= 10**limits.MAX_INT_DIGITS:
+    elif isinstance(data, int) and abs(data) >= 10**reader.MAX_INT_DIGITS:
         raise Violation("a number with too many digits")
-    if depth > limits.MAX_DEPTH:
+    if depth > reader.MAX_DEPTH:
         raise Violation(f"nested {depth} deep")
 
 

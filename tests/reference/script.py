@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any, Final
 
-from socialai_dsl.loader import Resolved, resolve
+from socialai_dsl.loader.resolved import ResolvedFile, resolve
 
 PRIMITIVES: Final = ("left", "right", "forward", "pickup", "drop", "toggle", "done")
 SHARED_GRAMMARS: Final = {
@@ -298,7 +298,7 @@ def script_of(source: Any) -> Script:
         return source
     if isinstance(source, str):
         source = resolve(source)
-    if not isinstance(source, Resolved):
+    if not isinstance(source, ResolvedFile):
         data = source if isinstance(source, Mapping) else source.model_dump(by_alias=True, exclude_unset=True)
         return of_data(data)
     assert isinstance(source.data, dict)

@@ -7,7 +7,8 @@ from dataclasses import fields, replace
 from itertools import count
 from typing import Any
 
-from socialai_dsl.grammar import ParseProblem, ast, parse_expression, parse_text
+from socialai_dsl.grammar import ast
+from socialai_dsl.grammar.ast import ParseProblem, parse_expression, parse_text
 from tests.reference.script import Belief, Frame, Script
 from tests.reference.world import Entity
 

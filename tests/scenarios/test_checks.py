@@ -7,7 +7,7 @@ import pytest
 import socialai_dsl
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.cli.check import check_scenario
-from socialai_dsl.loader import shipped_folder
+from socialai_dsl.loader.library import shipped_folder
 
 CLAIMING = {
     "talkitout": 3,

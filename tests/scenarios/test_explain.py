@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from socialai_dsl.compiler import compile_scenario
+from socialai_dsl.compilation import compile_scenario
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.frontend import LoadedScenario, load
 from tests.reference import frames, rules

@@ -10,7 +10,7 @@ import pytest
 
 from socialai_dsl.diagnostics import Diagnostic
 from socialai_dsl.frontend import check
-from socialai_dsl.loader.names import shipped_folder
+from socialai_dsl.loader.library import shipped_folder
 from socialai_dsl.source import Source
 
 SLIPS = {

@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 import yaml
 
-from socialai_dsl.compiler import compile_scenario
+from socialai_dsl.compilation import compile_scenario
 from socialai_dsl.diagnostics import ScenarioError, render_text
 from socialai_dsl.frontend import check
-from socialai_dsl.loader.names import shipped_folder
+from socialai_dsl.loader.library import shipped_folder
 from socialai_dsl.loader.reader import read_document
 
 SMALL = (Path(__file__).parent.parent / "diagnostics" / "small.yaml").read_text()

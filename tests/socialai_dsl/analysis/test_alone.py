@@ -12,7 +12,7 @@ from socialai_dsl.analysis.alone import Alone, success_alone
 from socialai_dsl.analysis.depth import depth
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.properties import Trial
-from socialai_dsl.checking import LoadedScenario
+from socialai_dsl.checking.loaded import LoadedScenario
 from socialai_dsl.compilation import compile_loaded
 
 # One of three doors is right, and Ada would say which. What it looks like is up to the test.

@@ -10,7 +10,7 @@ import pytest
 import socialai_dsl
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.properties import Report, Verdict, by_default, check_property
-from socialai_dsl.checking import LoadedScenario
+from socialai_dsl.checking.loaded import LoadedScenario
 
 # One of two doors is right. Ada tells which.
 TOLD = """

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from socialai_dsl.authoring.assist import complete, explain, usage
-from socialai_dsl.loader import read_document
+from socialai_dsl.loader.reader import read_document
 from socialai_dsl.semantics.signatures import SIGNATURES
 from socialai_dsl.source import Source
 from tests.socialai_dsl.authoring.marked import marked

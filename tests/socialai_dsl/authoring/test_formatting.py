@@ -8,8 +8,8 @@ import yaml
 
 from socialai_dsl.authoring.formatting import formatted
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.loader import Document, read_document
 from socialai_dsl.loader.comments import comments_of
+from socialai_dsl.loader.reader import Document, read_document
 from socialai_dsl.source import Source
 from tests.socialai_dsl.authoring.documents import document
 

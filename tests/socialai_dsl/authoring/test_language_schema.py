@@ -16,10 +16,10 @@ from socialai_dsl.authoring.language_schema import (
     schema_text,
     shipped_schema,
 )
-from socialai_dsl.checking import check_library, check_npc
-from socialai_dsl.checking.scenarios import draft_of
+from socialai_dsl.checking.scenarios import check_library, check_npc, draft_of
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError, Severity
-from socialai_dsl.loader import read_document, resolve
+from socialai_dsl.loader.reader import read_document
+from socialai_dsl.loader.resolved import resolve
 from socialai_dsl.schema.shape import model_of
 from socialai_dsl.schema.suite import Suite
 from socialai_dsl.source import Source

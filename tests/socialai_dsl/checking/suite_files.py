@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from socialai_dsl.checking import LoadedSuite
+from socialai_dsl.checking.loaded import LoadedSuite
 from socialai_dsl.frontend import check, load
 
 

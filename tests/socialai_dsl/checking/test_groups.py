@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 import yaml
 
-from socialai_dsl.checking.groups import MOST, spread
+from socialai_dsl.checking.scenarios import MOST_MEMBERS as MOST
+from socialai_dsl.checking.scenarios import spread
 from socialai_dsl.diagnostics import DiagnosticBag
 from socialai_dsl.frontend import check
 from socialai_dsl.loader.reader import read_document

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from socialai_dsl.checking import LoadedSuite
+from socialai_dsl.checking.loaded import LoadedSuite
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import check, load
-from socialai_dsl.loader import read_document
+from socialai_dsl.loader.reader import read_document
 from socialai_dsl.source import Source
 from tests.socialai_dsl.checking.suite_files import suite, written
 

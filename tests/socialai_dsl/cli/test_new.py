@@ -9,7 +9,7 @@ import pytest
 from socialai_dsl.cli.main import main
 from socialai_dsl.cli.new import TEMPLATES, template_files
 from socialai_dsl.cli.oracle_play import play_oracle
-from socialai_dsl.loader import read_document
+from socialai_dsl.loader.reader import read_document
 
 Capture = pytest.CaptureFixture[str]
 

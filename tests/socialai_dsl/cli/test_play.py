@@ -20,7 +20,7 @@ import socialai_dsl
 from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.cli.play_app import PlayApp
 from socialai_dsl.cli.play_game import Game
-from socialai_dsl.engine.errors import RoomError
+from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs.view import ahead
 
 SEED = 0

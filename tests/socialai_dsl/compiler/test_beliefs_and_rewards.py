@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from socialai_dsl.program import FrameColumn, Header, Op
-from socialai_dsl.semantics.plans import BeliefPlan, Checked, Drawn, OutcomePlan, RulePlan
+from socialai_dsl.semantics.plans import BeliefPlan, CheckedScenario, Drawn, OutcomePlan, RulePlan
 from socialai_dsl.semantics.terms import (
     CELL,
     DIRECTION,
@@ -52,7 +52,7 @@ COLUMN = Type("int", -1, 6)
 # --- beliefs ---
 
 
-def believing(when: Any, value: Any, type_: Type = COLUMN) -> Checked:
+def believing(when: Any, value: Any, type_: Type = COLUMN) -> CheckedScenario:
     checked = workbench()
     drawn = Drawn("guide.believes.it", type_, sited(value, "guide.believes.it"))
     belief = BeliefPlan("guide", "guide.believes.it", sited(value), None if when is None else sited(when))
@@ -99,7 +99,7 @@ def test_a_belief_that_finds_nothing_stays() -> None:
 
 
 def test_only_who_believes_perceives() -> None:
-    def perceive(checked: Checked) -> int:
+    def perceive(checked: CheckedScenario) -> int:
         program = compiled(checked)
         return int(program.words[program.header(Header.FRAME_AT) + FrameColumn.PERCEIVE])
 
@@ -131,7 +131,7 @@ def test_beside_the_edge_there_is_no_cell() -> None:
 # --- rewards ---
 
 
-def earned(checked: Checked, steps: int = 1) -> list[float]:
+def earned(checked: CheckedScenario, steps: int = 1) -> list[float]:
     env = start(checked)
     return [float(env.step(_still(env))[1]) for _ in range(steps)]
 
@@ -140,7 +140,7 @@ def _still(env: Any) -> Any:
     return np.array([len(env.program.actions), 0, 0, 0])
 
 
-def ending(graded: Any, success: bool = True) -> Checked:
+def ending(graded: Any, success: bool = True) -> CheckedScenario:
     over = sited(Compare("<=", number(2), NOW))
     plan = OutcomePlan("end", success, 100, over, None if graded is None else sited(graded))
     return replace(workbench(), outcomes=(plan,), slope=0)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from socialai_dsl.compiler.verifier import InvalidProgramError, verify
+from socialai_dsl.compiler.tables import InvalidProgramError, verify
 from socialai_dsl.program import (
     CELL,
     CONSTANT,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from socialai_dsl.program import Op
-from socialai_dsl.semantics.plans import Checked, Placing, Region
+from socialai_dsl.semantics.plans import CheckedScenario, Placing, Region
 from socialai_dsl.semantics.terms import Compare, Const, FieldOf, Read, Type, World
 from tests.socialai_dsl.compiler.workbench import (
     cell,
@@ -46,11 +46,11 @@ def at(time: int) -> Compare:
 
 
 @pytest.fixture
-def filled() -> Checked:
+def filled() -> CheckedScenario:
     return with_content(workshop(), APPLE, CHEST)
 
 
-def test_what_lies_in_something_is_out_of_the_room_and_on_no_cell(filled: Checked) -> None:
+def test_what_lies_in_something_is_out_of_the_room_and_on_no_cell(filled: CheckedScenario) -> None:
     env = start(filled)
     apple = env.describe()["apple"]
     assert (apple["at"], apple["gone"], apple["state"]) == (None, True, "whole")
@@ -59,7 +59,7 @@ def test_what_lies_in_something_is_out_of_the_room_and_on_no_cell(filled: Checke
     assert worth(FieldOf(HOLDERS, entity(APPLE), "inside"), checked=filled) == CHEST
 
 
-def test_a_drawn_holder(filled: Checked) -> None:
+def test_a_drawn_holder(filled: CheckedScenario) -> None:
     checked = with_let(workshop(), "let.where", Const(HOLDERS, OTHER_CHEST), HOLDERS)
     drawn = Read(HOLDERS, "let.where")
     *others, where = checked.setup
@@ -75,11 +75,11 @@ def test_a_drawn_holder(filled: Checked) -> None:
     assert worth(FieldOf(Type("int", -1, 31), entity(APPLE), "x"), checked=checked) == 4
 
 
-def test_a_layout_that_gives_its_place_lays_it_there(filled: Checked) -> None:
+def test_a_layout_that_gives_its_place_lays_it_there(filled: CheckedScenario) -> None:
     assert start(filled, {"apple": {"at": [6, 1]}}).describe()["apple"]["at"] == [6, 1]
 
 
-def test_an_opened_box_is_replaced_by_its_content(filled: Checked) -> None:
+def test_an_opened_box_is_replaced_by_its_content(filled: CheckedScenario) -> None:
     env = start(filled)
     step(env, "toggle")
     after = env.describe()
@@ -89,7 +89,7 @@ def test_an_opened_box_is_replaced_by_its_content(filled: Checked) -> None:
     assert env.describe()["apple"]["state"] == "eaten"
 
 
-def test_an_opened_box_without_content_stays(filled: Checked) -> None:
+def test_an_opened_box_without_content_stays(filled: CheckedScenario) -> None:
     env = start(with_content(filled, APPLE, OTHER_CHEST))
     step(env, "toggle")
     after = env.describe()
@@ -97,7 +97,7 @@ def test_an_opened_box_without_content_stays(filled: Checked) -> None:
     assert after["apple"]["at"] is None
 
 
-def test_several_contents_are_all_released(filled: Checked) -> None:
+def test_several_contents_are_all_released(filled: CheckedScenario) -> None:
     both = with_content(filled, MARBLE, CHEST)
     both = changed(both, CHEST, contains=(APPLE, MARBLE))
     env = start(both)
@@ -106,7 +106,7 @@ def test_several_contents_are_all_released(filled: Checked) -> None:
     assert after["apple"]["at"] == after["marble"]["at"] == [2, 3]
 
 
-def test_reveal_opens(filled: Checked) -> None:
+def test_reveal_opens(filled: CheckedScenario) -> None:
     env = start(with_rules(filled, rule(at(2), effect("reveal", CHEST))))
     step(env)
     assert env.describe()["apple"]["at"] is None
@@ -114,7 +114,7 @@ def test_reveal_opens(filled: Checked) -> None:
     assert env.describe()["apple"]["at"] == [2, 3]
 
 
-def test_move_into_takes_it_out_of_the_room(filled: Checked) -> None:
+def test_move_into_takes_it_out_of_the_room(filled: CheckedScenario) -> None:
     moved = effect("move_into", APPLE, value=entity(OTHER_CHEST))
     checked = with_rules(filled, rule(at(1), moved), rule(at(3), effect("reveal", OTHER_CHEST)))
     env = start(checked, {"apple": {"at": [6, 1]}})
@@ -127,7 +127,7 @@ def test_move_into_takes_it_out_of_the_room(filled: Checked) -> None:
     assert after["chests"][1]["at"] is None
 
 
-def test_put_shares_a_cell(filled: Checked) -> None:
+def test_put_shares_a_cell(filled: CheckedScenario) -> None:
     checked = with_rules(
         workshop(),
         rule(at(1), effect("put", APPLE, value=entity(CHEST))),
@@ -140,7 +140,7 @@ def test_put_shares_a_cell(filled: Checked) -> None:
     assert env.describe()["marble"]["at"] == [3, 2]
 
 
-def test_a_body_is_put_where_it_can_stand(filled: Checked) -> None:
+def test_a_body_is_put_where_it_can_stand(filled: CheckedScenario) -> None:
     checked = with_rules(
         workshop(),
         rule(at(1), effect("put", GUIDE, value=entity(CHEST))),
@@ -153,7 +153,7 @@ def test_a_body_is_put_where_it_can_stand(filled: Checked) -> None:
     assert env.describe()["guide"]["at"] == [3, 2]
 
 
-def test_reset_puts_contents_back(filled: Checked) -> None:
+def test_reset_puts_contents_back(filled: CheckedScenario) -> None:
     env = start(with_rules(filled, rule(at(3), effect("reset", CHEST))))
     before = env.describe()
     step(env, "toggle")
@@ -167,7 +167,7 @@ def test_reset_puts_contents_back(filled: Checked) -> None:
     assert env.describe()["apple"]["at"] == [2, 3]
 
 
-def test_reset_puts_back_place_and_direction(filled: Checked) -> None:
+def test_reset_puts_back_place_and_direction(filled: CheckedScenario) -> None:
     checked = with_rules(
         workshop(),
         rule(at(1), effect("put", MARBLE, value=cell(3, 2)), effect("put", GUIDE, value=cell(5, 2))),
@@ -196,7 +196,7 @@ def test_reset_keeps_only_what_can_change() -> None:
     assert paths == ["apple.reset.home", "apple.reset.home.gone"]
 
 
-def test_reset_of_one_of_several(filled: Checked) -> None:
+def test_reset_of_one_of_several(filled: CheckedScenario) -> None:
     which = with_let(filled, "let.which", Const(HOLDERS, CHEST), HOLDERS)
     named = replace(effect("reset", CHEST), entities=(Read(HOLDERS, "let.which"),))
     env = start(with_rules(which, rule(at(2), named)))
@@ -219,7 +219,7 @@ def test_overlap_counts_cells_that_are_taken() -> None:
     assert start(replace(checked, setup=setup)).describe()["apple"]["at"] == [2, 3]
 
 
-def test_the_container_is_one_of_those_there_are(filled: Checked) -> None:
+def test_the_container_is_one_of_those_there_are(filled: CheckedScenario) -> None:
     """Of what never lay in anything `inside` is still a thing that can hold something."""
     inside = FieldOf(HOLDERS, entity(MARBLE), "inside")
     program = compiled(with_let(workshop(), "let.where", inside, HOLDERS))

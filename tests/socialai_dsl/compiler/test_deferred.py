@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from socialai_dsl.compiler.verifier import InvalidProgramError
+from socialai_dsl.compiler.tables import InvalidProgramError
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.program import FrameColumn, Header
-from socialai_dsl.semantics.plans import Activity, Checked, Drawn, Effect, RulePlan
+from socialai_dsl.semantics.plans import Activity, CheckedScenario, Drawn, Effect, RulePlan
 from socialai_dsl.semantics.terms import (
     CELL,
     DIRECTION,
@@ -55,7 +55,7 @@ def first(do: Activity | None, **what: Any) -> RulePlan:
     return RulePlan("guide.idle.waiting.first[0]", "guide/first[0]", SPAN, do=do, **what)
 
 
-def scenario(rule: RulePlan, *more: RulePlan) -> Checked:
+def scenario(rule: RulePlan, *more: RulePlan) -> CheckedScenario:
     """The guide has a register n, and two states; in `waiting` it has some rules in `first`."""
     waiting = state("waiting", activity("stay"), first=(rule, *more))
     checked = with_guide(workbench(), waiting, state("moved", activity("stay")))

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from socialai_dsl.compiler.changes import Changes, When
+from socialai_dsl.compiler.folding import Changes, When
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.program import EntityColumn, Flag, Header, Program, TypeColumn
-from socialai_dsl.semantics.plans import Checked, Computed, StepPlan
+from socialai_dsl.semantics.plans import CheckedScenario, Computed, StepPlan
 from socialai_dsl.semantics.terms import BOOL, DIRECTION, Compare, Const, FieldOf, Sees, Type, World
 from socialai_dsl.semantics.terms import Test as Relation
 from tests.socialai_dsl.compiler.workbench import (
@@ -261,7 +261,7 @@ def test_pointing_and_letting_the_arm_sink() -> None:
 # --- when conditions can change ---
 
 
-def times(checked: Checked, *terms: Any) -> list[When]:
+def times(checked: CheckedScenario, *terms: Any) -> list[When]:
     changes = Changes(checked)
     return [changes.of(term) for term in terms]
 

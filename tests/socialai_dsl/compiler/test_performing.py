@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from socialai_dsl.program import Header, LineColumn
-from socialai_dsl.semantics.plans import Checked, Effect, RulePlan, StepPlan
+from socialai_dsl.semantics.plans import CheckedScenario, Effect, RulePlan, StepPlan
 from socialai_dsl.semantics.terms import ACTION, Compare, Const, Pattern, Read, Select, Term, Type
 from tests.socialai_dsl.compiler.workbench import (
     BOX,
@@ -38,11 +38,11 @@ def say(value: int) -> Const:
 DANCE: tuple[Term, ...] = (LEFT, say(0), FORWARD, say(4), RIGHT, say(1))
 
 
-def dancing(*args: Term) -> Checked:
+def dancing(*args: Term) -> CheckedScenario:
     return with_guide(workbench(), state("waiting", activity("perform", *args)))
 
 
-def turns(checked: Checked, count: int) -> list[tuple[list[int], str, str]]:
+def turns(checked: CheckedScenario, count: int) -> list[tuple[list[int], str, str]]:
     """Where the guide is, where it looks, and what is heard, after each turn."""
     env = start(checked)
     seen = []

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from socialai_dsl.program import Header
-from socialai_dsl.semantics.plans import Checked, Drawn, Effect, MemoryPlan, RulePlan
+from socialai_dsl.semantics.plans import CheckedScenario, Drawn, Effect, MemoryPlan, RulePlan
 from socialai_dsl.semantics.terms import (
     ACTION,
     CELL,
@@ -47,7 +47,7 @@ TIME = World(Type("int", 0, 20), "t")
 COUNTER = Read(Type("int", 0, 5), "let.n")
 
 
-def counting(*rules: RulePlan) -> Checked:
+def counting(*rules: RulePlan) -> CheckedScenario:
     """The scenario with a number `let.n` from 0 to 5 and rules of the world."""
     return replace(with_let(workbench(), "let.n", Const(COUNTER.type, 0)), rules=rules)
 
@@ -59,7 +59,7 @@ def rule(name: str, when: Term | None = None, add: Term | None = None, **more: A
     return RulePlan(name, f"rules.{name}", SPAN, when=sited(when, name) if when else None, sets=sets, **more)
 
 
-def played(checked: Checked, *actions: str, seed: int = 0) -> list[int]:
+def played(checked: CheckedScenario, *actions: str, seed: int = 0) -> list[int]:
     """The counter after each step."""
     env = start(checked, {"agent": {"at": [1, 4]}}, seed)
     seen = []
@@ -128,7 +128,7 @@ def test_a_rule_without_a_thing_to_pick_does_not_fire() -> None:
 # --- prev ---
 
 
-def remembering(term: Term, type_: Type, condition: Term) -> Checked:
+def remembering(term: Term, type_: Type, condition: Term) -> CheckedScenario:
     item = Drawn("prev.0", type_, sited(term, "prev.0"))
     return replace(counting(rule("law", condition)), remembered=(item,))
 
@@ -175,7 +175,7 @@ def test_a_value_without_zero_starts_with_its_least() -> None:
 # --- memories ---
 
 
-def acting(open_: Term | None = None, length: int = 2) -> Checked:
+def acting(open_: Term | None = None, length: int = 2) -> CheckedScenario:
     plan = MemoryPlan("memory.acts", length, UTTERANCE, sited(open_, "memory.acts") if open_ else None)
     return replace(workbench(), memories=(plan,))
 

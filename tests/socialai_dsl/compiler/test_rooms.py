@@ -6,7 +6,7 @@ from pathlib import Path
 
 import socialai_dsl as sd
 from socialai_dsl.program import MAX_SIDE, Header, room_words
-from socialai_dsl.semantics.room import LARGEST
+from socialai_dsl.semantics.setup import LARGEST
 
 BUILT = """
 scenario: built

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from socialai_dsl.compiler.classes import Classes
-from socialai_dsl.compiler.folding import Facts, fold
+from socialai_dsl.compiler.folding import Classes, Facts, fold
 from socialai_dsl.semantics.terms import (
     BOOL,
     Compare,

@@ -8,7 +8,7 @@ import pytest
 
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.program import EntityColumn, Header, TypeColumn
-from socialai_dsl.semantics.plans import Checked, Coloring, Drawn, Effect, Facing, Placing, RulePlan
+from socialai_dsl.semantics.plans import CheckedScenario, Coloring, Drawn, Effect, Facing, Placing, RulePlan
 from socialai_dsl.semantics.terms import COLOR, DIRECTION, Compare, Const, Read, Select, Type
 from socialai_dsl.vocabulary import NPC
 from tests.socialai_dsl.compiler.workbench import (
@@ -34,7 +34,7 @@ SMALL, LARGE = Compare("<", DIE, number(2)), Compare("<=", number(2), DIE)
 STATUS = Type("status", 0, 1, ("idle", "pressed"))
 
 
-def with_statue(*items: Placing | Coloring | Facing) -> Checked:
+def with_statue(*items: Placing | Coloring | Facing) -> CheckedScenario:
     """The statue set up in another way, once the die has been cast."""
     setup = [
         item
@@ -44,7 +44,7 @@ def with_statue(*items: Placing | Coloring | Facing) -> Checked:
     return replace(workbench(), setup=(*setup, *items))
 
 
-def statue(checked: Checked, die: int) -> dict:
+def statue(checked: CheckedScenario, die: int) -> dict:
     return start(checked, {"let": {"die": die}}).describe()["statue"]
 
 
@@ -66,7 +66,7 @@ def test_one_of_several_colours_and_directions() -> None:
     assert seen == [("green", "down")] * 2 + [("purple", "up")] * 2
 
 
-def with_initial(*drawn: int) -> Checked:
+def with_initial(*drawn: int) -> CheckedScenario:
     """Switches whose initial statuses are registers."""
     paths = {SWITCH: "switches[0].initial", OTHER_SWITCH: "switches[1].initial"}
     base = workbench()
@@ -80,7 +80,7 @@ def with_initial(*drawn: int) -> Checked:
     return replace(base, setup=(*base.setup, *items), entities=entities)
 
 
-def switches(checked: Checked, layout: dict | None = None) -> list[str]:
+def switches(checked: CheckedScenario, layout: dict | None = None) -> list[str]:
     return [thing["state"] for thing in start(checked, layout).describe()["switches"]]
 
 
@@ -123,7 +123,7 @@ def test_the_kind_of_an_npc_is_its_status() -> None:
     assert [pictured_kind(checked, die) for die in range(4)] == [3, 3, 5, 5]
 
 
-def pictured_kind(checked: Checked, die: int) -> int:
+def pictured_kind(checked: CheckedScenario, die: int) -> int:
     """The status code in the picture of the only NPC that the agent sees: the statue."""
     layout = {"let": {"die": die}, "agent": {"at": [4, 4], "facing": "down"}}
     env = ScenarioEnv(compiled(checked))

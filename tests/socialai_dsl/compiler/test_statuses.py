@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from socialai_dsl.compiler.changes import Changes, When
+from socialai_dsl.compiler.folding import Changes, When
 from socialai_dsl.program import Flag, Header
-from socialai_dsl.semantics.plans import Checked, Computed, Effect, RulePlan
+from socialai_dsl.semantics.plans import CheckedScenario, Computed, Effect, RulePlan
 from socialai_dsl.semantics.terms import (
     BOOL,
     CELL,
@@ -71,7 +71,7 @@ def status(thing: int, value: int) -> Compare:
     return Compare("==", FieldOf(STATUS, entity(thing), "status"), Const(STATUS, value))
 
 
-def computed(*conditions: Term) -> Checked:
+def computed(*conditions: Term) -> CheckedScenario:
     """The door is locked while each of the conditions holds (one after the other)."""
     items = tuple(
         Computed(DOOR, LOCKED, CLOSED, sited(condition, "objects.door.locked")) for condition in conditions
@@ -79,7 +79,7 @@ def computed(*conditions: Term) -> Checked:
     return replace(workbench(), computed=items)
 
 
-def linked(*targets: int) -> Checked:
+def linked(*targets: int) -> CheckedScenario:
     entities = tuple(replace(e, unlocks=targets) if e.number == SWITCH else e for e in workbench().entities)
     return replace(workbench(), entities=entities)
 
@@ -96,7 +96,7 @@ def door(env: Any) -> str:
     return env.describe()["door"]["state"]
 
 
-def settles_always(checked: Checked) -> bool:
+def settles_always(checked: CheckedScenario) -> bool:
     return bool(compiled(checked).header(Header.FLAGS) & Flag.SETTLE_ALWAYS)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
-from socialai_dsl.compiler.verifier import InvalidProgramError, verify
+from socialai_dsl.compiler.tables import InvalidProgramError, verify
 from socialai_dsl.program import (
     CONSTANT,
     TEMPORARY,

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from socialai_dsl.compiler.verifier import InvalidProgramError, verify
+from socialai_dsl.compiler.tables import InvalidProgramError, verify
 from socialai_dsl.program import Flag, Header, LineColumn, Op, Program
-from socialai_dsl.semantics.plans import Checked, Drawn, FramePlan, RulePlan, StatePlan
+from socialai_dsl.semantics.plans import CheckedScenario, Drawn, FramePlan, RulePlan, StatePlan
 from socialai_dsl.semantics.terms import (
     ACTION,
     BOOL,
@@ -71,7 +71,7 @@ def register(path: str, type_: Type, value: int) -> Drawn:
     return Drawn(path, type_, sited(Const(type_, value), path))
 
 
-def talking(*statues: RulePlan, hears: tuple[Pattern, ...] = (GO, LOOK_UP), **more: Any) -> Checked:
+def talking(*statues: RulePlan, hears: tuple[Pattern, ...] = (GO, LOOK_UP), **more: Any) -> CheckedScenario:
     """The guide notes who said what it hears; the statue talks."""
     sets = (("guide.who", sited(WHO)), ("guide.which", sited(WHICH)))
     note = rule("guide", "then[0]", hears=hears, sets=more.pop("sets", sets), **more)
@@ -204,7 +204,7 @@ def test_a_noun_that_the_agent_did_not_say_is_none() -> None:
 # --- SaidBy ---
 
 
-def watching(question: SaidBy, *statues: RulePlan) -> Checked:
+def watching(question: SaidBy, *statues: RulePlan) -> CheckedScenario:
     """A rule of the world notes what the statue says."""
     checked = with_let(talking(*statues, sets=(), hears=()), "let.noticed", number(0), Type("int", 0, 9))
     value = sited(Read(Type("int", 0, 9), "let.noticed"))

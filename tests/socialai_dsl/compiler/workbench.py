@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from socialai_dsl.compiler import compile_scenario
+from socialai_dsl.compilation import compile_scenario
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.frontend import load
 from socialai_dsl.program import CELL, Program
-from socialai_dsl.semantics.plans import Activity, Checked, Drawn, RulePlan, StatePlan
+from socialai_dsl.semantics.plans import Activity, CheckedScenario, Drawn, RulePlan, StatePlan
 from socialai_dsl.semantics.terms import BOOL, Const, FieldOf, Quantified, Read, Sited, Term, Type, Variable
 from socialai_dsl.semantics.terms import CELL as ANY_CELL
 from socialai_dsl.source import Span
@@ -58,7 +58,7 @@ DIE = Read(Type("int", 0, 3), "let.die")
 
 
 @cache
-def workbench() -> Checked:
+def workbench() -> CheckedScenario:
     """The resolved scenario."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "workbench.yaml"
@@ -104,13 +104,13 @@ def sited(term: Term, site: str = "let.answer") -> Sited:
     return Sited(term, site, SPAN)
 
 
-def with_let(checked: Checked, path: str, term: Term, type_: Type | None = None) -> Checked:
+def with_let(checked: CheckedScenario, path: str, term: Term, type_: Type | None = None) -> CheckedScenario:
     """The scenario with one more value that is computed at the end of the reset."""
     drawn = Drawn(path, type_ or term.type, sited(term, path))
     return replace(checked, setup=(*checked.setup, drawn))
 
 
-def with_guide(checked: Checked, *states: StatePlan) -> Checked:
+def with_guide(checked: CheckedScenario, *states: StatePlan) -> CheckedScenario:
     """The scenario with other states in the guide's frame."""
     (frame,) = checked.frames
     return replace(checked, frames=(replace(frame, start=states[0].name, states=states),))
@@ -126,12 +126,12 @@ def activity(name: Any, *args: Term) -> Activity:
     return Activity(name, args, "guide/activity", SPAN)
 
 
-def compiled(checked: Checked) -> Program:
+def compiled(checked: CheckedScenario) -> Program:
     """The proven program."""
     return compile_scenario(checked)
 
 
-def start(checked: Checked, layout: Mapping[str, Any] | None = None, seed: int = 0) -> ScenarioEnv:
+def start(checked: CheckedScenario, layout: Mapping[str, Any] | None = None, seed: int = 0) -> ScenarioEnv:
     """An environment at the start of an episode."""
     env = ScenarioEnv(compiled(checked))
     env.reset(seed=seed, options={"layout": dict(layout or {})})
@@ -148,7 +148,7 @@ def step(env: ScenarioEnv, word: str = "none", pair: int | None = None) -> dict[
 
 
 def worth(
-    term: Term, layout: Mapping[str, Any] | None = None, checked: Checked | None = None, seed: int = 0
+    term: Term, layout: Mapping[str, Any] | None = None, checked: CheckedScenario | None = None, seed: int = 0
 ) -> Any:
     """What a term is worth at the end of a reset; of what is no truth, number or word its register."""
     type_ = BOOL if term.type.kind == "bool" else NUMBER

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from socialai_dsl.frontend import load
-from socialai_dsl.semantics.plans import Checked, Effect, Placing, RulePlan
+from socialai_dsl.semantics.plans import CheckedScenario, Effect, Placing, RulePlan
 from socialai_dsl.semantics.terms import Term
 from tests.socialai_dsl.compiler.workbench import SPAN, entity, sited
 
@@ -45,7 +45,7 @@ AGENT, GUIDE, CHEST, OTHER_CHEST, APPLE, LEVER, OTHER_LEVER, MARBLE, GENERATOR, 
 
 
 @cache
-def workshop() -> Checked:
+def workshop() -> CheckedScenario:
     """The resolved scenario."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "workshop.yaml"
@@ -53,14 +53,14 @@ def workshop() -> Checked:
         return load(str(file)).checked
 
 
-def changed(checked: Checked, number: int, **values: Any) -> Checked:
+def changed(checked: CheckedScenario, number: int, **values: Any) -> CheckedScenario:
     """The scenario with an entity that differs."""
     entities = list(checked.entities)
     entities[number] = replace(entities[number], **values)
     return replace(checked, entities=tuple(entities))
 
 
-def with_content(checked: Checked, content: int, holder: int) -> Checked:
+def with_content(checked: CheckedScenario, content: int, holder: int) -> CheckedScenario:
     """The scenario with one thing inside another; either chest can hold it."""
     setup = tuple(
         replace(item, at=None, inside=entity(holder))
@@ -83,7 +83,7 @@ def rule(when: Term | None, *causes: Effect, **more: Any) -> RulePlan:
     return RulePlan("rule", "rules[0]", SPAN, when=sited(when) if when else None, causes=causes, **more)
 
 
-def with_rules(checked: Checked, *rules: RulePlan) -> Checked:
+def with_rules(checked: CheckedScenario, *rules: RulePlan) -> CheckedScenario:
     """The scenario with these rules of the world."""
     named = (replace(rule, name=f"rules[{k}]", site=f"rules[{k}]") for k, rule in enumerate(rules))
     return replace(checked, rules=tuple(named))

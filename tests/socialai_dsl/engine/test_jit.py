@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from socialai_dsl.engine.jit import is_interpreted
-from socialai_dsl.loader import shipped_names
+from socialai_dsl.loader.resolved import shipped_names
 from tests.test_agreement import FOLDERS, alone
 
 pytestmark = pytest.mark.skipif(is_interpreted(), reason="nothing is compiled")

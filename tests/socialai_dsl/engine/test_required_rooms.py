@@ -7,8 +7,7 @@ import pytest
 
 from socialai_dsl import draws
 from socialai_dsl.engine.batch import Batch, Part
-from socialai_dsl.engine.calls import Task
-from socialai_dsl.engine.errors import RoomError
+from socialai_dsl.engine.calls import RoomError, Task
 from socialai_dsl.engine.state import ATTEMPTS, PIN_NONE, Key
 from socialai_dsl.program import Body, Field, Op, Program, Register
 from tests.assembly import Assembly, FrameSpec, batch_of, constant, entity_register, temporary

@@ -9,7 +9,7 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.envs import ScenarioEnv
-from socialai_dsl.loader import shipped_names
+from socialai_dsl.loader.resolved import shipped_names
 from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Field, Flag, Header, Register
 
 DATA = Path(__file__).parents[2] / "data"

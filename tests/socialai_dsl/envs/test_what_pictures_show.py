@@ -19,7 +19,7 @@ from socialai_dsl.cli.trace_text import present
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.envs.picture import frame
 from socialai_dsl.library import prelude
-from socialai_dsl.loader import shipped_names
+from socialai_dsl.loader.resolved import shipped_names
 from socialai_dsl.program import LAST_ACTS, VIEW, Flag, Header
 from socialai_dsl.render import tiles
 from socialai_dsl.render.gestures import Gesture

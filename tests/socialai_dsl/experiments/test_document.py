@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from socialai_dsl.checking import LoadedExperiment
+from socialai_dsl.checking.experiments import LoadedExperiment
 from socialai_dsl.experiments.arguments import typed
 from socialai_dsl.experiments.document import differences, document_of
 from socialai_dsl.frontend import load_experiment

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from socialai_dsl.grammar import ParseProblem, ast, parse_expression, parse_text
-from socialai_dsl.grammar.parser import MAX_DEPTH, MAX_LENGTH
+from socialai_dsl.grammar import ast
+from socialai_dsl.grammar.ast import MAX_DEPTH, MAX_LENGTH, ParseProblem, parse_expression, parse_text
 
 
 def shape(node: ast.Expr | str) -> object:

@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 
 import socialai_dsl as sd
-from socialai_dsl.checking import LoadedSuite
-from socialai_dsl.grammar import ast, parse_expression, unparse
+from socialai_dsl.checking.loaded import LoadedSuite
+from socialai_dsl.grammar import ast
+from socialai_dsl.grammar.ast import parse_expression, unparse
 
 ROOT = Path(__file__).parents[3]
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import socialai_dsl as sd
 from socialai_dsl.llm import Action, ActionLanguage
 from socialai_dsl.llm.actions import ToolCall
-from socialai_dsl.loader import shipped_names
+from socialai_dsl.loader.resolved import shipped_names
 
 LANGUAGE = ActionLanguage(sd.compile(sd.load("talkitout")))
 EXIT = "Where is the exit"

@@ -1,7 +1,7 @@
 """Comments are found where YAML has them, and nowhere else."""
 
-from socialai_dsl.loader import read_document
 from socialai_dsl.loader.comments import comments_of
+from socialai_dsl.loader.reader import read_document
 from socialai_dsl.source import Source
 
 TEXT = """\

@@ -1,4 +1,4 @@
-"""Positions: of keys, of values, and of single characters inside every kind of scalar."""
+"""PositionedData: of keys, of values, and of single characters inside every kind of scalar."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.loader import Document, Style, read_document
+from socialai_dsl.loader.offsets import Style
+from socialai_dsl.loader.reader import Document, read_document
 from socialai_dsl.source import Source, Span
 
 

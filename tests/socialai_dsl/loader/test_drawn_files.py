@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.loader.resolved import Resolved, resolve
+from socialai_dsl.loader.resolved import ResolvedFile, resolve
 
 FILES = {
     "play.yaml": "scenario: play\ncast:\n  guide:\n    name: Gus\n    one_of: npcs/g_*.yaml\n  agent: {}\n",
@@ -33,7 +33,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def drawn(name: str) -> Resolved:
+def drawn(name: str) -> ResolvedFile:
     return resolve(name).with_drawn_files()
 
 

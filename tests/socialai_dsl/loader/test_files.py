@@ -9,9 +9,7 @@ from pathlib import Path
 import pytest
 
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.loader import read_document
-from socialai_dsl.loader.files import display_name
-from socialai_dsl.loader.limits import MAX_FILE_BYTES
+from socialai_dsl.loader.reader import MAX_FILE_BYTES, display_name, read_document
 
 
 def finding(path: Path) -> str:

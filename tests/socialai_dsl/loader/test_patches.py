@@ -9,10 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from socialai_dsl.diagnostics import DiagnosticBag, ScenarioError
-from socialai_dsl.loader import Document, Edit, read_document
-from socialai_dsl.loader.patch_paths import Place, follow
-from socialai_dsl.loader.patches import apply_patch
-from socialai_dsl.loader.tree import Node, merge, tree_of
+from socialai_dsl.loader.library import Node, merge, tree_of
+from socialai_dsl.loader.patches import Edit, Place, apply_patch, follow
+from socialai_dsl.loader.reader import Document, read_document
 from socialai_dsl.source import Source
 
 BASE = """\

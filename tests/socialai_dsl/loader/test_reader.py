@@ -15,9 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.loader import Document, reader
-from socialai_dsl.loader.document import Data
-from socialai_dsl.loader.limits import MAX_DEPTH, MAX_SCALAR
+from socialai_dsl.loader import reader
+from socialai_dsl.loader.reader import MAX_DEPTH, MAX_SCALAR, Data, Document
 from socialai_dsl.source import Source
 
 PARSERS = [yaml.CSafeLoader, yaml.SafeLoader] if yaml.__with_libyaml__ else [yaml.SafeLoader]

@@ -9,7 +9,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from socialai_dsl.loader.scalars import read_plain
+from socialai_dsl.loader.reader import read_plain
 
 REFUSED = object()
 

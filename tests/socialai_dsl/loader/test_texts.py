@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from socialai_dsl.diagnostics import ScenarioError
-from socialai_dsl.loader import read_document
+from socialai_dsl.loader.reader import read_document
 from socialai_dsl.source import Source
 from tests.tiny import Folder
 

@@ -13,8 +13,7 @@ from typing import Any
 import pytest
 
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, render_text
-from socialai_dsl.loader.files import decoded
-from socialai_dsl.loader.reader import read_document
+from socialai_dsl.loader.reader import decoded, read_document
 
 FOLDER = Path(__file__).parents[2] / "data" / "yaml_test_suite"
 CASES: dict[str, dict[str, Any]] = {

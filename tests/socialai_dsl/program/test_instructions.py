@@ -11,9 +11,8 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.compiler.assembler import Block
-from socialai_dsl.compiler.instruction_checks import problem_of
-from socialai_dsl.compiler.intervals import Known, Ranges
-from socialai_dsl.compiler.verifier import InvalidProgramError, verify
+from socialai_dsl.compiler.instruction_checks import Known, Ranges, problem_of
+from socialai_dsl.compiler.tables import InvalidProgramError, verify
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import (
@@ -31,9 +30,8 @@ from socialai_dsl.program import (
     Program,
     Register,
 )
-from socialai_dsl.program.instructions import TABLE, Instruction, Kind, Operand
+from socialai_dsl.program.instructions import ANYTHING, TABLE, Instruction, Interval, Kind, Operand
 from socialai_dsl.program.instructions_page import instructions_page
-from socialai_dsl.program.ranges import ANYTHING, Interval
 
 DOCS = Path(__file__).parents[3] / "docs"
 TOWN = Path(__file__).parents[2] / "diagnostics" / "town.yaml"

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from socialai_dsl.semantics.build import walk
-from socialai_dsl.semantics.terms import Const, HeardNoun, Said, SaidBy, Speaker, Spoke, World
+from socialai_dsl.semantics.terms import Const, HeardNoun, Said, SaidBy, Speaker, Spoke, World, walk
 
 
 def talking(*rules):

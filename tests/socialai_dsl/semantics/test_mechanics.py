@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from socialai_dsl.semantics.build import walk
-from socialai_dsl.semantics.terms import Const, FieldOf, Measure, PokedNow
+from socialai_dsl.semantics.terms import Const, FieldOf, Measure, PokedNow, walk
 from socialai_dsl.semantics.terms import Test as Relation
 
 THINGS = {

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from socialai_dsl.compiler import compile_asking, compile_scenario
+from socialai_dsl.compilation import compile_asking, compile_scenario
 
 DOOR = {"ask": "Which door?", "answer": "exit.color"}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from socialai_dsl.compiler import compile_scenario
+from socialai_dsl.compilation import compile_scenario
 
 EXIT = ("let.exit", (2, 3, 4, 5))
 

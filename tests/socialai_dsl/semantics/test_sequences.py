@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from socialai_dsl.semantics.groups import performs
 from socialai_dsl.semantics.plans import Drawn
-from socialai_dsl.semantics.sequences import performs
 from socialai_dsl.semantics.terms import Chance, Compare, Const, Logic, Not, Quantified, Read, Select
 
 DANCE = {"dance": {"sequence": 2, "moves": ["left", "forward"], "utterance": {"chance": 0.25}}}

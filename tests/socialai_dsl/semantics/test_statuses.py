@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.plans import Drawn
-from socialai_dsl.semantics.terms import FieldOf, Read, Select
+from socialai_dsl.semantics.terms import FieldOf, Read, Select, walk
 
 
 def of(checked, key):

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from socialai_dsl.semantics.build import walk
 from socialai_dsl.semantics.plans import Drawn
-from socialai_dsl.semantics.terms import Compare, Const, Select
-from socialai_dsl.semantics.wording import spoken
+from socialai_dsl.semantics.scope import spoken
+from socialai_dsl.semantics.terms import Compare, Const, Select, walk
 
 WORDS = {"red": "ana", "green": "bel", "blue": "ana", "purple": "bel", "yellow": "cor", "grey": "dol"}
 

@@ -1,0 +1,739 @@
+"""Placements without a free cell: certain ones, those the least favourable room lacks, and absences in drawn rooms.
+
+In drawn rooms, what cannot be told without the engine, such as what can be reached, counts as favourable, so that
+somebody who is found missing really is.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Sequence, Set
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from itertools import product
+from random import Random
+from typing import Final
+
+from socialai_dsl.semantics import plans, terms
+from socialai_dsl.semantics.plans import CheckedScenario, Placing, Region
+from socialai_dsl.semantics.scope import Findings
+from socialai_dsl.semantics.terms import Const, Term, compute, walk
+
+EXACT: Final = frozenset({"column", "row", "rect"})
+"""Regions that name their cells: what may overlap can be put there where the room builds something, too."""
+
+Cell = tuple[int, int]
+Size = tuple[int, int]
+
+
+class UnknownError(Exception):
+    """What decides this is only known in a drawn room."""
+
+
+def interior_cells(region: Region, size: Size) -> list[Cell]:
+    """Cells inside the walls that a region covers whose arguments read only the size, row by row."""
+    args = [value(arg, size) for arg in region.args]
+    cells = product(range(1, size[1] - 1), range(1, size[0] - 1))
+    return [(x, y) for y, x in cells if _lies_in(region.name, args, (x, y), size)]
+
+
+def wall_cells(region: Region, size: Size, side: str) -> set[Cell]:
+    """The cells of one wall, `margin` away from its corners."""
+    width, height = size
+    along = {"top": width, "bottom": width, "left": height, "right": height}
+    places = range(region.margin, along[side] - region.margin)
+    at = {"top": 0, "bottom": height - 1, "left": 0, "right": width - 1}[side]
+    return {(k, at) if side in ("top", "bottom") else (at, k) for k in places}
+
+
+def _lies_in(name: str, args: Sequence[int], cell: Cell, size: Size) -> bool:
+    (x, y), (width, height) = cell, size
+    match name:
+        case "left_half":
+            return x < width // 2
+        case "right_half":
+            return x > width // 2
+        case "top_half":
+            return y < height // 2
+        case "bottom_half":
+            return y > height // 2
+        case "column":
+            return x == args[0]
+        case "row":
+            return y == args[0]
+        case "rect":
+            return args[0] <= x <= args[2] and args[1] <= y <= args[3]
+        case "anywhere":
+            return True
+    raise AssertionError(f"internal: the size does not decide `{name}`")
+
+
+def value(term: Term, size: Size, here: Cell = (0, 0)) -> int:
+    """The value of a term that reads only the size of the room and the cell; raises UnknownError for others."""
+    match term:
+        case terms.Const():
+            return term.value
+        case terms.World(name="width"):
+            return size[0]
+        case terms.World(name="height"):
+            return size[1]
+        case terms.Here(name=name):
+            return here[0 if name == "x" else 1]
+        case terms.Operation(op=op, args=args):
+            numbers = [value(arg, size, here) for arg in args]
+            # As in a room: dividing by nothing gives 0.
+            return 0 if op in ("//", "%") and numbers[1] == 0 else compute(op, *numbers)
+        case terms.Compare(op=op, left=left, right=right):
+            return COMPARISONS[op](value(left, size, here), value(right, size, here))
+        case terms.Logic(op="and", args=args):
+            return all(value(arg, size, here) for arg in args)
+        case terms.Logic(args=args):
+            return any(value(arg, size, here) for arg in args)
+        case terms.Not(arg=arg):
+            return not value(arg, size, here)
+    raise UnknownError(str(term))
+
+
+COMPARISONS: Final[dict[str, Callable[[int, int], bool]]] = {
+    "==": lambda a, b: a == b,
+    "!=": lambda a, b: a != b,
+    "<": lambda a, b: a < b,
+    "<=": lambda a, b: a <= b,
+}
+
+
+# -- rooms of each size: what can be proven ------------------------------------------------------------------
+
+
+_AROUND: Final = ((0, -1), (0, 1), (-1, 0), (1, 0))
+_NAMED: Final = 5
+"""How many of those are named that are in the way."""
+
+_TAKES_AWAY: Final = {"at": 1, "in_front_of": 1, "next_to": 4}
+"""How many cells at most `not here.TEST(x)` excludes for each x."""
+
+
+def check_placements(checked: CheckedScenario, findings: Findings) -> frozenset[int]:
+    """Report S601: an error where no room of a size has a cell for something, a warning where some may have none.
+
+    Sizes are looked at from the smallest on, as far as a fixed effort goes. Returns the entities whose cells depend on
+    more than that.
+    """
+    certain: dict[str, tuple[Placing, Size, Sequence[int]]] = {}
+    possible: dict[str, tuple[Placing, Size, Sequence[int]]] = {}
+    effort, undecided = _Effort(), set[int]()
+    for size in _sizes(checked):
+        room = _Room(checked, size, effort)
+        crowded = False
+        for number, placing in enumerate(room.placings):
+            key = checked.entities[placing.entity].key
+            if key in certain or _is_sure(placing):
+                continue
+            most, least = room.cells_for(number)
+            if number in room.unknown:
+                undecided.add(placing.entity)
+            if least > 0:
+                continue
+            rivals: Sequence[int] = room.rivals(number) if room.has_cells(number) else ()
+            if rivals and crowded:
+                continue  # for want of the same cells
+            if most == 0:
+                certain[key] = (placing, size, rivals)
+                crowded = crowded or bool(rivals)
+            else:
+                possible.setdefault(key, (placing, size, rivals))
+    # Once for a group, of which the last ones lack a cell.
+    for key, (placing, size, rivals) in (possible | certain).items():
+        _report(checked, findings, placing, size, rivals, key in certain)
+    reported = possible | certain
+    return frozenset(number for number in undecided if checked.entities[number].key not in reported)
+
+
+def _is_sure(placing: Placing) -> bool:
+    """Whether nothing can be in its way."""
+    return placing.nowhere or placing.at is not None or placing.inside is not None
+
+
+def _report(
+    checked: CheckedScenario,
+    findings: Findings,
+    placing: Placing,
+    size: Size,
+    rivals: Sequence[int],
+    certain: bool,
+) -> None:
+    """`rivals` may take its cells, or are certain to."""
+    name = _called(checked, placing.entity)
+    where = f"a room of {size[0]}x{size[1]}"
+    before = _named(list(dict.fromkeys(checked.entities[number].key for number in rivals)))
+    if certain:
+        taken = f"; {before} take all there are" if before else ""
+        message = f"`{name}` has no free cell in {where}{taken}"
+        hint = "widen its place, or the room"
+        if not before and checked.room.build and any(region.name in EXACT for region in placing.regions):
+            hint = "with `overlap: true` it can stand where the room builds something"
+        report = findings.warning if before else findings.error
+        report("S601", message, placing.span, hint=hint)
+        return
+    message = f"`{name}` can be left without a free cell in {where}"
+    hint = f"{before} may take all of its place; place it earlier (`order:`), or widen its place"
+    findings.warning("S601", message, placing.span, hint=hint)
+
+
+def _named(keys: Sequence[str]) -> str:
+    more = len(keys) - _NAMED if len(keys) > _NAMED + 1 else 0
+    names = ", ".join(f"`{key}`" for key in (keys[:_NAMED] if more else keys))
+    return f"{names} and {more} more" if more else names
+
+
+def _called(checked: CheckedScenario, number: int) -> str:
+    entity = checked.entities[number]
+    return entity.key if entity.index is None else f"{entity.key}[{entity.index}]"
+
+
+class _Effort:
+    """How much may still be computed: parts of conditions, each for one cell."""
+
+    def __init__(self) -> None:
+        self._left = 500_000
+
+    def spend(self, amount: int) -> None:
+        """Raises UnknownError when nothing is left."""
+        self._left -= amount
+        if self._left < 0:
+            raise UnknownError("too much to compute")
+
+
+class _Room:
+    """The rooms of one size; all that is found out is remembered, by the place where many things share one."""
+
+    def __init__(self, checked: CheckedScenario, size: Size, effort: _Effort) -> None:
+        self.checked = checked
+        self.size = size
+        self._effort = effort
+        self.placings = [item for item in checked.setup if isinstance(item, Placing)]
+        self._places = _Places(self.placings)
+        self.unknown: set[int] = set()
+        self._cells: dict[int, tuple[int, int]] = {}
+        self._counted = 0
+        self._put_down: Counter[int] = Counter()
+        self._before: dict[int, list[int]] = {}
+        self._shared: dict[tuple[int, int], bool] = {}
+        self._homes_of: dict[int, set[Cell] | None] = {}
+        self._kept: dict[int, tuple[set[Cell] | None, int, set[Cell], int]] = {}
+
+    def cells_for(self, number: int) -> tuple[int, int]:
+        """The most cells that a placement can have, and the fewest it has in the least favourable room.
+
+        Where the fewest cannot be told, it is taken to be 1.
+        """
+        if number not in self._cells:
+            self._cells[number] = self._cells_for(number)
+        return self._cells[number]
+
+    def _cells_for(self, number: int) -> tuple[int, int]:
+        try:
+            cells, least, kept, excluded = self._room_for(number)
+            if cells is not None:
+                least = len(kept)
+            if least == 0:
+                return 0, 0
+            rivals = self.rivals(number)
+        except UnknownError:
+            self.unknown.add(number)
+            return 1, 1
+        if cells is None:
+            return least, least - excluded - len(rivals)
+        most = len(kept) - (self._surely_taken(number, kept) if len(rivals) >= len(kept) else 0)
+        return max(0, most), least - excluded - len(rivals)
+
+    def _room_for(self, number: int) -> tuple[set[Cell] | None, int, set[Cell], int]:
+        """Of a placement's kind of place: its cells and the fewest it has; those that its conditions leave and the most
+        that they take away.
+        """
+        kind = self._places.kinds[number]
+        if kind not in self._kept:
+            placing = self.placings[number]
+            cells, least = self._region_cells(placing)
+            self._kept[kind] = (cells, least, *self._conditions(placing.where, cells))
+        return self._kept[kind]
+
+    def _surely_taken(self, number: int, cells: set[Cell]) -> int:
+        """How many of these cells are taken in every room: what must be on one of them is on one of its own."""
+        assert self._counted <= number, "internal: placements are looked at in order"
+        while self._counted < number:
+            placing = self.placings[self._counted]
+            if not (_is_sure(placing) or placing.overlap) and self.cells_for(self._counted)[1] > 0:
+                self._put_down[self._places.kinds[self._counted]] += 1
+            self._counted += 1
+        return sum(count for kind, count in self._put_down.items() if self._is_within(kind, cells))
+
+    def _is_within(self, kind: int, cells: set[Cell]) -> bool:
+        homes = self._known_homes(kind)
+        return homes is not None and homes <= cells
+
+    def _known_homes(self, kind: int) -> set[Cell] | None:
+        """Where what has this place can be; None if that is only known in a drawn room."""
+        if kind not in self._homes_of:
+            try:
+                self._homes_of[kind] = self._homes(self._places.examples[kind])
+            except UnknownError:
+                self._homes_of[kind] = None
+        return self._homes_of[kind]
+
+    def has_cells(self, number: int) -> bool:
+        """Whether an empty room has a cell for a placement."""
+        cells, least, kept, _ = self._room_for(number)
+        return least > 0 and (cells is None or bool(kept))
+
+    def rivals(self, number: int) -> list[int]:
+        """The entities that are put down before and may lie on a cell of this placement."""
+        if number not in self._before:
+            self._before[number] = self._rivals(number)
+        return self._before[number]
+
+    def _rivals(self, number: int) -> list[int]:
+        placing, kinds = self.placings[number], self._places.kinds
+        if placing.overlap:
+            return []
+        cells, _, kept, _ = self._room_for(number)
+        self._effort.spend(number // 8)
+        # What a place lies around is not in it.
+        around = {arg.value for region in placing.regions for arg in region.args if isinstance(arg, Const)}
+        sharing = {
+            kind: self._may_share(kind, kinds[number], kept if cells is not None else None)
+            for kind in set(kinds[:number])
+        }
+        return [
+            other.entity
+            for other, kind in zip(self.placings[:number], kinds, strict=False)
+            if sharing[kind]
+            and other.entity != placing.entity
+            and not (cells is None and other.entity in around)
+        ]
+
+    # -- regions ---------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _floor(self) -> set[Cell]:
+        """Cells inside the walls on which nothing is built."""
+        return self._inside(Region("anywhere")) - self._built
+
+    def _inside(self, region: Region) -> set[Cell]:
+        """Cells inside the walls that a region covers which only the size decides."""
+        self._effort.spend(self.size[0] * self.size[1] // 8)
+        return set(interior_cells(region, self.size))
+
+    @cached_property
+    def _built(self) -> set[Cell]:
+        return {cell for _, region, _ in self.checked.room.build for cell in self._inside(region)}
+
+    def _region_cells(self, placing: Placing) -> tuple[set[Cell] | None, int]:
+        """The cells of a place; None for a place around something that is drawn, with how many there are at least."""
+        around = [r for r in placing.regions if r.name in ("next_to", "in_front_of")]
+        if around:
+            return None, min(self._least_around(region) for region in around)
+        found: set[Cell] = set()
+        for region in placing.regions:
+            found |= self._fixed(region, placing.overlap)
+        return found, len(found)
+
+    def _fixed(self, region: Region, overlap: bool) -> set[Cell]:
+        """Cells of a region that only the size decides, without those where something built is in the way."""
+        if region.name == "wall":
+            return self._wall(region)
+        inside = self._inside(region)
+        return inside if overlap and region.name in EXACT else inside - self._built
+
+    def _wall(self, region: Region) -> set[Cell]:
+        width, height = self.size
+        # Of a wall that is drawn, the shorter is looked at.
+        return wall_cells(region, self.size, region.side or ("top" if width <= height else "left"))
+
+    def _least_around(self, region: Region) -> int:
+        """How many floor cells there are at least next to, or in front of, something."""
+        if region.name == "in_front_of":
+            return 1
+        floor = self._floor
+        target = region.args[0]
+        if not isinstance(target, Const):
+            raise UnknownError
+        own = next((p for p in self.placings if p.entity == target.value), None)
+        if own is None or own.nowhere or own.inside is not None:
+            raise UnknownError
+        homes = self._homes(own)
+        return min((sum((x + dx, y + dy) in floor for dx, dy in _AROUND) for x, y in homes), default=0)
+
+    def _homes(self, placing: Placing) -> set[Cell]:
+        """Where something can be at all."""
+        if placing.at is not None:
+            return {(value(placing.at[0], self.size), value(placing.at[1], self.size))}
+        if any(region.name in ("next_to", "in_front_of") for region in placing.regions):
+            return self._floor
+        found: set[Cell] = set()
+        for region in placing.regions:
+            found |= self._fixed(region, placing.overlap)
+        return self._conditions(placing.where, found)[0]
+
+    # -- conditions --------------------------------------------------------------------------------------------------
+
+    def _conditions(self, where: Term | None, cells: set[Cell] | None) -> tuple[set[Cell], int]:
+        """The cells that conditions on the cell alone leave, and how many the others take away at most."""
+        kept, excluded = set(cells or ()), 0
+        parts = where.args if isinstance(where, terms.Logic) and where.op == "and" else (where,)
+        for part in parts:
+            if part is None:
+                continue
+            if _of_the_cell(part):
+                self._effort.spend(len(kept) * sum(1 for _ in walk(part)))
+                kept = {cell for cell in kept if value(part, self.size, cell)}
+            else:
+                excluded += _taken_away(part)
+        return kept, excluded
+
+    def _may_share(self, other: int, own: int, cells: set[Cell] | None) -> bool:
+        """Whether what has one kind of place may lie on the cells of another kind (None: any floor cell)."""
+        if (other, own) not in self._shared:
+            placing, homes = self._places.examples[other], self._known_homes(other)
+            absent = placing.nowhere or placing.inside is not None
+            self._effort.spend(len(homes or ()) // 16 + 1)
+            meets = homes is None or bool(homes & (self._floor if cells is None else cells))
+            self._shared[other, own] = meets and not absent
+        return self._shared[other, own]
+
+
+class _Places:
+    """The different places that things are put in.
+
+    Attributes:
+        kinds: of each placement, the number of its place. examples: of each place, something that is put there.
+    """
+
+    def __init__(self, placings: Sequence[Placing]) -> None:
+        numbers: dict[object, int] = {}
+        self.kinds = [numbers.setdefault(_place_of(placing), len(numbers)) for placing in placings]
+        self.examples = [placings[self.kinds.index(kind)] for kind in range(len(numbers))]
+
+
+def _place_of(placing: Placing) -> object:
+    inside = placing.nowhere or placing.inside is not None
+    return placing.at, placing.regions, placing.where, inside, placing.overlap
+
+
+def _of_the_cell(term: Term) -> bool:
+    """Whether a condition reads only the cell and the size of the room."""
+    known = (Const, terms.World, terms.Here, terms.Operation, terms.Compare, terms.Logic, terms.Not)
+    return all(
+        isinstance(part, known)
+        and not (isinstance(part, terms.World) and part.name not in ("width", "height"))
+        for part in walk(term)
+    )
+
+
+def _taken_away(term: Term) -> int:
+    """How many cells a condition excludes at most."""
+    match term:
+        case terms.Not(arg=terms.Test(subject=None, name=name)) if name in _TAKES_AWAY:
+            return _TAKES_AWAY[name]
+        case terms.Not(
+            arg=terms.Quantified(op="any", items=items, condition=terms.Test(subject=None, name=name))
+        ) if name in _TAKES_AWAY:
+            return _TAKES_AWAY[name] * len(items)
+    raise UnknownError
+
+
+# -- drawn rooms: who is missing without being asked to be ---------------------------------------------------
+
+
+_ROOMS: Final = 100
+_FEWEST: Final = 20
+"""With fewer rooms nothing is said."""
+
+_EFFORT: Final = 300_000
+"""How many parts of terms are computed, over all rooms."""
+
+_SIDES: Final = ("top", "bottom", "left", "right")
+
+
+def check_absences(checked: CheckedScenario, findings: Findings, undecided: Collection[int]) -> None:
+    """Report who is put outside of the room (S602 in all rooms, W603 in some), and who of the `undecided` entities has
+    no cell in rooms that are drawn (S601 in all, W603 in some).
+    """
+    placings = [item for item in checked.setup if isinstance(item, Placing)]
+    asked = [item for item in placings if item.entity in undecided and asks_about_cells(item)]
+    told: set[str] = set()
+    for placing in placings:
+        if placing.at is not None and (share := _outside(placing.at, checked)):
+            _report_outside(checked, findings, placing, share)
+            told.add(checked.entities[placing.entity].key)
+    found = _tried(checked) if asked else _Found(0, Counter())
+    for placing in asked if found.rooms >= _FEWEST else ():
+        key, absent = checked.entities[placing.entity].key, found.absent[placing.entity]
+        if key in told or not absent:
+            continue
+        told.add(key)
+        if absent == found.rooms:
+            hint = "its `where` never holds there; widen its place, or the room"
+            findings.error("S601", f"`{key}` has no free cell in any room", placing.span, hint=hint)
+        elif not checked.require:  # rooms that miss somebody may be among those that are drawn again
+            message = (
+                f"`{key}` has no free cell, and so is absent, in {_percent(absent / found.rooms)} of rooms"
+            )
+            hint = "widen its place, place it earlier (`order:`), or draw such rooms again (`require:`)"
+            findings.warning("W603", message, placing.span, hint=hint)
+
+
+def _outside(at: tuple[Term, Term], checked: CheckedScenario) -> float:
+    """In what share of the sizes of a room a place lies outside of it; 0 if that is drawn."""
+    sizes = _sizes(checked)
+    try:
+        spots = [(size, value(at[0], size), value(at[1], size)) for size in sizes]
+    except UnknownError:
+        return 0
+    return sum(not (0 <= x < width and 0 <= y < height) for (width, height), x, y in spots) / len(sizes)
+
+
+def _report_outside(checked: CheckedScenario, findings: Findings, placing: Placing, share: float) -> None:
+    key = checked.entities[placing.entity].key
+    if share == 1:
+        findings.error("S602", f"`{key}` is put outside of the room", placing.span, hint=_sizes_of(checked))
+        return
+    hint = "count from the far side: `W - 2`, `H - 2`"
+    message = f"`{key}` is put outside of the room in {_percent(share)} of rooms"
+    findings.warning("W603", message, placing.span, hint=hint)
+
+
+def _percent(share: float) -> str:
+    return f"{max(1, round(100 * share))} %"
+
+
+def _sizes(checked: CheckedScenario) -> list[Size]:
+    """The sizes that a room can have."""
+    (least_w, most_w), (least_h, most_h) = checked.room.width, checked.room.height
+    return list(product(range(least_w, most_w + 1), range(least_h, most_h + 1)))
+
+
+def _sizes_of(checked: CheckedScenario) -> str:
+    """What the coordinates of a room can be."""
+    (_, width), (_, height) = checked.room.width, checked.room.height
+    return f"x goes from 0 to {width - 1} and y from 0 to {height - 1}, walls included"
+
+
+def asks_about_cells(placing: Placing) -> bool:
+    """Whether a place may be empty without being meant to: a `where` that reads no cell decides who is there."""
+    return placing.where is None or any(_reads_cell(part) for part in walk(placing.where))
+
+
+def _reads_cell(part: Term) -> bool:
+    return isinstance(part, terms.Here) or (isinstance(part, terms.Test) and part.subject is None)
+
+
+@dataclass
+class _Found:
+    """In how many rooms each entity is without a cell."""
+
+    rooms: int
+    absent: Counter[int]
+
+
+def _tried(checked: CheckedScenario) -> _Found:
+    found, generator, left = _Found(0, Counter()), Random(0), _EFFORT
+    sizes = _sizes(checked)
+    generator.shuffle(sizes)
+    rooms = _ROOMS // len(sizes) * len(sizes) or _ROOMS  # each size equally often
+    known: _Known = cache(lambda region, size, overlap: frozenset(_cells(checked, region, size, overlap)))
+    for number in range(rooms):
+        room = _DrawnRoom(sizes[number % len(sizes)], generator, known)
+        for item in checked.setup:
+            room.do(item)
+        left -= room.effort
+        if left < 0:
+            break
+        found.rooms += 1
+        found.absent.update(room.absent)
+    return found
+
+
+_Known = Callable[[Region, Size, bool], frozenset[Cell]]
+
+
+def _cells(checked: CheckedScenario, region: Region, size: Size, overlap: bool) -> Iterator[Cell]:
+    """The cells of a region whose arguments are known."""
+    if region.name == "wall":
+        side = region.side or _SIDES[region.args[0].value]  # type: ignore[union-attr]
+        yield from wall_cells(region, size, side)
+        return
+    inside = interior_cells(region, size)
+    built = {cell for _, part, _ in checked.room.build for cell in interior_cells(part, size)}
+    yield from inside if overlap and region.name in EXACT else (cell for cell in inside if cell not in built)
+
+
+class _DrawnRoom:
+    """A room while it is drawn; None stands for what is not known here."""
+
+    def __init__(self, size: Size, generator: Random, cells: _Known) -> None:
+        self._size, self._generator, self._cells = size, generator, cells
+        self._places: dict[int, Cell | None] = {}
+        self._registers: dict[str, int | None] = {}
+        self._taken: set[Cell] = set()
+        self._here: Cell = (0, 0)
+        self._variables: dict[str, int] = {}
+        self.absent: set[int] = set()
+        self.effort = 0
+
+    def do(self, item: plans.Setup) -> None:
+        """Draw one thing."""
+        if isinstance(item, plans.Drawn):
+            self._registers[item.path] = self._value(item.value.term)
+        elif isinstance(item, Placing) and (item.when is None or self._value(item.when)):
+            self._place(item)
+
+    def _place(self, placing: Placing) -> None:
+        entity = placing.entity
+        if placing.nowhere or placing.inside is not None:
+            self._places[entity] = None
+            return
+        if placing.at is not None:
+            x, y = (self._value(part) for part in placing.at)
+            if x is not None and y is not None:
+                self._put(entity, (x, y))
+            return
+        candidates: set[Cell] = set()
+        for region in placing.regions:
+            found = self._region(region, placing.overlap)
+            if found is None:
+                return
+            candidates |= found
+        free = list(candidates if placing.overlap else candidates - self._taken)
+        while free:
+            number = self._generator.randrange(len(free))
+            free[number], free[-1] = free[-1], free[number]
+            self._here = free.pop()
+            if placing.where is None or self._value(placing.where) != 0:
+                self._put(entity, self._here)
+                return
+        self._places[entity] = None
+        self.absent.add(entity)
+
+    def _put(self, entity: int, cell: Cell) -> None:
+        self._places[entity] = cell
+        self._taken.add(cell)
+
+    def _region(self, region: Region, overlap: bool) -> Set[Cell] | None:
+        """The cells of a region; None if they are not known."""
+        if region.name in ("next_to", "in_front_of"):
+            target = self._value(region.args[0])
+            cell = None if target is None else self._places.get(target)
+            if cell is None or region.name == "in_front_of":
+                return None
+            floor = self._cells(Region("anywhere"), self._size, False)
+            return {near for dx, dy in _AROUND if (near := (cell[0] + dx, cell[1] + dy)) in floor}
+        args = [self._value(arg) for arg in region.args]
+        if None in args:
+            return None
+        known = tuple(Const(arg.type, value or 0) for arg, value in zip(region.args, args, strict=True))
+        return self._cells(replace(region, args=known), self._size, overlap)
+
+    # -- values --
+
+    def _value(self, term: Term) -> int | None:
+        """The value of a term; None if it is not known here."""
+        self.effort += 1
+        match term:
+            case Const(value=value):
+                return value
+            case terms.Here(name="x" | "y" as name):
+                return self._here["xy".index(name)]
+            case terms.World(name="width" | "height" as name):
+                return self._size[("width", "height").index(name)]
+            case terms.Variable(name=name):
+                return self._variables.get(name)
+            case terms.Read(path=path):
+                return self._registers.get(path)
+            case terms.FieldOf(entity=entity, name="x" | "y" as name):
+                cell = self._cell(entity)
+                return None if cell is None else cell["xy".index(name)]
+            case terms.Measure(name="distance", args=(one, other)):
+                return self._distance(self._cell(one), self._cell(other))
+            case terms.Operation(op=op, args=args):
+                values = [self._value(arg) for arg in args]
+                if op == "turn" or None in values:
+                    return None
+                known = [value for value in values if value is not None]
+                return 0 if op in ("//", "%") and known[1] == 0 else compute(op, *known)
+            case terms.Compare(op=op, left=left, right=right):
+                a, b = self._value(left), self._value(right)
+                return None if a is None or b is None else COMPARISONS[op](a, b)
+            case terms.Not(arg=arg):
+                truth = self._value(arg)
+                return None if truth is None else int(not truth)
+            case terms.Logic(op=op, args=args):
+                return _joined(op == "and", map(self._value, args))
+            case terms.Test(name=name, subject=subject, object=target):
+                return self._related(name, self._here if subject is None else self._cell(subject), target)
+            case terms.Quantified(cells=False):
+                return self._quantified(term)
+        return None
+
+    def _cell(self, entity: Term) -> Cell | None:
+        if isinstance(entity, terms.Here):
+            return self._here
+        number = self._value(entity)
+        return None if number is None else self._places.get(number)
+
+    @staticmethod
+    def _distance(one: Cell | None, other: Cell | None) -> int | None:
+        return None if one is None or other is None else abs(one[0] - other[0]) + abs(one[1] - other[1])
+
+    def _related(self, name: str, cell: Cell | None, target: Term) -> int | None:
+        other = self._cell(target)
+        if cell is None or other is None:
+            return None
+        match name:
+            case "at":
+                return int(cell == other)
+            case "next_to":
+                return int(self._distance(cell, other) == 1)
+            case "in_line":
+                return None if cell[0] == other[0] or cell[1] == other[1] else 0
+        return None
+
+    def _quantified(self, term: terms.Quantified) -> int | None:
+        truths = [(item.value, self._holds_for(term, item.value)) for item in term.items]
+        match term.op:
+            case "any" | "all":
+                return _joined(term.op == "all", (truth for _, truth in truths))
+            case "count":
+                return (
+                    None
+                    if any(truth is None for _, truth in truths)
+                    else sum(map(bool, dict(truths).values()))
+                )
+            case "first" | "pick":
+                fitting = [value for value, truth in truths if truth]
+                if not fitting or any(truth is None for _, truth in truths):
+                    return None
+                return fitting[0] if term.op == "first" else self._generator.choice(fitting)
+        return None
+
+    def _holds_for(self, term: terms.Quantified, value: int) -> int | None:
+        if term.condition is None:
+            return 1
+        outer = self._variables.get(term.variable)
+        self._variables[term.variable] = value
+        truth = self._value(term.condition)
+        if outer is None:
+            del self._variables[term.variable]
+        else:
+            self._variables[term.variable] = outer
+        return truth
+
+
+def _joined(every: bool, truths: Iterator[int | None]) -> int | None:
+    """All of them, or any; not known where one that is not known decides."""
+    unknown = False
+    for truth in truths:
+        if truth is not None and bool(truth) is not every:
+            return int(not every)
+        unknown = unknown or truth is None
+    return None if unknown else int(every)

@@ -1,0 +1,735 @@
+"""What has several members: groups and quantifiers, subjects of verbs, tables, sequences and memories."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Literal, cast
+
+from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.grammar import ast
+from socialai_dsl.schema.scenario import Frame, Sequence
+from socialai_dsl.semantics.plans import MemoryPlan
+from socialai_dsl.semantics.resolver import ANY_TEXT, ENTITY, INT, Resolver
+from socialai_dsl.semantics.scope import (
+    Draws,
+    FailedError,
+    Macro,
+    Scope,
+    at_every_step,
+    described,
+    quoted,
+    reset_scope,
+    spoken,
+    surviving,
+    usage,
+)
+from socialai_dsl.semantics.signatures import QUANTIFIERS, WORDS, Signature
+from socialai_dsl.semantics.terms import (
+    ACTION,
+    BOOL,
+    CELL,
+    COLOR,
+    Chance,
+    Compare,
+    Const,
+    FieldOf,
+    Here,
+    Quantified,
+    Read,
+    Select,
+    Sited,
+    Term,
+    Type,
+    Variable,
+    all_of,
+    between,
+    entity,
+    number,
+)
+from socialai_dsl.source import DataPath
+from socialai_dsl.vocabulary import is_number, is_plain
+
+MAX_GROUP = 256
+MAX_WEIGHT = 100
+_MOST_CELLS = 28 * 28
+
+Op = Literal["any", "all", "count", "first", "pick", "nearest"]
+
+
+@dataclass(frozen=True)
+class Group:
+    """Known values of one type, in order; a weight repeats a value. `bounds` narrow a range whose ends are drawn."""
+
+    type: Type
+    items: tuple[Const, ...]
+    bounds: tuple[Term, Term] | None = None
+
+
+def is_group(resolver: Resolver, node: ast.Expr, scope: Scope) -> bool:
+    """Whether an expression stands for several values."""
+    match node:
+        case ast.Alternatives() | ast.Interval():
+            return True
+        case ast.Name(id=word):
+            bound = scope.variables.get(word)
+            if bound is not None:
+                return isinstance(bound, Macro) and is_group(resolver, bound.node, bound.scope)
+            objects = resolver.symbols.objects.get(word)
+            return (
+                word in ("colors", "nouns", "cells")
+                or word in resolver.symbols.groups
+                or (objects is not None and not objects.single)
+            )
+    return False
+
+
+def group(resolver: Resolver, node: ast.Expr, expected: Type | None, scope: Scope) -> Group:
+    """The members of a group; bare words in it are of the expected type."""
+    match node:
+        case ast.Interval():
+            return _interval(resolver, node, scope)
+        case ast.Alternatives(options=options):
+            return _alternatives(resolver, node, options, expected, scope)
+        case ast.Name(id=word):
+            bound = scope.variables.get(word)
+            if isinstance(bound, Macro) and is_group(resolver, bound.node, bound.scope):
+                return group(resolver, bound.node, expected, bound.scope)
+            if bound is None and word == "cells":
+                return _cells(resolver, node, scope)
+            if bound is None and word in ("colors", "nouns"):
+                type_ = COLOR if word == "colors" else resolver.symbols.nouns
+                return Group(type_, _values(type_))
+            objects = resolver.symbols.objects.get(word)
+            if bound is None and word in resolver.symbols.groups:
+                numbers = [resolver.symbols.numbers[name] for name in resolver.symbols.groups[word]]
+                type_ = Type("entity", numbers[0], numbers[-1])
+                return Group(type_, _values(type_))
+            if bound is None and objects is not None:
+                type_ = Type("entity", objects.numbers[0], objects.numbers[-1])
+                return Group(type_, _values(type_))
+    single = resolver.value(node, expected, scope)
+    if isinstance(single, Const):
+        return Group(single.type, (single,))
+    message = f"`{quoted(node)}` is {described(single.type)}, here a group is needed"
+    hint = (
+        "a group is the name of objects with `count`, `colors`, `nouns`, a range 1..3, or alternatives a | b"
+    )
+    raise resolver.fail("S204", message, node, scope, hint=hint)
+
+
+def _cells(resolver: Resolver, node: ast.Name, scope: Scope) -> Group:
+    """All floor cells of the room; a search over cells cannot be done for each of many cells."""
+    bound = (term for term in scope.variables.values() if isinstance(term, Variable))
+    if scope.here or any(term.type.kind == "cell" for term in bound):
+        message = "`cells` cannot stand inside another search over cells"
+        raise resolver.fail(
+            "S211", message, node, scope, hint="draw or compute one of the two in `let` first"
+        )
+    return Group(CELL, ())
+
+
+def _values(type_: Type) -> tuple[Const, ...]:
+    return tuple(Const(type_, value) for value in range(type_.low, type_.high + 1))
+
+
+def _interval(resolver: Resolver, node: ast.Interval, scope: Scope) -> Group:
+    low, high = resolver.value(node.low, INT, scope), resolver.value(node.high, INT, scope)
+    type_ = Type("int", low.type.low, high.type.high)
+    known = isinstance(low, Const) and isinstance(high, Const)
+    if type_.size < 1:
+        raise resolver.fail(
+            "S106", f"the range {quoted(node)} is empty: its end is below its start", node, scope
+        )
+    if type_.size > MAX_GROUP:
+        raise resolver.fail(
+            "S106", f"a range has at most {MAX_GROUP} values, this one {type_.size}", node, scope
+        )
+    return Group(type_, _values(type_), None if known else (low, high))
+
+
+def _alternatives(
+    resolver: Resolver, node: ast.Expr, options: tuple[ast.Expr, ...], expected: Type | None, scope: Scope
+) -> Group:
+    parts = [_weighted(resolver, option, scope) for option in options]
+    lead = next((p for _, p in parts if not resolver.is_bare(p, scope)), None)
+    if expected is None and lead is not None:
+        expected = group(resolver, lead, None, scope).type
+    items: list[Const] = []
+    for weight, option in parts:
+        members = group(resolver, option, _open(expected), scope)
+        if members.bounds is not None:
+            raise resolver.fail(
+                "S204", f"the ends of `{quoted(option)}` are not known numbers", option, scope
+            )
+        items += members.items * weight
+    return _joined(resolver, node, items, scope)
+
+
+def _open(expected: Type | None) -> Type | None:
+    if expected is not None and expected.kind in ("int", "entity") and not expected.words:
+        return replace(expected, low=0, high=0)
+    return expected
+
+
+def _weighted(resolver: Resolver, option: ast.Expr, scope: Scope) -> tuple[int, ast.Expr]:
+    match option:
+        case ast.Arithmetic(op="*", left=ast.Number(value=weight), right=right) if not isinstance(
+            right, ast.Number
+        ):
+            if not 1 <= weight <= MAX_WEIGHT:
+                raise resolver.fail("S106", f"a weight is from 1 to {MAX_WEIGHT}", option, scope)
+            return weight, right
+    return 1, option
+
+
+def _joined(resolver: Resolver, node: ast.Expr, items: list[Const], scope: Scope) -> Group:
+    """Alternatives under one type that has room for all of them."""
+    kinds = {item.type.kind for item in items}
+    if len(kinds) > 1:
+        first, second = (described(item.type) for item in _different(items))
+        raise resolver.fail("S204", f"`{quoted(node)}` mixes {first} with {second}", node, scope)
+    if kinds == {"text"}:
+        words = tuple(dict.fromkeys(spoken(item.type, item.value) for item in items))
+        type_ = Type("text", 0, len(words) - 1, words)
+        return Group(type_, tuple(Const(type_, words.index(spoken(i.type, i.value))) for i in items))
+    if kinds <= {"int", "entity"} and not items[0].type.words:
+        numbers = [item.value for item in items]
+        type_ = Type(items[0].type.kind, min(numbers), max(numbers))
+        return Group(type_, tuple(Const(type_, value) for value in numbers))
+    return Group(items[0].type, tuple(items))
+
+
+def _different(items: list[Const]) -> Iterator[Const]:
+    yield items[0]
+    yield next(item for item in items if item.type.kind != items[0].type.kind)
+
+
+def quantified(resolver: Resolver, node: ast.Quantifier, expected: Type | None, scope: Scope) -> Term:
+    """`pick(x in group where condition to target)` and its kin."""
+    if node.name not in QUANTIFIERS:
+        near = did_you_mean(node.name, QUANTIFIERS)
+        raise resolver.fail("S205", f"`{node.name}(d in ...)` is not known", node, scope, suggestion=near)
+    if node.var in WORDS or node.var in resolver.symbols.declared:
+        message = f"the variable `{node.var}` has a name that means something already"
+        raise resolver.fail("S213", message, node, scope, hint="call it by a letter, such as `d`")
+    if node.name == "nearest" and node.to is None:
+        raise resolver.fail("S211", "`nearest` needs `to`: nearest(d in doors to agent)", node, scope)
+    if node.name != "nearest" and node.to is not None:
+        raise resolver.fail("S211", f"`to` belongs to `nearest`, not to `{node.name}`", node, scope)
+    if node.name in ("any", "all") and node.where is None:
+        raise resolver.fail("S211", f"`{node.name}` needs `where` and a condition", node, scope)
+    chooses = node.name in ("pick", "first", "nearest")
+    ordinal = scope.draws.number() if node.name == "pick" else 0
+    members = group(resolver, node.group, _open(expected) if chooses else None, scope)
+    variable = _named(node.var, scope)
+    inner = replace(scope.binding(node.var, Variable(members.type, variable)), nested=scope.nested + 1)
+    condition = resolver.value(node.where, BOOL, inner) if node.where is not None else None
+    to = resolver.somewhere(node.to, scope) if node.to is not None else None
+    return made(cast(Op, node.name), members, variable, condition, scope, ordinal, to)
+
+
+def pick(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope) -> Term:
+    """`pick(group)` and `first(group)`, `count(group)`: without a condition."""
+    ordinal = scope.draws.number() if node.name == "pick" else 0
+    members = group(resolver, node.args[0], _open(expected) if node.name != "count" else None, scope)
+    return made(cast(Op, node.name), members, _named("each", scope), None, scope, ordinal)
+
+
+def made(
+    op: Op,
+    members: Group,
+    variable: str,
+    condition: Term | None,
+    scope: Scope,
+    ordinal: int = 0,
+    to: Term | None = None,
+) -> Quantified:
+    """The term of a quantifier."""
+    if members.bounds is not None:
+        inside = between(Variable(members.type, variable), *members.bounds)
+        condition = inside if condition is None else all_of([inside, condition])
+    type_ = members.type
+    if op in ("any", "all"):
+        type_ = BOOL
+    elif op == "count":
+        type_ = Type("int", 0, len(members.items))
+    site = scope.pick_site if op == "pick" else ""
+    cells = members.type.kind == "cell"
+    if cells and op == "count":
+        type_ = Type("int", 0, _MOST_CELLS)
+    return Quantified(type_, op, variable, members.items, condition, to, ordinal, site, cells)
+
+
+def any_member(resolver: Resolver, node: ast.Expr, scope: Scope, relation: Callable[[Term], Term]) -> Term:
+    """Whether a relation holds to any member of the group at `node`."""
+    members = group(resolver, node, None, scope)
+    if members.type.kind not in ("entity", "cell"):
+        message = (
+            f"`{quoted(node)}` is {described(members.type)}, here somebody or something in the room is needed"
+        )
+        raise resolver.fail("S204", message, node, scope)
+    variable = _named("each", scope)
+    condition = relation(Variable(members.type, variable))
+    return made("any", members, variable, condition, scope)
+
+
+def _named(word: str, scope: Scope) -> str:
+    return f"{word}#{scope.nested}" if scope.nested else word
+
+
+# -- subjects: what may stand before the dot, and when it may be asked ---------------------------------------
+
+
+OF_CELLS = frozenset({"in_line", "unobstructed", "distance", "dir_to", "x", "y"})
+"""What a cell that is no candidate for a placement can be asked as well."""
+
+
+def check_points(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: Scope) -> None:
+    """Report what cannot point: an object, and the agent, which has no arm to do it with."""
+    if who.type.high >= len(resolver.symbols.numbers):
+        raise resolver.fail("S204", f"only NPCs point, so only they have `{name}`", node, scope)
+    if who.type.high == 0:
+        raise resolver.fail("S204", "the agent never points; only NPCs do", node, scope)
+
+
+def check_toggled(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: Scope) -> None:
+    """Report what nobody uses."""
+    if who.type.low < len(resolver.symbols.numbers):
+        message = f"only objects are toggled, so only they have `{name}`"
+        raise resolver.fail("S204", message, node, scope, hint="an NPC is poked: `anna.poked`")
+
+
+def check_moment(resolver: Resolver, signature: Signature, node: ast.Expr, scope: Scope) -> None:
+    """Report what speaks of a step where there is none yet."""
+    if signature.momentary and scope.at_reset:
+        message = (
+            f"`{signature.name}` speaks of a step, but this value is computed once, before the first step"
+        )
+        hint = "a `define` is recomputed at every use" if "let" in scope.path else None
+        if "beliefs" in scope.path:
+            hint = "a belief is there from the start, so it is about something that is true before the first step"
+        raise resolver.fail("S204", message, node, scope, hint=hint)
+
+
+def subject_of(
+    resolver: Resolver, subject: ast.Expr | None, signature: Signature, node: ast.Expr, scope: Scope
+) -> Term | None:
+    """Who a verb is about: what stands before the dot, else the NPC itself. None: the candidate cell."""
+    if subject is None:
+        if scope.member is None:
+            example = "agent" if signature.subject != "object" else "door"
+            raise resolver.fail(
+                "S211", f"`{signature.name}` needs somebody: `{example}.{signature.name}`", node, scope
+            )
+        return entity(resolver.symbols.numbers[scope.member])
+    if isinstance(subject, ast.Name) and subject.id == "here" and "here" not in scope.variables:
+        if not scope.here:
+            raise resolver.fail(
+                "S201", "`here` is the candidate cell; it means something only in a place", subject, scope
+            )
+        if signature.name in OF_CELLS and not signature.cell:
+            return Here(CELL, "cell")
+        if not signature.cell:
+            raise resolver.fail("S211", f"a cell cannot be asked for `{signature.name}`", node, scope)
+        return None
+    if is_group(resolver, subject, scope):
+        group = quoted(subject)
+        letter = group[0] if group[0].isalpha() else "x"
+        asked = f"{letter}.{usage(signature)}"
+        hint = f"`any({letter} in {group} where {asked} ...)`, or `all`, `first`, `pick`"
+        raise resolver.fail("S204", f"`{group}` is a group: say which of them", subject, scope, hint=hint)
+    who = resolver.value(subject, None, scope)
+    if who.type.kind == "cell" and (signature.cell or signature.name in OF_CELLS):
+        return who
+    return resolver.fit(who, ENTITY, subject, scope)
+
+
+def must_be_agent(resolver: Resolver, node: ast.Call | ast.Attribute | ast.Name, scope: Scope) -> None:
+    """Report what is known of the agent only, asked of somebody else."""
+    subject = None if isinstance(node, ast.Name) else node.subject
+    if subject is None and scope.member == "agent":
+        return
+    if not (isinstance(subject, ast.Name) and subject.id == "agent"):
+        name = node.id if isinstance(node, ast.Name) else node.name
+        hint = "what an NPC has heard is `heard(...)`, or `hears:` in a rule" if name == "said" else None
+        raise resolver.fail(
+            "S211", f"`{name}` is known of the agent only: `agent.{name}`", node, scope, hint=hint
+        )
+
+
+# -- which values something can have, as far as its declaration says -----------------------------------------
+
+
+_ALL_COLORS = frozenset(range(COLOR.low, COLOR.high + 1))
+_DRAWN_FREELY = ("random", "distinct")
+
+
+def values_of(resolver: Resolver, term: Term) -> frozenset[int]:
+    """The values that a term can have; those of its whole type where nothing more is known."""
+    match term:
+        case Const(value=value):
+            return frozenset({value})
+        case Read(path=path) if (drawn := resolver.registers.drawn_at_reset(path)) is not None:
+            return values_of(resolver, drawn)
+        case Quantified(op="pick" | "first" | "nearest", items=items):
+            return frozenset(item.value for item in items)
+        case Select(values=values, default=default):
+            return frozenset().union(*(values_of(resolver, value) for value in (*values, default)))
+        case FieldOf(entity=who, name="color"):
+            return frozenset().union(*(_colors(resolver, number) for number in values_of(resolver, who)))
+    return frozenset(range(term.type.low, term.type.high + 1))
+
+
+def _colors(resolver: Resolver, number: int) -> frozenset[int]:
+    """The colours that an object or a member of the cast can have."""
+    symbols = resolver.symbols
+    for objects in symbols.objects.values():
+        if number not in objects.numbers:
+            continue
+        given = symbols.scenario.objects[objects.name].color or (
+            symbols.default_colors.get(objects.type.name, "random"),
+        )
+        single = not resolver.findings.is_list(("objects", objects.name, "color"))
+        place = 0 if single else objects.numbers.index(number)
+        return _written(resolver, given[place]) if place < len(given) else _ALL_COLORS
+    member = symbols.member_of(number)
+    raws = [one.color for one in symbols.alternatives[member]] if member is not None else [None]
+    return frozenset().union(*(_written(resolver, raw) for raw in raws))
+
+
+def _written(resolver: Resolver, raw: object) -> frozenset[int]:
+    """The colours that a `color:` can mean."""
+    if not isinstance(raw, str) or raw in _DRAWN_FREELY:
+        return _ALL_COLORS
+    try:
+        return _values_named(resolver, resolver.findings.expression((), raw))
+    except FailedError:
+        return _ALL_COLORS  # which is reported where it is resolved
+
+
+def _values_named(resolver: Resolver, node: ast.Expr) -> frozenset[int]:
+    match node:
+        case ast.Name(id=word) if word in COLOR.words:
+            return frozenset({COLOR.low + COLOR.words.index(word)})
+        case ast.Call(name="pick", args=(ast.Alternatives(options=options),), subject=None):
+            return frozenset().union(*(_values_named(resolver, option) for option in options))
+        case ast.Call(name="permuted", args=(ast.Attribute(name="color") as colors,), subject=None):
+            return _values_named(resolver, colors)
+        case ast.Attribute(subject=ast.Name(id=name), name="color") if name in resolver.symbols.objects:
+            numbers = resolver.symbols.objects[name].numbers
+            return frozenset().union(*(_colors(resolver, number) for number in numbers))
+    return _ALL_COLORS
+
+
+# -- tables: values looked up by a key, as written or permuted at reset --------------------------------------
+
+
+_PERMUTED = "permuted"
+_NO_KEYS = ("entity", "cell", "bool", "utterance")
+"""Kinds of values that no words stand for."""
+
+
+def look_at_all(resolver: Resolver) -> None:
+    """Report what is wrong with a table, though nothing may be looked up in it."""
+    for name in resolver.symbols.scenario.tables:
+        with surviving():
+            resolver.table(name)
+
+
+def looked_up(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
+    """`dar(exit.color)`: the value beside the key that the argument is."""
+    name = node.name
+    resolver.used.add(("tables", name))
+    keys, values = resolver.table(name)
+    if len(node.args) != 1:
+        raise resolver.fail("S211", f"`{name}` is a table: it takes one key", node, scope)
+    key = _key(resolver, name, node.args[0], scope)
+    known = [key.value] if isinstance(key, Const) else range(key.type.low, key.type.high + 1)
+    possible = values_of(resolver, key)
+    cases: list[tuple[Term, Term]] = []
+    for value in known:
+        word = spoken(key.type, value)
+        if word not in keys and value not in possible:
+            continue
+        if word not in keys:
+            raise _no_key(resolver, name, keys, word, key, node.args[0], scope)
+        if isinstance(key, Const):
+            return values[keys.index(word)]
+        cases.append((Compare("==", key, Const(key.type, value)), values[keys.index(word)]))
+    *others, (_, default) = cases
+    return Select(default.type, tuple(c for c, _ in others), tuple(v for _, v in others), default)
+
+
+def _key(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> Term:
+    """What is looked up: something that words stand for. A word that means nothing else is itself looked up."""
+    means_nothing = isinstance(node, ast.Name) and resolver.means_nothing(node.id, scope)
+    key = resolver.value(node, ANY_TEXT if means_nothing else None, scope)
+    if key.type.kind in _NO_KEYS:
+        message = f"`{quoted(node)}` is {described(key.type)}; the keys of the table `{name}` are words"
+        hint = f"look up its colour: `{name}({quoted(node)}.color)`" if key.type.kind == "entity" else None
+        raise resolver.fail("S204", message, node, scope, hint=hint)
+    return key
+
+
+def _no_key(
+    resolver: Resolver,
+    name: str,
+    keys: tuple[str, ...],
+    word: str,
+    key: Term,
+    node: ast.Expr,
+    scope: Scope,
+) -> FailedError:
+    """What is looked up, or what it can be, is not in the table."""
+    near = did_you_mean(word, keys)
+    if isinstance(key, Const):
+        hint = None if near else "it has " + ", ".join(keys)
+        message = f"the table `{name}` has no `{word}`"
+        return resolver.fail("S402", message, node, scope, suggestion=near, hint=hint)
+    lacks = f" can be {word}, which the table `{name}` does not have"
+    if any(finding.message.endswith(lacks) for finding in resolver.findings.bag):
+        return FailedError()  # wherever else it is looked up, that is no other mistake
+    message = f"`{quoted(node)}`{lacks}"
+    hint = f"it has `{near}`; is that meant?" if near else "it has " + ", ".join(keys)
+    return resolver.fail("S402", message, node, scope, hint=hint)
+
+
+def resolved(resolver: Resolver, name: str) -> tuple[tuple[str, ...], tuple[Term, ...]]:
+    """Keys and values of a table."""
+    written = resolver.symbols.scenario.tables[name]
+    path: DataPath = ("tables", name)
+    if isinstance(written, str):
+        return _permuted(resolver, name, written, path)
+    if not written:
+        raise resolver.findings.fail("S106", "a table has at least one key", resolver.findings.at(path))
+    words = [_word(resolver, (*path, key), raw) for key, raw in written.items()]
+    return tuple(written), _as_values(words)
+
+
+def _word(resolver: Resolver, path: DataPath, raw: object) -> str:
+    """What a value of a table is called: a word, a number, a text."""
+    if isinstance(raw, str):
+        text = raw.strip()
+        if is_plain(text, "'-") or not text.strip(" '-"):
+            return text
+    term = resolver.written(path, raw, ANY_TEXT if isinstance(raw, str) else None, reset_scope(path))  # type: ignore[arg-type]
+    if not isinstance(term, Const):
+        raise resolver.findings.fail(
+            "S204", "a value of a table is known beforehand", resolver.findings.at(path)
+        )
+    return spoken(term.type, term.value)
+
+
+def _as_values(words: list[str]) -> tuple[Term, ...]:
+    """The words as values of one type: numbers if all are, else texts."""
+    if all(map(is_number, words)):
+        numbers = [int(word) for word in words]
+        type_ = Type("int", min(numbers), max(numbers))
+        return tuple(Const(type_, value) for value in numbers)
+    kinds = tuple(dict.fromkeys(words))
+    type_ = Type("text", 0, len(kinds) - 1, kinds)
+    return tuple(Const(type_, kinds.index(word)) for word in words)
+
+
+def _permuted(
+    resolver: Resolver, name: str, raw: str, path: DataPath
+) -> tuple[tuple[str, ...], tuple[Term, ...]]:
+    """`permuted(other)`: the keys of another table with its values in an order that is drawn at reset."""
+    node = resolver.findings.expression(path, raw)
+    match node:
+        case ast.Call(name=word, args=(ast.Name(id=other),), subject=None) if word == _PERMUTED:
+            pass
+        case _:
+            message = "a table is written out, or permuted(another table)"
+            raise resolver.findings.fail("S204", message, resolver.findings.at(path))
+    known = resolver.symbols.scenario.tables
+    if other not in known or isinstance(known[other], str):
+        near = did_you_mean(other, [key for key, value in known.items() if not isinstance(value, str)])
+        message = f"`{other}` is not a table that is written out"
+        span = resolver.findings.node(path, node.args[0])
+        raise resolver.findings.fail("S201", message, span, suggestion=near)
+    resolver.used.add(("tables", other))
+    keys, values = resolver.table(other)
+    order = permutation(resolver, f"tables.{name}", len(keys), path)
+    type_ = values[0].type
+    return keys, tuple(
+        Select(
+            type_,
+            tuple(Compare("==", place, Const(place.type, i)) for i in range(len(values) - 1)),
+            values[:-1],
+            values[-1],
+        )
+        for place in order
+    )
+
+
+def permutation(resolver: Resolver, register: str, count: int, path: DataPath) -> tuple[Read, ...]:
+    """The numbers from 0 in an order that is drawn at reset, all orders alike: one register for each place."""
+    type_ = Type("int", 0, count - 1)
+    items = tuple(Const(type_, value) for value in range(count))
+    order: list[Read] = []
+    for k in range(count):
+        each = Variable(type_, "each")
+        free = all_of(Compare("!=", each, before) for before in order) if order else None
+        site = f"{register}[{k}]"
+        drawn = Quantified(type_, "pick", "each", items, free)
+        if site in resolver.registers:
+            order.append(Read(type_, site))
+        else:
+            order.append(resolver.registers.put(site, Sited(drawn, site, resolver.findings.at(path))))
+    return tuple(order)
+
+
+# -- sequences and memories: what is performed, remembered, and compared element by element ------------------
+
+
+@dataclass(frozen=True)
+class Acts:
+    """A sequence or a memory: acts in a row, each a move and an utterance in registers of their own."""
+
+    path: str
+    length: int
+    utterances: Type
+    remembered: bool
+
+    def elements(self) -> tuple[Term, ...]:
+        """Move and utterance of each act in turn."""
+        return tuple(
+            term
+            for k in range(self.length)
+            for term in (
+                Read(ACTION, f"{self.path}[{k}].move"),
+                Read(self.utterances, f"{self.path}[{k}].utterance"),
+            )
+        )
+
+
+def utterance_type(resolver: Resolver) -> Type:
+    """Every utterance of the grammar as a value; 0 is silence."""
+    words = ("", *resolver.utterances.all_texts())
+    return Type("utterance", 0, len(words) - 1, words)
+
+
+# -- what is declared ----------------------------------------------------------------------------------------------
+
+
+def declare(resolver: Resolver, name: str, model: Sequence) -> None:
+    """Make the elements of a sequence known, each drawn at a site of its own."""
+    span = resolver.findings.places.key_span(("let", name))
+    moves = tuple(Const(ACTION, ACTION.words.index(move)) for move in model.moves)
+    for k in range(model.sequence):
+        element = f"let.{name}[{k}]"
+        move = moves[0] if len(moves) == 1 else Quantified(ACTION, "pick", "each", moves, None)
+        resolver.registers.put(f"{element}.move", Sited(move, f"{element}.move", span))
+        utterance = _utterance(utterance_type(resolver), model.utterance.chance if model.utterance else 0.0)
+        resolver.registers.put(f"{element}.utterance", Sited(utterance, f"{element}.utterance", span))
+
+
+def _utterance(type_: Type, chance: float) -> Term:
+    """With some probability one of the grammar's utterances, all alike; else silence."""
+    silence = Const(type_, 0)
+    if not chance:
+        return silence
+    said = tuple(Const(type_, value) for value in range(1, type_.high + 1))
+    return Select(
+        type_, (Chance(chance, 0),), (Quantified(type_, "pick", "each", said, None, ordinal=1),), silence
+    )
+
+
+def memories(resolver: Resolver) -> Iterator[MemoryPlan]:
+    """What is remembered of the agent's acts."""
+    for name, model in resolver.symbols.scenario.memory.items():
+        path = ("memory", name, "while")
+        open_: Sited | None = None
+        with surviving():
+            if model.while_ is not None:
+                scope = at_every_step(reset_scope(path))
+                term = resolver.written(path, model.while_, BOOL, scope)
+                open_ = Sited(term, scope.draws.site, resolver.findings.at(path))
+            yield MemoryPlan(f"memory.{name}", model.last, utterance_type(resolver), open_)
+
+
+def performs(frame: Frame) -> bool:
+    """Whether who follows a frame may perform a sequence, and so say whatever the grammar can."""
+    states = (frame.states or {}).values()
+    doing = [step.do for step in frame.steps or ()] + [state.do for state in states]
+    doing += [rule.do for state in states for rule in state.first]
+    return any(do is not None and "perform" in do for do in doing)
+
+
+# -- what is used --------------------------------------------------------------------------------------------------
+
+
+def acts_at(resolver: Resolver, node: ast.Expr, scope: Scope) -> Acts | None:
+    """The sequence or memory that an expression names; None if it names something else."""
+    if not isinstance(node, ast.Name) or node.id in scope.variables:
+        return None
+    scenario, frame = resolver.symbols.scenario, scope.frame
+    if frame is not None and frame.model.slots.get(node.id) == "sequence":
+        return _in_slot(resolver, frame.member, node.id, frame.looked_at)
+    model = scenario.let.get(node.id)
+    if isinstance(model, Sequence):
+        return Acts(f"let.{node.id}", model.sequence, utterance_type(resolver), remembered=False)
+    if node.id in scenario.memory:
+        length = scenario.memory[node.id].last
+        return Acts(f"memory.{node.id}", length, utterance_type(resolver), remembered=True)
+    return None
+
+
+def _in_slot(resolver: Resolver, member: str, slot: str, looked_at: bool) -> Acts:
+    """The sequence that fills a slot, the same in every file of a `one_of`."""
+    symbols, findings = resolver.symbols, resolver.findings
+    alternatives = symbols.alternatives[member]
+    if looked_at or not all(slot in alternative.with_ for alternative in alternatives):
+        raise FailedError  # a slot that nobody fills is reported where it is left empty
+    found: list[Acts] = []
+    for which, alternative in enumerate(alternatives):
+        path = symbols.with_path(member, slot, which)
+        node = findings.expression(path, alternative.with_[slot])
+        acts = acts_at(resolver, node, Scope(path, Draws(f"cast.{member}.with.{slot}"), member))
+        if acts is None and resolver.is_bare(node, Scope(path, Draws(""), member)):
+            resolver.value(node, None, Scope(path, Draws(""), member))
+        if acts is None or acts.remembered:
+            hint = "a sequence is drawn in `let`: {sequence: 3, moves: [left, right, forward]}"
+            raise findings.fail("S204", f"`{quoted(node)}` is not a sequence", findings.at(path), hint=hint)
+        if found and acts != found[0]:
+            message = f"the files of `{member}` have different sequences in `{slot}`; they must share one"
+            raise findings.fail("S315", message, findings.at(path))
+        found.append(acts)
+    return found[0]
+
+
+def same(resolver: Resolver, left: Acts, right: Acts, node: ast.Compare, scope: Scope) -> Term:
+    """Whether two rows of acts are alike, element by element; false while a memory is not full."""
+    if left.length != right.length:
+        message = f"`{quoted(node.left)}` has {left.length} acts, `{quoted(node.right)}` has {right.length}"
+        raise resolver.fail("S106", message, node, scope)
+    full = [
+        Compare("==", Read(Type("int", 0, acts.length), f"{acts.path}.filled"), number(acts.length))
+        for acts in (left, right)
+        if acts.remembered
+    ]
+    pairs = zip(left.elements(), right.elements(), strict=True)
+    return all_of([*full, *(Compare("==", a, b) for a, b in pairs)])
+
+
+def incomparable(resolver: Resolver, node: ast.Compare, left: bool, scope: Scope) -> FailedError:
+    """Only one side of a comparison, the left or the right one, is a sequence or memory; reports what is wrong."""
+    acts, other = (node.left, node.right) if left else (node.right, node.left)
+    if not is_group(resolver, other, scope):
+        resolver.value(other, None, scope)  # if it has a mistake of its own, that is what is wrong
+    message = f"`{quoted(acts)}` is several acts in a row, `{quoted(other)}` is not"
+    return resolver.fail("S204", message, other, scope, hint="a memory is compared with a sequence")
+
+
+def performed(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[Term, ...]:
+    """The elements of the sequence that `perform(...)` names."""
+    acts = acts_at(resolver, node, scope)
+    if acts is None and resolver.is_bare(node, scope):
+        resolver.value(node, None, scope)  # a name that means nothing is what is wrong
+    if acts is None or acts.remembered:
+        message = f"`{quoted(node)}` is not a sequence"
+        hint = "only what `let` draws as {sequence: ..., moves: ...} can be performed"
+        raise resolver.fail("S204", message, node, scope, hint=hint)
+    return acts.elements()

@@ -1,0 +1,509 @@
+"""What is true of objects: what contains and what unlocks what, their statuses, and what members believe of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.grammar import ast
+from socialai_dsl.grammar.ast import ParseProblem, parse_expression
+from socialai_dsl.schema.scenario import Effects, Frame, Ranged, Scenario
+from socialai_dsl.semantics import groups
+from socialai_dsl.semantics.plans import Activity, BeliefPlan, Computed, FramePlan, StatePlan
+from socialai_dsl.semantics.resolver import ENTITY, Declaration, Resolver
+from socialai_dsl.semantics.scope import (
+    FailedError,
+    Objects,
+    Scope,
+    at_every_step,
+    frames_of,
+    object_scope,
+    of_each,
+    quoted,
+    reset_scope,
+    surviving,
+    with_article,
+)
+from socialai_dsl.semantics.terms import (
+    BOOL,
+    Compare,
+    Const,
+    FieldOf,
+    Read,
+    Select,
+    Sited,
+    Term,
+    Type,
+    arithmetic,
+    draws,
+    number,
+    walk,
+)
+from socialai_dsl.source import DataPath, Span
+
+
+def holders(resolver: Resolver) -> tuple[int, int] | None:
+    """Least and greatest number of the objects that can hold others; None if there are none."""
+    numbers = [
+        number
+        for objects in resolver.symbols.objects.values()
+        if "opened" in objects.type.states
+        for number in objects.numbers
+    ]
+    return (min(numbers), max(numbers)) if numbers else None
+
+
+def inside_of(resolver: Resolver, objects: Objects, index: int, path: DataPath, raw: str) -> Term:
+    """The object that another lies in at first."""
+    scope = object_scope(objects, index, path, "inside", at_reset=True)
+    node = resolver.findings.expression(path, raw)
+    holder = resolver.value(node, ENTITY, scope)
+    check_holder(resolver, holder, node, scope)
+    return holder
+
+
+def check_holder(resolver: Resolver, holder: Term, node: ast.Expr, scope: Scope) -> None:
+    """Report what cannot hold anything."""
+    for entity in range(holder.type.low, holder.type.high + 1):
+        objects = resolver.symbols.object_of(entity)
+        if objects is None or "opened" not in objects.type.states:
+            able = [name for name, type_ in resolver.symbols.types.items() if "opened" in type_.states]
+            message = f"nothing can lie in `{quoted(node)}`"
+            raise resolver.fail(
+                "S204", message, node, scope, hint="what can hold something: " + ", ".join(able)
+            )
+
+
+def container(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
+    """`x.inside`: what something lies in."""
+    known = holders(resolver)
+    for entity in range(who.type.low, who.type.high + 1):
+        objects = resolver.symbols.object_of(entity)
+        if objects is None or known is None or not can_lie_inside(resolver, objects):
+            message = f"`{quoted(node)}`: it never lies inside anything"
+            hint = "an object is put into another with `inside:`, or by the effect `x.move_into(box)`"
+            raise resolver.fail("S204", message, node, scope, hint=hint)
+    assert known is not None, "internal: looked at above"
+    return FieldOf(Type("entity", *known), who, "inside")
+
+
+def can_lie_inside(resolver: Resolver, objects: Objects) -> bool:
+    """Whether objects of this name ever lie in others: at first, or because an effect moves them there."""
+    scenario = resolver.symbols.scenario
+    return scenario.objects[objects.name].inside is not None or objects.name in resolver.moved_inside
+
+
+def moved_inside(scenario: Scenario) -> set[str]:
+    """All names in what is moved into something, and in what these names stand for."""
+    subjects = [
+        node.subject
+        for effect in _effects(scenario)
+        for node in _nodes(effect)
+        if isinstance(node, ast.Call) and node.name == "move_into" and node.subject is not None
+    ]
+    waiting = [node.id for subject in subjects for node in subject.walk() if isinstance(node, ast.Name)]
+    sources, found = _sources(scenario), set[str]()
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            nodes = (node for source in sources.get(name, ()) for node in _nodes(source))
+            waiting += [node.id for node in nodes if isinstance(node, ast.Name)]
+    return found
+
+
+def _nodes(source: object) -> list[ast.Node]:
+    """The nodes of an expression; none of what is not one, which is reported elsewhere."""
+    try:
+        return list(parse_expression(str(source)).walk())
+    except ParseProblem:
+        return []
+
+
+def _sources(scenario: Scenario) -> dict[str, list[object]]:
+    """Name -> the expressions that it may stand for: lets, definitions, registers with what they are set to, slots."""
+    found: dict[str, list[object]] = {}
+    declared: list[Mapping[str, object]] = [scenario.let, scenario.define]
+    declared += [member.with_ for name in scenario.cast for member in scenario.alternatives(name)]
+    for _, frame in frames_of(scenario):
+        declared += [frame.let, frame.define, *(entry.set for entry in _entries(frame))]
+    for mapping in declared:
+        for name, source in mapping.items():
+            value = source.start if isinstance(source, Ranged) else source
+            found.setdefault(name.partition("(")[0].strip(), []).append(value)
+    return found
+
+
+def _entries(frame: Frame) -> Iterator[Effects]:
+    """Every rule and step of a frame."""
+    yield from frame.steps or ()
+    for state in (frame.states or {}).values():
+        yield from (*state.first, *state.then)
+
+
+def _effects(scenario: Scenario) -> Iterator[object]:
+    """Every effect as it is written."""
+    for rule in scenario.rules:
+        yield from rule.cause
+    for _, frame in frames_of(scenario):
+        for entry in _entries(frame):
+            yield from entry.cause
+
+
+def contained(resolver: Resolver) -> dict[int, tuple[int, ...]]:
+    """Object that can hold others -> what may ever lie in it."""
+    contents = tuple(
+        number
+        for objects in resolver.symbols.objects.values()
+        if can_lie_inside(resolver, objects)
+        for number in objects.numbers
+    )
+    found: dict[int, tuple[int, ...]] = {}
+    for objects in resolver.symbols.objects.values():
+        if contents and "opened" in objects.type.states:
+            with surviving():
+                found |= {number: tuple(c for c in contents if c != number) for number in objects.numbers}
+    return found
+
+
+# -- links: what a switch unlocks, and what unlocks a door ---------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """A kind of link: its key, and the statuses that what it works on must be able to have."""
+
+    key: str
+    verb: str
+    needs: frozenset[str]
+    lack: str
+
+
+_UNLOCKS = _Kind("unlocks", "unlock", frozenset({"locked"}), "has no lock")
+_OPENS = _Kind("opens", "open", frozenset({"open", "closed"}), "cannot be opened")
+
+
+def unlocked(resolver: Resolver) -> dict[int, tuple[int, ...]]:
+    """Object -> the objects it unlocks; reports what is no lock, or has nothing to do with one."""
+    return _all_links(resolver, _UNLOCKS)
+
+
+def opened(resolver: Resolver) -> dict[int, tuple[int, ...]]:
+    """Object -> the objects that are open while it is active; reports what cannot be."""
+    return _all_links(resolver, _OPENS)
+
+
+def _all_links(resolver: Resolver, kind: _Kind) -> dict[int, tuple[int, ...]]:
+    found: dict[int, tuple[int, ...]] = {}
+    for objects in resolver.symbols.objects.values():
+        with surviving():
+            found |= _links_of(resolver, objects, kind)
+    return found
+
+
+def _links_of(resolver: Resolver, objects: Objects, kind: _Kind) -> dict[int, tuple[int, ...]]:
+    raw = getattr(resolver.symbols.scenario.objects[objects.name], kind.key)
+    if raw is None:
+        return {}
+    path: DataPath = ("objects", objects.name, kind.key)
+    findings, scope = resolver.findings, reset_scope(path)
+    node = findings.expression(path, raw)
+    if not objects.type.active:
+        message = f"{with_article(objects.type.name)} cannot {kind.verb} anything"
+        able = [name for name, type_ in resolver.symbols.types.items() if type_.active]
+        raise resolver.fail("S204", message, node, scope, hint="what can: " + ", ".join(able))
+    targets = _objects_at(resolver, node, scope)
+    for target in targets:
+        type_ = resolver.symbols.object_of(target)
+        assert type_ is not None, "internal: a target is an object"
+        if not kind.needs <= set(type_.type.states):
+            message = f"{with_article(type_.type.name)} {kind.lack}: it is {' or '.join(type_.type.states)}"
+            raise resolver.fail("S204", message, node, scope)
+    numbers = list(objects.numbers)
+    if len(numbers) == len(targets):
+        return {a: (b,) for a, b in zip(numbers, targets, strict=True)}
+    if len(numbers) == 1 or len(targets) == 1:
+        return dict.fromkeys(numbers, tuple(targets))
+    message = f"{len(numbers)} of `{objects.name}` cannot be linked to {len(targets)} of `{quoted(node)}`"
+    hint = "as many as there are, or one for all"
+    raise resolver.fail("S106", message, node, scope, hint=hint)
+
+
+def _objects_at(resolver: Resolver, node: ast.Expr, scope: Scope) -> list[int]:
+    if groups.is_group(resolver, node, scope):
+        members = groups.group(resolver, node, None, scope)
+        terms: tuple[Term, ...] = members.items if members.type.kind == "entity" else ()
+    else:
+        terms = (resolver.value(node, ENTITY, scope),)
+    known = [term.value for term in terms if isinstance(term, Const)]
+    if not known or len(known) < len(terms) or any(resolver.symbols.object_of(n) is None for n in known):
+        message = f"`{quoted(node)}` is not an object of the room"
+        raise resolver.fail("S204", message, node, scope, hint="name an object, or a group of them")
+    return known
+
+
+def unlocker(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
+    """`door.unlocked_by`: what unlocks it, whichever of its group it is."""
+    found: dict[int, int] = {}
+    for key, locks in resolver.unlocks.items():
+        for lock in locks:
+            if lock in found and who.type.low <= lock <= who.type.high:
+                message = f"several things unlock `{_called(resolver, lock)}`"
+                raise resolver.fail("S204", message, node, scope, hint="name the one that is meant")
+            found[lock] = key
+    numbers = [who.value] if isinstance(who, Const) else range(who.type.low, who.type.high + 1)
+    for lock in numbers:
+        if lock not in found and _some_failed(resolver):
+            raise FailedError  # perhaps it is what that one was to unlock
+        if lock not in found:
+            message = f"nothing unlocks `{_called(resolver, lock)}`"
+            hint = "an object unlocks another with `unlocks:`"
+            raise resolver.fail("S204", message, node, scope, hint=hint)
+    keys = [found[lock] for lock in numbers]
+    type_ = Type("entity", min(keys), max(keys))
+    if len(set(keys)) == 1:
+        return Const(type_, keys[0])
+    shifts = {key - lock for lock, key in zip(numbers, keys, strict=True)}
+    if len(shifts) == 1:
+        return _shifted(who, shifts.pop(), type_)
+    *others, last = zip(numbers, keys, strict=True)
+    return Select(
+        type_,
+        tuple(Compare("==", who, Const(who.type, lock)) for lock, _ in others),
+        tuple(Const(type_, key) for _, key in others),
+        Const(type_, last[1]),
+    )
+
+
+def _some_failed(resolver: Resolver) -> bool:
+    """Whether it is not known, after a mistake that has been reported, what something unlocks."""
+    symbols = resolver.symbols
+    linked = [name for name, group in symbols.scenario.objects.items() if group.unlocks is not None]
+    return any(symbols.objects[name].numbers[0] not in resolver.unlocks for name in linked)
+
+
+def _shifted(who: Term, shift: int, type_: Type) -> Term:
+    """Objects that stand in the same order in two groups are found by adding to their number."""
+    as_number = replace(who, type=Type("int", who.type.low, who.type.high))
+    return replace(arithmetic("+", as_number, number(shift)), type=type_)
+
+
+def _called(resolver: Resolver, entity: int) -> str:
+    objects = resolver.symbols.object_of(entity)
+    if objects is None:
+        return resolver.symbols.member_of(entity) or "agent"
+    return objects.called(entity - objects.numbers[0])
+
+
+# -- statuses: the one an object begins with, and those that follow from a condition -------------------------
+
+
+_COMPUTED = {"locked": "closed", "tagged": None}
+"""Status that follows from a condition -> the status it leaves for, None for the initial one."""
+
+_INITIAL = ("pressed", "opened")
+
+
+# -- at first ------------------------------------------------------------------------------------------------------
+
+
+def initial(resolver: Resolver) -> dict[int, int | Read]:
+    """Object -> the status it begins with, where a scenario gives one; a register where it is drawn or computed."""
+    found: dict[int, int | Read] = {}
+    for objects in resolver.symbols.objects.values():
+        with surviving():
+            found |= _initial(resolver, objects)
+    return found
+
+
+def _initial(resolver: Resolver, objects: Objects) -> dict[int, int | Read]:
+    group = resolver.symbols.scenario.objects[objects.name]
+    base: DataPath = ("objects", objects.name)
+    given = [key for key in ("state", *_INITIAL) if getattr(group, key) is not None]
+    if not given:
+        return {}
+    if len(given) > 1:
+        span = resolver.findings.places.key_span((*base, given[1]))
+        raise resolver.findings.fail("S107", f"only one of `{given[0]}` and `{given[1]}` can be given", span)
+    key = given[0]
+    if key == "state":
+        status = _status(resolver, objects, str(group.state), (*base, "state"))
+        return dict.fromkeys(objects.numbers, status)
+    status = _status(resolver, objects, key, None, (*base, key))
+    found: dict[int, int | Read] = {}
+    for index, entity in enumerate(objects.numbers):
+        scope = object_scope(objects, index, (*base, key), key, at_reset=True)
+        condition = resolver.written((*base, key), getattr(group, key), BOOL, scope)
+        if isinstance(condition, Const):
+            found[entity] = status if condition.value else objects.type.initial
+            continue
+        states = objects.type.states
+        type_ = Type("status", 0, len(states) - 1, states)
+        value = Select(type_, (condition,), (Const(type_, status),), Const(type_, objects.type.initial))
+        sited = Sited(value, scope.draws.site, resolver.findings.at((*base, key)))
+        found[entity] = resolver.registers.put(f"{objects.called(index)}.initial", sited)
+    return found
+
+
+def _status(
+    resolver: Resolver, objects: Objects, status: str, written: DataPath | None, key: DataPath | None = None
+) -> int:
+    """The number of a status, which is `written` somewhere or the name of a `key`."""
+    states = objects.type.states
+    if status in states:
+        return states.index(status)
+    findings = resolver.findings
+    span = findings.at(written, 0, len(status)) if written else findings.places.key_span(key or ())
+    message = f"{with_article(objects.type.name)} is never `{status}`; it is {' or '.join(states)}"
+    raise findings.fail("S204", message, span, suggestion=did_you_mean(status, states) if written else None)
+
+
+# -- computed ------------------------------------------------------------------------------------------------------
+
+
+def computed(resolver: Resolver) -> tuple[Computed, ...]:
+    """Statuses that follow from conditions, each after those it reads."""
+    found: dict[int, Computed] = {}
+    for objects in resolver.symbols.objects.values():
+        for key, left_for in _COMPUTED.items():
+            with surviving():
+                for one in _computed(resolver, objects, key, left_for):
+                    _add(resolver, found, one, objects, key)
+    return tuple(_in_order(resolver, found))
+
+
+def _computed(resolver: Resolver, objects: Objects, key: str, left_for: str | None) -> Iterator[Computed]:
+    raw = getattr(resolver.symbols.scenario.objects[objects.name], key)
+    if raw is None:
+        return
+    path: DataPath = ("objects", objects.name, key)
+    on = _status(resolver, objects, key, None, path)
+    states = objects.type.states
+    off = states.index(left_for) if left_for in states else objects.type.initial
+    for index, entity in enumerate(objects.numbers):
+        scope = object_scope(objects, index, path, key, at_reset=False)
+        condition = resolver.written(path, raw, BOOL, scope)
+        if draws(condition):
+            message = f"`{key}` follows from how things are, so nothing can be drawn in it"
+            hint = "draw it in `let`, and use that"
+            raise resolver.findings.fail("S204", message, resolver.findings.at(path), hint=hint)
+        yield Computed(entity, on, off, Sited(condition, scope.draws.site, resolver.findings.at(path)))
+
+
+def _add(resolver: Resolver, found: dict[int, Computed], one: Computed, objects: Objects, key: str) -> None:
+    span = resolver.findings.places.key_span(("objects", objects.name, key))
+    if one.entity in found:
+        raise resolver.findings.fail("S107", "only one status of an object can be computed", span)
+    if key == "locked" and any(one.entity in locks for locks in resolver.unlocks.values()):
+        message = f"`{objects.name}` is unlocked by something (`unlocks`) and computed (`locked`); only one can decide"
+        raise resolver.findings.fail("S107", message, span)
+    found[one.entity] = one
+
+
+def _in_order(resolver: Resolver, found: dict[int, Computed]) -> Iterator[Computed]:
+    done: set[int] = set()
+    path: list[int] = []
+
+    def visit(entity: int) -> Iterator[Computed]:
+        if entity in done or entity not in found:
+            return
+        if entity in path:
+            names = [_object_called(resolver, one) for one in [*path[path.index(entity) :], entity]]
+            message = " and ".join(f"`{a}` needs `{b}`" for a, b in pairwise(names))
+            span = found[entity].condition.span
+            resolver.findings.error("S208", f"computed statuses in a circle: {message}", span)
+            done.add(entity)
+            return
+        path.append(entity)
+        for need in _statuses_read(found[entity].condition.term):
+            yield from visit(need)
+        path.pop()
+        if entity not in done:
+            done.add(entity)
+            yield found[entity]
+
+    for entity in found:
+        yield from visit(entity)
+
+
+def _statuses_read(term: Term) -> Iterator[int]:
+    for part in walk(term):
+        if isinstance(part, FieldOf) and part.name == "status":
+            yield from range(part.entity.type.low, part.entity.type.high + 1)
+
+
+def _object_called(resolver: Resolver, entity: int) -> str:
+    objects = resolver.symbols.object_of(entity)
+    assert objects is not None, "internal: only objects have statuses"
+    return objects.called(entity - objects.numbers[0])
+
+
+# -- beliefs: what a member of the cast takes for true, because it saw it last -------------------------------
+
+
+def register_of(member: str, key: str) -> str:
+    """The register that holds a belief."""
+    return f"{member}.believes.{key}"
+
+
+def declare(resolver: Resolver) -> None:
+    """Make every belief known; it starts with what is true when the episode begins."""
+    for name, member in resolver.symbols.cast.items():
+        for key, belief in member.beliefs.items():
+            path = _path(resolver, name, key, "of")
+            register = register_of(name, key)
+            scope = reset_scope(path, f"cast.{name}.beliefs.{key}", name)
+            resolver.registers.declare(Declaration(register, key, path, belief.of, scope))
+
+
+def _path(resolver: Resolver, member: str, key: str, part: str) -> DataPath:
+    return (*resolver.symbols.member_path(member, "beliefs"), key, part)
+
+
+def beliefs(resolver: Resolver) -> Iterator[BeliefPlan]:
+    """What members note at the start of their turns."""
+    for name, member in resolver.symbols.cast.items():
+        for key, belief in member.beliefs.items():
+            with surviving():
+                register = register_of(name, key)
+                of, when = _path(resolver, name, key, "of"), _path(resolver, name, key, "when")
+                start = resolver.registers.read(register)
+                scope = at_every_step(reset_scope(of, f"cast.{name}.beliefs.{key}", name))
+                value = resolver.written(of, belief.of, start.type, scope)
+                condition: Sited | None = None
+                if belief.when is not None:
+                    asked = at_every_step(reset_scope(when, f"cast.{name}.beliefs.{key}.when", name))
+                    term = resolver.written(when, belief.when, BOOL, asked)
+                    condition = Sited(term, asked.draws.site, resolver.findings.at(when))
+                noted = Sited(value, scope.draws.site, resolver.findings.at(of))
+                yield BeliefPlan(name, register, noted, condition)
+
+
+def watching(member: str, number: int, span: Span) -> FramePlan:
+    """What a member does who believes something but follows no frame: it stays, and looks."""
+    state = StatePlan("looking", (), Activity("stay", (), "", span), (), span)
+    return FramePlan(member, "looks on", number, span, state.name, (state,), written=False)
+
+
+def believed(resolver: Resolver, owner: ast.Attribute, node: ast.Attribute, scope: Scope) -> Term:
+    """`sally.believes.toy_in`; of several members, what the one believes who is meant."""
+    who = resolver.value(owner.subject, ENTITY, scope)
+    members = [resolver.symbols.member_of(number) for number in range(who.type.low, who.type.high + 1)]
+    if None in members:
+        raise resolver.fail("S211", "only a member of the cast believes something", owner, scope)
+    for member in map(str, members):
+        known = resolver.symbols.cast[member].beliefs
+        if node.name not in known:
+            near = did_you_mean(node.name, known)
+            hint = None if near else f"declare it: `beliefs: {{{node.name}: {{of: ..., when: sees(...)}}}}`"
+            called = (resolver.symbols.group_of(member) or (member, 0))[0]
+            message = f"`{called}` has no belief `{node.name}`"
+            raise resolver.fail("S201", message, node, scope, suggestion=near, hint=hint)
+    return of_each(who, [resolver.registers.read(register_of(str(m), node.name)) for m in members])
+
+
+def unnamed(subject: str) -> str:
+    """What to say of `sally.believes` without the name of a belief."""
+    return f"`believes` needs the name of a belief after a dot: `{subject}.believes.where_it_is`"
