@@ -9,16 +9,22 @@ from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
 from socialai_dsl.compiler.expressions import Lines
 from socialai_dsl.compiler.lowering import NO_PROBES, Probes, allocate, lower
 from socialai_dsl.compiler.probes import Part, Probe, ProbedProgram, Recorder, Value
+from socialai_dsl.compiler.questions import Asking, ProbeNotes, notes_of
+from socialai_dsl.compiler.questions import Text as NotedText
 from socialai_dsl.compiler.tables import Tables, verify
 from socialai_dsl.program import Header, Program
 from socialai_dsl.program_suite import ProgramSuite
 from socialai_dsl.semantics.plans import CheckedScenario
 
 __all__ = [
+    "NotedText",
     "Part",
     "Probe",
+    "ProbeNotes",
     "ProbedProgram",
     "Value",
+    "compile_asking",
+    "compile_asking_loaded",
     "compile_loaded",
     "compile_probed",
     "compile_scenario",
@@ -44,10 +50,28 @@ def compile_loaded(loaded: Loaded) -> Program | ProgramSuite:
         return compile_scenario(loaded.checked)
     if not isinstance(loaded, LoadedSuite):
         raise ValueError(f"compile: got {loaded!r}; expected what `load` returns")
+    return _suite(loaded, tuple(compile_scenario(member.checked) for member in loaded.members))
+
+
+def compile_asking_loaded(
+    loaded: Loaded,
+) -> tuple[Program | ProgramSuite, tuple[tuple[ProbeNotes, ...], ...]]:
+    """Programs that do the same as those of `compile_loaded` and note what `probes` ask about; and where they do.
+
+    Returns:
+        The program or suite, and for each of its programs the notes of its probes.
+    """
+    asking = tuple(map(compile_asking, scenarios_of(loaded)))
+    programs = tuple(one.program for one in asking)
+    playable = _suite(loaded, programs) if isinstance(loaded, LoadedSuite) else programs[0]
+    return playable, tuple(one.probes for one in asking)
+
+
+def _suite(loaded: LoadedSuite, programs: tuple[Program, ...]) -> ProgramSuite:
     space = loaded.space
     return ProgramSuite(
         loaded.name,
-        tuple(compile_scenario(member.checked) for member in loaded.members),
+        programs,
         loaded.member_names,
         space.actions,
         space.templates,
@@ -97,9 +121,21 @@ _SAME = (
 )
 
 
-def _compiled(checked: CheckedScenario, probes: Probes, numbered: Lines | None) -> tuple[Program, Lines]:
+def compile_asking(checked: CheckedScenario) -> Asking:
+    """A program that does the same as that of the scenario, and notes what its `probes` ask about."""
+    own = {item.path: item for probe in checked.probes for item in probe.remembered}
+    known = {item.path: item for item in checked.remembered}
+    program, _ = _compiled(replace(checked, remembered=tuple((own | known).values())), NO_PROBES, None, True)
+    names = {name.path: name for name in program.registers}
+    return Asking(program, tuple(notes_of(plan, names) for plan in checked.probes))
+
+
+def _compiled(
+    checked: CheckedScenario, probes: Probes, numbered: Lines | None, asking: bool = False
+) -> tuple[Program, Lines]:
     """The program and its lines, which are numbered as in `numbered`, if that is given."""
-    checked = replace(checked, properties=())  # so that nothing they ask about is part of a program
+    # So that nothing that claims and probes are about is part of a program.
+    checked = replace(checked, properties=(), probes=checked.probes if asking else ())
     allocation = allocate(checked, probes, numbered)
     lowered = lower(allocation)
     program = Tables(allocation, lowered).program()

@@ -68,6 +68,8 @@ CODES: Final[dict[str, str]] = {
     # S4xx: what can be said
     "S401": "an utterance that nobody can say",
     "S402": "a value that cannot be said",
+    "W403": "a right answer that is not among those of the probe",
+    "W404": "a probe with a single answer",
     # S5xx: variants, parameters and files that belong together
     "S501": "no such path in the scenario",
     "S502": "an added key that exists already",

@@ -26,6 +26,9 @@ UNSEEN, EMPTY, WALL, NPC = 0, 1, 2, 11
 FINISHED: Final = "finished"
 """The state of a frame whose `steps` are over."""
 
+TRUTHS: Final = ("no", "yes")
+"""How a truth value is answered."""
+
 _WORD: Final = re.compile(r"(?:[^\W_]|')+")
 
 

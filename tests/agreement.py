@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,8 +10,10 @@ import numpy as np
 
 from socialai_dsl.compilation import compile_scenario
 from socialai_dsl.envs import ScenarioEnv
+from socialai_dsl.envs.asking import Asker
 from socialai_dsl.frontend import LoadedScenario, load
 from socialai_dsl.program import Program
+from socialai_dsl.vocabulary import normal
 from tests.reference.interpreter import Action, Reference, Result, plain
 from tests.reference.vocabulary import LONGEST, Words
 
@@ -251,3 +253,44 @@ def agree(name: str, episodes: int, seed: int = 0, program: Program | None = Non
     pair = Pair.of(load(name), program)
     rng = np.random.default_rng(seed)
     return sum(pair.play(seed, episode, rng) for episode in range(episodes))
+
+
+def questions_agree(
+    env: ScenarioEnv, asker: Asker, reference: Reference, seed: int, choose: Callable[[], Any]
+) -> int:
+    """Play one episode, and find that both ask the same at the same moments; the number of questions.
+
+    Raises Disagreement.
+    """
+    observation, _ = env.reset(seed=seed)
+    reference.reset(seed=seed)
+    now, asked, ended, count, t = asker.reset(seed, None, observation["image"]), set[str](), False, 0, 0
+    while True:
+        expected = {name: found for name, found in reference.probed(ended).items() if name not in asked}
+        where = f"{env.program.name}, seed {seed}, step {t}"
+        for question in now:
+            text, _, right = expected.get(question.probe, ("nothing", [], ""))
+            right = "no" if right is None else right
+            if (question.text, normal(question.right)) != (text, normal(right)):
+                raise Disagreement(f"{where}: asked {question}, expected {text}, {right}")
+        for name in expected.keys() - {question.probe for question in now}:
+            _, answers, right = expected[name]
+            if right is not None and answers and len({*map(normal, answers), normal(right)}) > 1:
+                raise Disagreement(f"{where}: {name} was not asked")
+        asked |= {name for name, (_, _, right) in expected.items() if right is not None} | {
+            q.probe for q in now
+        }
+        count += len(now)
+        if ended:
+            return count
+        action = np.asarray(choose())
+        observation, _, terminated, truncated, _ = env.step(action)
+        t, ended = t + 1, terminated or truncated
+        now = asker.step(action, observation["image"], ended)
+        reference.step(plain_action(action))
+
+
+def plain_action(action: Any) -> Action:
+    """An action as plain numbers."""
+    primitive, speaks, template, noun = map(int, action)
+    return primitive, speaks, template, noun

@@ -4,6 +4,7 @@ import csv
 import re
 import shlex
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -29,6 +30,15 @@ def test_five_commands_lead_to_a_table(tmp_path: Path, monkeypatch: pytest.Monke
             assert main([word for words in named for word in words]) == 0
     report = (tmp_path / "report" / "report.md").read_text(encoding="utf-8")
     assert "6 of 6 runs done" in report
+    asked = next(table for table in report.split("\n\n") if "by chance" in table)
+    (probe,) = [row.split("|")[1:-1] for row in asked.splitlines() if "promise" in row]
+    assert [cell.strip(" *`") for cell in probe[1:]] == [
+        "promise",
+        "20",
+        "0.000",
+        "0.500",
+        "0.000",
+    ]  # it answers nothing
     header, _, *rows = next(table for table in report.split("\n\n") if "**talkitout**" in table).splitlines()
     players = [cell.strip() for cell in header.strip("|").split("|")][1:]
     assert set(players) == {"llm:qwen3-8b", "oracle", "random"}
@@ -45,3 +55,34 @@ def test_five_commands_lead_to_a_table(tmp_path: Path, monkeypatch: pytest.Monke
     assert float(pair["difference"]) == 1.0
     assert r"| help / oracle | help / llm:qwen3-8b | 20 | 20 | 0 | +1.000 \[" in report
     assert "| **help / llm:qwen3-8b** | 20 | 20 | 0.0% | 200 | 40 | – |" in report
+
+
+def test_the_command_about_probes_prints_such_a_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], update_goldens: bool
+) -> None:
+    """A model that takes the first answer each time, waits until it was asked, and then names the red box."""
+    monkeypatch.chdir(tmp_path)
+    page = PAGE.read_text(encoding="utf-8")
+    section = page.partition("## What a model knows\n")[2].partition("\n## ")[0]
+    (command,) = re.findall(r"```console\n\$ (.*?)\n```", section)
+    (table,) = re.findall(r"```text\n(.*?)```", section, re.DOTALL)
+
+    def respond(request: Any) -> str:
+        asked = request["messages"][-1]["content"]
+        if "A question, apart from your turns" in asked:
+            return f"Answer: {re.search(r'The answer is one of: ([^;]+);', asked)[1]}"  # type: ignore[index]
+        heard = any("Max: Where will Sally look" in message["content"] for message in request["messages"][1:])
+        return 'Act: say "In the red"' if heard else "Act: none"
+
+    with endpoint(respond) as stub:
+        assert main(shlex.split(command.replace("http://localhost:8080/v1", stub.url))[1:]) == 0
+    printed = capsys.readouterr().out
+    found = (
+        "probes, apart from success\n"
+        + printed.partition("probes, apart from success\n")[2].partition("\n\n")[0]
+    )
+    if update_goldens:
+        PAGE.write_text(page.replace(table, found + "\n"), encoding="utf-8")
+        table = found + "\n"
+    assert table == found + "\n", "if the new text is meant, run pytest --update-goldens"
+    assert "of 20 right, by chance 50.0%" in found

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+import socialai_dsl as sd
+from socialai_dsl.envs.asking import Asker
 from tests.tiny import Folder, Play
 
 PAGE = Path(__file__).parents[1] / "docs" / "one_step.md"
@@ -1751,3 +1753,66 @@ def test_9_7_hidden_npcs_are_not_in_the_picture(play: Folder) -> None:
     assert [run.shown(1)[0], run.shown(2)[0]] == [NPC, NPC]
     run = play(text.format("hidden")).step()
     assert [run.shown(1)[0], run.shown(2)[0]] == [DOOR, EMPTY]
+
+
+# -- 10. what probes are about ---------------------------------------------------------------------
+
+
+PROBED = """\
+state: {rounds: {start: 0, range: 0..9}}
+rules: [{when: t > 0, set: {rounds: rounds + 1}}]
+outcome: [{failure: agent.did(done), id: given_up}]
+probes:
+"""
+
+
+def _asked(play: Folder, probe: str, *bodies: str) -> list[list[tuple[str, str]]]:
+    """Probe and right answer of what is asked after the reset and after each step."""
+    env = play(PROBED + "\n".join(f"  {line}" for line in probe.splitlines())).env
+    observation, _ = env.reset(seed=0)
+    asker = Asker(sd.load(play.path / "tiny.yaml"))
+    found = [asker.reset(0, None, observation["image"])]
+    for body in bodies:
+        action = env.encode_action((None if body == "stay" else body, None))
+        observation, _, terminated, truncated, _ = env.step(action)
+        found.append(asker.step(action, observation["image"], terminated or truncated))
+    return [[(question.probe, question.right) for question in now] for now in found]
+
+
+def test_10_1_state_after_the_step(play: Folder) -> None:
+    probe = "first: {when: t == 0, ask: How many, answer: rounds}\nthen: {when: t == 2, ask: How many, answer: rounds}"
+    assert _asked(play, probe, "stay", "stay") == [[("first", "0")], [], [("then", "2")]]
+
+
+def test_10_2_acts_of_that_step(play: Folder) -> None:
+    probe = (
+        "turned: {when: agent.did(left) and prev(agent.facing) == right, ask: Where, answer: agent.facing}"
+    )
+    assert _asked(play, probe, "stay", "left", "left") == [[], [], [("turned", "up")], []]
+
+
+def test_10_3_once_at_the_first_moment(play: Folder) -> None:
+    probe = "late: {when: rounds >= 1, ask: How many, answer: rounds}"
+    assert _asked(play, probe, "stay", "stay", "stay") == [[], [("late", "1")], [], []]
+
+
+def test_10_4_without_when_at_the_end(play: Folder) -> None:
+    probe = "last: {ask: How many, answer: rounds}"
+    assert _asked(play, probe, "stay", "done") == [[], [], [("last", "2")]]
+    assert _asked(play, probe, *["stay"] * 20)[-2:] == [[], [("last", "9")]]
+
+
+def test_10_5_the_last_step_is_a_moment(play: Folder) -> None:
+    probe = "given_up: {when: agent.did(done), ask: How many, answer: rounds}"
+    assert _asked(play, probe, "stay", "done") == [[], [], [("given_up", "2")]]
+
+
+def test_10_6_before_the_first_step(play: Folder) -> None:
+    probe = "start: {when: prev(agent.facing) == right, ask: Where, answer: prev(agent.facing)}"
+    assert _asked(play, probe, "left") == [[("start", "right")], []]
+
+
+def test_10_7_asking_changes_nothing(play: Folder) -> None:
+    probe = "  first: {when: t == 0, ask: How many, answer: rounds}\n"
+    plain, probed = play(PROBED.removesuffix("probes:\n")).env, play(PROBED + probe).env
+    assert plain.program.sha256 == probed.program.sha256

@@ -10,10 +10,13 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.compiler.instruction_checks import Ranges
+from socialai_dsl.envs.asking import Asker
 from socialai_dsl.envs.audit import first_unsound
 from socialai_dsl.frontend import load
-from tests.agreement import Pair
-from tests.scenario_fuzzer import write
+from tests.agreement import Pair, questions_agree
+from tests.reference.interpreter import Reference
+from tests.reference.vocabulary import LONGEST, Words
+from tests.scenario_fuzzer import write, write_asking
 
 
 def compare(folder: Path, seed: int, episodes: int) -> int:
@@ -37,6 +40,30 @@ def test_random_scenarios_agree(tmp_path: Path, first: int) -> None:
 def test_ten_thousand_random_scenarios_agree(tmp_path: Path, first: int) -> None:
     for seed in range(first, first + 500):
         compare(tmp_path, seed, episodes=2)
+
+
+def compare_questions(folder: Path, seed: int) -> int:
+    """Ask the probes of a seed's scenario on both sides; the number of questions."""
+    path = folder / f"random_{seed}.yaml"
+    path.write_text(write_asking(seed), encoding="utf-8")
+    loaded, env, rng = load(str(path)), sd.make(str(path)), np.random.default_rng(seed)
+    words = Words({word: number for number, word in enumerate(env.program.vocabulary)}, LONGEST)
+    reference = Reference(loaded.resolved, words)
+    return questions_agree(
+        env, Asker(loaded), reference, seed, lambda: [rng.integers(0, size) for size in env.action_space.nvec]
+    )
+
+
+def test_random_probes_agree(tmp_path: Path) -> None:
+    assert sum(compare_questions(tmp_path, seed) for seed in range(12)) > 12
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("first", range(0, 2_000, 200))
+def test_two_thousand_random_scenarios_ask_alike(tmp_path: Path, first: int) -> None:
+    for seed in range(first, first + 200):
+        compare_questions(tmp_path, seed)
 
 
 def play_within(folder: Path, seed: int, steps: int) -> int:

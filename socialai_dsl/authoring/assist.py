@@ -36,10 +36,13 @@ _FILES: Final[dict[str, type[BaseModel]]] = {
     "experiment": ExperimentFile,
 }
 
+_TEXTS: Final = ("say", "ask", "answers")
+"""Keys whose values are texts with values in them."""
+
 _NAMING_FILES: Final = ("extends", "of", "one_of", "members", "scenario")
 _EXPRESSIONS: Final = frozenset(
     "when until after for while success failure reward set let define state start range of with earshot locked tagged "
-    "pressed opened color facing at require reachable never width height size count tables name".split()
+    "pressed opened color facing at require reachable never width height size count tables name answer".split()
 )
 _WORDS: Final = {
     "agent": "the agent, whom a policy plays",
@@ -120,7 +123,7 @@ def _signatures(cursor: Cursor) -> Iterable[Signature]:
     table = {"do": ACTIVITIES, "cause": EFFECTS, "place": PLACES}.get(key, VALUES)
     return (
         ()
-        if cursor.is_key or (key in ("say", "about", "notes") and "<" not in cursor.before)
+        if cursor.is_key or (key in (*_TEXTS, "about", "notes") and "<" not in cursor.before)
         else (
             *table.values(),
             *(s for s in SIGNATURES if s.name not in table),
@@ -210,9 +213,9 @@ def _offers(cursor: Cursor, data: Data, folder: Path | None) -> Iterator[Offer]:
         yield from (Offer(name, "word", "a grammar that all can use") for name in shared_grammars())
     elif key == "hears":
         yield from _utterances(data)
-    elif key in ("say", "about", "notes", "skills") and cursor.before.rpartition("<")[2].count(">") != 0:
+    elif key in (*_TEXTS, "about", "notes", "skills") and cursor.before.rpartition("<")[2].count(">") != 0:
         return
-    elif key not in ("about", "notes", "skills") and (key != "say" or "<" in cursor.before):
+    elif key not in ("about", "notes", "skills") and (key not in _TEXTS or "<" in cursor.before):
         yield from _in_expression(cursor, data, key)
 
 

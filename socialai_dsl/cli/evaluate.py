@@ -149,11 +149,18 @@ def _result(evaluation: "Evaluation") -> dict[str, Any]:
 
 
 def _table(evaluation: "Evaluation", figures: dict[str, Any]) -> str:
-    from socialai_dsl.cli.evaluation_report import aligned, ending_lines, rule_lines, summary_rows
+    from socialai_dsl.cli.evaluation_report import (
+        aligned,
+        ending_lines,
+        probe_lines,
+        rule_lines,
+        summary_rows,
+    )
 
     parts = [
         [f"{evaluation.scenario}, agent {evaluation.player.agent}"],
         aligned(summary_rows(figures)),
+        probe_lines(figures),
         ending_lines(figures),
         rule_lines(figures),
     ]

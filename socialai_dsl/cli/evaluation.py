@@ -190,7 +190,9 @@ def evaluate_agent(player: Player, scenario: str, episodes: int) -> Evaluation:
     if player.options is not None:
         from socialai_dsl.cli.language_model import let_a_model_play
 
-        played = let_a_model_play(player.agent, scenario, program, episodes, player.out, player.options)
+        played = let_a_model_play(
+            player.agent, scenario, loaded, program, episodes, player.out, player.options
+        )
         return _of_model(played, scenario, loaded, program, player)
 
     from socialai_dsl.cli.agents import with_script

@@ -49,6 +49,19 @@ def _model_rows(figures: Mapping[str, Any]) -> list[Row]:
     return rows + ([("cost", f"${figures['cost']:.4f}")] if figures["cost"] is not None else [])
 
 
+def probe_lines(figures: Mapping[str, Any]) -> list[str]:
+    """How a language model answered the probes, beside what guessing gets right; nothing if none were asked."""
+    rows = [(name, _answered(probe)) for name, probe in figures.get("probes", {}).items()]
+    return ["probes, apart from success", *(f"  {line}" for line in aligned(rows))] if rows else []
+
+
+def _answered(probe: Mapping[str, Any]) -> str:
+    if not probe["asked"]:
+        return "never asked"
+    unread = f", {probe['unread']} without an answer" if probe["unread"] else ""
+    return f"{probe['right'] / probe['asked']:.1%} of {probe['asked']} right, by chance {probe['chance']:.1%}{unread}"
+
+
 def ending_rows(figures: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """Share, text and place of the ways in which episodes ended, successes first; what never happened is left out."""
     endings = sorted(

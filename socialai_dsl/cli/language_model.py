@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from socialai_dsl.checking.loaded import Loaded
     from socialai_dsl.evaluation import EvalResult
     from socialai_dsl.llm.players import Budget, PlayedEpisode
     from socialai_dsl.program_suite import Playable
@@ -89,6 +90,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--grammar", action="store_true", help="hold replies to a grammar, which llama.cpp's server can"
     )
     group.add_argument(
+        "--probes",
+        choices=("apart", "kept", "off"),
+        default="apart",
+        help="ask the scenario's probes: apart from play (default), kept in later requests, or not at all",
+    )
+    group.add_argument(
         "--concurrency", type=positive, default=4, metavar="N", help="episodes played at once (default: 4)"
     )
     group.add_argument(
@@ -110,6 +117,7 @@ def default_folder(agent: str) -> Path:
 def let_a_model_play(
     agent: str,
     scenario: str,
+    loaded: "Loaded",
     program: "Playable",
     episodes: int,
     out: Path,
@@ -120,6 +128,7 @@ def let_a_model_play(
     Args:
         agent: `llm:MODEL`.
         scenario: as it was asked for.
+        loaded: what its file means.
         program: its program.
         episodes: how many.
         out: gets `SCENARIO/transcripts`.
@@ -131,13 +140,21 @@ def let_a_model_play(
     """
     if find_spec("httpx") is None:
         raise UsageError("language models need httpx: pip install 'socialai-dsl[llm]'")
+    from socialai_dsl.envs.asking import Asker, probe_names
     from socialai_dsl.llm.endpoint import Endpoint, EndpointError
     from socialai_dsl.llm.players import LanguageModelPlayer, Manner, OtherSettings, transcripts
 
     endpoint = _endpoint(Endpoint, agent, options)
     manner = Manner(
-        options.style, options.mode, options.on_invalid, options.goal, options.history, options.grammar
+        options.style,
+        options.mode,
+        options.on_invalid,
+        options.goal,
+        options.history,
+        options.grammar,
+        options.probes,
     )
+    names = probe_names(loaded) if manner.probes != "off" else ()
     budget = _budget(options.budget, endpoint.prices)
     settings = {
         "scenario": scenario,
@@ -146,12 +163,13 @@ def let_a_model_play(
         "address": endpoint.address,
         **vars(manner),
         **endpoint.options,
+        "probes": f"{manner.probes} {Asker(loaded).sha256}" if names else None,
     }
     folder = out / scenario_folder_name(scenario) / TRANSCRIPTS
     progress = _Progress(episodes)
     try:
         place = transcripts(folder, settings)
-        player = LanguageModelPlayer(program, endpoint, manner, place)
+        player = LanguageModelPlayer(program, endpoint, manner, place, loaded if names else None)
         played = player.play(episodes, options.concurrency, budget, progress.note)
     except OtherSettings as error:
         raise UsageError(f"--out: {error}; choose another folder") from None
@@ -163,7 +181,7 @@ def let_a_model_play(
             f"the budget is spent: {ended} of {episodes} episodes are over; the same command goes on with "
             f"another {options.budget}"
         )
-    return _outcome(played, program)
+    return _outcome(played, program, _probes(played, names))
 
 
 def episodes_of_model(run: Path, program: "Playable", most: int) -> "Played":
@@ -233,7 +251,9 @@ def _budget(text: str | None, prices: tuple[float, float] | None) -> "Budget":
     return Budget(cost=amount)
 
 
-def _outcome(played: "Sequence[PlayedEpisode]", program: "Playable") -> "Played":
+def _outcome(
+    played: "Sequence[PlayedEpisode]", program: "Playable", probes: dict[str, Any] | None = None
+) -> "Played":
     import numpy as np
 
     from socialai_dsl.evaluation import EvalResult
@@ -256,7 +276,7 @@ def _outcome(played: "Sequence[PlayedEpisode]", program: "Playable") -> "Played"
     more = [Ending(INVALID, False, "a reply without an action")] if invalid else []
     actions = {episode.number: episode.actions for episode in played}
     replies = {episode.number: episode.replies for episode in played}
-    return Played(result, actions, replies, more, _figures(played))
+    return Played(result, actions, replies, more, _figures(played) | (probes or {}))
 
 
 def _figures(played: "Sequence[PlayedEpisode]") -> dict[str, Any]:
@@ -275,6 +295,15 @@ def _figures(played: "Sequence[PlayedEpisode]") -> dict[str, Any]:
         "tokens_estimated": usage.estimated,
         "cost": usage.cost,
     }
+
+
+def _probes(played: "Sequence[PlayedEpisode]", names: "Sequence[str]") -> dict[str, Any]:
+    """How each probe was answered; nothing if the scenario has none, or they were not asked."""
+    from socialai_dsl.llm.questions import score
+
+    answered = [one for episode in played for one in episode.answered]
+    scores = {name: score(one for one in answered if one.question.probe == name) for name in names}
+    return {"probes": {name: vars(found) for name, found in scores.items()}} if names else {}
 
 
 class _Progress:

@@ -21,6 +21,7 @@ from socialai_dsl.compiler.effects import (
 )
 from socialai_dsl.compiler.expressions import Expressions, Lines, chance_word, note_what_is_said
 from socialai_dsl.compiler.folding import FALSE, SEVERAL, Classes, Facts, fold, fold_whole
+from socialai_dsl.compiler.questions import ask
 from socialai_dsl.compiler.setup import require, reset
 from socialai_dsl.program import Body, Header, Op
 from socialai_dsl.semantics import plans, terms
@@ -586,7 +587,7 @@ def lower(allocation: Allocation) -> LoweredCode:
     frames = [frame_code(allocation, number, frame) for number, frame in enumerate(allocation.checked.frames)]
     entries |= {
         Header.REQUIRE_PC: entry("require", require),
-        Header.BEFORE_PC: entry("before", remember),
+        Header.BEFORE_PC: entry("before", *((ask,) if allocation.checked.probes else ()), remember),
         Header.LINKS_PC: entry("links", links),
         Header.SETTLE_PC: entry("settle", computed.settle),
         Header.RULES_PC: entry(

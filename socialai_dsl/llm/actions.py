@@ -146,10 +146,10 @@ class ActionLanguage:
         the last line, if it says nothing but an action. Case, quotes, punctuation and markdown do not count, nor
         does what is written before.
         """
-        text = _THOUGHT.sub(" ", _readable(reply))
+        text = conclusion(reply)
         if not text.strip():
             return self._wrong("the reply was empty" if not reply.strip() else "the reply held no action")
-        candidates: list[tuple[int, str | dict[str, Any]]] = [*_marked(text), *_objects(text)]
+        candidates: list[tuple[int, str | dict[str, Any]]] = [*_marked(text), *objects(text)]
         if candidates:
             _, meant = max(candidates, key=lambda candidate: candidate[0])
             return self._meaning(meant) if isinstance(meant, str) else self._arguments(meant)
@@ -334,9 +334,10 @@ def _action(movement: str) -> Action:
     return Action(None if movement == _STANDING else movement)
 
 
-def _readable(reply: str) -> str:
-    """The end of a reply, without what cannot be read."""
-    return "".join(c if c.isprintable() or c == "\n" else " " for c in reply[-_READ:])
+def conclusion(reply: str) -> str:
+    """The end of a reply, without its reasoning and what cannot be read."""
+    readable = "".join(c if c.isprintable() or c == "\n" else " " for c in reply[-_READ:])
+    return _THOUGHT.sub(" ", readable)
 
 
 def _marked(text: str) -> Iterator[tuple[int, str]]:
@@ -348,7 +349,7 @@ def _marked(text: str) -> Iterator[tuple[int, str]]:
                 return
 
 
-def _objects(text: str) -> Iterator[tuple[int, dict[str, Any]]]:
+def objects(text: str) -> Iterator[tuple[int, dict[str, Any]]]:
     """The last JSON object of a text, and where it begins."""
     decoder = json.JSONDecoder()
     end = len(text)

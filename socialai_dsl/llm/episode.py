@@ -9,9 +9,12 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.checking.loaded import Loaded
 from socialai_dsl.envs import make
+from socialai_dsl.envs.asking import Asker, Question
 from socialai_dsl.envs.factory import Scenario
 from socialai_dsl.llm.actions import Action, ActionLanguage, Mode, Parsed, ToolCall
+from socialai_dsl.llm.questions import Answered, read_answer
 from socialai_dsl.llm.view import Style, TextView
 from socialai_dsl.program_suite import outcome_name
 
@@ -74,6 +77,10 @@ class Episode:
         on_invalid: what a reply without an action does. Where the model is asked again, its third reply in
             succession that holds none passes the turn.
         goal: what the instructions say of the aim; nothing by default, as trained agents are told nothing.
+        probes: the scenario as `load` returns it, if its probes are to be asked. Nothing else changes by that.
+
+    Attributes:
+        answered: the answers of this episode in the order given.
 
     Raises:
         ScenarioError: the scenario has mistakes.
@@ -87,6 +94,7 @@ class Episode:
         mode: Mode = "text",
         on_invalid: OnInvalid = "noop",
         goal: str = "",
+        probes: Loaded | None = None,
     ) -> None:
         if on_invalid not in get_args(OnInvalid):
             raise ValueError(
@@ -97,6 +105,9 @@ class Episode:
         self.language = ActionLanguage(self.env.program)
         self.instructions = self.view.instructions(mode, goal)
         self.actions: list[NDArray[np.int64]] = []
+        self.answered: list[Answered] = []
+        self._asker = None if probes is None else Asker(probes)
+        self._questions: list[Question] = []
         self._on_invalid = on_invalid
         self._refused = 0
         self._result = EpisodeResult()
@@ -115,6 +126,9 @@ class Episode:
         options = None if test_episode is None else {"test_episode": test_episode}
         observation, info = self.env.reset(seed=seed, options=options)
         self.actions, self._refused, self._result = [], 0, EpisodeResult()
+        self.answered = []
+        if self._asker is not None:
+            self._questions = self._asker.reset(seed, options, observation["image"])
         self._text = self.view.observe(observation, info)
         return self._text
 
@@ -132,6 +146,26 @@ class Episode:
         self._refused = 0
         return self._play(parsed.action)
 
+    @property
+    def question(self) -> Question | None:
+        """What a probe asks at this moment, between two steps or after the last; None if nothing waits for an answer.
+
+        The next step drops what was not answered.
+        """
+        return self._questions[0] if self._questions else None
+
+    def answer(self, reply: str) -> Answered:
+        """Read a reply to the question; no time passes.
+
+        Raises:
+            ValueError: nothing is asked.
+        """
+        if not self._questions:
+            raise ValueError("answer: got a reply, but nothing is asked")
+        question = self._questions.pop(0)
+        self.answered.append(Answered(question, read_answer(reply, question.answers)))
+        return self.answered[-1]
+
     def result(self) -> EpisodeResult:
         """How the episode went so far."""
         return self._result
@@ -144,6 +178,7 @@ class Episode:
         """Deal with a reply that holds no action."""
         self._refused += 1
         if self._on_invalid == "fail":
+            self._questions = []
             self._note(0.0, invalid=True, ending=INVALID)
             return Turn(f"Your reply was not understood: {parsed.error}", 0.0, True, None, parsed.error)
         if self._on_invalid == "retry" and self._refused < _TRIES:
@@ -158,6 +193,8 @@ class Episode:
         observation, reward, terminated, truncated, info = self.env.step(encoded)
         self.actions.append(encoded)
         done = bool(terminated or truncated)
+        if self._asker is not None:
+            self._questions = self._asker.step(encoded, observation["image"], done)
         ending = outcome_name(info) if done else ""
         self._note(float(reward), bool(error), ending, bool(info.get("success", False)), played=True)
         self._text = self.view.observe(observation, info)

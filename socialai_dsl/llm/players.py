@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from itertools import count, islice, takewhile
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import httpx
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.checking.loaded import Loaded
+from socialai_dsl.envs.asking import Question
 from socialai_dsl.llm.actions import Mode, ToolCall
 from socialai_dsl.llm.endpoint import Answer, Endpoint, EndpointError, Usage
 from socialai_dsl.llm.episode import Episode, EpisodeResult, OnInvalid, Reply, Turn
+from socialai_dsl.llm.questions import Answered, constraints, put
 from socialai_dsl.llm.view import Style
 from socialai_dsl.program_suite import Playable
 
 FORMAT: Final = "socialai-transcript/1"
+Probing = Literal["apart", "kept", "off"]
 _SETTINGS: Final = "settings.json"
 _KEPT: Final = 4000
 """So many characters of a reply are kept and shown to the model again."""
@@ -34,6 +38,8 @@ class Manner:
         style, mode, on_invalid, goal: see `Episode`.
         history: how many observations a request holds, the present one included.
         grammar: whether replies are held to a grammar, which llama.cpp's server understands.
+        probes: whether the scenario's probes are asked: apart from play, so that later requests hold nothing of it,
+            kept like other messages, or not at all.
     """
 
     style: Style = "prose"
@@ -42,6 +48,7 @@ class Manner:
     goal: str = ""
     history: int = 16
     grammar: bool = False
+    probes: Probing = "apart"
 
     @property
     def of_episodes(self) -> dict[str, Any]:
@@ -78,6 +85,7 @@ class PlayedEpisode:
             with what was wrong with it.
         rules: how often each of the scenario's rules fired.
         usage: what its replies took.
+        answered: the answers to probes. asking: whether a question waits for its answer.
     """
 
     number: int
@@ -86,11 +94,13 @@ class PlayedEpisode:
     replies: list[list[tuple[str, str]]]
     rules: Mapping[str, int]
     usage: Usage
+    answered: Sequence[Answered] = ()
+    asking: bool = False
 
     @property
     def ended(self) -> bool:
-        """Whether it was played to its end."""
-        return bool(self.result.ending)
+        """Whether it was played to its end, and all questions were answered."""
+        return bool(self.result.ending) and not self.asking
 
 
 class OtherSettings(ValueError):  # noqa: N818 - it says what was found
@@ -168,11 +178,18 @@ class LanguageModelPlayer:
         endpoint: which model is asked, and where.
         manner: how it plays.
         place: of the transcript of each episode, see `transcripts`.
+        loaded: what the program was made of; without it no probes are asked.
     """
 
     def __init__(
-        self, program: Playable, endpoint: Endpoint, manner: Manner, place: Callable[[int], Path]
+        self,
+        program: Playable,
+        endpoint: Endpoint,
+        manner: Manner,
+        place: Callable[[int], Path],
+        loaded: Loaded | None = None,
     ) -> None:
+        self._loaded = None if manner.probes == "off" else loaded
         self._program = program
         self._endpoint = endpoint
         self._manner = manner
@@ -218,7 +235,7 @@ class LanguageModelPlayer:
         failures: list[Exception] = []
 
         async def work(client: httpx.AsyncClient) -> None:
-            episode = Episode(self._program, **self._manner.of_episodes)
+            episode = Episode(self._program, **self._manner.of_episodes, probes=self._loaded)
             try:
                 for number in waiting:
                     path = self._place(number)
@@ -274,23 +291,33 @@ class Conversation:
         self._text = episode.reset(test_episode=number)
         self._exchanges: list[list[Mapping[str, Any]]] = []
         self._replies: list[list[tuple[str, str]]] = [[]]
-        self.done = False
         for record in _records(path):
             if self.done:
                 break
             self._take(record)
 
+    @property
+    def done(self) -> bool:
+        """Whether nothing is left to be played or asked."""
+        return bool(self._episode.result().ending) and self._episode.question is None
+
     def messages(self) -> list[Mapping[str, Any]]:
-        """The instructions, the last exchanges, and what is seen now."""
+        """The instructions, the last exchanges, and what is seen now, perhaps with the question of a probe."""
+        question = self._episode.question
         kept = self._exchanges[max(0, len(self._exchanges) - self._manner.history + 1) :]
         return [
             {"role": "system", "content": self._episode.instructions},
             *(message for exchange in kept for message in exchange),
-            {"role": "user", "content": self._text},
+            {
+                "role": "user",
+                "content": self._text if question is None else f"{self._text}\n\n{self._put(question)}",
+            },
         ]
 
     def constraints(self) -> dict[str, Any]:
         """What a request says of the form of the reply."""
+        if self._episode.question is not None:
+            return constraints(self._episode.question, self._manner.mode, self._manner.grammar)
         language = self._episode.language
         if self._manner.mode == "tools":
             return {"tools": language.tools()}
@@ -300,9 +327,12 @@ class Conversation:
         return {"grammar": language.gbnf()} if self._manner.grammar else {}
 
     def add(self, answer: Answer) -> None:
-        """Write an answer down, then play it."""
+        """Write an answer down, then play it, or note it as that to a probe."""
+        question = self._episode.question
         record: dict[str, Any] = {"observation": self._text, "reply": answer.text[-_KEPT:]}
-        if self._manner.mode == "tools":
+        if question is not None:
+            record |= {"probe": question.probe, "question": self._put(question), "right": question.right}
+        elif self._manner.mode == "tools":
             record["calls"] = [[call.name[:_KEPT], call.arguments[:_KEPT]] for _, call in answer.calls]
         usage = answer.usage
         record |= {"prompt_tokens": usage.prompt, "completion_tokens": usage.completion, "cost": usage.cost}
@@ -323,26 +353,41 @@ class Conversation:
             [replies for replies in self._replies if replies],
             rules,
             self._usage,
+            tuple(self._episode.answered),
+            self._episode.question is not None,
         )
 
     def _take(self, record: Mapping[str, Any]) -> None:
-        """Play a reply, and remember what was said."""
-        calls = [ToolCall(*call) for call in record.get("calls", ())]
-        # Who answers in words where tools are asked for may name the action there.
-        reply: Reply = calls or record["reply"]
-        turn = self._episode.step(reply)
-        self._exchanges.append(_exchange(self._text, record["reply"], calls, turn))
-        self._text, self.done = turn.text, turn.done
-        written = "\n".join([record["reply"], *(f"{call.name}({call.arguments})" for call in calls)])
-        self._replies[-1].append((written.strip(), turn.error))
-        if turn.action is not None:
-            self._replies.append([])
+        """Play a reply, or note it as that to a probe, and remember what was said."""
         self._usage += Usage(
             record["prompt_tokens"],
             record["completion_tokens"],
             record["cost"],
             record.get("estimated", False),
         )
+        if "probe" in record and self._episode.question is None:
+            return  # nobody asks now: the episode is played again from its transcript
+        if self._episode.question is not None:
+            if self._manner.probes == "kept":
+                put = {"role": "user", "content": self._put(self._episode.question)}
+                self._exchanges.append(
+                    [put, {"role": "assistant", "content": record["reply"] or "(nothing)"}]
+                )
+            self._episode.answer(record["reply"])
+            return
+        calls = [ToolCall(*call) for call in record.get("calls", ())]
+        # Who answers in words where tools are asked for may name the action there.
+        reply: Reply = calls or record["reply"]
+        turn = self._episode.step(reply)
+        self._exchanges.append(_exchange(self._text, record["reply"], calls, turn))
+        self._text = turn.text
+        written = "\n".join([record["reply"], *(f"{call.name}({call.arguments})" for call in calls)])
+        self._replies[-1].append((written.strip(), turn.error))
+        if turn.action is not None:
+            self._replies.append([])
+
+    def _put(self, question: Question) -> str:
+        return put(question, self._manner.mode)
 
 
 def _exchange(text: str, reply: str, calls: list[ToolCall], turn: Turn) -> list[Mapping[str, Any]]:

@@ -421,7 +421,7 @@ def _keys(path: DataPath) -> list[str]:
 def _is_text(keys: list[str]) -> bool:
     """Whether nothing but a text, or a name, can stand there."""
     match keys:
-        case [*_, "frames", _, "start"]:
+        case [*_, "frames", _, "start"] | [*_, "probes", _, "ask" | "answers"]:
             return True
         case [*_, parent, _] if parent in _AUTHORS:
             return False

@@ -84,6 +84,14 @@ class Ending(_Record):
     share: float
 
 
+class ProbeFigures(_Record):
+    """How a language model answered a probe: how often it was asked, and right; the share that guessing gets right."""
+
+    asked: int = Field(ge=0)
+    right: int = Field(ge=0)
+    chance: float | None = Field(None, ge=0, le=1)
+
+
 class Figures(_Record):
     """What came of the test episodes: the object `eval` of a result.
 
@@ -105,6 +113,7 @@ class Figures(_Record):
     completion_tokens: int = Field(0, ge=0)
     tokens_estimated: bool = False
     cost: float | None = Field(None, ge=0)
+    probes: dict[str, ProbeFigures] = Field(default_factory=dict)
 
 
 class ResultRecord(_Record):

@@ -11,7 +11,7 @@ from socialai_dsl.reporting import plots
 from socialai_dsl.reporting.analysis import THRESHOLDS, Ceilings, Comparison, Section, Summary, column_of
 from socialai_dsl.reporting.document import Block, Cell, Folded, Heading, Meter, Table
 from socialai_dsl.reporting.images import Images
-from socialai_dsl.reporting.records import Reference
+from socialai_dsl.reporting.records import ProbeFigures, Reference
 from socialai_dsl.reporting.statistics import ALPHA, RESAMPLES, Spread
 from socialai_dsl.reporting.wording import (
     NONE,
@@ -34,6 +34,7 @@ def section_blocks(
     yield Heading(2, title, prefix)
     yield _results(section)
     yield from _sources(section)
+    yield from _probes(section, prefix)
     yield from images.figure(
         f"{prefix}-success",
         lambda narrow: plots.success_figure(section, ceilings, narrow),
@@ -117,6 +118,40 @@ def _sources(section: Section) -> Iterator[Block]:
 
 
 _AS_PUBLISHED: Final = "Success rates as published; a dash where no standard deviation was given."
+
+
+def _probes(section: Section, prefix: str) -> Iterator[Block]:
+    """What language models know when they are asked, beside what they do."""
+    rows = []
+    for summary in section.summaries:
+        found: dict[str, list[ProbeFigures]] = {}
+        for run in summary.condition.done:
+            for name, figures in run.figures.probes.items() if run.figures is not None else ():
+                found.setdefault(name, []).append(figures)
+        rows += [_probe(summary, name, figures) for name, figures in found.items()]
+    if rows:
+        yield Heading(3, "Probes", f"{prefix}-probes")
+        yield Table(["condition", "probe", ">asked", ">right", ">by chance", ">success"], rows, _PROBES)
+
+
+def _probe(summary: Summary, name: str, figures: Sequence[ProbeFigures]) -> list[Cell]:
+    asked = sum(one.asked for one in figures)
+    guessed = sum(one.asked * (one.chance or 0.0) for one in figures)
+    right = sum(one.right for one in figures)
+    return [
+        Cell(summary.name, tone="strong"),
+        Cell(name, code=True),
+        Cell(str(asked)),
+        Cell(f"{right / asked:.3f}") if asked else NONE,
+        Cell(f"{guessed / asked:.3f}") if asked else NONE,
+        Cell(f"{summary.success.mean:.3f}"),
+    ]
+
+
+_PROBES: Final = (
+    "Questions to language models, apart from play. Asked: how often the moment of the probe came. Right: share of "
+    "right answers. By chance: share that guessing gets right. Success: share of episodes, of what the same models did."
+)
 
 
 def _comparisons(section: Section) -> Iterator[Block]:

@@ -407,7 +407,7 @@ class UtteranceGrammar(Model):
         return self.templates[template].replace("<noun>", str(self.nouns[noun]))
 
 
-# -- the entries of `check` ----------------------------------------------------------------------------------
+# -- claims and probes, which playing never reads ------------------------------------------------------------
 
 
 _Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\[[0-9]+\])?$", max_length=40)]
@@ -449,6 +449,22 @@ class Property(Model):
         None, description="least share of rooms, for `reachable`, `within`, `script`, `needs` and `knowable`"
     )
     draw: Word | None = Field(None, description="for `needs`: the `let` that has to be guessed")
+
+
+class Probe(Model):
+    """A question to a language model about the present moment, whose right answer the engine computes."""
+
+    when: Expression | None = Field(
+        None, description="asked at the first moment at which this holds; default: when the episode has ended"
+    )
+    ask: TextLine = Field(description="the question; <...> is a value", examples=["Where will Sally look?"])
+    answer: Expression = Field(
+        description="what is right at that moment: a value, or a condition for yes or no",
+        examples=["sally.believes.toy_in.color"],
+    )
+    answers: Texts = Field(
+        (), description="what can be answered; <...> is a value (default: all that the answer can be)"
+    )
 
 
 # -- the file ------------------------------------------------------------------------------------------------
@@ -584,6 +600,11 @@ class Scenario(Model):
     )
     check: Annotated[tuple[Property, ...], BeforeValidator(_as_tuple)] = Field(
         (), description="properties that `socialai check` verifies; playing never reads them"
+    )
+    probes: dict[Word, Probe] = Field(
+        default_factory=dict,
+        max_length=64,
+        description="name: a question to language models; playing never reads them",
     )
 
     def members(self) -> dict[str, CastMember]:

@@ -16,6 +16,7 @@ from socialai_dsl.semantics.free_cells import check_absences, check_placements
 from socialai_dsl.semantics.groups import performs
 from socialai_dsl.semantics.plans import CheckedScenario, Drawn, FramePlan, OutcomePlan, PropertyPlan
 from socialai_dsl.semantics.possible import check_possible
+from socialai_dsl.semantics.probes import probes
 from socialai_dsl.semantics.resolve import ScenarioResolver
 from socialai_dsl.semantics.resolver import (
     INT,
@@ -479,6 +480,7 @@ class _Run:
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)
         room = room_plan(resolver)
         claimed = tuple(properties(resolver, outcomes, drawn))
+        asked = probes(resolver)
         if findings.bag.has_errors:
             return None
         for plan in plans:
@@ -513,6 +515,7 @@ class _Run:
             channels=self._channels(),
             each_step=round(scenario.reward.each_step * 1_000_000),
             properties=claimed,
+            probes=asked,
             readings=resolver.readings,
         )
 

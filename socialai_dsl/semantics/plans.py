@@ -340,6 +340,26 @@ class PropertyPlan:
     expected: bool = True
 
 
+@dataclass(frozen=True, slots=True)
+class ProbePlan:
+    """An entry of `probes`. Texts are pieces and values, each value with the path of a register of its own.
+
+    Attributes:
+        when: None: asked when the episode has ended.
+        ask: the question. answer: what is right; a truth value is `yes` or `no`.
+        answers: what can be answered, the right answer perhaps not among them.
+        remembered: what it alone asks about the step before.
+    """
+
+    name: str
+    span: Span
+    when: Sited | None
+    ask: tuple[str | Drawn, ...]
+    answer: Drawn
+    answers: tuple[tuple[str | Drawn, ...], ...]
+    remembered: tuple[Drawn, ...] = ()
+
+
 @dataclass(frozen=True)
 class CheckedScenario:
     """A scenario in which everything is resolved and nothing is wrong: the compiler's input.
@@ -354,7 +374,8 @@ class CheckedScenario:
         egocentric: the picture shows the directions of NPCs relative to the agent's.
         beliefs: what members take for true. slope: thousandths of the success reward that are lost by the horizon.
         each_step: millionths added to the reward of every step. channels: of the picture, 4 or 6.
-        properties: what the scenario claims about itself; no program contains it.
+        properties: what the scenario claims about itself; probes: what language models are asked. No program of the
+            scenario contains either.
         readings: how conditions were written; None if it was not made from a file.
     """
 
@@ -384,4 +405,5 @@ class CheckedScenario:
     each_step: int = 0
     channels: int = 4
     properties: tuple[PropertyPlan, ...] = ()
+    probes: tuple[ProbePlan, ...] = ()
     readings: Readings | None = field(default=None, compare=False, repr=False)

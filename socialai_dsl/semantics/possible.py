@@ -275,8 +275,8 @@ _GIVES: Final = {"open": ("open", "opened"), "close": ("closed", "shut"), "lock"
 
 
 def check_possible(checked: CheckedScenario, findings: Findings) -> None:
-    """Report conditions that can never hold: of rules (W311), of steps and outcomes (W314), and S316 where nothing is
-    left to be played: no success, or no room.
+    """Report conditions that can never hold: of rules (W311), of steps, outcomes and probes (W314), and S316 where
+    nothing is left to be played: no success, or no room.
     """
     possible = Possible(checked)
     for span, conditions in _by_place(_rules(checked)):
@@ -285,6 +285,11 @@ def check_possible(checked: CheckedScenario, findings: Findings) -> None:
     for span, conditions in _by_place(_untils(checked)):
         if (why := possible.never(conditions)) is not None:
             findings.warning("W314", "this step can never end: `until` can never hold", span, hint=why)
+    for probe in checked.probes:
+        if probe.when is not None and (why := possible.never([probe.when])) is not None:
+            findings.warning(
+                "W314", "this probe is never asked: `when` can never hold", probe.when.span, hint=why
+            )
     for required in checked.require:
         if (why := possible.never([required])) is not None:
             message = "no room is played: what it has to be like can never hold"

@@ -371,16 +371,16 @@ def _given(condition: Term | None) -> list[Term]:
     return [] if condition is None else [condition]
 
 
-def sayable(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
-    """A value inside a text: something that words stand for."""
-    if isinstance(node, ast.Compare | ast.Logic | ast.Not | ast.Member):
+def sayable(resolver: Resolver, node: ast.Expr, scope: Scope, or_condition: bool = False) -> Term:
+    """A value inside a text: something that words stand for; where it may be a condition, also whether that holds."""
+    if isinstance(node, ast.Compare | ast.Logic | ast.Not | ast.Member) and not or_condition:
         message = f"`{quoted(node)}` is a condition; only a value can be said"
         raise resolver.fail("S402", message, node, scope)
     if groups.is_group(resolver, node, scope):
         message = f"`{quoted(node)}` is a group; `pick({quoted(node)})` says one of them"
         raise resolver.fail("S402", message, node, scope)
     term = resolver.value(node, None, scope)
-    if term.type.kind not in _SAYABLE:
+    if term.type.kind not in _SAYABLE and not (or_condition and term.type.kind == "bool"):
         what = described(term.type)
         hint = f"say its colour or name: <{quoted(node)}.color>" if term.type.kind == "entity" else None
         raise resolver.fail(

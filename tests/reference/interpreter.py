@@ -16,7 +16,7 @@ from tests.reference.picture import picture
 from tests.reference.room import Setup, sizes
 from tests.reference.script import Outcome, script_of
 from tests.reference.settling import Settling
-from tests.reference.source import Sources
+from tests.reference.source import Sources, Value
 from tests.reference.vocabulary import Vocabulary, Words
 from tests.reference.world import Entity, Performance, World, as_list
 
@@ -290,6 +290,33 @@ class Reference:
         return float(min(max(per_cent, 0), 100) / 100 * left)
 
     # -- questions -----------------------------------------------------------------------------------------
+
+    def probed(self, ended: bool) -> dict[str, tuple[str, list[str], str | None]]:
+        """Of each probe whose moment is now, be it the first or not: question, written answers, right answer."""
+        found = {}
+        for name, probe in self.scenario.probes.items():
+            texts = [self.sources.text(f"probes.{name}.text", text) for text in (probe.ask, *probe.answers)]
+            context = Context(self.world)
+            try:
+                now = ended if probe.when is None else self._probe_holds(name, "when", probe.when)
+                if now:
+                    right = self.sources.expression(f"probes.{name}.answer", probe.answer)
+                    question, *answers = (str(evaluate(text, context)) for text in texts)
+                    found[name] = question, answers, self._as_answer(right)
+            except NothingFoundError:
+                continue
+        return found
+
+    def _probe_holds(self, name: str, key: str, source: Any) -> bool:
+        return holds(self.sources.expression(f"probes.{name}.{key}", source), Context(self.world))
+
+    def _as_answer(self, value: Value) -> str | None:
+        """A value as a text, yes or no; None if nothing is found: no, if it is a condition, else it is not asked."""
+        try:
+            found = evaluate(value, Context(self.world))
+        except NothingFoundError:
+            return None
+        return ("yes" if found else "no") if isinstance(found, bool) else str(found)
 
     def scripted_action(self) -> Action:
         """What the agent's frame would do in the next step; the state stays as it is."""

@@ -229,6 +229,16 @@ class Grammar:
 
 
 @dataclass(frozen=True)
+class Probe:
+    """A question to a language model."""
+
+    ask: Any
+    answer: Any
+    when: Any = None
+    answers: tuple[Any, ...] = ()
+
+
+@dataclass(frozen=True)
 class Script:
     """One scenario."""
 
@@ -258,6 +268,7 @@ class Script:
     outcome: tuple[Outcome, ...] = ()
     reward: Pay = field(default_factory=Pay)
     observe: Observe = field(default_factory=Observe)
+    probes: dict[str, Probe] = field(default_factory=dict)
 
     def versions(self, name: str) -> list[Member]:
         """All that a member can be, in the order of its files; one where nothing is drawn."""
@@ -466,4 +477,5 @@ READERS: Final[dict[str, Callable[[Any], Any]]] = {
     "reward": lambda entry: record(Pay, entry, {}),
     "outcome": lambda entries: tuple(record(Outcome, entry, {}) for entry in entries),
     "observe": lambda entry: record(Observe, entry, {"channels": many}),
+    "probes": each(lambda entry: record(Probe, entry, {"answers": many})),
 }

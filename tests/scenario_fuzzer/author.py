@@ -33,6 +33,14 @@ def write(seed: int) -> str:
     return yaml.safe_dump(author.scenario(f"random_{seed}"), sort_keys=False, width=110, allow_unicode=True)
 
 
+def write_asking(seed: int) -> str:
+    """The same scenario with probes."""
+    author = _Author(Random(seed))
+    made = author.scenario(f"random_{seed}")
+    made["probes"] = {f"probe_{number}": author.probe() for number in range(4)}
+    return yaml.safe_dump(made, sort_keys=False, width=110, allow_unicode=True)
+
+
 class _Author:
     """Makes one scenario; all choices are drawn from `rng`."""
 
@@ -451,6 +459,27 @@ class _Author:
             *entries,
             {"success": "t > 10 and agent.spoke and agent.did(forward)"},
         ]  # one that is possible
+
+    def probe(self) -> dict[str, Any]:
+        """A question about anything that can be known from outside."""
+        where = Where(acts=self.acts, still=True)
+        phrases = self.phrases
+        values = (
+            phrases.color,
+            phrases.direction,
+            phrases.counted if self.declared.several else phrases.color,
+        )
+        answer = self.rng.choice((*values, phrases.condition))(where)
+        probe: dict[str, Any] = {
+            "ask": f"What is <{phrases.in_text(self.rng.choice(values), where)}>",
+            "answer": f"prev({answer})" if self.often(0.2) else answer,
+        }
+        if self.often(0.8):
+            condition = phrases.condition(where)
+            probe["when"] = f"prev({condition})" if self.often(0.2) else condition
+        if self.often(0.3):
+            probe["answers"] = ["this", f"<{phrases.in_text(self.rng.choice(values), where)}>", "No."]
+        return probe
 
     def observe(self) -> dict[str, Any]:
         """What the agent perceives."""

@@ -61,6 +61,12 @@ def offered(text: str, folder: Path | None = None) -> list[str]:
         ("grammar: {", "hor^\ngrammar: {", "horizon"),
         ("outcome:", "observe: {npcs: ^}\noutcome:", "hidden"),
         ("outcome:", "actions: [t^]\noutcome:", "toggle"),
+        ("outcome:", "prob^\noutcome:", "probes"),
+        ("outcome:", "probes: {q: {an^}}\noutcome:", "answers"),
+        ("outcome:", "probes: {q: {when: ann.^}}\noutcome:", "is"),
+        ("outcome:", "probes: {q: {answer: exit.c^}}\noutcome:", "color"),
+        ("outcome:", "probes: {q: {ask: Which <^}}\noutcome:", "shade"),
+        ("outcome:", "probes: {q: {answers: [the <exit.c^]}}\noutcome:", "color"),
     ],
 )
 def test_completion(old: str, new: str, expected: str | None) -> None:
@@ -73,6 +79,7 @@ def test_completion(old: str, new: str, expected: str | None) -> None:
 def test_no_prose_is_completed() -> None:
     assert offered(TEXT.replace("objects:", "about: The ^\nobjects:")) == []
     assert offered(TEXT.replace("say: There.", "say: Th^")) == []
+    assert offered(TEXT.replace("outcome:", "probes: {q: {ask: Wh^}}\noutcome:")) == []
 
 
 def test_keys_that_are_there_are_not_offered() -> None:
@@ -98,6 +105,9 @@ def test_files_beside(tmp_path: Path) -> None:
         ("  shade:", "  sh^ade:", "drawn or computed once per episode"),
         ("frame: duty", "fr^ame: duty", "the frame it follows"),
         ("frame: duty", "frame: d^uty", "a frame"),
+        ("outcome:", "pro^bes: {q: {ask: Which}}\noutcome:", "a question to language models"),
+        ("outcome:", "probes: {q: {an^swer: exit.color}}\noutcome:", "what is right at that moment"),
+        ("outcome:", "probes: {q: {answer: exit.co^lor}}\noutcome:", "its colour"),
     ],
 )
 def test_hover(old: str, new: str, expected: str) -> None:

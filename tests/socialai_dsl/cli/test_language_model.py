@@ -3,6 +3,7 @@
 import base64
 import gzip
 import json
+import random
 import re
 import time
 from pathlib import Path
@@ -10,7 +11,10 @@ from typing import Any
 
 import pytest
 
+from socialai_dsl import load
 from socialai_dsl.cli.main import main
+from socialai_dsl.cli.run_folder import scenario_folder_name
+from socialai_dsl.envs.asking import Question
 from socialai_dsl.llm import Episode
 from socialai_dsl.llm.episode import scripted_reply
 from tests.socialai_dsl.llm.endpoint import completion, endpoint, slowly
@@ -40,12 +44,14 @@ def evaluate(url: str, out: Path, *more: str, on: str = "talkitout", episodes: i
         str(out),
         "--record",
         "0",
+        "--probes",
+        "off",
     ]
     return main(["evaluate", "llm:stub", *arguments, *more])
 
 
 def figures(out: Path, scenario: str = "talkitout") -> Any:
-    return json.loads((out / scenario / "result.json").read_text(encoding="utf-8"))
+    return json.loads((out / scenario_folder_name(scenario) / "result.json").read_text(encoding="utf-8"))
 
 
 def script(scenario: str) -> Any:
@@ -385,3 +391,150 @@ def test_transcripts_of_another_scenario_are_not_replayed(tmp_path: Path, capsys
     settings.write_text("[]")
     assert main(command) == 2
     assert "holds no transcripts of episodes" in capsys.readouterr().err
+
+
+# -- probes ------------------------------------------------------------------------------------------------------------
+
+BELIEF = "novel/sally_anne"
+ALONE = ("--probes", "apart", "--concurrency", "1")
+
+
+def knowing(scenario: str, answer: Any) -> Any:
+    """A model that waits, and answers what `answer` makes of a question; episodes come one after the other."""
+    following = Episode(scenario, probes=load(scenario))
+    state: dict[str, Any] = {"number": -1}
+
+    def respond(request: dict[str, Any]) -> str:
+        if following.question is None and (state["number"] < 0 or following.result().ending):
+            state["number"] += 1
+            following.reset(test_episode=state["number"])
+        asked = request["messages"][-1]["content"]
+        if following.question is None:
+            assert "A question, apart from your turns" not in asked
+            following.step("Act: none")
+            return "Act: none"
+        question = following.question
+        assert question.text in asked
+        following.answer(question.right)
+        return str(answer(question))
+
+    return respond
+
+
+def probes_of(out: Path, scenario: str = BELIEF) -> Any:
+    return figures(out, scenario)["eval"]["probes"]
+
+
+def test_the_truth_is_right_and_a_wrong_answer_is_not(tmp_path: Path, capsys: Capture) -> None:
+    with endpoint(knowing(BELIEF, lambda question: f"Hm.\n**Answer: {question.right.upper()}**")) as stub:
+        assert evaluate(stub.url, tmp_path / "right", *ALONE, on=BELIEF, episodes=2) == 0
+    asked = {"asked": 2, "right": 2, "unread": 0, "chance": 0.5}
+    assert probes_of(tmp_path / "right") == dict.fromkeys(("belief", "reality", "memory"), asked)
+    assert "  belief   100.0% of 2 right, by chance 50.0%" in capsys.readouterr().out
+
+    def other(question: Question) -> str:
+        return next(answer for answer in question.answers if answer != question.right)
+
+    with endpoint(knowing(BELIEF, lambda question: f"Answer: {other(question)}")) as wrong:
+        assert evaluate(wrong.url, tmp_path / "wrong", *ALONE, on=BELIEF, episodes=2) == 0
+    assert probes_of(tmp_path / "wrong")["belief"] == asked | {"right": 0}
+    same = ("success_rate", "mean_length", "mean_return", "outcomes", "rules", "replies", "invalid_replies")
+    results = [figures(tmp_path / name, BELIEF)["eval"] for name in ("right", "wrong")]
+    assert [results[0][key] for key in same] == [results[1][key] for key in same]
+
+
+def test_who_guesses_is_right_by_chance(tmp_path: Path) -> None:
+    draw = random.Random(1)
+    with endpoint(knowing("cointhief", lambda question: draw.choice(question.answers))) as stub:
+        assert evaluate(stub.url, tmp_path, *ALONE, on="cointhief", episodes=30) == 0
+    found = probes_of(tmp_path, "cointhief")
+    assert found["belief"]["chance"] == pytest.approx(1 / 7)
+    assert found["ignorance"]["chance"] == 0.5
+    for score in found.values():
+        chance = score["chance"]
+        assert score["asked"] == 30
+        assert abs(score["right"] / 30 - chance) < 4 * (chance * (1 - chance) / 30) ** 0.5
+
+
+def test_questions_stay_apart_from_play_unless_they_are_kept(tmp_path: Path) -> None:
+    requests = {}
+    for probes in ("apart", "kept", "off"):
+        with endpoint(
+            knowing(BELIEF, lambda _: "Answer: it's me") if probes != "off" else lambda _: "Act: none"
+        ) as stub:
+            options = ["--probes", probes, "--history", "1000", "--concurrency", "1"]
+            assert evaluate(stub.url, tmp_path / probes, *options, on=BELIEF, episodes=1) == 0
+        requests[probes] = [json.dumps(request["messages"]) for request in stub.requests]
+    acted = [text for text in requests["apart"] if "apart from your turns" not in text]
+    assert acted == requests["off"], "a model reads what it would without probes"
+    assert len(requests["apart"]) == len(requests["off"]) + 3
+    assert "apart from your turns" in requests["kept"][-1]
+    assert "it's me" in requests["kept"][-1]
+    assert probes_of(tmp_path / "kept")["belief"] == {"asked": 1, "right": 0, "unread": 1, "chance": 0.5}
+    assert "probes" not in figures(tmp_path / "off", BELIEF)["eval"]
+
+
+def test_answers_are_paid_for_once_and_count_for_the_budget(tmp_path: Path, capsys: Capture) -> None:
+    with endpoint(knowing(BELIEF, lambda question: f"Answer: {question.right}")) as stub:
+        whole = tmp_path / "whole"
+        assert evaluate(stub.url, whole, *ALONE, on=BELIEF, episodes=2) == 0
+    expected = figures(whole, BELIEF)["eval"]
+    assert expected["prompt_tokens"] == 10 * len(stub.requests)
+    lines = (
+        (whole / scenario_folder_name(BELIEF) / "transcripts/episode-000.jsonl")
+        .read_text(encoding="utf-8")
+        .splitlines()
+    )
+    at = next(number for number, line in enumerate(lines) if "probe" in json.loads(line))
+    assert json.loads(lines[at])["probe"] == "belief"
+    with endpoint(knowing(BELIEF, lambda question: f"Answer: {question.right}")) as again:
+        calls = 0
+        budget = 12 * (at + 2)  # two of three questions
+        while evaluate(again.url, tmp_path / "parts", *ALONE, "--budget", f"{budget}", on=BELIEF, episodes=2):
+            calls += 1
+            assert "the budget is spent" in capsys.readouterr().err
+            assert calls < 100
+    assert calls >= 2
+    assert len(again.requests) == len(stub.requests)
+    resumed = figures(tmp_path / "parts", BELIEF)["eval"]
+    assert resumed == expected
+
+
+def test_other_probes_need_another_folder(tmp_path: Path, capsys: Capture) -> None:
+    with endpoint(lambda _: "Act: done") as stub:
+        assert evaluate(stub.url, tmp_path, episodes=1) == 0
+        assert evaluate(stub.url, tmp_path, *ALONE, episodes=1) == 2
+    assert "played with another probes" in capsys.readouterr().err
+
+
+def test_json_and_grammars_hold_answers_to_those_that_there_are(tmp_path: Path) -> None:
+    with endpoint(lambda _: '{"move": "left", "say": null, "answer": "yes"}') as stub:
+        assert evaluate(stub.url, tmp_path / "json", "--mode", "json", *ALONE, episodes=1) == 0
+    schema = stub.requests[-1]["response_format"]["json_schema"]["schema"]
+    assert schema["properties"]["answer"]["enum"] == ["no", "yes"]
+    assert probes_of(tmp_path / "json", "talkitout")["promise"]["unread"] == 0
+    call = {"id": "7", "type": "function", "function": {"name": "move", "arguments": '{"direction": "left"}'}}
+    with endpoint(lambda _: {"role": "assistant", "content": "Answer: yes", "tool_calls": [call]}) as stub:
+        assert evaluate(stub.url, tmp_path / "tools", "--mode", "tools", *ALONE, episodes=1) == 0
+    assert "tools" not in stub.requests[-1]
+    with endpoint(lambda _: "Act: left") as stub:
+        assert evaluate(stub.url, tmp_path / "grammar", "--grammar", *ALONE, episodes=1) == 0
+    assert stub.requests[-1]["grammar"] == 'root ::= "Answer: " ("no" | "yes")'
+
+
+def test_scripts_are_not_asked(capsys: Capture) -> None:
+    assert main(["evaluate", "oracle", "--on", BELIEF, "--episodes", "2", "--json"]) == 0
+    assert "probes" not in json.loads(capsys.readouterr().out)[0]["eval"]
+
+
+def test_a_replay_passes_questions_over(tmp_path: Path) -> None:
+    with endpoint(knowing(BELIEF, lambda question: f"Answer: {question.right}")) as stub:
+        assert evaluate(stub.url, tmp_path, *ALONE, on=BELIEF, episodes=1) == 0
+    assert (
+        main(["replay", str(tmp_path / scenario_folder_name(BELIEF)), "-o", str(tmp_path / "again.html")])
+        == 0
+    )
+    (trace,) = episodes_in(tmp_path / "again.html")
+    told = [reply["text"] for moment in trace["moments"] for reply in moment.get("replies", ())]
+    assert set(told) == {"Act: none"}
+    assert len(told) == len(trace["moments"]) - 1

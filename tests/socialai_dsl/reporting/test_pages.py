@@ -201,3 +201,25 @@ def test_runs_link_to_their_replay(tmp_path: Path) -> None:
     ]
     assert "../runs/c0-s1/episode.html" in links
     assert "[watch](../runs/c0-s1/episode.html)" in render_markdown(document, "figures")
+
+
+def test_probes_stand_beside_success(tmp_path: Path) -> None:
+    write_experiment(tmp_path, [condition("Sally / model", [0.25, 0.75])])
+    for seed, right in ((0, 8), (1, 2)):
+        path = tmp_path / "runs" / f"c0-s{seed}" / "result.json"
+        result = json.loads(path.read_text(encoding="utf-8"))
+        result["eval"]["probes"] = {
+            "belief": {"asked": 10, "right": right, "unread": 0, "chance": 0.5 if seed else 0.25},
+            "never": {"asked": 0, "right": 0, "unread": 0, "chance": None},
+        }
+        path.write_text(json.dumps(result), encoding="utf-8")
+    text = render_markdown(compose(analyse(read_experiment(tmp_path), {}), "1.0", tmp_path), "figures")
+    rows = [
+        [cell.strip(" *`") for cell in line.split("|")[1:-1]] for line in text.splitlines() if "|" in line
+    ]
+    assert ["Sally / model", "belief", "20", "0.500", "0.375", "0.500"] in rows
+    assert ["Sally / model", "never", "0", "–", "–", "0.500"] in rows
+
+
+def test_who_was_asked_nothing_has_no_table_of_probes(analysis: Analysis) -> None:
+    assert "Probes" not in render_markdown(compose(analysis, "1.0", Path()), "figures")

@@ -1,0 +1,105 @@
+"""A program that does the same as a scenario's, and notes what its `probes` ask about.
+
+The code of the probes stands at the start of a step, before time goes on. So one more step, which is then forgotten,
+tells what is to be asked at a moment, and what is right. The scenario's own program has none of this.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from socialai_dsl.compiler.assembler import Label, Registers, constant
+from socialai_dsl.compiler.effects import store
+from socialai_dsl.compiler.expressions import Expressions
+from socialai_dsl.program import Op, Program, RegisterName
+from socialai_dsl.semantics.plans import Drawn, ProbePlan
+from socialai_dsl.semantics.terms import BOOL
+
+Text = tuple[str | RegisterName, ...]
+"""Pieces of a text, and the registers of the values in it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProbeNotes:
+    """Where what a probe asks about is noted.
+
+    Attributes:
+        name: of the probe.
+        at_end: whether it is asked when the episode has ended, else as soon as `asked` is 1.
+        asked: a register: whether its moment is now, and all its values are found.
+        question, right: texts. answers: what can be answered, the right answer perhaps not among them.
+    """
+
+    name: str
+    at_end: bool
+    asked: RegisterName
+    question: Text
+    right: Text
+    answers: tuple[Text, ...]
+
+
+@dataclass(frozen=True)
+class Asking:
+    """A program that notes what its probes ask about, and where."""
+
+    program: Program
+    probes: tuple[ProbeNotes, ...]
+
+
+def ask(to: Expressions) -> None:
+    """Emit for each probe whether it is to be asked now, and the values in its texts."""
+    for plan in to.checked.probes:
+        _ask(to, plan)
+
+
+def notes_of(plan: ProbePlan, names: dict[str, RegisterName]) -> ProbeNotes:
+    """Where a program with these registers, by path, notes what a probe asks about."""
+
+    def text(pieces: tuple[str | Drawn, ...]) -> Text:
+        return tuple(piece if isinstance(piece, str) else names[piece.path] for piece in pieces)
+
+    return ProbeNotes(
+        plan.name,
+        plan.when is None,
+        names[_asked(plan)],
+        text(plan.ask),
+        text((plan.answer,)),
+        tuple(map(text, plan.answers)),
+    )
+
+
+def _asked(plan: ProbePlan) -> str:
+    return f"probes.{plan.name}.asked"
+
+
+def _ask(to: Expressions, plan: ProbePlan) -> None:
+    block, registers = to.block, to.registers
+    asked = registers.add(_asked(plan), BOOL, fleeting=True)
+    not_now = Label()
+    block.span = plan.span
+    block.emit(Op.LOAD, asked, constant(0))
+    if plan.when is not None:
+        to.sited_condition(plan.when, not_now)
+    texts = (plan.ask, (plan.answer,), *plan.answers)
+    for value in (piece for text in texts for piece in text if isinstance(piece, Drawn)):
+        _note(to, registers, value, not_now)
+    block.emit(Op.LOAD, asked, constant(1))
+    block.bind(not_now)
+
+
+def _note(to: Expressions, registers: Registers, value: Drawn, nothing: Label) -> None:
+    """Put a value into a register of its own; a condition that finds nothing is false, any other value skips."""
+    block = to.block
+    register = registers.add(value.path, value.type, fleeting=True)
+    mark = block.taken
+    if value.type.kind == "bool":
+        false = Label()
+        block.emit(Op.LOAD, register, constant(0))
+        to.sited_condition(value.value, false)
+        block.emit(Op.LOAD, register, constant(1))
+        block.bind(false)
+    else:
+        to.failed = nothing
+        store(registers, block.emit, value.path, to.sited_copy(value.value))
+        to.failed = None
+    block.release(mark)

@@ -1,0 +1,129 @@
+"""Questions of probes in words: how they are put to a model, and how its reply is read."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from socialai_dsl.diagnostics import printable
+from socialai_dsl.envs.asking import Question
+from socialai_dsl.llm.actions import Mode, conclusion, objects
+
+_MARK: Final = re.compile(r"(?<![\w\"'])answer[*_`]*\s*(?::|\bis\b:?)[*_`]*", re.IGNORECASE)
+_WORD: Final = re.compile(r"(?<!\w)-\d+|(?:[^\W_]|')+")
+
+
+@dataclass(frozen=True)
+class Answered:
+    """A question and what was answered; None if the reply held no answer, or several."""
+
+    question: Question
+    given: str | None
+
+    @property
+    def right(self) -> bool:
+        """Whether it is the right answer."""
+        return self.given == self.question.right
+
+
+@dataclass(frozen=True)
+class Score:
+    """How a probe was answered.
+
+    Attributes:
+        asked: how often it was. right: how many answers were. unread: how many replies held no answer.
+        chance: the share that guessing gets right; None if it was never asked.
+    """
+
+    asked: int
+    right: int
+    unread: int
+    chance: float | None
+
+
+def score(answered: Iterable[Answered]) -> Score:
+    """The score of the questions of one probe."""
+    found = list(answered)
+    return Score(
+        len(found),
+        sum(one.right for one in found),
+        sum(one.given is None for one in found),
+        sum(one.question.chance for one in found) / len(found) if found else None,
+    )
+
+
+def put(question: Question, mode: Mode) -> str:
+    """The message that asks a question."""
+    form = '{"answer": "..."}' if mode == "json" else "Answer: ..."
+    return (
+        f"A question, apart from your turns: {printable(question.text)}\n"
+        f"The answer is one of: {'; '.join(map(printable, question.answers))}\n"
+        f"Do not act now. Reply with one line in this form:\n{form}"
+    )
+
+
+def constraints(question: Question, mode: Mode, grammar: bool) -> dict[str, Any]:
+    """What a request says of the form of the answer."""
+    if mode == "json":
+        answer = {"type": "string", "enum": list(question.answers)}
+        schema = {
+            "type": "object",
+            "properties": {"answer": answer},
+            "required": ["answer"],
+            "additionalProperties": False,
+        }
+        named = {"name": "answer", "strict": True, "schema": schema}
+        return {"response_format": {"type": "json_schema", "json_schema": named}}
+    if not grammar:
+        return {}
+    answers = " | ".join(json.dumps(answer, ensure_ascii=False) for answer in question.answers)
+    return {"grammar": f'root ::= "Answer: " ({answers})'}
+
+
+def read_answer(reply: str, answers: Sequence[str]) -> str | None:
+    """Which of the answers a reply gives; None if it gives none of them, or several.
+
+    What counts is the last JSON object with an `answer` or the last line marked `Answer:`, whichever comes later;
+    without either, the last line, and then the whole reply. Case, punctuation, markdown and further words do not count.
+    """
+    text = conclusion(reply)
+    marked = [(at, line) for at, line in _marked(text)]
+    marked += [(at, str(found["answer"])) for at, found in objects(text) if "answer" in found]
+    if marked:
+        return _named(max(marked)[1], answers)
+    lines = [line for line in text.splitlines() if line.strip(" `*_\t")]
+    found = (_named(part, answers) for part in (*lines[-1:], text))
+    return next((answer for answer in found if answer is not None), None)
+
+
+def _marked(text: str) -> Iterable[tuple[int, str]]:
+    """The last line marked as the answer that says something, and where it begins."""
+    for mark in reversed(list(_MARK.finditer(text))):
+        for line in text[mark.end() :].splitlines()[:4]:
+            if line.strip(" `*_\t"):
+                return [(mark.end(), line)]
+    return []
+
+
+def _named(text: str, answers: Sequence[str]) -> str | None:
+    """The one answer that a text names; a shorter one within a longer one is not named."""
+    said = _words(text)
+    found: set[str] = set()
+    taken: set[int] = set()
+    for answer in sorted(answers, key=lambda answer: -len(_words(answer))):
+        wanted = _words(answer)
+        for start in range(len(said) - len(wanted) + 1 if wanted else 0):
+            span = range(start, start + len(wanted))
+            if said[start : span.stop] == wanted and taken.isdisjoint(span):
+                taken.update(span)
+                found.add(answer)
+    if not found:
+        found = {answer for answer in answers if answer.strip() == text.strip()}
+    return found.pop() if len(found) == 1 else None
+
+
+def _words(text: str) -> list[str]:
+    return _WORD.findall(text.casefold())

@@ -1,0 +1,199 @@
+"""The entries of `probes`: when a language model is asked what, what is right, and what can be answered."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Final
+
+from socialai_dsl.grammar.ast import every
+from socialai_dsl.schema.scenario import Expression, Probe
+from socialai_dsl.semantics.groups import values_of
+from socialai_dsl.semantics.plans import Drawn, ProbePlan
+from socialai_dsl.semantics.resolver import Resolver
+from socialai_dsl.semantics.scope import FailedError, Scope, at_every_step, reset_scope, spoken, surviving
+from socialai_dsl.semantics.terms import BOOL, Chance, Sited, Term, draws, walk
+from socialai_dsl.semantics.texts import parts, sayable
+from socialai_dsl.source import DataPath
+from socialai_dsl.vocabulary import TRUTHS, normal
+
+_MOST: Final = 64
+"""So many possible answers need not be written out."""
+_MOST_VALUES: Final = 1_000
+"""So many values the texts of all probes may have."""
+_LARGEST: Final = 32767
+_KNOWN_BEFOREHAND: Final = "what is known beforehand tells nothing of who is asked"
+
+Text = tuple[str | Drawn, ...]
+
+
+def probes(resolver: Resolver) -> tuple[ProbePlan, ...]:
+    """The entries in the order written; those with a mistake are left out once it has been reported."""
+    remembered = resolver.registers.remembered
+    known = len(remembered)
+    try:
+        return tuple(_plans(resolver))
+    finally:
+        del remembered[
+            known:
+        ]  # what only probes ask about the step before is no part of the scenario's program
+
+
+def _plans(resolver: Resolver) -> Iterator[ProbePlan]:
+    left = _MOST_VALUES
+    for name, entry in resolver.symbols.scenario.probes.items():
+        with surviving():
+            plan = _Entry(resolver, name, entry).plan()
+            left -= len(list(every(Drawn, (plan.ask, plan.answer, plan.answers))))
+            if left < 0:
+                message = f"the probes of a scenario have at most {_MOST_VALUES} values in their texts"
+                raise resolver.findings.fail("S106", message, plan.span)
+            yield plan
+
+
+class _Entry:
+    """One entry, and where it stands."""
+
+    def __init__(self, resolver: Resolver, name: str, entry: Probe) -> None:
+        self._resolver, self._findings = resolver, resolver.findings
+        self._name, self._entry = name, entry
+        self._path: DataPath = ("probes", name)
+        self._values: list[Drawn] = []
+
+    def plan(self) -> ProbePlan:
+        """The entry with everything resolved."""
+        when, ask, answer, answers = self._parts()
+        terms = [
+            sited.term for sited in (*([when] if when else []), *(value.value for value in self._values))
+        ]
+        used = {part.path for term in terms for part in walk(term) if hasattr(part, "path")}
+        own = tuple(item for item in self._resolver.registers.remembered if item.path in used)
+        span = self._findings.places.key_span(self._path)
+        return ProbePlan(self._name, span, when, ask, answer, answers, own)
+
+    def _parts(self) -> tuple[Sited | None, Text, Drawn, tuple[Text, ...]]:
+        """When, question, answer and answers, after the mistakes in each of them have been reported."""
+        when: Sited | None = None
+        ask: Text | None = None
+        answers: tuple[Text, ...] | None = None
+        fine = False
+        with surviving():
+            when = None if self._entry.when is None else self._condition(self._entry.when)
+            fine = True
+        with surviving():
+            ask = self._text("ask", (*self._path, "ask"), self._entry.ask)
+        with surviving():
+            answer = self._answer()
+            answers = tuple(self._answers(answer))
+        if not fine or ask is None or answers is None:
+            raise FailedError
+        return when, ask, answer, answers
+
+    def _condition(self, raw: Expression) -> Sited:
+        return self._sited(
+            (*self._path, "when"), lambda scope: self._resolver.written(scope.path, raw, BOOL, scope)
+        )
+
+    def _answer(self) -> Drawn:
+        """What is right."""
+        path = (*self._path, "answer")
+        node = self._findings.expression(path, self._entry.answer)
+        return self._value(
+            "answer", self._sited(path, lambda s: sayable(self._resolver, node, s, or_condition=True))
+        )
+
+    def _text(self, part: str, path: DataPath, raw: str) -> Text:
+        """The pieces of a text and the values in it."""
+        text = self._findings.text(path, raw)
+        scope = self._scope(path)
+        pieces: list[str | Drawn] = []
+        for piece in parts(self._resolver, text, scope):
+            if isinstance(piece, Term):
+                sited = self._undrawn(Sited(piece, scope.draws.site, self._findings.at(path)), path)
+                pieces.append(self._value(f"{part}[{len(pieces)}]", sited))
+            else:
+                pieces.append(piece)
+        return tuple(pieces)
+
+    def _answers(self, answer: Drawn) -> Iterator[Text]:
+        """What can be answered: what is written, else all that the answer can be."""
+        possible = self._possible(answer)
+        if not self._entry.answers:
+            if possible is None:
+                message = f"the answer can be anything from {answer.type.low} to {answer.type.high}"
+                hint = f"list what can be answered in `answers`, or bound it to {_MOST} values"
+                raise self._findings.fail("S106", message, answer.value.span, hint=hint)
+            self._check_number(len(possible))
+            yield from ((word,) for word in possible)
+            return
+        written = [
+            self._text(f"answers[{i}]", path, text)
+            for i, text in enumerate(self._entry.answers)
+            for path in [self._place(i)]
+        ]
+        self._check_written(written, possible)
+        yield from written
+
+    def _place(self, number: int) -> DataPath:
+        path = (*self._path, "answers")
+        return (*path, number) if self._findings.is_list(path) else path
+
+    def _possible(self, answer: Drawn) -> list[str] | None:
+        """What the answer can be as far as its declaration says; None if that is too much to list."""
+        term = answer.value.term
+        if answer.type.kind == "bool":
+            return [TRUTHS[value] for value in sorted(values_of(self._resolver, term), reverse=True)]
+        if answer.type.size > _MOST_VALUES:
+            return None
+        values = sorted(values_of(self._resolver, term))
+        return list(dict.fromkeys(spoken(term.type, v) for v in values)) if len(values) <= _MOST else None
+
+    def _check_written(self, written: list[Text], possible: list[str] | None) -> None:
+        """Answers that are written twice, and those that are missing."""
+        known: dict[str, int] = {}
+        for i, text in enumerate(written):
+            if all(isinstance(piece, str) for piece in text):
+                said = normal("".join(map(str, text)))
+                if said in known:
+                    message = f"`{self._entry.answers[i]}` is among the answers already"
+                    raise self._findings.fail("S213", message, self._findings.at(self._place(i)))
+                known[said] = i
+        self._check_number(len(written))
+        if len(known) < len(written):
+            return  # what the others are is known only when it is asked
+        span = self._findings.at((*self._path, "answers"))
+        missing = [word for word in possible or () if normal(word) not in known]
+        if missing:
+            message = f"the answer can be `{missing[0]}`, which is not among `answers`"
+            self._findings.warning(
+                "W403", message, span, hint="it would be offered only where it is right, which gives it away"
+            )
+
+    def _check_number(self, number: int) -> None:
+        if number < 2:
+            span = self._findings.at((*self._path, "answers" if self._entry.answers else "answer"))
+            message = f"`{self._name}` has only one answer, so nobody is asked"
+            self._findings.warning("W404", message, span, hint=_KNOWN_BEFOREHAND)
+
+    def _value(self, part: str, sited: Sited) -> Drawn:
+        """A value with a register of its own."""
+        type_ = sited.term.type
+        if max(abs(type_.low), abs(type_.high)) > _LARGEST:
+            message = f"this can be anything from {type_.low} to {type_.high}, and the limit is {_LARGEST}"
+            raise self._findings.fail("S106", message, sited.span, hint="bound it: min(..., 100)")
+        self._values.append(Drawn(f"probes.{self._name}.{part}", type_, sited))
+        return self._values[-1]
+
+    def _sited(self, path: DataPath, resolve: Callable[[Scope], Term]) -> Sited:
+        scope = self._scope(path)
+        return self._undrawn(Sited(resolve(scope), scope.draws.site, self._findings.at(path)), path)
+
+    def _scope(self, path: DataPath) -> Scope:
+        return at_every_step(reset_scope(path))
+
+    def _undrawn(self, sited: Sited, path: DataPath) -> Sited:
+        """The same, in which nothing is drawn: who asks changes nothing."""
+        if draws(sited.term) or any(isinstance(part, Chance) for part in walk(sited.term)):
+            message = "a probe draws nothing itself"
+            hint = "draw it in `let`, and use that"
+            raise self._findings.fail("S204", message, self._findings.at(path), hint=hint)
+        return sited
