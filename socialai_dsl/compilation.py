@@ -7,8 +7,8 @@ from typing import overload
 
 from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
 from socialai_dsl.compiler.expressions import Lines
-from socialai_dsl.compiler.lowering import NO_PROBES, Probes, allocate, lower
-from socialai_dsl.compiler.probes import Part, Probe, ProbedProgram, Recorder, Value
+from socialai_dsl.compiler.lowering import NO_NOTES, NoteTaker, allocate, lower
+from socialai_dsl.compiler.notes import Note, NotingProgram, Part, Recorder, Value
 from socialai_dsl.compiler.questions import Asking, ProbeNotes, notes_of
 from socialai_dsl.compiler.questions import Text as NotedText
 from socialai_dsl.compiler.tables import Tables, verify
@@ -17,16 +17,16 @@ from socialai_dsl.program_suite import ProgramSuite
 from socialai_dsl.semantics.plans import CheckedScenario
 
 __all__ = [
+    "Note",
     "NotedText",
+    "NotingProgram",
     "Part",
-    "Probe",
     "ProbeNotes",
-    "ProbedProgram",
     "Value",
     "compile_asking",
     "compile_asking_loaded",
     "compile_loaded",
-    "compile_probed",
+    "compile_noting",
     "compile_scenario",
     "scenarios_of",
 ]
@@ -97,22 +97,22 @@ def compile_scenario(checked: CheckedScenario) -> Program:
 
     Raises AssertionError("internal: ...") for our own mistakes only: an author's are found before.
     """
-    program, _ = _compiled(checked, NO_PROBES, None)
+    program, _ = _compiled(checked, NO_NOTES, None)
     return program
 
 
-def compile_probed(checked: CheckedScenario) -> ProbedProgram:
-    """A program that does the same as that of the scenario, and notes why rules do not fire (`probes`)."""
-    program, lines = _compiled(checked, NO_PROBES, None)
+def compile_noting(checked: CheckedScenario) -> NotingProgram:
+    """A program that does the same as that of the scenario, and notes why rules do not fire (`compiler.notes`)."""
+    program, lines = _compiled(checked, NO_NOTES, None)
     recorder = Recorder(checked, program.header(Header.REGISTERS))
-    probed, _ = _compiled(checked, recorder, lines)
+    noting, _ = _compiled(checked, recorder, lines)
     for word in _SAME:
-        same = program.header(word) == probed.header(word)
-        assert same, f"internal: {word.name} of a probed program is not that of the program"
-    names = [name for name in probed.registers if name.register < recorder.first]
-    assert tuple(names) == program.registers, "internal: registers of a probed program are not the program's"
-    assert program.rules == probed.rules, "internal: rules of a probed program are not the program's"
-    return ProbedProgram(probed, recorder.first, recorder.rules, recorder.outcomes)
+        same = program.header(word) == noting.header(word)
+        assert same, f"internal: {word.name} of a noting program is not that of the program"
+    names = [name for name in noting.registers if name.register < recorder.first]
+    assert tuple(names) == program.registers, "internal: registers of a noting program are not the program's"
+    assert program.rules == noting.rules, "internal: rules of a noting program are not the program's"
+    return NotingProgram(noting, recorder.first, recorder.rules, recorder.outcomes)
 
 
 _SAME = (
@@ -125,18 +125,18 @@ def compile_asking(checked: CheckedScenario) -> Asking:
     """A program that does the same as that of the scenario, and notes what its `probes` ask about."""
     own = {item.path: item for probe in checked.probes for item in probe.remembered}
     known = {item.path: item for item in checked.remembered}
-    program, _ = _compiled(replace(checked, remembered=tuple((own | known).values())), NO_PROBES, None, True)
+    program, _ = _compiled(replace(checked, remembered=tuple((own | known).values())), NO_NOTES, None, True)
     names = {name.path: name for name in program.registers}
     return Asking(program, tuple(notes_of(plan, names) for plan in checked.probes))
 
 
 def _compiled(
-    checked: CheckedScenario, probes: Probes, numbered: Lines | None, asking: bool = False
+    checked: CheckedScenario, notes: NoteTaker, numbered: Lines | None, asking: bool = False
 ) -> tuple[Program, Lines]:
     """The program and its lines, which are numbered as in `numbered`, if that is given."""
     # So that nothing that claims and probes are about is part of a program.
     checked = replace(checked, properties=(), probes=checked.probes if asking else ())
-    allocation = allocate(checked, probes, numbered)
+    allocation = allocate(checked, notes, numbered)
     lowered = lower(allocation)
     program = Tables(allocation, lowered).program()
     verify(program)

@@ -48,7 +48,7 @@ class Asked:
         """Emit what notes the parts that are false, right before `otherwise`."""
 
 
-class Probes:
+class NoteTaker:
     """Gives out what notes the rules. This one notes nothing, so that a program is what it would be without."""
 
     recording = False
@@ -67,7 +67,7 @@ class Probes:
 
 
 _NOTHING_NOTED = Asked()
-NO_PROBES = Probes()
+NO_NOTES = NoteTaker()
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Allocation:
     """
 
     checked: CheckedScenario
-    probes: Probes
+    notes: NoteTaker
     registers: Registers
     classes: Classes
     lines: Lines
@@ -101,7 +101,7 @@ class Allocation:
         return to
 
 
-def allocate(checked: CheckedScenario, probes: Probes, numbered: Lines | None) -> Allocation:
+def allocate(checked: CheckedScenario, notes: NoteTaker, numbered: Lines | None) -> Allocation:
     """Where everything of a scenario is; lines are numbered as in `numbered`, if that is given."""
     registers = Registers.of(checked)
     classes = Classes(checked)
@@ -115,9 +115,7 @@ def allocate(checked: CheckedScenario, probes: Probes, numbered: Lines | None) -
     inbox = registers.reserve(0)
     inbox_of = {frame.member: registers.reserve(1 + entry_size * inbox_size) for frame in checked.frames}
     computed = ComputedStatuses(checked)
-    return Allocation(
-        checked, probes, registers, classes, lines, homes, computed, inbox, inbox_of, inbox_size
-    )
+    return Allocation(checked, notes, registers, classes, lines, homes, computed, inbox, inbox_of, inbox_size)
 
 
 # -- frames: for each state and each class of utterance heard, only the rules that can then fire -------------
@@ -229,7 +227,7 @@ class _FrameCompiler:
         ]
 
     def _by_class(self, emit: Callable[[Expressions], None], label: str) -> list[int]:
-        if self.shared.probes.recording:
+        if self.shared.notes.recording:
             to = self._expressions(Facts(heard=SEVERAL))
             emit(to)
             return [self.shared.code.add(to.block, label)] * (self.shared.classes.count + 1)
@@ -280,7 +278,7 @@ class _FrameCompiler:
             when = fold_whole(rule.when.term, to.facts, self.shared.classes) if rule.when else None
             if FALSE not in (heard, when) and (clock is None or rule.after <= clock):
                 self._rule(to, rule, follow)
-            elif self.shared.probes.recording:
+            elif self.shared.notes.recording:
                 self._ask_in_vain(to, rule)
         to.block.halt()
 
@@ -293,7 +291,7 @@ class _FrameCompiler:
         to.block.bind(following)
 
     def _asked(self, to: Expressions, what: RulePlan | StepPlan) -> Asked:
-        return self.shared.probes.rule(to, self.counters[what.name], what, self.frame.entity)
+        return self.shared.notes.rule(to, self.counters[what.name], what, self.frame.entity)
 
     def _conditions(self, to: Expressions, rule: RulePlan, asked: Asked, following: Label) -> None:
         """Fall through if all conditions of a rule hold, else skip to `following`."""
@@ -456,23 +454,23 @@ def world_rules(
     lines: Lines,
     homes: Homes,
     counted: list[str],
-    probes: Probes = NO_PROBES,
+    notes: NoteTaker = NO_NOTES,
 ) -> None:
     """Emit the rules top to bottom, and add their names to those that are counted."""
     for rule in to.checked.rules:
         counted.append(rule.name)
         if rule.when is not None and fold(rule.when.term, to.facts, to.classes) == FALSE:
-            if probes.recording:
-                _ask_in_vain(to, rule, len(counted) - 1, probes)
+            if notes.recording:
+                _ask_in_vain(to, rule, len(counted) - 1, notes)
             continue
-        _world_rule(to, lines, homes, rule, len(counted) - 1, probes)
+        _world_rule(to, lines, homes, rule, len(counted) - 1, notes)
 
 
-def _ask_in_vain(to: Expressions, rule: RulePlan, counter: int, probes: Probes) -> None:
+def _ask_in_vain(to: Expressions, rule: RulePlan, counter: int, notes: NoteTaker) -> None:
     """Only note what keeps a rule from ever firing."""
     assert rule.when is not None, "internal: a rule without a condition can fire"
     following = Label()
-    asked = probes.rule(to, counter, rule, None)
+    asked = notes.rule(to, counter, rule, None)
     asked.condition(to, "when", rule.when, following)
     asked.report(to, following)
     to.block.bind(following)
@@ -484,7 +482,7 @@ def _world_rule(
     homes: Homes,
     rule: RulePlan,
     counter: int,
-    probes: Probes,
+    notes: NoteTaker,
 ) -> None:
     assert not rule.hears, "internal: the world has no ears"
     assert rule.say is None, "internal: the world has no voice"
@@ -494,7 +492,7 @@ def _world_rule(
     mark = block.taken
     fired = to.registers.add(f"world.fired.{rule.name}", BOOL) if rule.once else None
     block.span = rule.span
-    asked = probes.rule(to, counter, rule, None)
+    asked = notes.rule(to, counter, rule, None)
     if fired is not None:
         block.test(Op.IF_EQ, fired, constant(0), asked.unless("once", following))
     if rule.when is not None:
@@ -520,28 +518,28 @@ _BODIES = range(Body.NONE + 1)
 
 def outcome_table(allocation: Allocation) -> list[int]:
     """Addresses by (class, action), row by row."""
-    checked, probes, code = allocation.checked, allocation.probes, allocation.code
+    checked, notes, code = allocation.checked, allocation.notes, allocation.code
     classes = range(allocation.classes.count)
-    if probes.recording:
+    if notes.recording:
         to = allocation.expressions()
-        _first_that_holds(to, checked, probes)
+        _first_that_holds(to, checked, notes)
         return [code.add(to.block, "outcome")] * (len(classes) * len(_BODIES))
     table = []
     for said, action in product(classes, map(Body, _BODIES)):
         to = allocation.expressions(Facts(said=said, action=action))
-        _first_that_holds(to, checked, probes)
+        _first_that_holds(to, checked, notes)
         table.append(code.add(to.block, f"outcome after class {said}, {action.name.lower()}"))
     return table
 
 
-def _first_that_holds(to: Expressions, checked: CheckedScenario, probes: Probes) -> None:
+def _first_that_holds(to: Expressions, checked: CheckedScenario, notes: NoteTaker) -> None:
     block = to.block
     for number, outcome in enumerate(checked.outcomes):
         never = fold_whole(outcome.condition.term, to.facts, to.classes) == FALSE
-        if never and not probes.recording:
+        if never and not notes.recording:
             continue
         following = Label()
-        asked = probes.outcome(to, number, outcome)
+        asked = notes.outcome(to, number, outcome)
         asked.condition(to, "outcome", outcome.condition, following)
         if outcome.graded is not None and outcome.success:
             mark = block.taken
@@ -582,7 +580,7 @@ def lower(allocation: Allocation) -> LoweredCode:
             emit(to)
         return allocation.code.add(to.block, label)
 
-    computed, homes, probes = allocation.computed, allocation.homes, allocation.probes
+    computed, homes, notes = allocation.computed, allocation.homes, allocation.notes
     entries = {Header.RESET_PC: entry("reset", lambda to: reset(to, computed, homes))}
     frames = [frame_code(allocation, number, frame) for number, frame in enumerate(allocation.checked.frames)]
     entries |= {
@@ -593,10 +591,10 @@ def lower(allocation: Allocation) -> LoweredCode:
         Header.RULES_PC: entry(
             "rules",
             push_acts,
-            lambda to: world_rules(to, allocation.lines, homes, allocation.rules, probes),
+            lambda to: world_rules(to, allocation.lines, homes, allocation.rules, notes),
         ),
         Header.TICK_PC: entry("tick", tick),
     }
     outcomes = outcome_table(allocation)
-    probes.declare(allocation.registers)
+    notes.declare(allocation.registers)
     return LoweredCode(entries, frames, outcomes)

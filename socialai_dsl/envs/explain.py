@@ -1,6 +1,6 @@
 """Which rules fired in the last step, why the others did not, and who stood in the way.
 
-The episode is played again by a program that notes what was asked and what was false (`compiler.probes`), on the same
+The episode is played again by a program that notes what was asked and what was false (`compiler.notes`), on the same
 engine, from the same moment, with the same actions. That it ends in the same state is checked each time.
 """
 
@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.compilation import Part, Probe, Value, compile_probed
+from socialai_dsl.compilation import Note, Part, Value, compile_noting
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.table import Table
@@ -190,8 +190,8 @@ class Explainer:
     ) -> None:
         self._checked = scenario
         self._program = program
-        self._probed = compile_probed(scenario)
-        self._table = Table([_alone(self._probed.program, suite, number)], 1, 1)
+        self._noting = compile_noting(scenario)
+        self._table = Table([_alone(self._noting.program, suite, number)], 1, 1)
         self._table.reset(0, None)
 
     def explain(self, recording: Recording, reached: NDArray[np.int16] | None) -> dict[str, Any]:
@@ -201,11 +201,11 @@ class Explainer:
         """
         fired = self._play(recording)
         registers = self._table.state.registers[0]
-        known = self._probed.first
+        known = self._noting.first
         same = reached is None or np.array_equal(registers[:known], reached[:known])
         assert same, "internal: the step that was explained went another way"
-        notes = _Notes(self._probed.program, self._program, registers, self._table.state.boards[0])
-        story = _Story(self._checked, self._probed.rules, self._probed.outcomes, notes, fired)
+        notes = _Notes(self._noting.program, self._program, registers, self._table.state.boards[0])
+        story = _Story(self._checked, self._noting.rules, self._noting.outcomes, notes, fired)
         entries = list(story.entries())
         return {
             "t": int(registers[Register.T]),
@@ -221,12 +221,12 @@ class Explainer:
         key[own] = state.keys[0, own]
         state.keys[0] = key
         state.registers[:] = 0
-        state.registers[0, : self._probed.first] = start.registers[: self._probed.first]
+        state.registers[0, : self._noting.first] = start.registers[: self._noting.first]
         state.boards[0] = start.board[: state.boards.shape[1]]
         state.tokens[:] = 0
         before = batch.counters.copy()
         for action in recording.actions:
-            state.registers[0, self._probed.first :] = 0
+            state.registers[0, self._noting.first :] = 0
             before = batch.counters.copy()
             batch.ports.actions[0] = np.frombuffer(action, np.int64)
             batch.step(Task.STEP_ONLY)
@@ -251,25 +251,25 @@ def _alone(program: Program, suite: ProgramSuite | None, number: int) -> Program
 
 @dataclass(frozen=True)
 class _Notes:
-    """What a probed program has noted, in words."""
+    """What such a program has noted, in words."""
 
-    probed: Program
+    noting: Program
     program: Program
     registers: NDArray[np.int16]
     board: NDArray[Any]
 
-    def number(self, probe: Probe) -> int:
-        """What `Probe.register` says."""
-        return int(self.registers[probe.register])
+    def number(self, note: Note) -> int:
+        """What `Note.register` says."""
+        return int(self.registers[note.register])
 
     def values(self, part: Part) -> dict[str, Any]:
         """What a part was about, by how it is written."""
         return {value.words: self._value(value) for value in part.values if value.words}
 
-    def why(self, probe: Probe, words: str) -> str:
+    def why(self, note: Note, words: str) -> str:
         """Why a rule did not fire: its first part that was false."""
-        number = self.number(probe)
-        part = probe.parts[abs(number) - 1]
+        number = self.number(note)
+        part = note.parts[abs(number) - 1]
         written = part.words or words
         if number < 0:
             return f"{written} finds nothing" if written else "something that it needs is not there"
@@ -283,7 +283,7 @@ class _Notes:
             case "chance":
                 return f"{words}: not drawn"
             case "do":
-                hindered = self._hindered(probe.plan)
+                hindered = self._hindered(note.plan)
                 return f"{words} is not finished" + (f": {hindered}" if hindered else "")
         values = ", ".join(f"{name} is {_spoken(value)}" for name, value in self.values(part).items())
         return f"{written} is false" + (f": {values}" if values else "")
@@ -305,7 +305,7 @@ class _Notes:
         if isinstance(term, Const):
             return term.value
         wanted = (term.path, noted) if isinstance(term, Read) else (noted,)
-        found = {name.path: name.register for name in self.probed.registers}
+        found = {name.path: name.register for name in self.noting.registers}
         register = next((found[path] for path in wanted if path in found), None)
         return None if register is None else int(self.registers[register])
 
@@ -357,8 +357,8 @@ class _Story:
     """The rules of a step in the order in which they were asked."""
 
     checked: CheckedScenario
-    rules: dict[int, Probe]
-    outcomes: dict[int, Probe]
+    rules: dict[int, Note]
+    outcomes: dict[int, Note]
     notes: _Notes
     raised: NDArray[np.int64]
 
@@ -372,7 +372,7 @@ class _Story:
         for number in range(counter, counter + len(self.checked.rules)):
             yield from self._asked(number, self.rules.get(number), "world", {}, "world rule")
         ended = self.raised[counter + len(self.checked.rules) :]
-        listed = [(probe.plan, probe, bool(ended[number])) for number, probe in sorted(self.outcomes.items())]
+        listed = [(note.plan, note, bool(ended[number])) for number, note in sorted(self.outcomes.items())]
         yield from self._list(listed, "outcome", {}, "outcome")
 
     def _frame(self, frame: FramePlan, counters: range) -> Iterator[dict[str, Any]]:
@@ -382,7 +382,7 @@ class _Story:
                 yield from self._asked(number, self.rules.get(number), frame.member, named, "step")
             return
         numbers = iter(counters)
-        lists: list[tuple[str, str, list[tuple[Any, Probe | None, bool]]]] = []
+        lists: list[tuple[str, str, list[tuple[Any, Note | None, bool]]]] = []
         for state in frame.states:
             for part, rules in (("first", state.first), ("then", state.then)):
                 own = [next(numbers) for _ in rules]
@@ -394,42 +394,42 @@ class _Story:
         for name, part, found in _in_turn([one for one in lists if self._is_asked(one[2])]):
             yield from self._list(found, frame.member, {"state": name, "list": part}, "rule")
 
-    def _is_asked(self, found: Iterable[tuple[Any, Probe | None, bool]]) -> bool:
-        return any(fired or (probe is not None and self.notes.number(probe)) for _, probe, fired in found)
+    def _is_asked(self, found: Iterable[tuple[Any, Note | None, bool]]) -> bool:
+        return any(fired or (note is not None and self.notes.number(note)) for _, note, fired in found)
 
     def _list(
-        self, found: Sequence[tuple[Any, Probe | None, bool]], who: str, more: dict[str, Any], kind: str
+        self, found: Sequence[tuple[Any, Note | None, bool]], who: str, more: dict[str, Any], kind: str
     ) -> Iterator[dict[str, Any]]:
         """A list of which the first that holds fires; nothing if it was not read."""
         if not self._is_asked(found):
             return
         before: Span | None = None
-        for plan, probe, fired in found:
+        for plan, note, fired in found:
             entry = self._entry(plan, who, more, kind, fired)
             if not fired and before is not None:
                 entry["why"] = f"not asked: line {before.line} came first"
-            elif not fired and probe is not None:
-                entry |= self._reason(probe)
+            elif not fired and note is not None:
+                entry |= self._reason(note)
             yield entry
             if fired:
                 before = _span(plan)
 
     def _asked(
-        self, number: int, probe: Probe | None, who: str, more: dict[str, Any], kind: str
+        self, number: int, note: Note | None, who: str, more: dict[str, Any], kind: str
     ) -> Iterator[dict[str, Any]]:
         """One that is asked for itself; nothing if it was not."""
         fired = bool(self.raised[number])
-        if probe is None or not (fired or self.notes.number(probe)):
+        if note is None or not (fired or self.notes.number(note)):
             return
-        entry = self._entry(probe.plan, who, more, kind, fired)
-        yield entry if fired else entry | self._reason(probe)
+        entry = self._entry(note.plan, who, more, kind, fired)
+        yield entry if fired else entry | self._reason(note)
 
-    def _reason(self, probe: Probe) -> dict[str, Any]:
-        number = self.notes.number(probe)
-        part = probe.parts[abs(number) - 1]
-        words = part.words or self._words_of(probe.plan, part.key)
+    def _reason(self, note: Note) -> dict[str, Any]:
+        number = self.notes.number(note)
+        part = note.parts[abs(number) - 1]
+        words = part.words or self._words_of(note.plan, part.key)
         values = self.notes.values(part) if number > 0 else {}
-        return {"why": self.notes.why(probe, words), "part": words, "values": values}
+        return {"why": self.notes.why(note, words), "part": words, "values": values}
 
     def _entry(
         self, plan: RulePlan | StepPlan | OutcomePlan, who: str, more: dict[str, Any], kind: str, fired: bool
@@ -458,7 +458,7 @@ class _Story:
         return ", ".join(f"{word}: {_flow(written[word])}" for word in keys)
 
 
-def _in_turn(lists: list[tuple[str, str, list[tuple[Any, Probe | None, bool]]]]) -> Iterator[Any]:
+def _in_turn(lists: list[tuple[str, str, list[tuple[Any, Note | None, bool]]]]) -> Iterator[Any]:
     """Lists of a frame that were read in a step: `first`, then the lists of `then` as `goto_now` leads through them."""
     left = [one for one in lists if one[1] == "then"]
     yield from (one for one in lists if one[1] == "first")

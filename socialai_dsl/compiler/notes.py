@@ -1,6 +1,6 @@
 """This module lets a program note why rules did not fire: a program that does the same as another, and writes it down.
 
-A probed program has the registers of the program that it explains, and behind them some of its own. Wherever a part of
+Such a program has the registers of the program that it explains, and behind them some of its own. Wherever a part of
 a condition turns out false, code that the program itself does not have puts the number of that part into a register
 and the values that the part was about into others. So what is noted is what the engine computed, at that point of the
 step. It does not sort rules by what was heard: each is asked.
@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from socialai_dsl.compiler.assembler import Label, Registers, constant, label, state_names
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import fold, mentions
-from socialai_dsl.compiler.lowering import Asked, Probes
+from socialai_dsl.compiler.lowering import Asked, NoteTaker
 from socialai_dsl.grammar.ast import unparse
 from socialai_dsl.program import Op, Program, RegisterName
 from socialai_dsl.semantics import terms
@@ -54,7 +54,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Probe:
+class Note:
     """What is noted of a rule, an entry of `steps`, or an outcome.
 
     Attributes:
@@ -68,8 +68,8 @@ class Probe:
 
 
 @dataclass(frozen=True)
-class ProbedProgram:
-    """A probed program, its first register that the program explained does not have, and its probes.
+class NotingProgram:
+    """A program that notes, its first register that the program explained does not have, and its notes.
 
     Attributes:
         rules: by counter. outcomes: by index.
@@ -77,11 +77,11 @@ class ProbedProgram:
 
     program: Program
     first: int
-    rules: dict[int, Probe]
-    outcomes: dict[int, Probe]
+    rules: dict[int, Note]
+    outcomes: dict[int, Note]
 
 
-class Recorder(Probes):
+class Recorder(NoteTaker):
     """Notes everything, in registers from `first` on."""
 
     recording = True
@@ -89,27 +89,27 @@ class Recorder(Probes):
     def __init__(self, checked: CheckedScenario, first: int) -> None:
         self.checked, self.readings = checked, checked.readings or Readings()
         self.first = self.next = first
-        self.rules: dict[int, Probe] = {}
-        self.outcomes: dict[int, Probe] = {}
+        self.rules: dict[int, Note] = {}
+        self.outcomes: dict[int, Note] = {}
         self.names: list[RegisterName] = []
 
     def rule(self, to: Expressions, counter: int, plan: RulePlan | StepPlan, entity: int | None) -> Asked:
-        """See `Probes.rule`; a rule that is emitted several times is noted in one place."""
+        """See `NoteTaker.rule`; a rule that is emitted several times is noted in one place."""
         if counter not in self.rules:
-            self.rules[counter] = Probe(self.register(), plan)
+            self.rules[counter] = Note(self.register(), plan)
         return _Noting(self, self.rules[counter], self._aside(to, entity))
 
     def outcome(self, to: Expressions, number: int, plan: OutcomePlan) -> Asked:
-        """See `Probes.outcome`."""
+        """See `NoteTaker.outcome`."""
         if number not in self.outcomes:
-            self.outcomes[number] = Probe(self.register(), plan)
+            self.outcomes[number] = Note(self.register(), plan)
         return _Noting(self, self.outcomes[number], {})
 
     def register(self, type_: Type | None = None) -> int:
         """A fresh register."""
         self.next += 1
         number = self.next - 1
-        self.names.append(RegisterName(f"probe[{number - self.first}]", number, (), _LEAST, _GREATEST))
+        self.names.append(RegisterName(f"note[{number - self.first}]", number, (), _LEAST, _GREATEST))
         return number
 
     def declare(self, registers: Registers) -> None:
@@ -167,8 +167,8 @@ class _Pad:
 class _Noting(Asked):
     """Notes the parts of one rule."""
 
-    def __init__(self, recorder: Recorder, probe: Probe, aside: dict[str, list[_Shown]]) -> None:
-        self._recorder, self._probe, self._aside = recorder, probe, aside
+    def __init__(self, recorder: Recorder, note: Note, aside: dict[str, list[_Shown]]) -> None:
+        self._recorder, self._note, self._aside = recorder, note, aside
         self._pads: list[_Pad] = []
         self._count = 0
 
@@ -202,8 +202,8 @@ class _Noting(Asked):
             block.skip(otherwise)
         for pad in used:
             block.bind(pad.label)
-            block.emit(Op.LOAD, self._probe.register, constant(pad.number))
-            for value, shown in zip(self._probe.parts[abs(pad.number) - 1].values, pad.shown, strict=False):
+            block.emit(Op.LOAD, self._note.register, constant(pad.number))
+            for value, shown in zip(self._note.parts[abs(pad.number) - 1].values, pad.shown, strict=False):
                 mark = block.taken
                 least = to.into_temporary(Op.MAX, shown.emit(to), constant(_LEAST))
                 block.emit(Op.MIN, value.name.register, least, constant(_GREATEST))
@@ -217,9 +217,9 @@ class _Noting(Asked):
     def _number(self, key: str, words: str, shown: Sequence[_Shown]) -> int:
         """The number of the next part, from 1; a rule that is emitted again has the same parts in the same order."""
         self._count += 1
-        if len(self._probe.parts) < self._count:
+        if len(self._note.parts) < self._count:
             values = tuple(self._value(one) for one in shown)
-            self._probe.parts.append(Part(key, words, values))
+            self._note.parts.append(Part(key, words, values))
         return self._count
 
     def _value(self, shown: _Shown) -> Value:
