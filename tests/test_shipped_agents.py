@@ -13,6 +13,7 @@ import socialai_dsl
 from socialai_dsl import frontend
 from socialai_dsl.cli import agents
 from socialai_dsl.cli.main import main, run_main
+from socialai_dsl.envs.registration import IDS
 from socialai_dsl.evaluation import evaluate
 from socialai_dsl.loader.library import shipped_folder
 from tools.ship_agent import EPISODES, INDEX, LARGEST, ROUNDING, index
@@ -51,6 +52,10 @@ def test_an_agent_plays_as_its_card_says(name: str) -> None:
     assert promised == pytest.approx(recorded["eval"]["success_rate"], abs=1e-4)
     assert result.success_rate == pytest.approx(promised, abs=ROUNDING)
     assert result.mean_length == pytest.approx(recorded["eval"]["mean_length"], rel=0.02)
+
+
+def test_every_scenario_of_the_paper_has_an_agent() -> None:
+    assert set(IDS.values()) <= set(AGENTS)
 
 
 @pytest.mark.parametrize("name", AGENTS)
