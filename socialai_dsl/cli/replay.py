@@ -119,15 +119,16 @@ def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
     from socialai_dsl.cli.player import Player
 
     source = arguments.source
-    if (folder_of(source) / SETTINGS).is_file():
+    folder = folder_of(source)
+    if (folder / SETTINGS).is_file():
         if arguments.agent is not None:
             raise UsageError(
                 "--agent: a run is replayed by its own agent; name a scenario to let another play"
             )
         agent, scenario = source, own_scenario(source)
-        played_by = str(read_json(Path(source) / SETTINGS).get("agent"))
+        played_by = str(read_json(folder / SETTINGS).get("agent"))
         if played_by.startswith(PREFIX):
-            return evaluation_of_model(Path(source), played_by, scenario, episodes)
+            return evaluation_of_model(folder, played_by, scenario, episodes)
     else:
         scenario = source
         usual = "oracle" if scripted_name(scenario) is not None else "random"
