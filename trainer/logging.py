@@ -255,6 +255,9 @@ class WandbTracker:
         run_dir: folder of the run, where W&B keeps its own files as well.
         config: what the run was asked for, shown beside its curves.
         name: what the run is called there.
+
+    Raises:
+        ValueError: the package is not installed.
     """
 
     project: str
@@ -263,18 +266,21 @@ class WandbTracker:
     name: str
     _run: Any = field(default=None, init=False)
 
-    def open(self) -> None:
-        """Begin, or go on where the run was.
+    def __post_init__(self) -> None:
+        try:
+            self._wandb = importlib.import_module("wandb")
+        except ImportError:
+            raise ValueError(
+                "W&B is not there: pip install 'socialai-dsl[wandb]', or leave out --wandb"
+            ) from None
 
-        Raises:
-            ValueError: the package is not installed, or it cannot begin; the message says what to do.
-        """
+    def open(self) -> None:
+        """Begin, or go on where the run was; ValueError says why it cannot."""
         path = self.run_dir / _ID_FILE
         if not path.exists():
             path.write_text(uuid.uuid4().hex[:12] + "\n", encoding="utf-8")
         try:
-            wandb = importlib.import_module("wandb")
-            self._run = wandb.init(
+            self._run = self._wandb.init(
                 project=self.project,
                 name=self.name,
                 config=dict(self.config),
@@ -282,12 +288,8 @@ class WandbTracker:
                 dir=str(self.run_dir),
                 resume="allow",
                 # The terminal shows the progress; W&B is not to copy what is printed.
-                settings=wandb.Settings(console="off"),
+                settings=self._wandb.Settings(console="off"),
             )
-        except ImportError:
-            raise ValueError(
-                "W&B is not installed: pip install 'socialai-dsl[wandb]', or leave out --wandb"
-            ) from None
         except Exception as error:
             raise ValueError(f"W&B cannot begin: {type(error).__name__}: {error}") from error
 
