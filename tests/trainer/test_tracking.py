@@ -109,11 +109,10 @@ def test_a_failure_at_the_start_is_explained(wandb: FakeWandb, tmp_path: Path, s
         train(small_config(), EchoEnvs(8), tmp_path, tracker=tracker)
 
 
-def test_it_has_to_be_installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, small_config: Any) -> None:
+def test_it_has_to_be_installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "wandb", None)
-    tracker = WandbTracker("project", tmp_path, {}, "a run")
     with pytest.raises(ValueError, match=r"pip install 'socialai-dsl\[wandb\]'"):
-        train(small_config(), EchoEnvs(8), tmp_path, tracker=tracker)
+        WandbTracker("project", tmp_path, {}, "a run")
 
 
 def test_the_package_itself_offline(
