@@ -17,7 +17,7 @@ import pytest
 import socialai_dsl
 from socialai_dsl.cli.main import main
 from socialai_dsl.cli.reporters import REPORTERS
-from socialai_dsl.diagnostics import ScenarioError
+from socialai_dsl.diagnostics import ScenarioError, Severity
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.frontend import check
 from socialai_dsl.grammar.ast import ParseProblem, parse_expression
@@ -454,3 +454,17 @@ def test_the_source_has_no_way_to_execute_data(layer: str) -> None:
                 assert not {name.partition(".")[0] for name in names} & _FORBIDDEN_IMPORTS, (
                     f"{file}:{node.lineno}"
                 )
+
+
+def test_more_registers_than_an_environment_holds_are_a_finding(tmp_path: Path) -> None:
+    """Each of twenty members has the 300 registers of its frame."""
+    registers = "".join(f"      r{i}: {{start: 0, range: 0..9}}\n" for i in range(300))
+    frame = f"frames:\n  f:\n    let:\n{registers}    states: {{s: {{}}}}\n"
+    cast = "cast:\n  agent: {}\n" + "".join(f"  n{i}: {{frame: f}}\n" for i in range(20))
+    outcome = "outcome: [{success: agent.next_to(n0)}]\n"
+    text = f"scenario: x\nroom: {{size: 9}}\ngrammar: body\n{frame}{cast}{outcome}"
+    file = tmp_path / "f.yaml"
+    file.write_text(text, encoding="utf-8")
+    (found,) = [d for d in check(file).diagnostics if d.severity is Severity.ERROR]
+    assert (found.code, found.span.line) == ("S106", 4)
+    assert found.message == "a scenario has at most 4,096 registers, this one 6,021"

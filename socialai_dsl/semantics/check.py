@@ -343,6 +343,9 @@ _MAX_ROUNDS = 24
 MAX_BODIES: Final = 128
 """How many objects and members of the cast a scenario may have."""
 
+MAX_REGISTERS: Final = 4096
+"""How many registers a scenario may have; an environment's row holds twice as many numbers."""
+
 
 def check_meaning(
     scenario: Scenario,
@@ -463,6 +466,16 @@ class _Run:
             return None
         possible.check_grammar(scenario, findings)
         entities.declare_registers(resolver)
+        if len(resolver.registers) > MAX_REGISTERS:
+            own = len(scenario.let) + len(scenario.state)
+            larger = "let" if len(scenario.let) > len(scenario.state) else "state"
+            part = larger if own > MAX_REGISTERS // 2 else "frames"
+            message = (
+                f"a scenario has at most {MAX_REGISTERS:,} registers, this one {len(resolver.registers):,}"
+            )
+            hint = "each member of the cast has a copy of the registers of its frame"
+            findings.error("S106", message, findings.places.key_span((part,)), hint=hint)
+            return None
         entities.check_slots(resolver)
         possible.check_flow(scenario, findings)
         spoken = self._spoken()

@@ -240,6 +240,10 @@ class Registers:
         self._given_ranges = dict(ranges)
         self.ranges: dict[str, Type] = {}
 
+    def __len__(self) -> int:
+        """How many registers are declared or hold a known value."""
+        return len(self._declared) + len(self._terms)
+
     def declare(self, declaration: Declaration) -> None:
         """Make a register known; it is resolved later."""
         self._declared[declaration.path] = declaration
