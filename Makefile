@@ -12,7 +12,7 @@ ARGS ?=
 
 SECONDS_EACH ?= 60
 
-.PHONY: help run test test-pages test-long test-learning test-models test-faults test-bounds endurance fuzz nightly lint format bench docs fidelity update-goldens clean
+.PHONY: help run test test-pages test-long test-learning test-models test-faults test-bounds endurance fuzz nightly lint format bench docs fidelity oracles sheets reference update-goldens clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -75,11 +75,20 @@ format: $(STAMP) ## rewrite the code in the house style
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: $(STAMP) ## measure the engine's speed on this machine
-	$(BIN)/socialai bench $(ARGS)
+bench: $(STAMP) ## measure the speed of the environments, or with ARGS=--train of training, on this machine
+	$(BIN)/python -m benchmarks $(ARGS)
 
 fidelity: $(STAMP) ## compare the scenarios with the paper's code, under a random policy; writes docs/fidelity.md
-	$(BIN)/socialai fidelity --write docs/fidelity.md $(ARGS)
+	$(BIN)/python -m tools.fidelity --out docs/fidelity.md $(ARGS)
+
+oracles: $(STAMP) ## let the script of each shipped scenario play 5,000 rooms, and search those that it does not solve
+	$(BIN)/python -m tools.oracles $(ARGS)
+
+sheets: $(STAMP) ## write the data sheets of the shipped scenarios, docs/scenarios/
+	$(BIN)/python -m tools.sheets --out $(ARGS)
+
+reference: $(STAMP) ## write every key and word of the language, docs/reference.md
+	$(BIN)/python -m tools.reference --out docs/reference.md
 
 docs: $(STAMP) ## build the pages of docs/ as a site, in build/site
 	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[docs]'

@@ -1,1 +1,1 @@
-"""This package holds what `socialai bench` compares with; it stays in the repository, no wheel carries it."""
+"""This package holds what `make bench` compares with; it stays in the repository, no wheel carries it."""

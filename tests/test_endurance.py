@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import socialai_dsl as sd
-from socialai_dsl.cli.shipped import shipped_scenarios
+from socialai_dsl.loader.shipped import shipped_scenarios
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 IN_FOLDERS = [

@@ -19,7 +19,7 @@ from gymnasium import wrappers
 from gymnasium.wrappers import vector
 
 import socialai_dsl
-from socialai_dsl.envs.registration import IDS
+from socialai_dsl.loader.shipped import IDS
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "interop.md").read_text(encoding="utf-8")

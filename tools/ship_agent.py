@@ -78,7 +78,7 @@ def chance_of_difference(only_single: int, only_half: int) -> float:
         only_half: episodes that succeed in half precision alone.
     """
     total = only_single + only_half
-    tail = sum(math.comb(total, k) for k in range(min(only_single, only_half) + 1)) / 2**total
+    tail: float = sum(math.comb(total, k) for k in range(min(only_single, only_half) + 1)) / 2**total
     return min(1.0, 2 * tail)
 
 

@@ -8,7 +8,7 @@ import traceback
 import warnings
 from collections.abc import Sequence
 from importlib import import_module
-from typing import Final, NoReturn
+from typing import Any, Final, NoReturn
 
 from socialai_dsl.cli.errors import Exit, RunFailed, UsageError, is_usage
 from socialai_dsl.cli.terminal import shows_color
@@ -25,7 +25,6 @@ _COMMANDS: Final = (
     "codes",
     "fmt",
     "schema",
-    "reference",
     "lsp",
     "show",
     "evaluate",
@@ -35,17 +34,22 @@ _COMMANDS: Final = (
     "replay",
     "studio",
     "coverage",
-    "bench",
-    "fidelity",
-    "oracles",
     "check",
     "curves",
     "report",
     "export",
-    "sheets",
     "experiment",
 )
 """Each is a module beside this one."""
+
+_FOR_MAINTAINERS: Final = {
+    "bench": "bench",
+    "fidelity": "fidelity",
+    "oracles": "oracles",
+    "reference": "reference",
+    "sheets": "sheets",
+}
+"""What was a command of ours until 0.1 -> its target of make."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -56,12 +60,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--version", action=_Version)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     words = sys.argv[1:] if argv is None else argv
+    if words and words[0] in _FOR_MAINTAINERS:
+        print(
+            f"socialai: {words[0]} is for maintainers: `make {_FOR_MAINTAINERS[words[0]]}` in a checkout",
+            file=sys.stderr,
+        )
+        return Exit.USAGE
     # The others are needed for their summaries alone, and loading them would double the time to start.
     named = words[:1] if words and words[0] in _COMMANDS else _COMMANDS
     for name in named:
         module = import_module(f"socialai_dsl.cli.{name}")
         summary = module.SUMMARY
-        command = commands.add_parser(name, help=summary, description=summary[0].upper() + summary[1:] + ".")
+        command = commands.add_parser(name, help=summary, description=_sentence(summary))
         module.add_arguments(command)
         command.set_defaults(execute=module.execute)
         _add_debug(command)
@@ -70,14 +80,27 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def run_main(argv: Sequence[str] | None = None) -> int:
     """Run `socialai-run ...`, the same as `socialai run ...`, and return its exit code."""
-    from socialai_dsl.cli import run
+    return run_alone("socialai-run", import_module("socialai_dsl.cli.run"), argv)
 
-    parser = _Parser(prog="socialai-run", description=run.SUMMARY.capitalize() + ".")
+
+def run_alone(program: str, module: Any, argv: Sequence[str] | None = None) -> int:
+    """Run a command as a program of its own and return its exit code.
+
+    Args:
+        program: what it is called.
+        module: has `SUMMARY`, `add_arguments` and `execute`, as every command does.
+        argv: what was typed (default: `sys.argv`).
+    """
+    parser = _Parser(prog=program, description=_sentence(module.SUMMARY))
     parser.add_argument("--version", action=_Version)
-    run.add_arguments(parser)
-    parser.set_defaults(execute=run.execute)
+    module.add_arguments(parser)
+    parser.set_defaults(execute=module.execute)
     _add_debug(parser)
     return _guarded(parser, argv)
+
+
+def _sentence(summary: str) -> str:
+    return summary[0].upper() + summary[1:] + "."
 
 
 def _add_debug(parser: argparse.ArgumentParser) -> None:

@@ -5,21 +5,8 @@ from __future__ import annotations
 import gymnasium
 
 from socialai_dsl.loader.library import shipped_folder
+from socialai_dsl.loader.shipped import IDS
 
-# What the paper calls them; the file says the rest.
-IDS = {
-    "TalkItOut": "talkitout",
-    "TalkItOutNoLiar": "talkitout_no_liar",
-    "Dance": "dance",
-    "CoinThief": "cointhief",
-    "CoinThiefTags": "cointhief_tags",
-    "DiverseExit": "diverse_exit",
-    "ShowMe": "showme",
-    "ShowMeNoSocial": "showme_no_social",
-    "Help": "help",
-    "HelpAsHelper": "help_as_helper",
-    "SocialEnv": "social_env",
-}
 _ENTRY = "socialai_dsl.envs.factory:make_env"
 _VECTOR_ENTRY = "socialai_dsl.envs.factory:make_vector_env"
 

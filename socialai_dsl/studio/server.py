@@ -18,7 +18,7 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from socialai_dsl.cli.new import TEMPLATES, template_files
-from socialai_dsl.cli.shipped import file_of, shipped_scenarios, variants_of
+from socialai_dsl.loader.shipped import file_of, shipped_scenarios, variants_of
 from socialai_dsl.replay.scripts import static_text
 from socialai_dsl.studio.engine import Engine, EngineLostError, start_worker
 from socialai_dsl.studio.files import ConflictError, FileError, Folder

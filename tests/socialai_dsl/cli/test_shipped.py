@@ -1,7 +1,7 @@
 """Which files are scenarios to readers, and which only change one."""
 
 from socialai_dsl import frontend
-from socialai_dsl.cli.shipped import shipped_scenarios, variants_of
+from socialai_dsl.loader.shipped import shipped_scenarios, variants_of
 
 
 def test_scenarios_and_variants_that_say_what_they_are_about() -> None:

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import socialai_dsl as sd
-from socialai_dsl.cli.shipped import shipped_scenarios
+from socialai_dsl.loader.shipped import shipped_scenarios
 
 ENVS = 6
 AFTER = 40

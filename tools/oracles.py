@@ -1,17 +1,19 @@
-"""This module is `socialai oracles`: scenarios' own scripts play, and what they do not solve is searched."""
+"""Let the scripts of all shipped scenarios play, and search the rooms that they do not solve: `make oracles`."""
 
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.main import run_alone
 from socialai_dsl.cli.oracle_play import OracleReport, Room, play_oracle
 from socialai_dsl.cli.run_folder import write_text
-from socialai_dsl.cli.shipped import shipped_scenarios, variants_of
 from socialai_dsl.cli.terminal import ProgressLine
+from socialai_dsl.loader.shipped import shipped_scenarios, variants_of
 
 SUMMARY: Final = "let the scenarios' own scripts play, and search the rooms that they do not solve"
 
@@ -47,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json", action="store_true", help="print an array with one object for each scenario"
     )
-    parser.add_argument("--write", type=Path, metavar="FILE", help="write the reports as a Markdown page")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the reports as a Markdown page")
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
@@ -69,8 +71,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
             print("\n".join(summary(reports[-1])), flush=True)
     if arguments.json:
         print(json.dumps([as_object(report) for report in reports], indent=2))
-    if arguments.write is not None:
-        write_text(arguments.write, _page(reports, arguments.states))
+    if arguments.out is not None:
+        write_text(arguments.out, _page(reports, arguments.states))
     return Exit.FINDINGS if any(report.found("solvable") for report in reports) else Exit.GOOD
 
 
@@ -137,3 +139,12 @@ def _indices(rooms: tuple[Room, ...]) -> str:
     shown = ", ".join(str(room.index) for room in rooms[:_ROOMS_SHOWN])
     more = len(rooms) - _ROOMS_SHOWN
     return shown + (f" and {more} more" if more > 0 else "")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run this script and return its exit code."""
+    return run_alone("python -m tools.oracles", sys.modules[__name__], argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

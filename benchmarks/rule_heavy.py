@@ -1,4 +1,4 @@
-"""This module finds actions for `socialai bench` that make something happen in nearly every step.
+"""This module finds actions for `make bench` that make something happen in nearly every step.
 
 Walking and talking at random rarely triggers a rule, so the speed under it says little of how fast rules are. Here, for
 every environment and step, several actions are tried from the same state, and the one is kept after which somebody was
@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from socialai_dsl.cli.mixes import BATCHES, Actions, Allowed
+from benchmarks.mixes import BATCHES, Actions, Allowed
 from socialai_dsl.program import Header, Program
 
 _TRIED: Final = 4

@@ -1,4 +1,4 @@
-"""`socialai sheets`: what is committed is what would be written, and the command notices when it is not."""
+"""`make sheets`: what is committed is what would be written, and the command notices when it is not."""
 
 import re
 from pathlib import Path
@@ -8,24 +8,23 @@ import pytest
 from PIL import Image
 
 import socialai_dsl
-from socialai_dsl.cli import sheets
-from socialai_dsl.cli.main import main
-from socialai_dsl.cli.sheets import INDEX, measure, stale_files
-from socialai_dsl.cli.sheets_page import page
-from socialai_dsl.cli.sheets_picture import picture
-from socialai_dsl.cli.sheets_text import flow, frame, rule, table
-from socialai_dsl.cli.shipped import shipped_scenarios
+from socialai_dsl.analysis.data_sheet import page
+from socialai_dsl.analysis.sheet_text import flow, frame, rule, table
+from socialai_dsl.loader.shipped import shipped_scenarios
+from tools import sheets
+from tools.sheets import INDEX, main, measure, stale_files
+from tools.sheets_picture import picture
 
 Capture = pytest.CaptureFixture[str]
 
-SHEETS = Path(__file__).parents[3] / "docs" / "scenarios"
+SHEETS = Path(__file__).parents[2] / "docs" / "scenarios"
 WRITTEN = sorted(path.stem for path in SHEETS.glob("*.md") if path.name != INDEX)
 LINK = re.compile(r"\]\((?!https?://|#)([^)\s]+)\)")
 
 
 def test_the_sheets_are_up_to_date() -> None:
     assert "talkitout" in WRITTEN
-    assert stale_files(WRITTEN, SHEETS) == [], "run `socialai sheets --write`"
+    assert stale_files(WRITTEN, SHEETS) == [], "run `make sheets`"
 
 
 def test_links_of_the_sheets_lead_somewhere() -> None:
@@ -92,32 +91,32 @@ def test_the_command(monkeypatch: pytest.MonkeyPatch, capsys: Capture, tmp_path:
     monkeypatch.setattr(sheets, "_EPISODES", 50)
     monkeypatch.setattr(sheets, "_ROOMS", 20)
     folder, name = str(tmp_path / "sheets"), "talkitout_no_liar"
-    assert main(["sheets", name, "--check", folder]) == 1
+    assert main([name, "--check", folder]) == 1
     assert f"{name}.md: missing or out of date" in capsys.readouterr().err
-    assert main(["sheets", name, "--measure", folder, "--write", folder]) == 0
-    assert main(["sheets", name, "--check", folder]) == 0
+    assert main([name, "--measure", folder, "--out", folder]) == 0
+    assert main([name, "--check", folder]) == 0
     assert sorted(path.name for path in Path(folder).iterdir()) == [
         INDEX, "measured.json", f"{name}.md", f"{name}.png",
     ]  # fmt: skip
     assert "| random policy |" in (Path(folder) / f"{name}.md").read_text()
-    assert main(["sheets", name]) == 0
+    assert main([name]) == 0
     assert capsys.readouterr().out.startswith(f"# {name}\n")
 
 
 @pytest.mark.parametrize("file", ["talkitout.md", "talkitout.png", INDEX])
 def test_what_is_out_of_date_is_noticed(file: str, capsys: Capture, tmp_path: Path) -> None:
-    assert main(["sheets", "talkitout", "--write", str(tmp_path)]) == 0
+    assert main(["talkitout", "--out", str(tmp_path)]) == 0
     changed = tmp_path / file
     if changed.suffix == ".png":
         Image.new("RGB", (256, 256)).save(changed)
     else:
         changed.write_text(changed.read_text() + "\n")
-    assert main(["sheets", "talkitout", "--check", str(tmp_path)]) == 1
-    assert capsys.readouterr().err == f"{changed}: missing or out of date; run `socialai sheets --write`\n"
+    assert main(["talkitout", "--check", str(tmp_path)]) == 1
+    assert capsys.readouterr().err == f"{changed}: missing or out of date; run `make sheets`\n"
 
 
 def test_usage(capsys: Capture) -> None:
-    assert main(["sheets", "nowhere"]) == 2
+    assert main(["nowhere"]) == 2
     assert "nowhere: no shipped scenario; there are talkitout, " in capsys.readouterr().err
 
 

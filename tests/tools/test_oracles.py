@@ -1,4 +1,4 @@
-"""`socialai oracles`: what a script does not solve is proven unsolvable, or the script's fault."""
+"""`make oracles`: what a script does not solve is proven unsolvable, or the script's fault."""
 
 import json
 from pathlib import Path
@@ -7,8 +7,8 @@ import pytest
 
 import socialai_dsl
 from socialai_dsl.cli.errors import UsageError
-from socialai_dsl.cli.main import main
 from socialai_dsl.cli.oracle_play import play_oracle
+from tools.oracles import main
 
 Capture = pytest.CaptureFixture[str]
 
@@ -99,7 +99,7 @@ def test_without_a_script_there_is_nothing_to_play(halves: str) -> None:
 
 def test_the_command(halves: str, capsys: Capture, tmp_path: Path) -> None:
     page = tmp_path / "page.md"
-    assert main(["oracles", halves, "--episodes", "40", "--seed", "5", "--write", str(page)]) == 0
+    assert main([halves, "--episodes", "40", "--seed", "5", "--out", str(page)]) == 0
     printed = capsys.readouterr().out
     report = play_oracle(halves, 40, 5, 10_000)
     assert f"{report.solved} of 40 rooms solved" in printed
@@ -109,7 +109,7 @@ def test_the_command(halves: str, capsys: Capture, tmp_path: Path) -> None:
 
 
 def test_a_fault_is_a_finding(halves: str, capsys: Capture) -> None:
-    assert main(["oracles", lazy(halves), "--episodes", "20", "--json"]) == 1
+    assert main([lazy(halves), "--episodes", "20", "--json"]) == 1
     (report,) = json.loads(capsys.readouterr().out)
     assert report["rooms"] == len(report["unsolved"]) == 20
     assert {room["verdict"] for room in report["unsolved"]} == {"solvable", "unsolvable"}
@@ -127,4 +127,4 @@ def test_the_script_of_talkitout(capsys: Capture) -> None:
 
 @pytest.mark.parametrize("options", [["--episodes", "0"], ["--states", "0"], ["--seed", "-1"], ["nowhere"]])
 def test_usage(options: list[str]) -> None:
-    assert main(["oracles", *options]) == 2
+    assert main(options) == 2

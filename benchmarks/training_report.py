@@ -1,11 +1,11 @@
-"""What `socialai bench --train` measured, as text."""
+"""What `make bench ARGS=--train` measured, as text."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from socialai_dsl.cli.training_speed import Comparison, Row, TrainingReport
+    from benchmarks.training_speed import Comparison, Row, TrainingReport
 
 _IDLE: Final = 0.5
 
@@ -36,10 +36,7 @@ def training_table(report: TrainingReport) -> str:
             "scaled: the clock's ratio, with the floor in the place of a peer that is slower than it"
         )
     else:
-        lines += [
-            "",
-            "no peer was measured; they are in the repository's benchmarks/, not in an installed package",
-        ]
+        lines += ["", "no peer was measured"]
     return "\n".join(lines)
 
 

@@ -1,4 +1,4 @@
-"""The measurements of `socialai bench --train`: frames per second of our trainer and of the peers."""
+"""The measurements of `make bench ARGS=--train`: frames per second of our trainer and of the peers."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import Any, Final
 import numpy as np
 import torch
 
-from socialai_dsl.cli.machine import load, machine, on_cores
-from socialai_dsl.cli.reference_loop import reference_speed
-from socialai_dsl.cli.training_entries import Entry, Update
+from benchmarks.machine import load, machine, on_cores
+from benchmarks.reference_loop import reference_speed
+from benchmarks.training_entries import Entry, Update
 
 _PATIENCE: Final = 2.5
 _PACKAGES: Final = ("torch", "numpy", "gymnasium", "stable-baselines3", "sb3-contrib")

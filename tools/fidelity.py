@@ -1,17 +1,18 @@
-"""This module is `socialai fidelity`: it plays the scenarios at random and compares with the paper's own code."""
+"""Play the scenarios at random and compare with the paper's own code: `make fidelity`."""
 
 import argparse
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.cli.errors import Exit, UsageError
-from socialai_dsl.cli.fidelity_page import page
-from socialai_dsl.cli.fidelity_statistics import Comparison, Published, compare
+from socialai_dsl.cli.main import run_alone
 from socialai_dsl.cli.run_folder import write_text
+from tools.fidelity_page import page
+from tools.fidelity_statistics import Comparison, Published, compare
 
 SUMMARY: Final = "compare what a random policy comes to with the figures of the paper's own code"
 
@@ -31,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="to play of each scenario (default: 400000)",
     )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="default: 0")
-    parser.add_argument("--write", type=Path, metavar="FILE", help="write the tables as a Markdown page")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the tables as a Markdown page")
     parser.add_argument(
         "--json", action="store_true", help="print an array with one object for each comparison"
     )
@@ -50,8 +51,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
             print(_line(name, compared[name]), flush=True)
     if arguments.json:
         print(json.dumps([_object(name, c) for name, c in compared.items()], indent=2))
-    if arguments.write is not None:
-        write_text(arguments.write, page(compared, arguments.episodes, arguments.seed))
+    if arguments.out is not None:
+        write_text(arguments.out, page(compared, arguments.episodes, arguments.seed))
     differing = [name for name, comparison in compared.items() if not comparison.agrees]
     if differing:
         print(f"differs from the paper's code: {', '.join(differing)}", file=sys.stderr)
@@ -96,3 +97,12 @@ def _line(name: str, comparison: Comparison) -> str:
 
 def _object(name: str, comparison: Comparison) -> dict[str, Any]:
     return {"scenario": name, **asdict(comparison), "agrees": comparison.agrees}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run this script and return its exit code."""
+    return run_alone("python -m tools.fidelity", sys.modules[__name__], argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,4 +1,4 @@
-"""This module puts parts of a scenario into lines of Markdown."""
+"""Parts of a scenario as lines of Markdown."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final

@@ -1,13 +1,15 @@
-"""This module is `socialai bench`: how fast the environments are on this machine, or the trainer beside its peers."""
+"""Measure how fast the environments are on this machine, or the trainer beside its peers: `make bench`."""
 
 import argparse
 import json
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.main import run_alone
 
 SUMMARY: Final = "measure the speed of the environments, or of training, on this machine"
 
@@ -77,13 +79,13 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
 def _environments(arguments: argparse.Namespace) -> tuple[dict[str, Any], str]:
     """Report on the environments, as an object and as a table."""
-    from socialai_dsl.cli.bench_engine import Plan, measure_engine, parts
-    from socialai_dsl.cli.shipped import shipped_scenarios
+    from benchmarks.engine import Plan, measure_engine, parts
+    from socialai_dsl.loader.shipped import shipped_scenarios
 
     _check_names(arguments.only, parts(), "; for a trainer, expected --train beside it")
     if arguments.plot:
         try:
-            from socialai_dsl.cli.bench_plot import draw_report
+            from benchmarks.plot import draw_report
         except ImportError as error:
             raise UsageError(f"--plot: {error}; install the extra [train]") from error
     plan = Plan(
@@ -111,9 +113,9 @@ def _training(arguments: argparse.Namespace) -> tuple[dict[str, Any], str]:
     if arguments.all or len(arguments.scenarios) > 1:
         raise UsageError("--train: expected one SCENARIO")
     try:
-        from socialai_dsl.cli.training_entries import entries
-        from socialai_dsl.cli.training_report import training_table
-        from socialai_dsl.cli.training_speed import measure_training
+        from benchmarks.training_entries import entries
+        from benchmarks.training_report import training_table
+        from benchmarks.training_speed import measure_training
     except ImportError as error:
         raise UsageError(f"--train: {error}; install the extra [train]") from error
 
@@ -143,3 +145,12 @@ def _batches(text: str) -> list[int]:
     if not batches or min(batches) < 1:
         raise argparse.ArgumentTypeError(f"expected numbers such as 1,256, got {text!r}")
     return batches
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run this script and return its exit code."""
+    return run_alone("python -m benchmarks", sys.modules[__name__], argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,16 +1,17 @@
-"""This module takes the measurements of `socialai bench`, ours and those of others, in one run on one core."""
+"""This module takes the measurements of `make bench`, ours and those of others, in one run on one core."""
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from socialai_dsl.cli.bench_peers import known_peers, measure_limit, measure_peer
-from socialai_dsl.cli.bench_report import Report
-from socialai_dsl.cli.machine import load, machine, on_cores
-from socialai_dsl.cli.many_programs import different_programs
-from socialai_dsl.cli.measure import PROGRAMS, Ours
-from socialai_dsl.cli.reference_loop import reference_speed
-from socialai_dsl.cli.start_up import waits
+from benchmarks.comparison import measure_limit, measure_peer
+from benchmarks.machine import load, machine, on_cores
+from benchmarks.many_programs import different_programs
+from benchmarks.ours import PROGRAMS, Ours
+from benchmarks.peers import LIMITS, PEERS
+from benchmarks.reference_loop import reference_speed
+from benchmarks.report import Report
+from benchmarks.start_up import waits
 
 OWN_PARTS: Final = ("ours", "rules", "programs", "start")
 
@@ -42,8 +43,7 @@ class Plan:
 
 def parts() -> list[str]:
     """Names of all that can be measured."""
-    peers, limits = known_peers()
-    return [*OWN_PARTS, *(peer.name for peer in peers), *(limit.name for limit in limits)]
+    return [*OWN_PARTS, *(peer.name for peer in PEERS), *(limit.name for limit in LIMITS)]
 
 
 def measure_engine(plan: Plan, note: Callable[[str], None]) -> Report:
@@ -58,12 +58,11 @@ def measure_engine(plan: Plan, note: Callable[[str], None]) -> Report:
     with on_cores(1):
         report = Report(machine(), busy, plan.repetitions, reference_speed(plan.repetitions))
         _measure_ours(report, ours, plan, note)
-        peers, limits = known_peers()
-        for limit in limits:
+        for limit in LIMITS:
             if plan.holds(limit.name):
                 note(f"the limit: {limit.what}")
                 measure_limit(report, limit, plan.mixes, plan.batches, plan.repetitions, plan.seconds)
-        for peer in peers:
+        for peer in PEERS:
             if plan.holds(peer.name):
                 note(f"{peer.name}: {peer.workload}")
                 measure_peer(report, peer, plan.batches, plan.repetitions, plan.seconds)

@@ -1,4 +1,4 @@
-"""`socialai bench`: what is measured, and what `walk` leaves out."""
+"""`make bench`: what is measured, and what `walk` leaves out."""
 
 import json
 import shutil
@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 import socialai_dsl
-from socialai_dsl.cli import bench_engine, timing
-from socialai_dsl.cli.bench_report import Report, Row
-from socialai_dsl.cli.main import main
-from socialai_dsl.cli.many_programs import different_programs
-from socialai_dsl.cli.measure import Ours
-from socialai_dsl.cli.mixes import Allowed, random_actions, translated, walk_actions
-from socialai_dsl.cli.rule_heavy import rule_heavy_actions
-from socialai_dsl.cli.timing import Speed, speed_of
+from benchmarks import engine, timing
+from benchmarks.__main__ import main
+from benchmarks.many_programs import different_programs
+from benchmarks.mixes import Allowed, random_actions, translated, walk_actions
+from benchmarks.ours import Ours
+from benchmarks.report import Report, Row
+from benchmarks.rule_heavy import rule_heavy_actions
+from benchmarks.timing import Speed, speed_of
 from socialai_dsl.program import Header
 
-DATA = Path(__file__).parents[2] / "data"
+DATA = Path(__file__).parents[1] / "data"
 
 Capture = pytest.CaptureFixture[str]
 
@@ -59,7 +59,7 @@ QUICK = ["--repeat", "1", "--seconds", "0.02"]
 
 
 def test_the_report_is_json(scenario: str, capsys: Capture) -> None:
-    command = ["bench", scenario, "--batch", "1,8", "--mix", "random", "--only", "ours", *QUICK]
+    command = [scenario, "--batch", "1,8", "--mix", "random", "--only", "ours", *QUICK]
     assert main([*command, "--json", "--out", "report.json", "--plot", "report.png"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report == json.loads(Path("report.json").read_text(encoding="utf-8"))
@@ -75,12 +75,12 @@ def test_the_report_is_json(scenario: str, capsys: Capture) -> None:
 
 
 def test_wrong_usage(capsys: Capture) -> None:
-    assert main(["bench", "--repeat", "0"]) == 2
-    assert main(["bench", "--only", "nobody"]) == 2
+    assert main(["--repeat", "0"]) == 2
+    assert main(["--only", "nobody"]) == 2
     assert "expected one of ours, rules, programs, start" in capsys.readouterr().err
-    assert main(["bench", "--train", "--plot", "x.png"]) == 2
+    assert main(["--train", "--plot", "x.png"]) == 2
     with pytest.raises(SystemExit) as ended:
-        main(["bench", "--batch", "1,x"])
+        main(["--batch", "1,x"])
     assert ended.value.code == 2
 
 
@@ -112,8 +112,8 @@ def test_peers_run_or_it_is_said_why_not(monkeypatch: pytest.MonkeyPatch, capsys
             16,
         ),
     )
-    monkeypatch.setattr(bench_engine, "known_peers", lambda: (peers, ()))
-    command = ["bench", "--batch", "4", "--mix", "walk", "--only", "ours"]
+    monkeypatch.setattr(engine, "PEERS", peers)
+    command = ["--batch", "4", "--mix", "walk", "--only", "ours"]
     assert main([*command, *(f"--only={one.name}" for one in peers), *QUICK, "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert report["missing"] == {"absent": "not installed", "broken": "RuntimeError: this release cannot"}
@@ -128,8 +128,7 @@ def test_peers_run_or_it_is_said_why_not(monkeypatch: pytest.MonkeyPatch, capsys
 
 
 def test_the_limit_is_measured_under_the_same_actions(capsys: Capture) -> None:
-    pytest.importorskip("benchmarks.peers")
-    assert main(["bench", "--batch", "8", "--only", "ours", "--only", "c-portable", *QUICK, "--json"]) == 0
+    assert main(["--batch", "8", "--only", "ours", "--only", "c-portable", *QUICK, "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     if report["missing"]:
         assert report["missing"] == {"c-portable": "there is no C compiler"}

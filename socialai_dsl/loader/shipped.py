@@ -1,17 +1,32 @@
-"""This module knows which scenarios are shipped, and which of the other files are only variants of them."""
+"""Which scenarios ship, and which of the other files are only variants of them."""
 
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+
+import yaml
+
+from socialai_dsl.loader.library import shipped_folder
+
+IDS: Final = {
+    "TalkItOut": "talkitout",
+    "TalkItOutNoLiar": "talkitout_no_liar",
+    "Dance": "dance",
+    "CoinThief": "cointhief",
+    "CoinThiefTags": "cointhief_tags",
+    "DiverseExit": "diverse_exit",
+    "ShowMe": "showme",
+    "ShowMeNoSocial": "showme_no_social",
+    "Help": "help",
+    "HelpAsHelper": "help_as_helper",
+    "SocialEnv": "social_env",
+}
+"""Gymnasium's id without `SocialAI/` and `-v1`, as the paper calls a scenario -> its name."""
 
 
 @cache
 def _documents() -> dict[str, dict[str, Any]]:
     """Name (of the file, without its suffix) -> top level of each file in the folder of shipped scenarios."""
-    import yaml
-
-    from socialai_dsl.loader.library import shipped_folder
-
     files = sorted(shipped_folder().glob("*.yaml"))
     read = {path.stem: yaml.safe_load(path.read_text("utf-8")) for path in files}
     return {name: content for name, content in read.items() if isinstance(content, dict)}
@@ -19,8 +34,6 @@ def _documents() -> dict[str, dict[str, Any]]:
 
 def shipped_scenarios() -> list[str]:
     """The scenarios of the paper, then other scenarios and suites, and variants that say what they are about."""
-    from socialai_dsl.envs.registration import IDS
-
     documents = _documents()
     of_the_paper = [name for name in IDS.values() if name in documents]
     others = [name for name, content in documents.items() if _stands_alone(content)]
@@ -65,8 +78,6 @@ def _stands_alone(content: dict[str, Any]) -> bool:
 
 def file_of(scenario: str, variant: str | None = None) -> Path:
     """The file of a shipped scenario, or of a variant that `variants_of` names."""
-    from socialai_dsl.loader.library import shipped_folder
-
     names = [scenario]
     if variant is not None:
         names, base = [], scenario

@@ -1,4 +1,4 @@
-"""`socialai fidelity`: the statistics, the figures, the page; and, slowly, the comparisons themselves."""
+"""`make fidelity`: the statistics, the figures, the page; and, slowly, the comparisons themselves."""
 
 import json
 from math import comb
@@ -6,13 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from socialai_dsl.cli import fidelity
 from socialai_dsl.cli.errors import UsageError
-from socialai_dsl.cli.fidelity import chosen
-from socialai_dsl.cli.fidelity_page import page
-from socialai_dsl.cli.fidelity_statistics import Published, compare, fisher_exact
-from socialai_dsl.cli.main import main
 from socialai_dsl.cli.random_play import Sample
+from tools import fidelity
+from tools.fidelity import chosen, main
+from tools.fidelity_page import page
+from tools.fidelity_statistics import Published, compare, fisher_exact
 
 Capture = pytest.CaptureFixture[str]
 
@@ -99,7 +98,7 @@ def test_page() -> None:
 
 def test_the_page_that_is_committed() -> None:
     """It has every comparison, with the figures that are compared with, and none that differs."""
-    text = (Path(__file__).parents[3] / "docs" / "fidelity.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "docs" / "fidelity.md").read_text(encoding="utf-8")
     rows = {line.split("`")[1]: line for line in text.splitlines() if line.startswith("| `")}
     assert set(rows) == {name for name, _ in chosen([])}
     for name, figures in chosen([]):
@@ -117,7 +116,7 @@ def test_the_command(monkeypatch: pytest.MonkeyPatch, capsys: Capture, tmp_path:
     monkeypatch.setattr(fidelity, "_FIGURES", figures)
     written = tmp_path / "page.md"
     options = ["--episodes", "500", "--seed", "2"]
-    assert main(["fidelity", "talkitout", *options, "--json", "--write", str(written)]) == 1
+    assert main(["talkitout", *options, "--json", "--out", str(written)]) == 1
     printed = capsys.readouterr()
     (comparison,) = json.loads(printed.out)
     assert comparison["scenario"] == "talkitout+as_coded"
@@ -129,12 +128,12 @@ def test_the_command(monkeypatch: pytest.MonkeyPatch, capsys: Capture, tmp_path:
 
 
 def test_usage(capsys: Capture) -> None:
-    assert main(["fidelity", "--episodes", "0"]) == 2
-    assert main(["fidelity", "--seed", "-1"]) == 2
-    assert main(["fidelity", "nowhere"]) == 2
+    assert main(["--episodes", "0"]) == 2
+    assert main(["--seed", "-1"]) == 2
+    assert main(["nowhere"]) == 2
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, _ in chosen([]) if not name.endswith("+unsocial")])
 def test_scenarios_agree_with_the_papers_code(name: str, capsys: Capture) -> None:
-    assert main(["fidelity", name, "--episodes", "40000"]) == 0, capsys.readouterr()
+    assert main([name, "--episodes", "40000"]) == 0, capsys.readouterr()

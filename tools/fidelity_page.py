@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Final
 
-from socialai_dsl.cli.fidelity_statistics import LEAST_P, LIMIT, Comparison
+from tools.fidelity_statistics import LEAST_P, LIMIT, Comparison
 
 _HEAD: Final = """\
 # Fidelity to the paper's code

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import socialai_dsl
-from socialai_dsl.cli.shipped import shipped_scenarios
+from socialai_dsl.loader.shipped import shipped_scenarios
 
 
 def different_programs(count: int) -> dict[str, str]:

@@ -1,16 +1,16 @@
-"""This module writes the data sheet of a scenario: what its file says, in tables, and what was measured."""
+"""The data sheet of a scenario: what its file says, in tables, and what was measured."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from socialai_dsl.cli.sheets_text import code, entries, flow, frame, items, rule, table
+from socialai_dsl.analysis.sheet_text import code, entries, flow, frame, items, rule, table
 
 if TYPE_CHECKING:
     from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
     from socialai_dsl.schema.scenario import CastMember
 
-_GENERATED: Final = "<!-- Written by `socialai sheets`; change the scenario's file and run it again. -->"
+_GENERATED: Final = "<!-- Written by `make sheets`; change the scenario's file and run it again. -->"
 _FILES: Final = "../../scenarios"
 _DEFAULTS: Final = {"kind": "peer", "place": "anywhere", "facing": "random", "color": "random"}
 
@@ -77,7 +77,7 @@ def _data(loaded: "Loaded") -> dict[str, Any]:
 
 def _about(name: str, data: Mapping[str, Any]) -> str:
     """What a scenario says it is about; a variant that does not say it says what it changes."""
-    from socialai_dsl.cli.shipped import base_of
+    from socialai_dsl.loader.shipped import base_of
 
     about, base = str(data.get("about", "")), base_of(name)
     if not base:
@@ -88,7 +88,7 @@ def _about(name: str, data: Mapping[str, Any]) -> str:
 
 def _facts(name: str, loaded: "Loaded", data: Mapping[str, Any]) -> list[str]:
     from socialai_dsl.compilation import compile_loaded
-    from socialai_dsl.envs.registration import IDS
+    from socialai_dsl.loader.shipped import IDS
     from socialai_dsl.program import Header
     from socialai_dsl.program_suite import ProgramSuite
 
@@ -116,7 +116,7 @@ def _facts(name: str, loaded: "Loaded", data: Mapping[str, Any]) -> list[str]:
 
 
 def _variants(name: str) -> list[str]:
-    from socialai_dsl.cli.shipped import variants_of
+    from socialai_dsl.loader.shipped import variants_of
 
     lines = [
         f"* {code(f'{name}+{variant}')}: {_first_comment(_file_of(name, variant))}"
@@ -127,7 +127,7 @@ def _variants(name: str) -> list[str]:
 
 def _as_coded(name: str) -> list[str]:
     """What the code of the paper does otherwise: the variant itself, since every line of it is one difference."""
-    from socialai_dsl.cli.shipped import variants_of
+    from socialai_dsl.loader.shipped import variants_of
 
     if "as_coded" not in variants_of(name):
         return []
@@ -138,7 +138,7 @@ def _as_coded(name: str) -> list[str]:
 
 def _file_of(name: str, variant: str | None = None) -> Path:
     """The file of a shipped scenario, or of its variant: its own, or one of what it is itself a variant of."""
-    from socialai_dsl.cli.shipped import file_of
+    from socialai_dsl.loader.shipped import file_of
 
     return file_of(name, variant)
 

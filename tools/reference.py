@@ -1,13 +1,15 @@
-"""This module is `socialai reference`: it prints every key and word of the language, as the engine has them."""
+"""Write docs/reference.md, every key and word of the language as the engine has them: `make reference`."""
 
 import argparse
 import re
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Any, Final, get_args, get_origin
 
 from socialai_dsl.cli.errors import Exit
+from socialai_dsl.cli.main import run_alone
 
 if TYPE_CHECKING:
     from pydantic.fields import FieldInfo
@@ -19,23 +21,23 @@ SUMMARY: Final = "print every key and word of the language as a page of Markdown
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
-    parser.add_argument("--write", type=Path, metavar="FILE", help="write the page to a file instead")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the page to a file instead")
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Print or write the page."""
     page = reference_page()
-    if arguments.write is None:
+    if arguments.out is None:
         print(page, end="")
     else:
-        arguments.write.write_text(page, encoding="utf-8")
+        arguments.out.write_text(page, encoding="utf-8")
     return Exit.GOOD
 
 
 _INTRODUCTION: Final = """\
 # Reference
 
-Every key and every word of the language, as `socialai reference` prints them from the engine itself. What they are
+Every key and every word of the language, as `make reference` takes them from the engine itself. What they are
 for, and how they work together, is explained in [The scenario language](language.md).
 
 """
@@ -267,3 +269,12 @@ def _grammars() -> Iterator[str]:
         nouns = ", ".join(map(str, grammar["nouns"]))
         yield f"| `{name}` | {templates} | {nouns} |"
     yield ""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run this script and return its exit code."""
+    return run_alone("python -m tools.reference", sys.modules[__name__], argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

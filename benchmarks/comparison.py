@@ -1,29 +1,18 @@
-"""This module measures what `socialai bench` compares with, where the repository's `benchmarks` are at hand."""
+"""Measures what `make bench` compares our environments with."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from socialai_dsl.cli.bench_report import Report, Row
-from socialai_dsl.cli.mixes import Allowed, random_actions, walk_actions
-from socialai_dsl.cli.timing import speed_of
-
-if TYPE_CHECKING:
-    from benchmarks.peers import Limit, Peer
+from benchmarks.mixes import Allowed, random_actions, walk_actions
+from benchmarks.peers import Limit, Peer
+from benchmarks.report import Report, Row
+from benchmarks.timing import speed_of
 
 _SCENARIO: Final = "talkitout"  # what the hard-coded versions play
 
 
-def known_peers() -> "tuple[Sequence[Peer], Sequence[Limit]]":
-    """Engines of other projects and hand-written ones; none in an installed package, which has no `benchmarks`."""
-    try:
-        from benchmarks.peers import LIMITS, PEERS
-    except ImportError:
-        return (), ()
-    return PEERS, LIMITS
-
-
 def measure_peer(
-    report: Report, peer: "Peer", batches: Sequence[int], repetitions: int, seconds: float
+    report: Report, peer: Peer, batches: Sequence[int], repetitions: int, seconds: float
 ) -> None:
     """Add a peer's rows to a report, or why there are none."""
     version = peer.version()
@@ -44,7 +33,7 @@ def measure_peer(
 
 def measure_limit(
     report: Report,
-    limit: "Limit",
+    limit: Limit,
     mixes: Sequence[str],
     batches: Sequence[int],
     repetitions: int,

@@ -1,10 +1,10 @@
-"""This module is what `socialai bench` says: its rows, what they are compared with, as JSON and as a table."""
+"""This module is what `make bench` says: its rows, what they are compared with, as JSON and as a table."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
-from socialai_dsl.cli.timing import Speed
+from benchmarks.timing import Speed
 
 _BUSY: Final = 0.5
 

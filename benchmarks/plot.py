@@ -1,10 +1,10 @@
-"""This module draws what `socialai bench` measured: steps per second over the number of environments."""
+"""This module draws what `make bench` measured: steps per second over the number of environments."""
 
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from socialai_dsl.cli.bench_report import Report, Row
+from benchmarks.report import Report, Row
 
 _STYLES = {"ours": "-o", "peer": ":s", "limit": "--^"}
 

@@ -1,4 +1,4 @@
-"""`socialai bench --only start`: what is started, how often, and what is said if that fails."""
+"""`make bench ARGS="--only start"`: what is started, how often, and what is said if that fails."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from socialai_dsl.cli import start_up
-from socialai_dsl.cli.main import main
+from benchmarks import start_up
+from benchmarks.__main__ import main
 
 Capture = pytest.CaptureFixture[str]
 
@@ -33,7 +33,7 @@ class Processes:
 def test_each_wait_is_measured_as_often_as_asked(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     processes = Processes()
     monkeypatch.setattr(start_up.subprocess, "run", processes)
-    assert main(["bench", "--only", "start", "--repeat", "3", "--json"]) == 0
+    assert main(["--only", "start", "--repeat", "3", "--json"]) == 0
     report = json.loads(capsys.readouterr().out)
     assert [flag for flag, _ in processes.started] == ["-c", *["-c"] * 3, *["-m"] * 3]
     assert len({folder for _, folder in processes.started}) == 1, "compiled once, then loaded"
@@ -49,7 +49,7 @@ def test_each_wait_is_measured_as_often_as_asked(monkeypatch: pytest.MonkeyPatch
 
 def test_the_table_shows_them(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     monkeypatch.setattr(start_up.subprocess, "run", Processes())
-    assert main(["bench", "--only", "start", "--repeat", "1"]) == 0
+    assert main(["--only", "start", "--repeat", "1"]) == 0
     table = capsys.readouterr().out
     assert "seconds on the clock" in table
     assert "a file becomes a program, again" in table
@@ -57,7 +57,7 @@ def test_the_table_shows_them(monkeypatch: pytest.MonkeyPatch, capsys: Capture) 
 
 def test_what_cannot_be_started_is_said(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     monkeypatch.setattr(start_up.subprocess, "run", Processes(code=1))
-    assert main(["bench", "--only", "start"]) == 0
+    assert main(["--only", "start"]) == 0
     table = capsys.readouterr().out
     assert "not measured: start (a process failed: no engine today)" in table
     assert "bytes of one environment" in table, "the rest is reported all the same"

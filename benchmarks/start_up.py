@@ -1,4 +1,4 @@
-"""This module measures for `socialai bench` how long one waits: for a check, for a program, for the first step."""
+"""This module measures for `make bench` how long one waits: for a check, for a program, for the first step."""
 
 import os
 import statistics
@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 import socialai_dsl
-from socialai_dsl.cli.bench_report import Wait
+from benchmarks.report import Wait
 
 _FIRST_STEP: Final = """
 import sys, socialai_dsl

@@ -1,4 +1,4 @@
-"""The trainers that `socialai bench --train` measures: ours, and the peers where they are installed."""
+"""The trainers that `make bench ARGS=--train` measures: ours, and the peers where they are installed."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 import torch
 
 import socialai_dsl
+from benchmarks.training import PEERS, LongDialogue
 from trainer.config import RunConfig, configure
 from trainer.ppo import update
 from trainer.rollout import collect
@@ -74,10 +75,6 @@ def entries() -> list[Entry]:
         _own("paper-every-frame", "ours, paper, duplicates kept", narrow, every_frame=True),
         _own("paper-reference", "ours, paper-reference", reference),
     ]
-    try:
-        from benchmarks.training import PEERS, LongDialogue
-    except ImportError:
-        return own
     long = _own("fast-long", "ours, fast, long dialogue", configure(), LongDialogue)
     return [own[0], long, *own[1:], *(_peer(peer) for peer in PEERS)]
 

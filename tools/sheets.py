@@ -1,14 +1,15 @@
-"""This module is `socialai sheets`: a data sheet for each shipped scenario, written or checked."""
+"""Write or check the data sheets of the shipped scenarios, docs/scenarios/: `make sheets`."""
 
 import argparse
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.main import run_alone
 from socialai_dsl.cli.run_folder import read_json, write_json, write_text
-from socialai_dsl.cli.shipped import shipped_scenarios, variants_of
+from socialai_dsl.loader.shipped import shipped_scenarios, variants_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -38,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             "--measure",
             f"play {_EPISODES} random episodes and {_ROOMS} rooms of the script and note the figures",
         ),
-        ("--write", "write the sheets"),
+        ("--out", "write the sheets"),
         ("--check", "say which sheets are missing or out of date"),
     ):
         parser.add_argument(
@@ -58,14 +59,14 @@ def execute(arguments: argparse.Namespace) -> Exit:
         raise UsageError(f"{unknown[0]}: no shipped scenario; there are {', '.join(shipped_scenarios())}")
     if arguments.measure is not None:
         _measure(names, arguments.measure)
-    if arguments.write is not None:
-        _write(names, arguments.write)
+    if arguments.out is not None:
+        _write(names, arguments.out)
     if arguments.check is not None:
         stale = stale_files(names, arguments.check)
         for file in stale:
-            print(f"{file}: missing or out of date; run `socialai sheets --write`", file=sys.stderr)
+            print(f"{file}: missing or out of date; run `make sheets`", file=sys.stderr)
         return Exit.FINDINGS if stale else Exit.GOOD
-    if arguments.measure is None and arguments.write is None:
+    if arguments.measure is None and arguments.out is None:
         for text in _pages(names, _FOLDER).values():
             print(text)
     return Exit.GOOD
@@ -73,7 +74,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
 def stale_files(names: list[str], folder: Path) -> list[Path]:
     """The sheets, pictures and the list in a folder that are missing or would be written otherwise now."""
-    from socialai_dsl.cli.sheets_picture import picture
+    from tools.sheets_picture import picture
 
     stale = [
         folder / file
@@ -88,7 +89,7 @@ def stale_files(names: list[str], folder: Path) -> list[Path]:
 
 def _pages(names: list[str], folder: Path) -> dict[str, str]:
     """Text of each sheet, and of the list of all sheets that are there, by the name of the file."""
-    from socialai_dsl.cli.sheets_page import index, page
+    from socialai_dsl.analysis.data_sheet import index, page
 
     measured = _measurements(folder)
     texts = {f"{name}.md": page(name, _load(name), measured.get(name)) for name in names}
@@ -100,7 +101,7 @@ def _pages(names: list[str], folder: Path) -> dict[str, str]:
 def _write(names: list[str], folder: Path) -> None:
     from PIL import Image
 
-    from socialai_dsl.cli.sheets_picture import picture
+    from tools.sheets_picture import picture
 
     folder.mkdir(parents=True, exist_ok=True)
     for file, text in _pages(names, folder).items():
@@ -170,3 +171,12 @@ def _alike(path: Path, drawn: "NDArray[np.uint8]") -> bool:
     with Image.open(path) as image:
         shown = np.asarray(image.convert("RGB"))
     return shown.shape == drawn.shape and float(np.abs(shown.astype(int) - drawn).mean()) < _LIKENESS
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run this script and return its exit code."""
+    return run_alone("python -m tools.sheets", sys.modules[__name__], argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

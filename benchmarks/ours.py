@@ -1,4 +1,4 @@
-"""This module measures our environments for `socialai bench`."""
+"""This module measures our environments for `make bench`."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
@@ -6,10 +6,10 @@ from typing import Any, Final
 import numpy as np
 
 import socialai_dsl
-from socialai_dsl.cli.bench_report import Memory, Row
-from socialai_dsl.cli.mixes import BATCHES, Actions, Allowed, random_actions, translated, walk_actions
-from socialai_dsl.cli.rule_heavy import rule_heavy_actions
-from socialai_dsl.cli.timing import Speed, speed_of
+from benchmarks.mixes import BATCHES, Actions, Allowed, random_actions, translated, walk_actions
+from benchmarks.report import Memory, Row
+from benchmarks.rule_heavy import rule_heavy_actions
+from benchmarks.timing import Speed, speed_of
 
 PROGRAMS: Final = 64
 """How many different programs one batch is made of."""

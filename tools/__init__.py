@@ -1,0 +1,1 @@
+"""What maintainers run from a checkout: `make help` lists the targets."""
