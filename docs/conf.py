@@ -4,13 +4,22 @@ project = "socialai-dsl"
 author = "socialai-dsl contributors"
 copyright = author
 
-extensions = ["myst_parser"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 myst_heading_anchors = 4
 myst_enable_extensions = ["attrs_inline"]
 # Pages link to files of the project, which are no pages of the site: they are offered for download.
 suppress_warnings = ["myst.header"]
 
+# Docstrings write code in single backquotes.
+default_role = "code"
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+napoleon_google_docstring = True
+napoleon_use_ivar = True
+
 html_theme = "furo"
 html_title = "socialai-dsl"
 exclude_patterns = ["_build", "results"]
 nitpicky = True
+# Types of other libraries, and of our own that no page shows.
+nitpick_ignore_regex = [("py:.*", ".*")]

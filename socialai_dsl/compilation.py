@@ -41,10 +41,13 @@ def compile_loaded(loaded: Loaded) -> Program | ProgramSuite: ...
 
 
 def compile_loaded(loaded: Loaded) -> Program | ProgramSuite:
-    """The program of a scenario, or the programs of a suite.
+    """Compile a scenario to its program, or a suite to its programs.
+
+    Args:
+        loaded: what `load` returned.
 
     Raises:
-        ValueError: it was not loaded yet.
+        ValueError: it is something else, such as a name.
     """
     if isinstance(loaded, LoadedScenario):
         return compile_scenario(loaded.checked)

@@ -256,11 +256,11 @@ class CheckResult:
 
 
 def load(name: str | Path, texts: Mapping[Path, Source] | None = None) -> Loaded:
-    """A scenario or suite by path or shipped name, with variants and parameters: `talkitout+unsocial`, `a.yaml?n=2`.
+    """Read and check a scenario or suite.
 
     Args:
-        name: which one.
-        texts: see `check`.
+        name: a shipped name or the path of a file, with variants and parameters: `talkitout+unsocial`, `a.yaml?n=2`.
+        texts: contents that stand for those of files, such as an editor's unsaved text.
 
     Raises:
         ScenarioError: with all findings, if one of them is an error.

@@ -18,16 +18,20 @@ Positions = tuple[int, ...]
 
 @dataclass(frozen=True, eq=False)
 class ProgramSuite:
-    """Programs of which each episode plays one.
+    """The programs of a suite, of which each episode plays one.
 
     Attributes:
         name: canonical name with its variants.
-        programs: in the order of the suite. members: what each is called in layouts, infos and counters.
-        actions, templates, nouns: words of the action space, in order of index.
-        template_maps, noun_maps: for each program its own index of each template and noun.
-        labels: of members that are leaves or were swept over, parameter -> value.
-        weights: how likely an episode plays each, in proportion; all alike if empty.
-        starts: the layout that each member's episodes start from, None if they are drawn; none has one if empty.
+        programs: in the order of the suite.
+        members: the name of each program in layouts, infos and counters.
+        actions: words of the shared body actions, by index.
+        templates: the shared templates, by index.
+        nouns: the shared nouns, by index.
+        template_maps: for each program its own index of each shared template, -1 without one.
+        noun_maps: for each program its own index of each shared noun, -1 without one.
+        labels: parameters and values of members that are leaves of a tree or were swept over.
+        weights: relative probability of each program in an episode; all equal if empty.
+        starts: the layout that each member's episodes start from, None where they are drawn; empty if none has one.
         in_sequence: whether an episode plays all of them, one after another.
     """
 
@@ -46,12 +50,12 @@ class ProgramSuite:
 
     @cached_property
     def vocabulary(self) -> tuple[str, ...]:
-        """Token id -> word; 0 pads, 1 is unknown; each word once, in the order of the members."""
+        """The word of each token id, each once, in the order of the members; 0 pads, 1 is unknown."""
         return _union(program.vocabulary for program in self.programs)
 
     @cached_property
     def outcome_table(self) -> tuple[Outcome, ...]:
-        """Every way that an episode can end; the members' names come first: `dance: timeout`."""
+        """Every way that an episode can end, each with its member's name before it."""
         table: dict[str, Outcome] = {}
         for member, program in zip(self.members, self.programs, strict=True):
             for outcome in program.outcome_table:

@@ -60,7 +60,7 @@ def test_readme_examples_run(reader: Path) -> None:
     with contextlib.redirect_stdout(printed):
         for number, example in enumerate(examples):
             exec(compile(example, f"README.md, example {number + 1}", "exec"), {})
-    assert "(7, 7, 4)" in printed.getvalue()
+    assert "(1024, 7, 7, 4)" in printed.getvalue()
     assert "Ada: After you." in printed.getvalue(), "the keeper of the example's door answers"
 
 

@@ -1,4 +1,4 @@
-"""Exploration bonuses: rewards of the trainer's own for what an episode has not heard or seen before."""
+"""Exploration bonuses: rewards of the trainer for lines and cells that are new in an episode."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ _SILENCE = 0  # what the environments' `utterance_ids` say when nothing was hear
 
 
 class Bonus(Protocol):
-    """Pays a bonus on top of the scenario's reward; `--bonus mine:Bonus` is built as `Bonus(config, num_envs)`."""
+    """The interface of a bonus on the scenario's reward; `--bonus mine:Bonus` builds `Bonus(config, num_envs)`."""
 
     def step(self, envs: Any, image: NDArray[np.uint8], ended: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Bonus of the step just made, float64 (E,).
+        """The bonus of the step just made, float64 (E,).
 
         Args:
-            envs: the vector environment, asked for the ids of what was heard.
-            image: uint8 (E, H, W, C) observed after the step.
-            ended: bool (E,), where the step ended the episode (so that the observation is already the next one's).
+            envs: the vector environment, which knows the ids of what was heard.
+            image: uint8 (E, H, W, C), observed after the step.
+            ended: bool (E,), true where the step ended the episode; the observation is then the next episode's first.
         """
 
     def state(self) -> dict[str, NDArray[np.generic]]:
-        """All it remembers, as arrays by name."""
+        """Its whole state, as arrays by name."""
 
     def load_state(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from `state()` of an equal one. Raises ValueError for any other."""
+        """Continue from what `state()` of an equal bonus returned. Raises ValueError for any other."""
 
 
 class EpisodicBonus:

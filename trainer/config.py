@@ -36,13 +36,13 @@ Name = Annotated[str, Field(min_length=1)]
 
 
 class RunConfig(BaseModel):
-    """What a run depends on besides the code and the machine. Every value is resolved: there is no `auto`.
+    """Every option of a run, resolved: there is no `auto`. Equal configurations and code compute equal runs.
 
-    Defaults marked "measured" learned to ask and to heed in small rooms within two million frames. Those marked
-    "paper" are in the appendix of the SocialAI 1.0 paper on its baselines, or in the code released with it.
+    Defaults marked "measured" were chosen by runs of this trainer. Those marked "paper" are in the appendix of the
+    SocialAI 1.0 paper on its baselines, or in the code released with it.
 
     Raises:
-        pydantic.ValidationError: (a ValueError) a value is out of bounds, or two values contradict each other.
+        ValueError: a value is out of bounds, or two values contradict each other (pydantic's ValidationError).
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
@@ -278,13 +278,15 @@ RECIPES: Final[Mapping[str, Preset]] = {
 
 
 def configure(recipe: str = "plain", **given: Any) -> RunConfig:
-    """A configuration from a recipe, the presets of a network, and the options given, the later the stronger.
+    """Make a configuration from a recipe, the preset of a network, and single options; later ones override.
 
-    Where fewer environments are given than a preset has minibatches, there are as many minibatches as environments.
+    Args:
+        recipe: `plain`, `paper` or `guided`.
+        given: options of `RunConfig` by name. Where `envs` is below the preset's minibatches, the number of minibatches
+            is `envs`.
 
     Raises:
-        pydantic.ValidationError: see `RunConfig`.
-        ValueError: there is no such recipe.
+        ValueError: there is no such recipe or option, or a value is out of bounds (pydantic's ValidationError).
     """
     if recipe not in RECIPES:
         raise ValueError(f"recipe: got {recipe!r}, expected one of {', '.join(RECIPES)}")

@@ -1,4 +1,4 @@
-"""Guides: somebody else who acts in some steps, and whose actions the agent imitates."""
+"""Guides: players that act in some steps of training and whose actions the agent imitates."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ SHIPPED = ("none", "script")
 
 
 class Lead(NamedTuple):
-    """What a guide does in one step of E environments: NumPy arrays; of a rollout, tensors (T, E, ...).
+    """A guide's part in one step of E environments: NumPy arrays, or tensors (T, E, ...) for a rollout.
 
     Attributes:
-        actions: int64 (E, 4), what the guide would do now.
-        led: bool (E,), where its action is played instead of the policy's. The policy gradient skips these steps. An
-            environment that is led stays led or is handed over once: who plays on after a hand-over decides alone,
-            or generalised advantage estimation would be biased.
-        weights: float32 (E,), weight of the cross-entropy between the policy and `actions`: of led steps that is
-            imitation, of others advice. 0: nothing is imitated.
+        actions: int64 (E, 4), the guide's own choice.
+        led: bool (E,), true where the guide's action is played instead of the policy's; the policy gradient skips these
+            steps. A guide hands an environment over at most once in an episode, after which the policy decides alone;
+            otherwise generalised advantage estimation would be biased.
+        weights: float32 (E,), weight of the cross-entropy between the policy and `actions`: imitation in led steps,
+            advice in others, nothing where it is 0.
     """
 
     actions: Any
@@ -32,25 +32,25 @@ class Lead(NamedTuple):
 
 
 class Guide(Protocol):
-    """Leads and advises while the agent is trained; never asked while it is evaluated.
+    """The interface of a guide, which leads and advises in training and is never asked in evaluation.
 
-    A guide of the user's own, `--guide mine:Guide`, is built as `Guide(config, envs)`.
+    `--guide mine:Guide` builds `Guide(config, envs)`.
     """
 
     def lead(self, envs: Any, starts: NDArray[np.bool_], progress: float) -> Lead:
-        """What happens in the coming step.
+        """Decide about the coming step.
 
         Args:
-            envs: the vector environment, before the step; `envs.scripted_actions()` is what its script would do.
-            starts: bool (E,), where the coming step is an episode's first.
-            progress: share of the run's frames made so far, 0 to 1.
+            envs: the vector environment before the step; `envs.scripted_actions()` asks its script.
+            starts: bool (E,), true where the coming step is an episode's first.
+            progress: share of the run's frames so far, 0 to 1.
         """
 
     def state(self) -> dict[str, Any]:
-        """All it remembers, as JSON data."""
+        """Its whole state, as JSON data."""
 
     def load_state(self, state: Mapping[str, Any]) -> None:
-        """Go on from `state()` of an equal one."""
+        """Continue from what `state()` of an equal guide returned."""
 
 
 class ScriptGuide:

@@ -1,4 +1,4 @@
-"""Trained agents at play."""
+"""Trained agents as policies."""
 
 from __future__ import annotations
 
@@ -27,13 +27,14 @@ _WORDS_SHOWN = 6
 
 
 class CheckpointPolicy:
-    """A trained agent: a network with its memory.
+    """A trained agent: a network with its memory, which plays one environment or many.
 
-    It samples its actions, as in the paper, or takes the most probable ones if `greedy`. The network is in
-    evaluation mode, so batch normalisation uses the statistics of training, and what one environment gets does not
-    depend on the others (but for the rounding of matrix products).
+    It samples its actions, as in the paper, or takes the most probable ones if `greedy`. The network is in evaluation
+    mode, so batch normalisation uses the statistics of training, and the actions in one environment do not depend on
+    the others (except for the rounding of matrix products). `load` makes one.
 
-    Plays one environment as well as many: `act` answers an observation in the form in which it is asked.
+    Attributes:
+        net: the network, a `torch.nn.Module`.
     """
 
     def __init__(self, net: ActorCritic, greedy: bool = False, seed: int = 0) -> None:
@@ -54,7 +55,7 @@ class CheckpointPolicy:
         net: str | None = None,
         folder: Path = Path(),
     ) -> CheckpointPolicy:
-        """Load an agent for playing `envs`; where they are not what it was trained on, a warning lists the differences.
+        """Load an agent to play `envs`; a `TransferWarning` lists how they differ from the ones it was trained on.
 
         Args:
             path: `shipped:NAME`, a run's folder, its folder of checkpoints (of both the newest is taken), or one
@@ -63,13 +64,14 @@ class CheckpointPolicy:
                 was trained.
             greedy: take the most probable action instead of sampling.
             seed: of the sampling.
-            device: where the network runs.
-            net: name of the network, needed if it is not a shipped one: no file chooses what is imported.
-            folder: where the file of such a network is looked for first.
+            device: PyTorch's name of the device that the network runs on.
+            net: the name `module:Class` of a network of your own, which the call must name: no file chooses what is
+                imported.
+            folder: the folder whose `module.py` is tried first.
 
         Raises:
-            CheckpointError: see `checkpoint.read_agent` and `checkpoint.restore_net`; or `envs` is None and the
-                checkpoint does not say which scenario it is for.
+            CheckpointError: the file is missing, damaged or of another version of the trainer, or does not fit the
+                environment; or `envs` is None and the checkpoint names no scenario.
             ValueError: no agent of this name ships.
         """
         checkpoint = checkpoints.read_agent(path)
@@ -83,7 +85,7 @@ class CheckpointPolicy:
         return cls(restored.to(device), greedy, seed)
 
     def reset(self, mask: NDArray[np.bool_] | None = None, episodes: Int64 | None = None) -> None:
-        """Forget the past of the environments where `mask`, bool (E,), is true; without it, that of all."""
+        """Forget the past where a new episode begins, `mask` bool (E,), or everywhere; see `Policy.reset`."""
         if mask is None:
             mask = np.ones(len(self._memory), np.bool_)
         self._require(len(mask))
@@ -92,7 +94,7 @@ class CheckpointPolicy:
 
     @torch.no_grad()
     def act(self, observation: Observation) -> Int64:
-        """Actions, int64 (E, 4), for `image` (E, H, W, C) and `tokens` (E, L), or (4,) for a single observation."""
+        """Choose actions, int64 (E, 4), as `Policy.act` does; a single observation gives one action, int64 (4,)."""
         alone = observation["tokens"].ndim == 1
         logits, _ = self._look(observation, alone)
         if not self._greedy:
@@ -103,10 +105,10 @@ class CheckpointPolicy:
 
     @torch.no_grad()
     def think(self, observation: Observation) -> tuple[list[list[float]], float]:
-        """What the agent makes of a single observation, which it remembers as after `act`.
+        """The agent's view of a single observation, which enters its memory as in `act`.
 
         Returns:
-            The probabilities of each head's choices, and the return that it expects.
+            The probabilities of each head's choices, and the expected return.
         """
         logits, values = self._look(observation, alone=True)
         parts = torch.split(logits[0], list(self.net.spec.action_sizes))
@@ -132,7 +134,7 @@ class CheckpointPolicy:
 
 
 class TransferWarning(UserWarning):
-    """An agent plays something else than it was trained on."""
+    """Warns that an agent plays another program than the one it was trained on."""
 
 
 def warn_of_differences(meta: CheckpointMeta, program: Any) -> None:

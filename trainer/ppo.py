@@ -242,13 +242,13 @@ def train(
     CPU with the same number of threads.
 
     Args:
-        config: every number.
-        envs: vector environment with same-step auto-reset, as `socialai_dsl.make_vec` gives; fresh, not yet reset.
+        config: every option of the run.
+        envs: what `socialai_dsl.make_vec(..., autoreset_mode="SameStep")` returns, not yet reset.
         run_dir: directory of the run, made if missing.
-        progress: called after every update with its row, as `metrics.jsonl` has it.
+        progress: called after every update with its row, as in `metrics.jsonl`.
         resume: continue the run in `run_dir`.
-        tracker: takes the figures elsewhere as well.
-        program: of the scenario that the agent is for, where a guide plays a variant of it; default the environments'.
+        tracker: sends the figures elsewhere as well.
+        program: of the scenario that the agent is for, where a guide plays a variant of it; by default that of `envs`.
 
     Raises:
         ValueError: configuration and environments do not fit, or the tracker cannot begin.

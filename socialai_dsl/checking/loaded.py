@@ -17,11 +17,13 @@ from socialai_dsl.source import DataPath
 
 @dataclass(frozen=True)
 class LoadedScenario:
-    """A scenario that is right: what `compile` takes.
+    """A scenario without mistakes, ready for `compile`.
 
     Attributes:
         name: with variants, e.g. `talkitout+unsocial`.
-        checked: everything resolved. scenario: the models. resolved: the data with its positions.
+        checked: its meaning, every name resolved.
+        scenario: its shape, as pydantic models.
+        resolved: its plain data with positions.
         warnings: findings that do not keep it from running.
     """
 
@@ -49,11 +51,12 @@ class Start:
 
 @dataclass(frozen=True)
 class LoadedSuite:
-    """A suite that is right: scenarios of which each episode plays one.
+    """A suite without mistakes: scenarios of which each episode plays one.
 
     Attributes:
         name: with variants, e.g. `social_env+unsocial`.
-        members: the scenarios in order. member_names: what the suite's file calls them.
+        members: the scenarios in order.
+        member_names: what the suite's file calls them.
         labels: of each member that is a leaf of a tree or is swept over, parameter -> value.
         weights: how likely each member is, in proportion to the others.
         starts: how each member's episodes start; None if they are drawn.

@@ -1,4 +1,4 @@
-"""Environments by name."""
+"""Makes environments from names, paths and programs."""
 
 from __future__ import annotations
 
@@ -34,8 +34,14 @@ def _compiled(loaded: Loaded) -> Playable:
 def make(scenario: Scenario, render_mode: str | None = None) -> ScenarioEnv:
     """One environment of a scenario or suite: `make("talkitout+unsocial")`, `make("my/scenario.yaml")`.
 
+    Args:
+        scenario: a shipped name or the path of a file, with variants (`+unsocial`) and parameters (`?n=2`); or what
+            `compile` returned.
+        render_mode: see `ScenarioEnv`.
+
     Raises:
         ScenarioError: the scenario does not exist or has mistakes; `.diagnostics` lists them all.
+        ValueError: there is no such render mode.
     """
     if isinstance(scenario, Playable):
         return ScenarioEnv(scenario, render_mode)
@@ -51,7 +57,15 @@ def make_vec(
     copy: bool = True,
     render_mode: str | None = None,
 ) -> ScenarioVectorEnv:
-    """Many environments of a scenario or suite, or of several in turn; see ScenarioVectorEnv.
+    """A batch of environments: one scenario or suite, or several in turn.
+
+    Args:
+        scenario: as for `make`, or a sequence of such; environment i plays number i modulo their number.
+        num_envs: E, at least 1.
+        num_threads: 1.
+        autoreset_mode: `NextStep`, `SameStep` or `Disabled`.
+        copy: False returns the engine's own buffers, valid until the next call.
+        render_mode: `rgb_array`, `ansi` or None.
 
     Raises:
         ScenarioError: a scenario does not exist or has mistakes.

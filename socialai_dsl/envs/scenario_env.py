@@ -107,17 +107,32 @@ _INT64 = np.dtype(np.int64)
 
 
 class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
-    """One environment.
+    """One environment of a scenario or suite.
 
-    Observation: `image` uint8 (7, 7, 4), or (7, 7, 6) if gestures are shown, `tokens` int16 (L,). Action: int64 (4,):
-    body action (the last is no movement), speak or not, template, noun; the last two are ignored in silence. Info:
-    `utterance` (what is heard now, one line for each speaker, "NA" in silence), `history` (all lines since the reset),
-    of a suite `member` (which scenario is played), and at the end `success` and `outcome`.
+    **Observation.** `image`, uint8 (7, 7, 4), or (7, 7, 6) if the scenario shows gestures: `image[i, j]` counts i from
+    the agent's left to its right and j from far to near, the agent itself is at `[3, 6]`, and the channels are type,
+    colour, status, orientation, then pointing and last act. `tokens`, int16 (L,): the words heard since the reset,
+    oldest first, as indices into `program.vocabulary`; 0 pads, 1 is an unknown word.
+
+    **Action.** int64 (4,): body action (the last one is no movement), speak (1) or not (0), template, noun. Template
+    and noun count only if the agent speaks. `encode_action` makes one from words.
+
+    **Reward.** A success in step t pays 1 - 0.9 t / horizon, everything else 0, unless the scenario's `reward` and
+    `rules` say otherwise.
+
+    **Info.** `utterance`, the lines heard in this step, "NA" in silence; `history`, all lines since the reset; of a
+    suite `member`, the name of the scenario that is played; in the last step `success` (bool) and `outcome`, its name
+    in `outcomes` of the program that is played.
+
+    `socialai_dsl.make` makes one from a name.
 
     Args:
         program: what `socialai_dsl.compile` returns, for a scenario or a suite.
-        render_mode: rgb_array, ansi or human (a picture in the terminal).
-        scenarios: what the program, or each of a suite's, was compiled from; only `scenario` and `explain` need it.
+        render_mode: `rgb_array`, `ansi`, or `human`, which prints the room after every step.
+        scenarios: what the program, or each of a suite's, was compiled from; `scenario` and `explain` need it.
+
+    Raises:
+        ValueError: there is no such render mode.
     """
 
     metadata = {"render_modes": ["rgb_array", "ansi", "human"], "render_fps": 4}  # noqa: RUF012 - Gymnasium's protocol
@@ -157,10 +172,26 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Start an episode: `seed` starts episode 0 of the seed, without it the next one.
+        """Start an episode.
 
-        Options: `layout` (a known room), `test_episode` (of the fixed test set), `index` (play as environment
-        `index` of a vector with this seed).
+        Options:
+
+        * `layout`, a mapping: starts from a known room; what the layout leaves out is drawn.
+        * `test_episode`, an int: plays this episode of a domain that no seed reaches; 0 to 499 are the fixed test set.
+        * `index`, an int: plays as environment `index` of a vector environment with this seed.
+        * `reset_mask`, one boolean: False leaves the episode as it is.
+
+        Args:
+            seed: starts episode 0 of this seed. Without it the next episode follows; the first reset then draws a seed
+                from the operating system.
+            options: any of those above.
+
+        Returns:
+            The observation and the info.
+
+        Raises:
+            ValueError: the seed, an option or the layout is not what was expected.
+            RuntimeError: 64 drawn rooms in a row violate the scenario's `require`.
         """
         super().reset(seed=seed)
         self._table.reset(seed, options)
@@ -175,7 +206,17 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
     def step(
         self, action: NDArray[np.int64] | Sequence[int]
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """One step. Raises ValueError for an action outside the space, or after the end of the episode."""
+        """Take one step.
+
+        Args:
+            action: four integers.
+
+        Returns:
+            Observation, reward (float), terminated (an outcome ended the episode), truncated (the horizon did), info.
+
+        Raises:
+            ValueError: the action is outside the space, or the episode has ended.
+        """
         if self._ended:
             raise ValueError("step: got a call outside of an episode; expected reset() first")
         given = action if isinstance(action, np.ndarray) else np.asarray(action)
@@ -240,25 +281,40 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         return {"image": self._copy_image(), "tokens": self._copy_tokens()}
 
     def encode_action(self, action: Sequence[Any]) -> NDArray[np.int64]:
-        """The action of the space for the paper's notation or words: see `actions.encode_action`."""
+        """The action that words or the paper's notation mean, int64 (4,).
+
+        `("forward", "Open sesame")` moves and speaks, `(None, "Open sesame")` only speaks, `("left", None)` only moves.
+        The paper's notation has indices: `(1, None, None)` is body action 1, `(None, 1, 5)` template 1 with noun 5.
+
+        Args:
+            action: a pair of body action and sentence, or a triple of body action, template and noun, each part a word,
+                an index or None.
+
+        Raises:
+            ValueError: the action is none of these; the message says what was expected.
+        """
         live = self.program.live(self._table.number(0)) if isinstance(self.program, ProgramSuite) else None
         return encode_action(action, self.program.actions, self.program.templates, self.program.nouns, live)
 
     def scripted_action(self) -> NDArray[np.int64]:
-        """What the agent's frame would do now, int64 (4,). Raises ValueError if the agent follows no frame."""
+        """The action of the scenario's own script for the agent, int64 (4,); nothing changes.
+
+        Raises:
+            ValueError: the agent follows no frame.
+        """
         scripted: NDArray[np.int64] = self._table.scripted_actions()[0]
         return scripted
 
     def describe(self) -> dict[str, Any]:
-        """The state in the scenario's own names; can be put back as a layout."""
+        """The state in the scenario's own names, as a layout that `reset` accepts."""
         return self._table.describe(0)
 
     @property
     def scenario(self) -> CheckedScenario:
-        """What the program of this episode was compiled from.
+        """The checked scenario that this episode's program was compiled from.
 
         Raises:
-            ValueError: the environment was made from a program.
+            ValueError: the environment was made from a program alone.
         """
         return self._scenario(self._table.number(0))
 
@@ -268,17 +324,20 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         return self._scenarios[number]
 
     def explain(self) -> dict[str, Any]:
-        """Which rules fired in the last step, and for the others that could have, why they did not.
+        """Which rules fired in the last step, and why the others that were asked did not.
 
-        Keys: `t`, `fired` and `others`, two lists in the order in which rules were asked. An entry has `who` (a member
-        of the cast, `world` or `outcome`), `kind` (rule, step, world rule or outcome), of a rule in a frame `state` and
-        `list` (first or then), `name`, `at` (file:line), `words` (how it is written), and of the others `why`; where a
-        part of its condition was false, also that `part` as it is written and `values`, what it was about. Rules of
-        states that a frame was not in are left out. Nothing changes; the step is played again from the start of the
-        episode, so this is for looking, not for every step of training.
+        Nothing changes. The episode is played again from its start up to this step, so this is for looking, not for
+        every step of training.
+
+        Returns:
+            `t`, `fired` and `others`, two lists in the order in which the rules were asked. An entry has `who` (a
+            member of the cast, `world` or `outcome`), `kind` (rule, step, world rule or outcome), `name`, `at`
+            (file:line) and `words` (the rule as written); a rule in a frame also `state` and `list` (first or then); an
+            entry of `others` also `why`, and, where a part of its condition was false, that `part` as written and the
+            `values` it compared. Rules of states that a frame was not in are left out.
 
         Raises:
-            ValueError: no step has been taken since `reset` or `restore`, or the environment was made from a program.
+            ValueError: no step was taken since `reset` or `restore`, or the environment was made from a program alone.
         """
         recording = self._last_act or self._recording
         if not recording.actions:
@@ -297,11 +356,15 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         return explained
 
     def snapshot(self) -> bytes:
-        """The exact state, randomness included."""
+        """The exact state as bytes, randomness included."""
         return self._table.snapshot()
 
     def restore(self, data: bytes) -> None:
-        """Put back a snapshot of this scenario. Raises ValueError for any other."""
+        """Return to a snapshot.
+
+        Raises:
+            ValueError: it is damaged, or of another scenario.
+        """
         self._table.restore(data)
         self._look_up()
         self._record()
@@ -309,11 +372,15 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._history = "\n".join(self._table.history(0))
 
     def counters(self) -> dict[str, Any]:
-        """Counts since the environment was made: {"outcomes": {name: n}, "rules": {name: n}, "episodes": n}."""
+        """Counts since the environment was made.
+
+        Returns:
+            The keys are `outcomes` and `rules`, which map names to counts, and `episodes`, the number that have ended.
+        """
         return self._table.counters()
 
     def render(self) -> Any:
-        """The room as uint8 (H, W, 3), as text, or printed, by `render_mode`."""
+        """The room, by `render_mode`: uint8 (H, W, 3), text, or printed; without a mode, None."""
         if self.render_mode is None:
             return None
         if self.render_mode == "rgb_array":
@@ -326,7 +393,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         return None
 
     def plain_text(self) -> str:
-        """The room as text, two characters a cell."""
+        """The room as text, two characters for each cell, without colours."""
         return plain_text(self._table, 0)
 
     def coloured_text(self) -> str:

@@ -1,4 +1,4 @@
-"""Thousands of scenarios at once as a Gymnasium vector environment."""
+"""Batches of environments as a Gymnasium vector environment."""
 
 from __future__ import annotations
 
@@ -27,21 +27,35 @@ Observation = dict[str, NDArray[Any]]
 
 
 class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]]):
-    """Environments of one scenario or suite, or of several in turn (environment i plays number i modulo their number).
+    """A batch of E environments of one scenario or suite, or of several in turn.
 
-    Observation: `image` uint8 (E, 7, 7, 4), or (E, 7, 7, 6) if a scenario shows gestures, `tokens` int16 (E, L).
-    Action: int64 (E, 4): body action (the last is no movement), speak or not, template, noun. Infos, only in steps
-    that end episodes: `success` bool (E,), `outcome` int (E,) (an index into `outcomes`), with masks `_success` and
-    `_outcome`; in same-step mode also `final_obs` (arrays as in an observation) and `final_info`.
+    **Observation.** `image`, uint8 (E, 7, 7, 4), or (E, 7, 7, 6) if a scenario shows gestures: `image[e, i, j]` counts
+    i from the agent's left to its right and j from far to near, the agent itself is at `[e, 3, 6]`, and the channels
+    are type, colour, status, orientation, then pointing and last act. `tokens`, int16 (E, L): the words heard since the
+    reset, oldest first, as indices into `vocabulary`; 0 pads, 1 is an unknown word.
+
+    **Action.** int64 (E, 4): body action (the last one is no movement), speak (1) or not (0), template, noun. Template
+    and noun count only where the agent speaks.
+
+    **Infos.** Empty, except in a step that ends an episode: `success` bool (E,), `outcome` int (E,), an index into
+    `outcomes`, and the masks `_success` and `_outcome`, bool (E,), of the episodes that ended. In same-step mode also
+    `final_obs`, arrays as in an observation, and `final_info`, with their masks.
+
+    `socialai_dsl.make_vec` makes one from names.
 
     Args:
-        playables: at least one program or suite of programs; of a suite every episode plays a member, drawn anew.
-        num_envs: E.
+        playables: at least one program or suite of programs; environment i plays number i modulo their number. Every
+            episode of a suite plays one member, drawn anew.
+        num_envs: E, at least 1.
         num_threads: 1; to use more cores run more processes.
-        autoreset_mode: NextStep, SameStep or Disabled (`reset(options={"reset_mask": ...})` restarts some).
-        copy: False gives the engine's own buffers, also in infos, valid until the next call; only what changed is
-            written to them.
-        render_mode: rgb_array or ansi: `render()` gives one picture for each environment.
+        autoreset_mode: `NextStep`, `SameStep` or `Disabled`, as in Gymnasium. With `Disabled` the caller restarts
+            environments by `reset(options={"reset_mask": ...})`.
+        copy: False returns the engine's own buffers, also in infos. They are valid until the next call, which writes
+            only what changed.
+        render_mode: `rgb_array` or `ansi`; `render()` then returns one picture for each environment.
+
+    Raises:
+        ValueError: an argument is not what was expected.
     """
 
     def __init__(
@@ -83,31 +97,49 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
 
     @property
     def programs(self) -> tuple[Program, ...]:
-        """The programs played, the members of suites each for itself."""
+        """The programs that are played; of a suite, those of its members."""
         return self._table.programs
 
     @property
     def program(self) -> Playable:
-        """The program or suite that is played; of several scenarios their mixture."""
+        """The program or suite that is played; for several scenarios, a suite of them."""
         return self._table.merged.playable
 
     @property
     def outcomes(self) -> list[str]:
-        """Name of each number in `infos["outcome"]`: `program.outcomes`."""
+        """The names that `infos["outcome"]` indexes, equal to `program.outcomes`."""
         return [name for name, _ in self._table.merged.outcomes]
 
     @property
     def vocabulary(self) -> tuple[str, ...]:
-        """Word of each token id: `program.vocabulary`."""
+        """The words that `tokens` indexes, equal to `program.vocabulary`."""
         return self._table.merged.vocabulary
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Start episodes. Options: `layout` (one or a list), `reset_mask`, `test_episode`, `index`.
+        """Start episodes.
+
+        Options:
+
+        * `reset_mask`, bool (E,): the environments that restart; without it, all of them.
+        * `test_episode`, an int or a list of E: plays these episodes of a domain that no seed reaches; 0 to 499 are the
+          fixed test set.
+        * `layout`, a mapping or a list of E with None for a drawn room: starts from a known room.
+        * `index`, an int or a list of E: plays as environment `index` of a batch with this seed.
+
+        Args:
+            seed: one number s gives environment i the stream (s, i); a list of E gives it (seeds[i], 0). Both begin
+                with episode 0. Without a seed every environment plays its next episode; the first reset then draws a
+                seed from the operating system.
+            options: any of those above.
+
+        Returns:
+            The observation and empty infos.
 
         Raises:
             ValueError: a seed, an option or a layout is not what was expected.
+            RuntimeError: 64 drawn rooms in a row violate the scenario's `require`.
         """
         if seed is not None:
             self._np_random_seed = seed if isinstance(seed, int) else -1
@@ -117,7 +149,18 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
     def step(
         self, actions: NDArray[np.int64]
     ) -> tuple[Observation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """One step of every environment. Raises ValueError for actions outside the space."""
+        """Step every environment once.
+
+        Args:
+            actions: integers (E, 4).
+
+        Returns:
+            Observation, rewards float64 (E,), terminations bool (E,), truncations bool (E,), infos. An outcome
+            terminates an episode; the scenario's horizon truncates it.
+
+        Raises:
+            ValueError: there was no reset yet, or an action is outside the space.
+        """
         ended = self._table.step(self._task, actions)
         ports = self._table.batch.ports
         infos = self._infos() if ended else {}
@@ -156,60 +199,68 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
     # --- strings, made only when asked for ---
 
     def utterances(self) -> list[str]:
-        """What is heard now: one line for each speaker, "NA" in silence."""
+        """What each environment's agent heard in the last step: one line for each speaker, "NA" in silence."""
         return ["\n".join(self._table.heard(row)) or "NA" for row in range(self.num_envs)]
 
     def histories(self) -> list[str]:
-        """What was heard since the reset, as far as it is kept."""
+        """What each environment's agent heard since the reset: the lines that the token buffer still holds."""
         return ["\n".join(self._table.history(row)) for row in range(self.num_envs)]
 
     def members(self) -> list[str | None]:
-        """What a suite calls the scenario that each environment plays in this episode; None without a suite."""
+        """The name of the suite's member that each environment plays in this episode; None without a suite."""
         return [self._table.member(row) for row in range(self.num_envs)]
 
     def member_ids(self) -> NDArray[np.int64]:
-        """Which of `program.members` each environment plays in this episode, (E,); 0 without a suite."""
+        """The index into `program.members` of what each environment plays now, int64 (E,); 0 without a suite."""
         return self._table.batch.program_numbers().astype(np.int64)
 
     def set_member_weights(self, weights: Sequence[int]) -> None:
-        """Let later episodes draw the members of the suite, or the leaves of its tree, in proportion to their weights.
+        """Draw the members of the suite, or the leaves of its tree, in proportion to these weights in later episodes.
 
         Args:
-            weights: a whole number from 0 on for each of `program.members`, not all 0.
+            weights: a whole number of at least 0 for each of `program.members`, not all 0.
 
         Raises:
-            ValueError: they are not that, or no suite is played whose members are drawn.
+            ValueError: the weights are not right, or the environments play no suite that draws members.
         """
         self._table.set_member_weights(weights)
 
     def describe(self, index: int) -> dict[str, Any]:
-        """The state of one environment in the scenario's own names; can be put back as a layout."""
+        """The state of environment `index` in the scenario's own names, as a layout that `reset` accepts."""
         return self._table.describe(index)
 
     # --- numbers for a learner ---
 
     def utterance_ids(self) -> NDArray[np.int64]:
-        """A number for what was heard in the last step, (E,); 0 for silence."""
+        """An id of what was heard in the last step, int64 (E,): equal for equal texts, 0 for silence."""
         return self._table.utterance_ids()
 
     def history_ids(self) -> NDArray[np.int64]:
-        """A number for all that was heard since the reset, (E,); 0 for nothing."""
+        """An id of all that was heard since the reset, int64 (E,): equal for equal histories, 0 for none."""
         return self._table.history_ids()
 
     def image_ids(self) -> NDArray[np.int64]:
-        """A number for the picture, (E,)."""
+        """An id of the picture, int64 (E,): equal for equal pictures."""
         return self._table.image_ids()
 
     def scripted_actions(self) -> NDArray[np.int64]:
-        """What the agents' frames would do now, (E, 4). Raises ValueError if the agent follows no frame."""
+        """The actions of the scenario's own script for the agent, int64 (E, 4); nothing changes.
+
+        Raises:
+            ValueError: the agent of a scenario follows no frame.
+        """
         return self._table.scripted_actions()
 
     def counters(self) -> dict[str, Any]:
-        """Counts since the environments were made: {"outcomes": {name: n}, "rules": {name: n}, "episodes": n}."""
+        """Counts since the environments were made.
+
+        Returns:
+            The keys are `outcomes` and `rules`, which map names to counts, and `episodes`, the number that have ended.
+        """
         return self._table.counters()
 
     def bytes_per_env(self) -> dict[str, int]:
-        """Bytes of one environment: its state, its observation, and what goes in and out of a step."""
+        """Bytes that one environment takes, under the keys `state`, `observation` and `call` (in and out of a step)."""
         state, ports = self._table.batch.state, self._table.batch.ports
         arrays = {
             "state": (state.registers, state.boards, state.keys),
@@ -222,15 +273,19 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
         return {name: sum(a.nbytes for a in parts) // self.num_envs for name, parts in arrays.items()}
 
     def snapshot(self) -> bytes:
-        """The exact state of all environments, randomness included."""
+        """The exact state of all environments as bytes, randomness included."""
         return self._table.snapshot()
 
     def restore(self, data: bytes) -> None:
-        """Put back a snapshot of the same scenarios and number of environments. Raises ValueError for any other."""
+        """Return to a snapshot.
+
+        Raises:
+            ValueError: it is damaged, or of other scenarios or another number of environments.
+        """
         self._table.restore(data)
 
     def render(self) -> tuple[Any, ...] | None:
-        """One picture for each environment, in the form of `render_mode`."""
+        """One picture for each environment: uint8 (H, W, 3) or text, by `render_mode`; None without one."""
         if self.render_mode is None:
             return None
         return tuple(frame(self._table, row, self.render_mode) for row in range(self.num_envs))

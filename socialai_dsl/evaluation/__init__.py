@@ -1,4 +1,4 @@
-"""Measuring what plays a scenario, on the same test episodes for all."""
+"""Evaluation of any policy on the fixed test episodes of a scenario, without PyTorch."""
 
 from socialai_dsl.evaluation.episodes import (
     EvalResult,

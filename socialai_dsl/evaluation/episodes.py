@@ -1,7 +1,4 @@
-"""Playing the test episodes of a scenario: policies without a network, and how well a policy does.
-
-Needs no PyTorch, so that scripts, chance, language models and people are measured without it.
-"""
+"""Plays the test episodes of a scenario with any policy, without PyTorch."""
 
 from __future__ import annotations
 
@@ -16,6 +13,7 @@ from numpy.typing import NDArray
 
 Int64 = NDArray[np.int64]
 Observation = Mapping[str, NDArray[Any]]
+"""`image`, uint8 (E, H, W, C), and `tokens`, int16 (E, L)."""
 
 # The two-sided 95 % quantile of the normal distribution.
 _Z = 1.959963984540054
@@ -24,20 +22,28 @@ _UNNUMBERED = 1 << 63
 
 
 class Policy(Protocol):
-    """Plays E environments together."""
+    """The interface of a player of E environments. It needs no base class: two methods are enough."""
 
     def reset(self, mask: NDArray[np.bool_], episodes: Int64 | None = None) -> None:
-        """Forget the past of the environments where `mask`, bool (E,), is true: a new episode begins there.
+        """Forget the past of environments in which a new episode begins.
 
-        Where `episodes`, int64 (E,), gives the episode's number, whatever is drawn in it depends on that alone.
+        Args:
+            mask: bool (E,), true for those environments.
+            episodes: int64 (E,), the number of each environment's episode. The policy's random numbers in an episode
+                then depend on that number alone.
         """
 
     def act(self, observation: Observation) -> Int64:
-        """Actions, int64 (E, 4), for `image` (E, H, W, C) and `tokens` (E, L)."""
+        """Choose actions, int64 (E, 4), given `image`, uint8 (E, H, W, C), and `tokens`, int16 (E, L)."""
 
 
 class RandomPolicy:
-    """Chooses uniformly in every head; so it speaks half of the time."""
+    """Chance: every part of the action is drawn uniformly, so it speaks in half of the steps.
+
+    Args:
+        action_sizes: the number of choices of each part, `envs.single_action_space.nvec`.
+        seed: of the draws, 0 to 2**63 - 1.
+    """
 
     def __init__(self, action_sizes: tuple[int, ...], seed: int = 0) -> None:
         self._sizes = np.array(action_sizes)
@@ -55,7 +61,11 @@ class RandomPolicy:
 
 
 class ScriptedPolicy:
-    """Does what the scenario's own script for the agent would do now."""
+    """The scenario's own script for the agent.
+
+    Args:
+        envs: the vector environment that is played, of a scenario whose agent follows a frame.
+    """
 
     def __init__(self, envs: Any) -> None:
         self._envs = envs
@@ -71,8 +81,14 @@ class ScriptedPolicy:
 class Streams:
     """One stream of random numbers for each of E environments.
 
-    What an environment draws depends on the seed and on the number of its episode alone, not on how many others
-    are played beside it. Where episodes have no numbers, it depends on the seed and the environment's place.
+    A stream depends on the seed and on the number of the episode, not on how many environments are played together.
+    Where episodes have no numbers, it depends on the seed and the environment's index.
+
+    Args:
+        seed: 0 to 2**63 - 1.
+
+    Raises:
+        ValueError: the seed is out of range.
     """
 
     def __init__(self, seed: int) -> None:
@@ -113,7 +129,7 @@ def _stream(seed: int, number: int) -> np.random.Generator:
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
     """The 95 % confidence interval of a success rate (Wilson 1927, the score interval without correction).
 
-    Unlike rate ± 2 standard errors it stays within 0 and 1 and is of use where nothing, or everything, succeeded.
+    Unlike rate ± 2 standard errors it stays within 0 and 1, and it has a width where all trials had one result.
 
     Raises:
         ValueError: there was no trial, or there were more successes than trials.
@@ -133,13 +149,15 @@ def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class EvalResult:
-    """How a policy did on test episodes 0 to N - 1.
+    """The result of a policy on test episodes 0 to N - 1.
 
     Attributes:
-        success: bool (N,). outcome: int64 (N,), index into `names`. lengths: int64 (N,), steps.
-        returns: float64 (N,), undiscounted.
-        names: of the scenario's outcomes.
-        rules: how often each of the scenario's rules fired in an episode, on average.
+        success: bool (N,), whether each episode ended in success.
+        outcome: int64 (N,), how each ended, as an index into `names`.
+        lengths: int64 (N,), in steps.
+        returns: float64 (N,), the undiscounted sum of rewards.
+        names: the scenario's outcomes.
+        rules: mean number of times that each rule of the scenario fired in an episode.
     """
 
     success: NDArray[np.bool_]
@@ -151,7 +169,7 @@ class EvalResult:
 
     @property
     def episodes(self) -> int:
-        """How many episodes were played, each once."""
+        """N, the number of episodes, each played once."""
         return len(self.success)
 
     @property
@@ -166,17 +184,17 @@ class EvalResult:
 
     @property
     def success_interval(self) -> tuple[float, float]:
-        """The 95 % confidence interval of `success_rate`, see `wilson_interval`."""
+        """The 95 % confidence interval of `success_rate` by `wilson_interval`."""
         return wilson_interval(int(self.success.sum()), self.episodes)
 
     @property
     def mean_length(self) -> float:
-        """Steps."""
+        """Mean length of an episode in steps."""
         return float(self.lengths.mean())
 
     @property
     def mean_return(self) -> float:
-        """Undiscounted."""
+        """Mean undiscounted return of an episode."""
         return float(self.returns.mean())
 
     @property
@@ -186,19 +204,18 @@ class EvalResult:
 
 
 def evaluate(policy: Policy, envs: Any, episodes: int = 500) -> EvalResult:
-    """Play test episodes 0 to `episodes - 1`, each exactly once, as many together as there are environments.
+    """Play test episodes 0 to `episodes - 1`, each exactly once.
 
-    Whoever ends its episode is given the next one. The rooms are the same for every policy, and the policy is told
-    the number of each episode, so that what it draws does not depend on how many are played together.
+    An environment whose episode has ended plays the next one that is left. The rooms are the same for every policy, and
+    the policy is told the number of each episode, so the result does not depend on the number of environments.
 
     Args:
-        policy: greedy or sampling, and with which seed, is the policy's own affair.
-        envs: vector environment without auto-reset (`autoreset_mode="Disabled"`), so that nothing but the test
-            episodes is played and counted.
-        episodes: how many; the common test set has 500.
+        policy: the player; whether it samples, and with which seed, is its own affair.
+        envs: a vector environment with `autoreset_mode="Disabled"`, which plays and counts the test episodes alone.
+        episodes: N, at least the number of environments; the common test set has 500.
 
     Raises:
-        ValueError: `episodes` is not positive, or the environments are more than that, or reset themselves.
+        ValueError: `episodes` is less than 1 or than the number of environments, or these reset themselves.
     """
     if episodes < 1:
         raise ValueError(f"episodes: got {episodes}, expected at least 1")

@@ -60,11 +60,11 @@ _QUOTATION: Final = re.compile(r"[\"“«]([^\"“”«»\n]{1,500})[\"”»]|(?
 
 
 class Action(NamedTuple):
-    """What an agent does in a step, in the form that `env.encode_action` takes.
+    """An agent's action in words, in the form that `ScenarioEnv.encode_action` takes.
 
     Attributes:
-        movement: a word for a body action; None for standing still.
-        sentence: what is said; None for silence.
+        movement: the word for a body action; None for no movement.
+        sentence: the utterance; None for silence.
     """
 
     movement: str | None = None
@@ -72,10 +72,10 @@ class Action(NamedTuple):
 
 
 class Parsed(NamedTuple):
-    """What a reply means.
+    """A reply that was read.
 
     Attributes:
-        action: None if the reply means none.
+        action: None if the reply holds none.
         error: what was wrong with the reply and what is possible, for the model; empty if nothing was.
     """
 
@@ -84,14 +84,19 @@ class Parsed(NamedTuple):
 
 
 class ToolCall(NamedTuple):
-    """A tool that a model calls: its name and its arguments, a JSON object as the model wrote it."""
+    """A model's call of a tool.
+
+    Attributes:
+        name: `move` or `say`.
+        arguments: a JSON object as the model wrote it.
+    """
 
     name: str
     arguments: str
 
 
 class ActionLanguage:
-    """Everything that can be done and said in a scenario or suite.
+    """Replies as actions: the instructions for a model, and the reader of its replies.
 
     Args:
         program: of a scenario or suite.

@@ -32,13 +32,13 @@ _TRIES: Final = 3
 
 @dataclass(frozen=True)
 class Turn:
-    """What came of a reply.
+    """The result of a reply.
 
     Attributes:
-        text: what the model is told next: what was wrong with the reply, if anything, then what is seen and heard.
+        text: the next message to the model: what was wrong with the reply, if anything, then what is seen and heard.
         reward: of the step; 0 where no step was played.
         done: whether the episode has ended.
-        action: what was done; None where no step was played.
+        action: the action that was played; None where no step was played.
         error: what was wrong with the reply; empty if nothing was.
     """
 
@@ -51,12 +51,15 @@ class Turn:
 
 @dataclass(frozen=True)
 class EpisodeResult:
-    """How an episode went so far.
+    """The figures of an episode so far.
 
     Attributes:
-        success: whether it ended in success. ending: the outcome as `program.outcomes` calls it, or `INVALID`; empty
-            while the episode goes on.
-        total: sum of the rewards. steps: that were played. replies: that were read. invalid: how many held no action.
+        success: whether it ended in success.
+        ending: the outcome, a name of `program.outcomes`, or `INVALID`; empty while the episode goes on.
+        total: undiscounted sum of the rewards.
+        steps: number of steps played.
+        replies: number of replies read.
+        invalid: number of replies without an action.
     """
 
     success: bool = False
@@ -72,15 +75,17 @@ class Episode:
 
     Args:
         scenario: a path, a name or a program.
-        style: how observations are written, see `TextView`.
-        mode: how replies are given, see `ActionLanguage`.
-        on_invalid: what a reply without an action does. Where the model is asked again, its third reply in
-            succession that holds none passes the turn.
-        goal: what the instructions say of the aim; nothing by default, as trained agents are told nothing.
-        probes: the scenario as `load` returns it, if its probes are to be asked. Nothing else changes by that.
+        style: how observations are written: `prose`, `grid` or `json`.
+        mode: how replies are given: `text`, `json` or `tools`.
+        on_invalid: the effect of a reply without an action: `noop` passes the turn, `retry` asks again (the third such
+            reply in a row passes the turn), `fail` ends the episode.
+        goal: a sentence about the aim for the instructions; none by default, as trained agents are told nothing.
+        probes: the scenario as `load` returns it, to ask its probes, which changes nothing else.
 
     Attributes:
-        answered: the answers of this episode in the order given.
+        instructions: the text that a model reads before the first observation.
+        actions: the actions of this episode, int64 (4,) each.
+        answered: the answers to probes of this episode, in the order given.
 
     Raises:
         ScenarioError: the scenario has mistakes.
@@ -114,14 +119,15 @@ class Episode:
         self._text = ""
 
     def reset(self, seed: int | None = None, test_episode: int | None = None) -> str:
-        """Begin an episode; what is seen at its start.
+        """Begin an episode and return what is seen at its start.
 
         Args:
             seed: starts episode 0 of the seed; without it the next one is played.
             test_episode: number of an episode of the fixed test set.
 
         Raises:
-            ValueError: a number is out of range, or no room is as the scenario requires.
+            ValueError: a number is out of range.
+            RuntimeError: 64 drawn rooms in a row violate the scenario's `require`.
         """
         options = None if test_episode is None else {"test_episode": test_episode}
         observation, info = self.env.reset(seed=seed, options=options)
@@ -133,7 +139,10 @@ class Episode:
         return self._text
 
     def step(self, reply: Reply) -> Turn:
-        """Play what a reply means.
+        """Play the action of a reply.
+
+        Args:
+            reply: text, or in the mode `tools` a sequence of `ToolCall`.
 
         Raises:
             ValueError: the episode has ended.
@@ -148,17 +157,17 @@ class Episode:
 
     @property
     def question(self) -> Question | None:
-        """What a probe asks at this moment, between two steps or after the last; None if nothing waits for an answer.
+        """The probe that waits for an answer, between two steps or after the last; None without one.
 
-        The next step drops what was not answered.
+        The next step drops questions that were not answered.
         """
         return self._questions[0] if self._questions else None
 
     def answer(self, reply: str) -> Answered:
-        """Read a reply to the question; no time passes.
+        """Read a reply to the question; no step passes.
 
         Raises:
-            ValueError: nothing is asked.
+            ValueError: there is no question.
         """
         if not self._questions:
             raise ValueError("answer: got a reply, but nothing is asked")
@@ -167,7 +176,7 @@ class Episode:
         return self.answered[-1]
 
     def result(self) -> EpisodeResult:
-        """How the episode went so far."""
+        """The figures of the episode so far."""
         return self._result
 
     def close(self) -> None:
@@ -216,7 +225,7 @@ class Episode:
 
 
 def scripted_reply(episode: Episode) -> str:
-    """What the scenario's own script would reply now.
+    """The reply of the scenario's own script, in the mode `text`.
 
     Raises:
         ValueError: the agent follows no frame.

@@ -57,12 +57,12 @@ class SocialEnv:
 
 
 def social_env(scenario: Scenario, style: Style = "prose", goal: str = "") -> type[SocialEnv]:
-    """The environment of a scenario: `GRPOTrainer(..., environment_factory=social_env("talkitout"))`.
+    """The environment class of a scenario for TRL: `GRPOTrainer(..., environment_factory=social_env("talkitout"))`.
 
     Args:
         scenario: a path, a name or a program.
-        style: how observations are written, see `TextView`.
-        goal: what the instructions say of the aim; nothing by default.
+        style: how observations are written: `prose`, `grid` or `json`.
+        goal: a sentence about the aim for the instructions; none by default.
 
     Raises:
         ScenarioError: the scenario has mistakes.

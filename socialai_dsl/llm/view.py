@@ -41,14 +41,14 @@ Area = tuple[int, int, int, int]
 
 
 class TextView:
-    """Puts observations into words.
+    """Observations as text.
 
-    The text depends on the observation and on what was heard alone, and observations that differ have texts that
-    differ; so a language model perceives what a trained agent perceives.
+    A language model perceives what a trained agent perceives: the text depends on the observation and the lines heard
+    alone, and different observations have different texts.
 
     Args:
         program: of a scenario or suite.
-        style: how what is seen is written.
+        style: `prose` (sentences with places in steps), `grid` (letters with a legend) or `json`.
 
     Raises:
         ValueError: there is no such style.
@@ -64,11 +64,11 @@ class TextView:
         self._described = lru_cache(_REMEMBERED)(self._describe)
 
     def instructions(self, mode: Mode = "text", goal: str = "") -> str:
-        """What there is to see, to do and to say, and how to reply; nothing of what solves the scenario.
+        """What there is to see, to do and to say, and how to reply, without a word on what solves the scenario.
 
         Args:
-            mode: how actions are given, see `ActionLanguage`.
-            goal: what to say of the aim. Trained agents are told nothing of it, and nothing is the default.
+            mode: how replies are given: `text`, `json` or `tools`.
+            goal: a sentence about the aim; none by default.
         """
         turns = max(program.header(Header.HORIZON) for program in self._members.values())
         aim = goal or "Find out from what you see and hear what there is to do, and do it in few turns."
@@ -86,8 +86,8 @@ class TextView:
         """What the agent sees and hears now.
 
         Args:
-            observation: of the environment; `image` is uint8 (7, 7, 4), or (7, 7, 6) with gestures.
-            info: of the same step; `utterance` holds the lines that were heard, or "NA".
+            observation: of `ScenarioEnv`.
+            info: of the same step.
         """
         image = observation["image"]
         seen = self._described(image.tobytes(), image.shape[-1], self._directions(info))

@@ -104,13 +104,19 @@ class Program:
     """A compiled scenario: integers for the engine, names for people.
 
     Attributes:
-        words: int32 (Header.SIZE,), see the module's docstring. Never changed.
+        words: int32 (Header.SIZE,), laid out as `socialai_dsl.program` says; never changed.
         name: canonical name of the scenario with its variants.
-        actions, templates, nouns: words of the agent's action, in order of index.
-        entities: by number. registers: the program's own. lines: text of each line, as heard.
-        outcomes: by index; the last two are `deadly` and `timeout`. rules: name of each counted rule.
-        vocabulary: token id -> word; 0 pads, 1 is unknown.
-        source_map: one span (or None) for each instruction. labels: pc -> what starts there.
+        actions: words of the body actions, by index.
+        templates: what the agent can say, each with its `<noun>`, by index.
+        nouns: what the `<noun>` can be, by index.
+        entities: the agent, the NPCs and the objects, by number.
+        registers: the registers of the scenario itself.
+        lines: text of each line that can be heard, by number.
+        outcome_table: the ways an episode can end, by index; the last two are `deadly` and `timeout`.
+        rules: name of each counted rule.
+        vocabulary: word of each token id; 0 pads, 1 is unknown.
+        source_map: one span (or None) for each instruction.
+        labels: heading of the block that starts at a pc.
     """
 
     words: npt.NDArray[np.int32]

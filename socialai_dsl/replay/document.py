@@ -83,11 +83,11 @@ class Outcome(_Part):
 
 
 class Thought(_Part):
-    """What a trained agent made of a moment.
+    """A trained agent's view of a moment.
 
     Attributes:
-        probabilities: of each choice of each head: body action, speak or not, template, noun.
-        value: the return that it expects from here on; None if it estimates none.
+        probabilities: for each head (body action, speak or not, template, noun), of each choice.
+        value: the expected return from here on; None if the agent estimates none.
     """
 
     probabilities: list[list[float]]
@@ -152,14 +152,20 @@ class Moment(_Part):
 
 
 class Trace(_Part):
-    """One episode.
+    """One episode, in the format `socialai-trace/1`. In a notebook it shows itself.
 
     Attributes:
         format: the version of this format.
-        scenario: as it was asked for. about: what its file says of it.
-        agent: who played. episode: which one it was, in words.
-        actions, templates, nouns: the words of the agent's choices; one more action is no movement.
-        looks, texts, rules: what moments refer to by number.
+        scenario: its name, as it was asked for.
+        about: the scenario's own sentence about itself.
+        agent: the player, in words.
+        episode: which episode it was, in words.
+        actions: words of the body actions; one more index is no movement.
+        templates: words of the templates.
+        nouns: words of the nouns.
+        looks: the looks of cells that moments refer to by number.
+        texts: the texts that moments refer to by number.
+        rules: the rules that moments refer to by number.
         moments: the room before the first step and after each step.
     """
 
@@ -183,7 +189,7 @@ class Trace(_Part):
         return ended is not None and ended.success
 
     def as_json(self) -> str:
-        """The trace as one line of JSON, without what has its default."""
+        """The trace as one line of JSON, which leaves out values that are defaults."""
         return self.model_dump_json(exclude_defaults=True)[:-1] + f',"format":"{FORMAT}"}}'
 
     def _repr_html_(self) -> str:

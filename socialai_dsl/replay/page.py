@@ -45,7 +45,7 @@ class Shown(Protocol):
 
 
 def replay_page(traces: Sequence[Shown]) -> str:
-    """The page; episodes without success come first.
+    """One HTML file with the episodes, which loads nothing from elsewhere; episodes without success come first.
 
     Raises:
         ValueError: there is no episode.

@@ -1,4 +1,4 @@
-"""From a played episode to its trace."""
+"""Makes the trace of a played episode."""
 
 from __future__ import annotations
 
@@ -46,24 +46,25 @@ def trace_of(
 ) -> Trace:
     """Play an episode with given actions, and trace it.
 
-    Since episodes replay exactly, a seed or a test episode and the actions are a complete record of any episode.
+    Episodes replay exactly, so a seed or a test episode and the actions are a complete record of one.
 
     Args:
         env: of the scenario, as `socialai_dsl.make` returns it.
-        actions: int64 (4,) each; those after the end of the episode are left out.
-        reset: arguments of `env.reset`.
-        scenario: as it was asked for.
-        agent: who chose the actions.
-        episode: which one it is, in words.
-        endings: outcome -> what the scenario's file says there; by default its name.
-        about: what the file says of the scenario.
-        think: what the agent makes of each observation, for a trained one.
-        replies: for a language model, what it answered before each action, and perhaps after the last one, each
-            with what was wrong with it.
-        cut_short: how the episode ended where no step ended it.
+        actions: int64 (4,) each; those after the end of the episode are ignored.
+        reset: arguments of `env.reset`, such as `{"seed": 7}`.
+        scenario: its name, for people.
+        agent: the player, for people.
+        episode: which episode it is, for people.
+        endings: the text to show for each outcome; by default its name.
+        about: a sentence about the scenario.
+        think: returns the `Thought` of a trained agent about an observation; called in each moment before a step, in
+            order.
+        replies: of a language model, for each action the pairs of reply and error before it, and perhaps one more entry
+            after the last action.
+        cut_short: the outcome of an episode that no step ended.
 
     Raises:
-        ValueError: there is no such episode, or an action is not of its space.
+        ValueError: there is no such episode, or an action is outside the space.
     """
     observation, info = env.reset(**reset)
     tracer = Tracer(env, scenario, agent, endings or {}, about)
@@ -93,12 +94,17 @@ class _Seen:
 
 
 class Tracer:
-    """Makes the trace of an episode while it is played; a step can be taken back.
+    """Traces an episode while it is played; steps can be taken back.
 
     Args:
-        env: in which the episode is played.
-        scenario, agent, about: see `Trace`.
-        endings: outcome -> what the scenario's file says there.
+        env: the environment that plays the episode.
+        scenario: its name, for people.
+        agent: the player, for people.
+        endings: the text to show for each outcome.
+        about: a sentence about the scenario.
+
+    Attributes:
+        moments: the moments so far.
     """
 
     def __init__(
@@ -114,7 +120,7 @@ class Tracer:
         self._episode = ""
 
     def begin(self, episode: str, observation: Mapping[str, NDArray[Any]], info: Mapping[str, Any]) -> Moment:
-        """The moment after `env.reset`, which returned these; `episode` says in words which one it is."""
+        """Add the moment after `env.reset`, which returned these; `episode` says in words which one it is."""
         self._episode, self._seen, self.moments = episode, [], []
         return self._add(observation, info)
 
@@ -130,7 +136,7 @@ class Tracer:
         thought: Thought | None = None,
         replies: Answers = (),
     ) -> Moment:
-        """The moment after `env.step`, which returned these."""
+        """Add the moment after `env.step`, which returned these."""
         step = describe_step(self._program, action, len(self.moments), info["utterance"])
         explained = self._env.explain()
         called = [member.name for member in self._seen[-1].cast]
@@ -168,7 +174,7 @@ class Tracer:
         """The trace so far.
 
         Args:
-            since: leave out the numbered things and moments that there were at that time; `marks` tells them.
+            since: counts from `marks`; looks, texts, rules and moments up to these counts are left out.
         """
         looks, texts, rules, moments = since or (0, 0, 0, 0)
         program = self._program

@@ -1,4 +1,4 @@
-"""What a curriculum is, and how one chooses what the environments play."""
+"""The interface of curricula, and the tutor that lets one choose what the environments play."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ class Leaves:
     """The members of a suite, in order.
 
     Attributes:
-        names: what the suite calls them.
-        labels: of leaves of a tree, and of members that were swept over, parameter -> value; else empty.
-        weights: how likely an episode plays each where nobody chooses, in proportion.
+        names: their names in the suite.
+        labels: parameters and values of leaves of a tree and of members that were swept over; else empty.
+        weights: relative probability of each in an episode without a curriculum.
     """
 
     names: tuple[str, ...]
@@ -26,7 +26,7 @@ class Leaves:
 
     @classmethod
     def of(cls, envs: Any) -> Leaves:
-        """Those of the suite that vector environments play.
+        """The members of the suite that a vector environment plays.
 
         Raises:
             ValueError: they play no suite.
@@ -41,19 +41,22 @@ class Leaves:
 
 @runtime_checkable
 class Curriculum(Protocol):
-    """Chooses members by success so far. What it does depends on nothing but what it observed, in that order."""
+    """The interface of a curriculum, which chooses members by success so far, and by nothing else.
+
+    `--curriculum mine:Curriculum` builds `Curriculum(leaves)`.
+    """
 
     def observe(self, member: int, success: bool) -> None:
-        """An episode of this member, by number, has ended."""
+        """Take in that an episode of a member, an index into `Leaves.names`, has ended."""
 
     def weights(self) -> Sequence[int]:
-        """How likely later episodes play each member, in proportion: whole numbers from 0 on, not all 0."""
+        """The relative probability of each member in later episodes: whole numbers of at least 0, not all 0."""
 
     def state(self) -> dict[str, Any]:
-        """All it remembers, as JSON data."""
+        """Its whole state, as JSON data."""
 
     def load_state(self, state: dict[str, Any]) -> None:
-        """Go on from `state()` of an equal one. Raises ValueError (KeyError, TypeError) for any other."""
+        """Continue from what `state()` of an equal one returned; ValueError (KeyError, TypeError) for any other."""
 
 
 class Tutor:

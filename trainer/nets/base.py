@@ -1,4 +1,4 @@
-"""What the trainer asks of a network, and the parts that all networks share."""
+"""The interface of networks, and the parts that all of them share."""
 
 from __future__ import annotations
 
@@ -22,13 +22,14 @@ HEADS = ("primitive", "speak", "template", "noun")
 
 @dataclass(frozen=True)
 class NetSpec:
-    """What a network is built for.
+    """The sizes that a network is built for.
 
     Attributes:
-        action_sizes: choices of the four heads: primitive (last = no movement), speak (0 = silent), template, noun.
-        image_shape: cells along, cells ahead, channels.
+        action_sizes: choices of the four heads: body action (the last is no movement), speak (0 is silence), template,
+            noun.
+        image_shape: (H, W, C): cells from left to right, cells from far to near, channels.
         image_high: highest value of each channel.
-        vocabulary: word of each token id, the padding and the unknown word included.
+        vocabulary: word of each token id; 0 pads, 1 is the unknown word.
     """
 
     action_sizes: tuple[int, int, int, int]
@@ -43,7 +44,7 @@ class NetSpec:
 
     @classmethod
     def of(cls, envs: Any) -> NetSpec:
-        """Of an environment, single or vector.
+        """The sizes of an environment, single or vector.
 
         Raises:
             ValueError: the spaces are not a `MultiDiscrete` of four and a `Dict` of `image` and `tokens`.
@@ -99,17 +100,21 @@ class ActorCritic(nn.Module, ABC):
     """A recurrent policy and value: images and dialogue to features, a memory, four heads and a critic.
 
     A subclass implements `prepare` and `perceive`, and may replace `memory`, `dialogue` or `heads` after this
-    constructor; `--net mine:Net` builds `Net(spec)`. The trainer calls the parts one by one, so that each distinct
-    image, history and pair of the two is processed once.
+    constructor; `--net mine:Net` builds `Net(spec)`. The trainer calls the parts one by one, so that each
+    distinct image, history and pair of the two is processed once.
+
+    Args:
+        features: number of features of a frame.
+        memory_size: number of units of the memory.
 
     Attributes:
         distinct: whether equal frames may share their features; False for networks whose features depend on the
             rest of the batch.
         reducible: whether the network can do the bulk of its arithmetic in bfloat16.
-        precision: number type of that bulk; all that is stored, and everything else, is float32.
-        word_rows: the parameters that have a row for each word, by which an agent keeps what it knows of words in
-            another vocabulary.
-        reader_class: how histories are read before they are encoded. reader: such a reader of the scenario's words.
+        precision: number type of that bulk; everything else, and all that is stored, is float32.
+        word_rows: the parameters with one row for each word; an agent that plays with another vocabulary keeps the rows
+            of the words that both have.
+        reader_class: how histories are read before they are encoded; `reader` is one for the scenario's words.
     """
 
     distinct = True
@@ -131,7 +136,7 @@ class ActorCritic(nn.Module, ABC):
 
     @abstractmethod
     def prepare(self, images: Tensor) -> Any:
-        """Whatever `perceive` wants to know about images, uint8 (I, H, W, C), that no weight influences."""
+        """The part of the work on images, uint8 (I, H, W, C), that uses no weights; `perceive` gets the result."""
 
     @abstractmethod
     def perceive(self, prepared: Any, text: Tensor, image_index: Tensor, text_index: Tensor) -> Tensor:
@@ -144,5 +149,5 @@ class ActorCritic(nn.Module, ABC):
             text_index: int64 (P,) history of each pair.
 
         Returns:
-            (P, features).
+            Features, float32 (P, features).
         """
