@@ -75,7 +75,10 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         TEXT_SIDE | {"program", "program_suite", "envs", "render"},
         {"numpy", "httpx", "fastapi", "inspect_ai", "openenv", "pydantic"},
     ),
-    "experiments": (TEXT_SIDE | {"atomic", "compilation"}, {"ray", "submitit", "yaml", CONFIG, SHIPPED}),
+    "experiments": (
+        TEXT_SIDE | {"atomic", "compilation"},
+        {"filelock", "ray", "submitit", "yaml", CONFIG, SHIPPED},
+    ),
     "reporting": (
         {"experiments"},
         {"numpy", "scipy", "matplotlib", "pydantic", "jinja2", "markupsafe", "pyarrow", CONFIG},

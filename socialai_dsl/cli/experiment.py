@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -245,9 +246,8 @@ def _threads(document: dict[str, Any]) -> int:
 
 def _workers(document: dict[str, Any]) -> int:
     """As many runs at once as this machine has cores for."""
-    from socialai_dsl.experiments.cores import available_cores
-
-    return max(1, len(available_cores()) // _threads(document))
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, cores // _threads(document))
 
 
 # -- status, retry, cancel ---------------------------------------------------------------------------------------------
@@ -269,7 +269,7 @@ def _status(arguments: argparse.Namespace) -> Exit:
 
 
 def _retry(arguments: argparse.Namespace) -> Exit:
-    from socialai_dsl.experiments.wishes import retry
+    from socialai_dsl.experiments.work import retry
 
     chosen = _chosen(arguments)
     wanted = [run for run in chosen if run.shown_status().state in ("failed", "cancelled")]
@@ -277,7 +277,7 @@ def _retry(arguments: argparse.Namespace) -> Exit:
 
 
 def _cancel(arguments: argparse.Namespace) -> Exit:
-    from socialai_dsl.experiments.wishes import cancel
+    from socialai_dsl.experiments.work import cancel
 
     wanted = [run for run in _chosen(arguments) if run.shown_status().state in ("waiting", "running")]
     for run in wanted:

@@ -1,4 +1,4 @@
-"""This module shows how far all runs of an experiment are: redrawn on a terminal, plain lines elsewhere."""
+"""How far all runs of an experiment are: a line for each worker on a terminal, plain lines elsewhere."""
 
 import time
 from collections import Counter
@@ -12,14 +12,17 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from socialai_dsl.cli.experiment_tables import clock
+from socialai_dsl.cli.experiment_tables import clock, seconds_left
 
 if TYPE_CHECKING:
     from socialai_dsl.experiments.folder import Run
 
 _SECONDS_BETWEEN_LINES: Final = 30.0
 _SECONDS_BETWEEN_LOOKS: Final = 2.0
-_RUNS_SHOWN: Final = 16
+_SECONDS_BETWEEN_ESTIMATES: Final = 10.0
+_FAILURES_SHOWN: Final = 5
+_OTHER_LINES: Final = 4
+"""Of the picture: below the runs, and what the terminal needs itself."""
 
 
 class RunsProgress:
@@ -27,12 +30,15 @@ class RunsProgress:
 
     def __init__(self, runs: "Sequence[Run]", stream: IO[str]) -> None:
         """Report on `runs`, writing to `stream`."""
-        self._runs = {run.id: run for run in runs}
+        self._all = runs
+        self._left = {run.id: run for run in runs}
         self._stream = stream
         self._ends: Counter[str] = Counter()
+        self._failures: list[str] = []
         self._began = time.monotonic()
-        self._looked = float("-inf")
+        self._looked = self._estimated = float("-inf")
         self._wrote = time.monotonic()
+        self._estimate = ""
         self._live: Live | None = None
         if stream.isatty():
             self._live = Live(console=Console(file=stream), refresh_per_second=2)
@@ -51,11 +57,11 @@ class RunsProgress:
     def ended(self, run: "Run", outcome: str, message: str) -> None:
         """Report that a run has come to its end."""
         self._ends[outcome] += 1
-        self._runs.pop(run.id, None)
-        found = ""
-        if outcome == "done":
-            found = f"  success {_success(run)}"
-        line = f"[{self._ends.total()}/{self._ends.total() + len(self._runs)}] {run.label}: {outcome}{found}"
+        self._left.pop(run.id, None)
+        if outcome == "failed":
+            self._failures.append(f"{run.label}: {message}")
+        line = f"[{self._ends.total()}/{len(self._all)}] {run.label}: {outcome}"
+        line += f"  success {_success(run)}" if outcome == "done" else ""
         line += f": {message}" if message else ""
         if self._live is not None:
             self._live.console.print(Text(line))
@@ -68,20 +74,18 @@ class RunsProgress:
         if self._live is not None:
             if now - self._looked > _SECONDS_BETWEEN_LOOKS:
                 self._looked = now
-                self._live.update(self._picture())
+                self._live.update(self._picture(self._live.console.height))
         elif now - self._wrote > _SECONDS_BETWEEN_LINES:
             self._wrote = now
             at_work = self._at_work()
-            summary = ", ".join(f"{run.label} {share:.0%}" for run, share, _ in at_work[:4])
+            runs = ", ".join(f"{run.label} {share:.0%}" for run, share, _ in at_work[:4])
             more = f", and {len(at_work) - 4} more" if len(at_work) > 4 else ""
-            counts = f"{self._ends.total()} ended, {len(self._runs)} left"
-            line = f"{clock(now - self._began)}: {counts}; at work: {summary}{more}"
-            print(line, file=self._stream, flush=True)
+            print(f"{self._sum(len(at_work))}; at work: {runs}{more}", file=self._stream, flush=True)
 
     def _at_work(self) -> "list[tuple[Run, float, float | None]]":
         """Runs that somebody works on, here or elsewhere: how far each is, and its last frames per second."""
         found = []
-        for run in self._runs.values():
+        for run in self._left.values():
             if run.shown_status().state != "running":
                 continue
             row = run.last_metrics() or {}
@@ -89,17 +93,28 @@ class RunsProgress:
             found.append((run, min(1.0, row.get("frames", 0) / wanted), row.get("frames_per_second")))
         return found
 
-    def _picture(self) -> Group:
-        table = Table.grid(padding=(0, 2))
+    def _picture(self, height: int) -> Group:
+        """A line for each run at work, the last failures, which stay in sight, and the sum, on a screen so high."""
         at_work = self._at_work()
-        for run, share, speed in at_work[:_RUNS_SHOWN]:
+        failures = [Text(line, style="red", overflow="ellipsis", no_wrap=True) for line in self._failures]
+        table = Table.grid(padding=(0, 2))
+        room = max(1, height - _OTHER_LINES - min(len(failures), _FAILURES_SHOWN))
+        for run, share, speed in at_work[:room]:
             shown = f"{speed:,.0f} frames/s" if speed else ""
-            table.add_row(Text(run.label), ProgressBar(1.0, share, width=28), f"{share:4.0%}", shown)
-        ends = ", ".join(f"{count} {outcome}" for outcome, count in self._ends.items())
-        left = len(self._runs) - len(at_work)
-        total = f"{ends or 'none ended'}, {len(at_work)} at work, {left} waiting, "
-        total += clock(time.monotonic() - self._began)
-        return Group(table, Text(total))
+            left = clock(run.condition["frames"] * (1 - share) / speed) + " left" if speed else ""
+            table.add_row(Text(run.label), ProgressBar(1.0, share, width=28), f"{share:4.0%}", shown, left)
+        return Group(table, *failures[-_FAILURES_SHOWN:], Text(self._sum(len(at_work))))
+
+    def _sum(self, at_work: int) -> str:
+        """`5 min: 3 done, 1 failed, 2 at work, 6 waiting; 20 min left`."""
+        now = time.monotonic()
+        if now - self._estimated > _SECONDS_BETWEEN_ESTIMATES:
+            self._estimated = now
+            seconds = seconds_left(self._all, list(self._left.values()))
+            self._estimate = f"; {clock(seconds / max(1, at_work))} left" if seconds is not None else ""
+        ends = [f"{count} {outcome}" for outcome, count in self._ends.items()]
+        counts = [*ends, f"{at_work} at work", f"{len(self._left) - at_work} waiting"]
+        return f"{clock(now - self._began)}: {', '.join(counts)}{self._estimate}"
 
 
 def _success(run: "Run") -> str:

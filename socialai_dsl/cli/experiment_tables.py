@@ -46,6 +46,21 @@ def plan_figures(
     }
 
 
+def seconds_left(runs: "Sequence[Run]", left: "Sequence[Run]") -> float | None:
+    """What some runs of an experiment still take, one after the other; None if the speed of one is not known.
+
+    Args:
+        runs: all, which tell the speed.
+        left: those that are asked about.
+    """
+    from socialai_dsl.experiments.estimate import Speeds
+
+    speeds = Speeds(runs)
+    times = [_remaining(speeds, run) for run in left]
+    known = [seconds for seconds in times if seconds is not None]
+    return sum(known) if len(known) == len(times) else None
+
+
 def _remaining(speeds: "Speeds", run: "Run") -> float | None:
     from socialai_dsl.experiments.folder import UnreadableError
 

@@ -9,10 +9,12 @@ from typing import IO, TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.errors import Exit, UsageError
 from socialai_dsl.cli.run_folder import (
+    LOCK,
     REPLAY,
     RESULT,
     SETTINGS,
     create_run_folder,
+    only_writer,
     scenario_folder_name,
     versions,
     write_json,
@@ -52,17 +54,26 @@ def execute(arguments: argparse.Namespace) -> Exit:
     """Do the whole run."""
     import socialai_dsl
     from socialai_dsl.cli.agents import require_trainer
-    from socialai_dsl.cli.evaluation import evaluate_agent
-    from socialai_dsl.cli.player import Player
 
     require_trainer()
     config = _resumed(arguments) if arguments.resume else _started(arguments)
     loaded = socialai_dsl.load(config.scenario)
     program = socialai_dsl.compile(loaded)
+    folder = arguments.resume or create_run_folder(arguments.out, config.scenario, config.seed)
+    with only_writer(folder):
+        return _run(config, loaded, program, folder, arguments)
+
+
+def _run(
+    config: "RunConfig", loaded: "Loaded", program: "Playable", folder: Path, arguments: argparse.Namespace
+) -> Exit:
+    """Train if the agent is to be trained, evaluate, write everything down."""
+    from socialai_dsl.cli.evaluation import evaluate_agent
+    from socialai_dsl.cli.player import Player
+
     # With --json, standard output belongs to the result alone.
     stream = sys.stderr if arguments.json else sys.stdout
     agent, training = config.agent, _NOT_TRAINED
-    folder = arguments.resume or create_run_folder(arguments.out, config.scenario, config.seed)
     write_json(folder / SETTINGS, config.model_dump())
     print(f"{config.scenario}: {_size(program)}; writing to {folder}", file=stream, flush=True)
     if config.trains:
@@ -115,7 +126,8 @@ def _discard_unstarted(folder: Path) -> None:
 
     checkpoints = folder / FOLDER
     if not any(checkpoints.glob("*.safetensors")):
-        (folder / SETTINGS).unlink(missing_ok=True)
+        for file in (SETTINGS, LOCK):
+            (folder / file).unlink(missing_ok=True)
         for empty in (checkpoints, folder):
             with contextlib.suppress(OSError):  # it is not there, or holds files of the user's
                 empty.rmdir()

@@ -1,11 +1,15 @@
 """This module names a run's folder and reads its small files."""
 
+import contextlib
 import json
 import platform
 import time
+from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final
+
+from filelock import FileLock, Timeout
 
 from socialai_dsl.atomic import write_json as write_json
 from socialai_dsl.atomic import write_text as write_text
@@ -15,6 +19,9 @@ from socialai_dsl.experiments.folder import REPLAY as REPLAY
 
 RESULT: Final = "result.json"
 SETTINGS: Final = "config.json"
+LOCK: Final = "run.lock"
+_SECONDS_TO_WAIT: Final = 10.0
+"""A process whose parent was killed takes a moment to end."""
 _REPORTED_PACKAGES: Final = ("socialai-dsl", "numpy", "numba", "gymnasium", "torch")
 
 
@@ -50,6 +57,24 @@ def create_run_folder(out: Path | None, spec: str, seed: int) -> Path:
             continue
         return folder
     raise UsageError(f"{parent}: a hundred runs were started in this second")
+
+
+@contextlib.contextmanager
+def only_writer(folder: Path) -> Iterator[None]:
+    """Be the one process that writes a run's folder; the system ends this when the process dies, however it dies.
+
+    Raises:
+        UsageError: another process writes there.
+    """
+    lock = FileLock(folder / LOCK, timeout=_SECONDS_TO_WAIT)
+    try:
+        lock.acquire()
+    except Timeout:
+        raise UsageError(f"{folder}: another process is at work on this run") from None
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""All runs of an experiment to their end, on any engine: what another machine works on is waited for, or taken over."""
+"""All runs of an experiment to their end, on any engine: what another command works on is waited for."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Final
 
 from socialai_dsl.experiments.engines import Engine, Handle
-from socialai_dsl.experiments.folder import Run, UnreadableError, said_of
-from socialai_dsl.experiments.work import Outcome, finished
+from socialai_dsl.experiments.folder import Run, UnreadableError, is_locked, said_of
+from socialai_dsl.experiments.work import End, Outcome, finished
 
 SECONDS_BETWEEN_LOOKS: Final = 0.2
 SECONDS_BEFORE_ASKING_AGAIN: Final = 2.0
@@ -59,15 +59,15 @@ def drive(
         engine.stop()
 
 
-def _known(run: Run) -> tuple[tuple[Outcome, str] | None, bool]:
+def _known(run: Run) -> tuple[End | None, bool]:
     """What came of a run, if that is known, and whether somebody works on it; then no engine is asked."""
     try:
-        return finished(run), run.is_claimed()
+        return finished(run), is_locked(run.path)
     except (OSError, UnreadableError) as error:
         return (Outcome.FAILED, said_of(error)), False
 
 
-def _outcome(handle: Handle, failures: dict[str, int], identity: str) -> tuple[Outcome, str]:
+def _outcome(handle: Handle, failures: dict[str, int], identity: str) -> End:
     """What came of a run; what an engine failed at is tried again some times, since the run is as it was."""
     try:
         outcome, message = handle.result()

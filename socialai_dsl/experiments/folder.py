@@ -13,8 +13,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, get_args
 
+from filelock import FileLock
+
 from socialai_dsl.atomic import write_text
-from socialai_dsl.experiments import claims
 
 EXPERIMENT: Final = "experiment.json"
 RUNS: Final = "runs"
@@ -26,6 +27,8 @@ TESTS: Final = "tests.json"
 METRICS: Final = "metrics.jsonl"
 CHECKPOINTS: Final = "checkpoints"
 CANCEL: Final = "cancel"
+LOCK: Final = "worker.lock"
+"""Locked by the one process that works on a run; the system unlocks it when that process dies, however it dies."""
 
 State = Literal["waiting", "running", "done", "failed", "cancelled"]
 FINAL: Final[frozenset[State]] = frozenset({"done", "failed", "cancelled"})
@@ -41,13 +44,11 @@ class Status:
     Attributes:
         state: waiting (also: stopped half-way), running, done, failed or cancelled.
         attempts: each time that a process worked on it: host, pid, started, ended, reason, from_frames.
-        heartbeat: last sign of life, seconds since 1970.
         message: what a person should know, if anything.
     """
 
     state: State = "waiting"
     attempts: list[dict[str, Any]] = field(default_factory=list)
-    heartbeat: float | None = None
     message: str | None = None
 
     def begin(self, pid: int, from_frames: int) -> None:
@@ -57,7 +58,6 @@ class Status:
             {
                 "host": socket.gethostname(),
                 "pid": pid,
-                "born": claims.born(pid),
                 "started": time.time(),
                 "ended": None,
                 "reason": None,
@@ -109,24 +109,15 @@ class Run:
             return Status()
         if content.get("state") not in get_args(State):
             raise UnreadableError(f"{self.path / STATUS}: unknown state {content.get('state')!r}")
-        return Status(
-            content["state"], content.get("attempts", []), content.get("heartbeat"), content.get("message")
-        )
+        return Status(content["state"], content.get("attempts", []), content.get("message"))
 
     def write_status(self, status: Status) -> None:
-        """Replace the status, with the present time as sign of life; by its owner alone.
+        """Replace the status; by who holds the lock alone.
 
         Raises:
             OSError: it cannot be written.
         """
-        status.heartbeat = time.time()
-        content = {
-            "state": status.state,
-            "attempts": status.attempts,
-            "heartbeat": status.heartbeat,
-            "message": status.message,
-        }
-        text = json.dumps(content, indent=1, ensure_ascii=True)
+        text = json.dumps(vars(status), indent=1, ensure_ascii=True)
         text += " " * (-(len(text) + 1) % _BLOCK) + "\n"
         try:
             write_text(self.path / STATUS, text)
@@ -146,20 +137,23 @@ class Run:
             raise error from None
 
     def shown_status(self) -> Status:
-        """The status for people: a run whose owner is gone is waiting, one that cannot be read has failed."""
+        """The status for people: a run whose worker is gone is waiting, one that cannot be read has failed."""
         try:
             status = self.status()
-            if status.state == "running" and not self.is_claimed():
-                status.end("its process is gone", status.heartbeat)
+            if status.state == "running" and not is_locked(self.path):
+                status.end("its process is gone", self.last_sign())
                 status.state = "waiting"
         except (OSError, UnreadableError) as error:
             return Status("failed", message=f"cannot be read: {said_of(error)}")
         return status
 
-    def is_claimed(self) -> bool:
-        """Whether a process works on it."""
-        newest = claims.newest_claim(self.path)
-        return newest is not None and claims.is_held(newest)
+    def lock(self) -> FileLock:
+        """To be held while working on it.
+
+        Raises:
+            Timeout: on entry, if another worker holds it.
+        """
+        return FileLock(self.path / LOCK, timeout=0)
 
     # -- what a process left ---------------------------------------------------------------------------------
 
@@ -213,16 +207,29 @@ class Run:
             raise UnreadableError(f"{path}: expected a JSON object")
         return content
 
-    # -- wishes of people ------------------------------------------------------------------------------------
+    def last_sign(self) -> float | None:
+        """When its processes last wrote something, seconds since 1970; None if they never did."""
+        times = []
+        for name in (STATUS, METRICS):
+            with contextlib.suppress(FileNotFoundError):
+                times.append((self.path / name).stat().st_mtime)
+        return max(times, default=None)
 
     def is_cancelled(self) -> bool:
         """Whether somebody wants it to be given up."""
         return (self.path / CANCEL).exists()
 
-    def ask_to_cancel(self) -> None:
-        """Want it to be given up."""
-        self.path.mkdir(parents=True, exist_ok=True)
-        (self.path / CANCEL).touch()
+
+def is_locked(run: Path) -> bool:
+    """Whether a process works on the run in this folder."""
+    path = run / LOCK
+    if not path.exists():
+        return False
+    try:
+        with FileLock(path, timeout=0):
+            return False
+    except OSError:  # among them `Timeout`; or the folder is one that only its worker may write to
+        return True
 
 
 def said_of(error: Exception) -> str:

@@ -1,8 +1,7 @@
-"""One run from where it stands to its end: claimed, as processes of `socialai`, watched, resumed, written down."""
+"""One run from where it stands to its end: locked, as processes of `socialai`, resumed, written down."""
 
 from __future__ import annotations
 
-import collections
 import contextlib
 import json
 import os
@@ -10,22 +9,21 @@ import signal
 import subprocess
 import sys
 import tempfile
-import threading
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import IO, Any, Final
+from typing import IO, Final
+
+from filelock import Timeout
 
 from socialai_dsl.atomic import write_json
-from socialai_dsl.experiments import claims
 from socialai_dsl.experiments.arguments import typed
-from socialai_dsl.experiments.claims import Claim
-from socialai_dsl.experiments.cores import lent_cores
 from socialai_dsl.experiments.folder import (
+    CANCEL,
     CHECKPOINTS,
     TESTS,
     Run,
+    State,
     Status,
     UnreadableError,
     read_experiment,
@@ -33,16 +31,11 @@ from socialai_dsl.experiments.folder import (
     said_of,
 )
 
-SECONDS_BETWEEN_SIGNS: Final = 5.0
 PROGRAM = "socialai_dsl"
 """The module that is run for each run, with the words of the command line."""
 _SECONDS_BETWEEN_LOOKS: Final = 0.2
 _CRASHES_IN_PLACE: Final = 3
 """How often a process may die without having got further before its run counts as failed."""
-_SECONDS_FOR_OLD_CHILDREN: Final = 2.5
-"""How long a process that has lost its run may take to notice, see `leash`."""
-
-Stop = Callable[[], bool]
 
 
 class Outcome(StrEnum):
@@ -55,6 +48,12 @@ class Outcome(StrEnum):
     HELD = "held"  # somebody else works on it
 
 
+End = tuple[Outcome, str]
+"""What came of a run, and what a person should know."""
+
+Stop = Callable[[], bool]
+
+
 class _StoppedError(Exception):
     """The run is to be left as it stands."""
 
@@ -63,47 +62,38 @@ class _CancelledError(Exception):
     """The run is to be given up."""
 
 
-class _OvertakenError(Exception):
-    """Somebody else works on it now."""
-
-
 class _FailedError(Exception):
     """A process ended with an error; the message is what it said."""
 
 
-def perform(
-    folder: Path, run_id: str, stop: Stop, stale_after: float = claims.STALE_AFTER
-) -> tuple[Outcome, str]:
-    """Bring one run of an experiment to its end, from wherever it stands.
+def never() -> bool:
+    """For an engine that stops its workers by other means."""
+    return False
+
+
+def perform(folder: Path, run_id: str, stop: Stop = never) -> End:
+    """Bring one run of an experiment to its end, from wherever it stands. All engines call this function.
 
     Args:
         folder: the experiment's.
         run_id: which run.
         stop: asked several times a second whether the run is to be left as it stands.
-        stale_after: seconds without a sign of life after which an owner elsewhere counts as gone.
 
     Returns:
-        What came of it, and what a person should know. Errors of the run and of its folder are no exceptions: they
-        stop this run, and no other.
+        What came of it. Errors of the run and of its folder are no exceptions: they stop this run, and no other.
     """
     try:
         document = read_experiment(folder)
         if document is None:
             raise UnreadableError(f"{folder}: this is no experiment's folder")
         run = next(run for run in runs_of(folder, document) if run.id == run_id)
-        return _Work(run, stop).perform(stale_after)
+        return finished(run) or _performed_alone(run, stop)
     except (OSError, UnreadableError) as error:
         return Outcome.FAILED, said_of(error)
 
 
-def perform_unasked(folder: str, run_id: str) -> tuple[str, str]:
-    """`perform` for a process that a scheduler starts, and stops by a signal; plain words in and out."""
-    outcome, message = perform(Path(folder), run_id, stop=lambda: False)
-    return outcome.value, message
-
-
-def finished(run: Run) -> tuple[Outcome, str] | None:
-    """What came of a run that has come to its end, and a message; None if there is something left to do.
+def finished(run: Run) -> End | None:
+    """What came of a run that has come to its end; None if there is something left to do.
 
     Raises:
         OSError, UnreadableError: its folder does not tell.
@@ -116,8 +106,47 @@ def finished(run: Run) -> tuple[Outcome, str] | None:
     return None
 
 
+def cancel(run: Run) -> None:
+    """Give a run up: at once if nobody works on it, else within a second by the worker."""
+    run.path.mkdir(parents=True, exist_ok=True)
+    (run.path / CANCEL).touch()
+    _settle(run, "cancelled")
+
+
+def retry(run: Run) -> bool:
+    """Let a run that failed or was cancelled wait again; False if somebody works on it."""
+    (run.path / CANCEL).unlink(missing_ok=True)
+    return _settle(run, "waiting")
+
+
+def _settle(run: Run, state: State) -> bool:
+    """Change the state of a run that nobody works on; whether that was so."""
+    try:
+        with run.lock():
+            try:
+                status = run.status()
+            except UnreadableError:
+                status = Status()  # what it said is lost; what the run has computed is not
+            status.end("its process was gone", run.last_sign())
+            status.state, status.message = state, None
+            run.write_status(status)
+    except Timeout:
+        return False
+    return True
+
+
+def _performed_alone(run: Run, stop: Stop) -> End:
+    run.path.mkdir(parents=True, exist_ok=True)
+    try:
+        with run.lock():
+            # It may have come to its end, or been given up, just before it was ours.
+            return finished(run) or _Work(run, stop).perform()
+    except Timeout:
+        return Outcome.HELD, ""
+
+
 class _Work:
-    """Work on one run."""
+    """Work on one run, by the one who holds its lock."""
 
     def __init__(self, run: Run, stop: Stop) -> None:
         self._run = run
@@ -125,33 +154,14 @@ class _Work:
         self._status = Status()
         self._condition = run.condition
 
-    def perform(self, stale_after: float) -> tuple[Outcome, str]:
-        """Claim it, work, let go of it."""
-        known = finished(self._run)
-        if known is not None:
-            return known
-        before = claims.newest_claim(self._run.path)
-        claim = claims.claim(self._run.path, stale_after)
-        if claim is None:
-            return Outcome.HELD, ""
-        try:
-            # It may have come to its end, or been given up, just before it was ours.
-            return finished(self._run) or self._work(claim, before)
-        finally:
-            with contextlib.suppress(OSError):  # a claim whose process is gone counts as released as well
-                claim.release()
-
-    def _work(self, claim: Claim, before: Path | None) -> tuple[Outcome, str]:
+    def perform(self) -> End:
+        """Train, test, and write down what came of it."""
         self._status = self._run.status()
-        self._status.end("its process was gone", self._status.heartbeat)
-        if before is not None:
-            self._let_go(claims.owner_of(before) or {})
+        self._status.end("its process was gone", self._run.last_sign())
         try:
-            self._train(claim)
-            self._test(claim)
-        except _OvertakenError:
-            return Outcome.HELD, ""
-        except (_StoppedError, KeyboardInterrupt):  # the latter is how a scheduler says it in its worker
+            self._train()
+            self._test()
+        except (_StoppedError, KeyboardInterrupt):  # the latter is how Ray says it in its worker
             return self._leave("waiting", "stopped", Outcome.STOPPED)
         except SystemExit:  # Slurm takes the machine away
             self._leave("waiting", "stopped", Outcome.STOPPED)
@@ -162,32 +172,20 @@ class _Work:
             return self._leave("failed", str(error), Outcome.FAILED)
         return self._leave("done", "done", Outcome.DONE)
 
-    def _let_go(self, owner: Mapping[str, Any]) -> None:
-        """Wait until what an owner that is gone had started has noticed."""
-        if "released" in owner:
-            return
-        end = time.monotonic() + _SECONDS_FOR_OLD_CHILDREN
-        child = self._status.attempts[-1] if self._status.attempts else None
-        here = owner.get("scope") == claims.scope()
-        while time.monotonic() < end:
-            if here and (child is None or claims.born(child["pid"]) != child.get("born")):
-                return
-            time.sleep(_SECONDS_BETWEEN_LOOKS)
-
-    def _leave(self, state: str, reason: str, outcome: Outcome) -> tuple[Outcome, str]:
+    def _leave(self, state: State, reason: str, outcome: Outcome) -> End:
         self._status.end(reason)
-        self._status.state = state  # type: ignore[assignment]
+        self._status.state = state
         self._status.message = reason if state == "failed" else None
         self._run.write_status(self._status)
         return outcome, self._status.message or ""
 
     # -- the two parts of a run ------------------------------------------------------------------------------
 
-    def _train(self, claim: Claim) -> None:
+    def _train(self) -> None:
         """Train if the agent is to be trained, and play its own test set."""
         died_at: list[int] = []
         while self._run.result() is None:
-            crash = self._process(claim, self._run_command(), None)
+            crash = self._process(self._run_command())
             if crash is None:
                 assert self._run.result() is not None, "internal: a run that ended well has no result"
                 return
@@ -198,7 +196,7 @@ class _Work:
                 )
             self._status.end(crash)
 
-    def _test(self, claim: Claim) -> None:
+    def _test(self) -> None:
         """Play the other scenarios."""
         missing = self._run.missing_tests()
         if not missing:
@@ -206,7 +204,7 @@ class _Work:
         self._status.end("trained")
         crashes = 0
         with tempfile.TemporaryFile() as output:
-            while (crash := self._process(claim, self._test_command(missing), output)) is not None:
+            while (crash := self._process(self._test_command(missing), output)) is not None:
                 crashes += 1
                 if crashes == _CRASHES_IN_PLACE:
                     raise _FailedError(f"{crash}, {crashes} times while playing {', '.join(missing)}")
@@ -253,34 +251,50 @@ class _Work:
 
     # -- processes -------------------------------------------------------------------------------------------
 
-    def _process(self, claim: Claim, arguments: Sequence[str], output: IO[bytes] | None) -> str | None:
+    def _process(self, arguments: Sequence[str], output: IO[bytes] | None = None) -> str | None:
         """Run one process of `socialai` to its end; what killed it, if something did.
 
         Raises:
             _FailedError: it ended with an error.
-            _StoppedError, _CancelledError, _OvertakenError: it was ended.
+            _StoppedError, _CancelledError: it was ended.
         """
         self._heed_wishes()
-        threads = int(self._condition["options"].get("threads", 1))
-        with lent_cores(threads) as cores:
-            child = self._start(claim, arguments, cores, threads, output)
-            said: collections.deque[str] = collections.deque(maxlen=20)
-            listener = threading.Thread(target=_listen, args=(child.stderr, said), daemon=True)
-            listener.start()
+        with tempfile.TemporaryFile() as said:
+            child = self._start(arguments, output, said)
             try:
                 # What training starts from; testing starts where training ended.
                 self._status.begin(child.pid, self._run.checkpoint_frames() or 0)
                 self._run.write_status(self._status)
-                self._watch(claim, child)
+                self._wait(child)
             finally:
-                _end(child)
-                listener.join()
-        if child.returncode < 0:
-            return f"killed by signal {signal.Signals(-child.returncode).name}"
-        if child.returncode:
-            reason = said[-1] if said else f"exit code {child.returncode}, and no word"
-            raise _FailedError(reason)
-        return None
+                child.kill()  # if it still runs; what it had not saved is trained again, to the same bits
+                child.wait()
+                assert child.stdin is not None, "internal: the pipe was asked for"
+                child.stdin.close()
+            if child.returncode > 0:
+                raise _FailedError(_last_line(said) or f"exit code {child.returncode}, and no word")
+        return f"killed by signal {signal.Signals(-child.returncode).name}" if child.returncode else None
+
+    def _start(
+        self, arguments: Sequence[str], output: IO[bytes] | None, said: IO[bytes]
+    ) -> subprocess.Popen[bytes]:
+        threads = str(self._condition["options"].get("threads", 1))
+        return subprocess.Popen(
+            [sys.executable, "-m", "socialai_dsl.experiments.leash", PROGRAM, *arguments],
+            stdin=subprocess.PIPE,  # closed when we die, see `leash`
+            stdout=subprocess.DEVNULL if output is None else output,
+            stderr=said,
+            env=os.environ
+            | dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), threads),
+            start_new_session=True,  # so that Ctrl-C reaches us alone
+        )
+
+    def _wait(self, child: subprocess.Popen[bytes]) -> None:
+        while True:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                child.wait(_SECONDS_BETWEEN_LOOKS)
+                return
+            self._heed_wishes()
 
     def _heed_wishes(self) -> None:
         if self._stop():
@@ -288,56 +302,9 @@ class _Work:
         if self._run.is_cancelled():
             raise _CancelledError
 
-    def _start(
-        self,
-        claim: Claim,
-        arguments: Sequence[str],
-        cores: Sequence[int],
-        threads: int,
-        output: IO[bytes] | None,
-    ) -> subprocess.Popen[bytes]:
-        leash = [sys.executable, "-m", "socialai_dsl.experiments.leash", str(claim.path)]
-        command = [*leash, ",".join(map(str, cores)), PROGRAM, *arguments]
-        environment = os.environ | {
-            name: str(threads) for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-        }
-        return subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,  # closed when we die, see `leash`
-            stdout=subprocess.DEVNULL if output is None else output,
-            stderr=subprocess.PIPE,
-            env=environment,
-            start_new_session=True,  # so that Ctrl-C reaches us alone
-        )
 
-    def _watch(self, claim: Claim, child: subprocess.Popen[bytes]) -> None:
-        next_sign = time.monotonic() + SECONDS_BETWEEN_SIGNS
-        while True:
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                child.wait(_SECONDS_BETWEEN_LOOKS)
-                return
-            self._heed_wishes()
-            if time.monotonic() >= next_sign:
-                next_sign = time.monotonic() + SECONDS_BETWEEN_SIGNS
-                if not claim.renew():
-                    raise _OvertakenError
-                self._run.write_status(self._status)
-
-
-def _listen(stream: IO[bytes] | None, said: collections.deque[str]) -> None:
-    """Keep the last lines of a stream, and empty it, so that nobody waits for us."""
-    assert stream is not None, "internal: the stream was asked for"
-    with stream:
-        for line in stream:
-            text = line.decode("utf-8", "replace").rstrip()
-            if text:
-                said.append(text)
-
-
-def _end(child: subprocess.Popen[bytes]) -> None:
-    """End a process if it still runs; what it had not saved is trained again, to the same bits."""
-    if child.poll() is None:
-        child.kill()
-        child.wait()
-    assert child.stdin is not None, "internal: the pipe was asked for"
-    child.stdin.close()
+def _last_line(stream: IO[bytes]) -> str:
+    """The last line of a file that says anything."""
+    stream.seek(max(0, stream.seek(0, os.SEEK_END) - 65_536))
+    lines = stream.read().decode("utf-8", "replace").split("\n")
+    return next((line.rstrip() for line in reversed(lines) if line.strip()), "")

@@ -16,8 +16,17 @@ from typing import Any, Final, TypeVar
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from socialai_dsl.experiments import claims
-from socialai_dsl.experiments.folder import EPISODES, EXPERIMENT, METRICS, RESULT, RUNS, STATUS, TESTS
+from socialai_dsl.experiments.folder import (
+    EPISODES,
+    EXPERIMENT,
+    LOCK,
+    METRICS,
+    RESULT,
+    RUNS,
+    STATUS,
+    TESTS,
+    is_locked,
+)
 from socialai_dsl.reporting.records import (
     ConditionEntry,
     ExperimentRecord,
@@ -249,12 +258,8 @@ def _state(folder: Path, status: StatusRecord | None, result: ResultRecord | Non
 
 
 def _is_left(folder: Path) -> bool:
-    """Whether a run was claimed by somebody who is gone."""
-    try:
-        newest = claims.newest_claim(folder)
-        return newest is not None and not claims.is_held(newest)
-    except OSError:  # a folder that can only be read
-        return False
+    """Whether an experiment worked on a run, and nobody does any more."""
+    return (folder / LOCK).exists() and not is_locked(folder)
 
 
 def _read(path: Path, model: type[Model], problems: list[str]) -> Model | None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
-from socialai_dsl.experiments.work import Outcome, perform
+from socialai_dsl.experiments.work import End, perform
 
 
 class LocalEngine:
@@ -19,7 +19,7 @@ class LocalEngine:
         # The threads only watch processes.
         self._pool = ThreadPoolExecutor(workers, thread_name_prefix="run")
 
-    def submit(self, folder: Path, run_ids: Sequence[str]) -> list[Future[tuple[Outcome, str]]]:
+    def submit(self, folder: Path, run_ids: Sequence[str]) -> list[Future[End]]:
         """See `Engine.submit`."""
         return [self._pool.submit(perform, folder, run_id, self._stopped.is_set) for run_id in run_ids]
 

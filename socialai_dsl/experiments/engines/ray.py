@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.experiments.engines import Handle, MissingEngineError
-from socialai_dsl.experiments.work import perform_unasked
+from socialai_dsl.experiments.work import perform
 
 _RETRIES: Final = 20
 """How often Ray may start a task again whose worker or machine was lost; the run goes on from its checkpoint."""
@@ -51,14 +51,12 @@ class RayEngine:
         except (ConnectionError, ValueError, RuntimeError) as error:
             said = str(error).strip().splitlines()[0]
             raise MissingEngineError(f"there is no Ray cluster at {address}: {said}") from None
-        self._task = ray.remote(perform_unasked).options(
-            num_cpus=threads, max_retries=_RETRIES, name="socialai run"
-        )
+        self._task = ray.remote(perform).options(num_cpus=threads, max_retries=_RETRIES, name="socialai run")
         self._references: list[Any] = []
 
     def submit(self, folder: Path, run_ids: Sequence[str]) -> list[Handle]:
         """See `Engine.submit`."""
-        references = [self._task.remote(str(folder.resolve()), run_id) for run_id in run_ids]
+        references = [self._task.remote(folder.resolve(), run_id) for run_id in run_ids]
         self._references += references
         return [reference.future() for reference in references]
 

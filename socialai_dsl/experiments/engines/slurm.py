@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from socialai_dsl.experiments.engines import Handle, MissingEngineError
-from socialai_dsl.experiments.work import perform_unasked
+from socialai_dsl.experiments.work import End, perform
 
 FOLDER: Final = "slurm"
 """Where the jobs' scripts and logs are, in the experiment's folder."""
@@ -26,13 +26,13 @@ _TIMEOUTS: Final = 1000
 class Job:
     """What a job does; submitit carries it to the machine, and calls `checkpoint` before that is taken away."""
 
-    def __init__(self, folder: str, run_id: str) -> None:
+    def __init__(self, folder: Path, run_id: str) -> None:
         self.folder = folder
         self.run_id = run_id
 
-    def __call__(self) -> tuple[str, str]:
+    def __call__(self) -> End:
         """Work on the run."""
-        return perform_unasked(self.folder, self.run_id)
+        return perform(self.folder, self.run_id)
 
     def checkpoint(self, *_: Any, **__: Any) -> Any:
         """The same again: the run goes on from its newest checkpoint."""
@@ -79,7 +79,7 @@ class SlurmEngine:
 
     def submit(self, folder: Path, run_ids: Sequence[str]) -> list[Handle]:
         """See `Engine.submit`; several are one array of jobs."""
-        tasks = [Job(str(folder.resolve()), run_id) for run_id in run_ids]
+        tasks = [Job(folder.resolve(), run_id) for run_id in run_ids]
         with self._executor.batch():
             jobs = [self._executor.submit(task) for task in tasks]
         self._jobs += jobs

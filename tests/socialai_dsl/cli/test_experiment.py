@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
 from socialai_dsl.cli import evaluate as evaluate_command
 from socialai_dsl.cli import run as run_command
@@ -169,7 +170,7 @@ class Terminal(io.StringIO):
 @pytest.mark.parametrize("stream", [io.StringIO(), Terminal()])
 def test_progress(tmp_path: Path, stream: io.StringIO, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("socialai_dsl.cli.experiment_progress._SECONDS_BETWEEN_LINES", -1)
-    condition = {"name": "one", "frames": 100, "options": {}}
+    condition = {"name": "one", "scenario": "dance", "frames": 100, "options": {"net": "fast"}}
     runs = [Run(tmp_path / str(seed), str(seed), condition, seed, ()) for seed in range(3)]
     for run in runs:
         run.path.mkdir()
@@ -177,14 +178,32 @@ def test_progress(tmp_path: Path, stream: io.StringIO, monkeypatch: pytest.Monke
     status.begin(1, 0)
     runs[1].write_status(status)
     (runs[1].path / "metrics.jsonl").write_text('{"frames": 50, "frames_per_second": 10.0}\n')
-    monkeypatch.setattr(Run, "is_claimed", lambda run: run.seed == 1)
+    monkeypatch.setattr("socialai_dsl.experiments.folder.is_locked", lambda path: path.name == "1")
     with RunsProgress(runs, stream) as shown:
-        shown.look()
         shown.ended(runs[0], "failed", "no memory")
+        shown.look()
     said = stream.getvalue()
     assert "one, seed 1" in said
     assert "50%" in said
     assert "[1/3] one, seed 0: failed: no memory" in said
+    assert "1 failed, 1 at work, 1 waiting; " in said
+    assert " left" in said
+
+
+def test_failures_stay_in_sight(tmp_path: Path) -> None:
+    """However many runs end after them, and however small the terminal is."""
+    condition = {"name": "one", "frames": 100, "options": {"net": "mine"}}
+    runs = [Run(tmp_path / str(seed), str(seed), condition, seed, ()) for seed in range(40)]
+    with RunsProgress(runs, Terminal()) as shown:
+        shown.ended(runs[0], "failed", "no memory")
+        for run in runs[1:]:
+            shown.ended(run, "done", "")
+        console = Console(file=io.StringIO(), width=60, height=10)
+        console.print(shown._picture(console.height))
+    lines = console.file.getvalue().splitlines()
+    assert len(lines) < 10
+    assert "one, seed 0: no memory" in lines
+    assert "1 failed, 39 done, 0 at work, 0 waiting" in lines[-1]
 
 
 def test_the_words_of_a_run_are_those_of_the_command(file: Path) -> None:

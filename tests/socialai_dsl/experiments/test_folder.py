@@ -3,12 +3,11 @@
 import errno
 import json
 import os
-import time
 from pathlib import Path
 
 import pytest
 
-from socialai_dsl.experiments import claims, folder
+from socialai_dsl.experiments import folder
 from socialai_dsl.experiments.folder import Run, Status, UnreadableError, read_experiment, runs_of
 
 
@@ -26,7 +25,6 @@ def test_nothing_there_yet(tmp_path: Path) -> None:
     assert run.last_metrics() is None
     assert run.result() is None
     assert run.missing_tests() == []
-    assert not run.is_claimed()
 
 
 def test_a_status_is_read_as_it_was_written(run: Run) -> None:
@@ -54,18 +52,17 @@ def test_a_full_disk_still_takes_a_status(run: Run, monkeypatch: pytest.MonkeyPa
         run.write_status(Status("failed"))
 
 
-def test_a_run_whose_owner_is_gone_waits(run: Run) -> None:
+def test_a_run_whose_worker_is_gone_waits(run: Run) -> None:
     status = Status()
     status.begin(1, 0)
     run.write_status(status)
-    mine = claims.claim(run.path)
-    assert mine is not None
-    assert run.shown_status().state == "running"
-    os.utime(mine.path, (time.time() - 500,) * 2)
+    with run.lock():
+        assert run.shown_status().state == "running"
+    os.utime(run.path / "status.json", (1000, 1000))
     shown = run.shown_status()
     assert shown.state == "waiting"
     assert shown.attempts[-1]["reason"] == "its process is gone"
-    assert shown.attempts[-1]["ended"] == run.status().heartbeat
+    assert shown.attempts[-1]["ended"] == 1000, "when it last gave a sign of life"
 
 
 @pytest.mark.parametrize(

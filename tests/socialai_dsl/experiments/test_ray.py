@@ -14,7 +14,6 @@ from typing import Any
 import pytest
 
 from socialai_dsl.cli.main import main
-from socialai_dsl.experiments import claims
 from socialai_dsl.experiments.folder import Run, read_experiment, runs_of
 
 ROOT = Path(__file__).parents[3]
@@ -119,10 +118,8 @@ class Cluster:
 
 
 def owner(run: Run) -> int:
-    """The process that works on a run."""
-    newest = claims.newest_claim(run.path)
-    content = claims.owner_of(newest) if newest is not None else None
-    return content["pid"] if content is not None else 0
+    """Ray's worker that works on a run: the parent of the process that trains."""
+    return parent_of(run.status().attempts[-1]["pid"]) or 0
 
 
 def parent_of(pid: int) -> int | None:

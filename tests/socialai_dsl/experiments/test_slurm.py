@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from socialai_dsl.experiments import claims, work
+from socialai_dsl.experiments import work
 from socialai_dsl.experiments.driver import drive
 from socialai_dsl.experiments.engines import MissingEngineError
 from socialai_dsl.experiments.engines.slurm import Job, SlurmEngine
@@ -20,10 +20,10 @@ pytestmark = pytest.mark.filterwarnings(
 )  # submitit leaves its jobs' pipes to the collector
 
 
-def pretending(folder: str, run_id: str) -> tuple[str, str]:
-    """`perform_unasked` in a job, which is a process that does not know of the test's patches."""
+def pretending(folder: Path, run_id: str) -> work.End:
+    """`perform` in a job, which is a process that does not know of the test's patches."""
     work.PROGRAM = "pretend"
-    return work.perform_unasked(folder, run_id)
+    return work.perform(folder, run_id)
 
 
 @pytest.fixture
@@ -49,7 +49,7 @@ def test_all_runs_come_to_their_end_as_jobs(prepared, monkeypatch):
 class PretendJob(Job):
     """A job whose runs are those of `pretend`."""
 
-    def __call__(self) -> tuple[str, str]:
+    def __call__(self) -> work.End:
         import sys
 
         sys.path.insert(0, str(Path(__file__).parent))
@@ -71,8 +71,9 @@ def test_a_machine_is_taken_away(prepared, monkeypatch):
     run = prepared.runs()["none, seed 0"]
     (job,) = engine.submit(prepared.out, [run.id])
     prepared.until(lambda: run.checkpoint_frames())
-    owner = claims.owner_of(claims.newest_claim(run.path))
-    os.kill(owner["pid"], signal.SIGUSR2)  # as Slurm does some time before it takes a machine away
+    status = Path(f"/proc/{run.status().attempts[-1]['pid']}/stat").read_text()
+    parent = int(status.rpartition(")")[2].split()[1])
+    os.kill(parent, signal.SIGUSR2)  # as Slurm does some time before it takes a machine away
     assert job.result() == ("done", "")
     assert [attempt["reason"] for attempt in run.status().attempts] == ["stopped", "done"]
     assert run.status().attempts[1]["from_frames"] > 0

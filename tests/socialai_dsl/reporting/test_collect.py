@@ -5,8 +5,8 @@ import shutil
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
-from socialai_dsl.experiments import claims
 from socialai_dsl.reporting.collect import Run, read_experiment, read_runs
 from tests.socialai_dsl.reporting.synthetic import condition, write_experiment, write_run, write_tests
 
@@ -55,10 +55,8 @@ def test_a_run_whose_worker_is_gone_has_stopped(folder: Path) -> None:
     run = folder / "runs" / "c0-s0"
     (run / "status.json").write_text(json.dumps({"state": "running", "attempts": [1]}))
     assert runs(folder)[0].state == "running"
-    claim = claims.claim(run)
-    assert claim is not None
-    assert runs(folder)[0].state == "running"
-    claim.release()
+    with FileLock(run / "worker.lock"):
+        assert runs(folder)[0].state == "running"
     assert runs(folder)[0].state == "stopped"
 
 
