@@ -28,9 +28,7 @@ TUTORIAL = ROOT / "docs" / "tutorial.md"  # its steps are followed one by one: t
 INTEROP = ROOT / "docs" / "interop.md"  # it needs other libraries: tests/test_interop.py
 DOCUMENTS = [ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CHANGELOG.md")]
 DOCUMENTS += sorted((ROOT / "docs").rglob("*.md"))
-FINDINGS = (
-    ROOT / "docs" / "diagnostics"
-)  # their commands and files are wrong on purpose: tests/test_diagnostics_pages.py
+FINDINGS = ROOT / "docs" / "diagnostics"  # their commands and files are wrong on purpose: tests/diagnostics
 REFERENCE = (ROOT / "docs" / "language.md").read_text(encoding="utf-8")
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)

@@ -96,17 +96,18 @@ def symbols_of_other_languages(text: str) -> Iterator[Site]:
             yield found.start(1), found.end(1), other[found[1]]
 
 
-KINDS: list[Callable[[str], Iterator[Site]]] = [
-    keys_misspelt,
-    names_misspelt,
-    verbs_misspelt,
-    states_misspelt,
-    types_misspelt,
-    brackets_left_open,
-    keys_twice,
-    values_left_out,
-    symbols_of_other_languages,
-]
+KINDS: dict[Callable[[str], Iterator[Site]], str] = {
+    keys_misspelt: "S101 S105 S108",
+    names_misspelt: "S201",
+    verbs_misspelt: "S205",
+    states_misspelt: "S301",
+    types_misspelt: "S309",
+    brackets_left_open: "S202",
+    keys_twice: "S002",
+    values_left_out: "S104",
+    symbols_of_other_languages: "S203",
+}
+"""With the codes that a kind of mistake is reported as."""
 
 
 def slip(word: str) -> str:
@@ -131,7 +132,10 @@ def scenarios(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def check_mistakes(folder: Path, kind: Callable[[str], Iterator[Site]], most: int) -> int:
-    """Make up to `most` mistakes of a kind in each scenario, one at a time; how many were made."""
+    """Make up to `most` mistakes of a kind in each scenario, one at a time; how many were made.
+
+    A word that is misspelt is found where it stands, with the word that was meant.
+    """
     made = 0
     for name in SCENARIOS:
         path = folder / name
@@ -139,10 +143,15 @@ def check_mistakes(folder: Path, kind: Callable[[str], Iterator[Site]], most: in
         found = sites(kind, text)
         for start, end, wrong in Random(f"{kind.__name__} {name}").sample(found, min(most, len(found))):
             path.write_text(text[:start] + wrong + text[end:], encoding="utf-8")
-            line = text.count("\n", 0, start) + 1
-            said = [str(d) for d in check(name).diagnostics]
-            assert len(said) == 1, (name, line, wrong, said)
-            assert said[0].startswith(f"{name}:{line}:"), (name, line, wrong, said)
+            line, column = text.count("\n", 0, start) + 1, start - text.rfind("\n", 0, start)
+            result = check(name)
+            about = (name, line, wrong, [str(d) for d in result.diagnostics])
+            assert len(result.diagnostics) == 1, about
+            (said,) = result.diagnostics
+            assert (said.span.file, said.span.line) == (name, line), about
+            assert said.code in KINDS[kind].split(), about
+            if kind.__name__.endswith("_misspelt"):
+                assert (said.span.column, said.suggestion) == (column, text[start:end]), about
             made += 1
         path.write_text(text, encoding="utf-8")
     return made

@@ -1,0 +1,137 @@
+"""Mistakes of authors: each has a file here and, beside it, what is said of it; each code has its page in the docs."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from socialai_dsl.analysis.effort import Effort
+from socialai_dsl.cli.check import check_scenario, scenarios_of
+from socialai_dsl.diagnostics import CODES, render_text
+from socialai_dsl.frontend import CheckResult, check
+
+FOLDER = Path(__file__).parent
+CASES = sorted(path.stem for path in FOLDER.glob("[0-9]*.yaml"))
+ONE_SLIP = ("75", "76", "77", "78", "80", "81", "82", "83")
+"""How the numbers of files begin in which an author made one slip: it is one finding."""
+
+NOT_FROM_ONE_FILE = {
+    "S507": "needs dozens of files",
+    "S508": "about a name on the command line",
+    "S801": "found by trying a scenario out",
+    "W802": "found by trying a scenario out",
+}
+
+
+@cache
+def checked(case: str) -> CheckResult:
+    return check(f"{case}.yaml")
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_is_said_of_a_mistake(case: str, update_goldens: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(FOLDER)
+    result = checked(case)
+    said = render_text(result.diagnostics, result.sources) + "\n"
+    golden = FOLDER / f"{case}.out"
+    if update_goldens:
+        golden.write_text(said, encoding="utf-8")
+    assert result.diagnostics, f"{case}.yaml has no mistake"
+    assert said == golden.read_text(encoding="utf-8"), "if the new text is meant, run pytest --update-goldens"
+    assert len(result.diagnostics) == 1 or not case.startswith(ONE_SLIP)
+
+
+def test_every_code_has_a_case(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(FOLDER)
+    seen = {d.code for case in CASES for d in checked(case).diagnostics}
+    missing = set(CODES) - seen - set(NOT_FROM_ONE_FILE)
+    assert not missing, f"no file in tests/diagnostics shows {sorted(missing)}"
+    assert not seen & set(NOT_FROM_ONE_FILE), "these codes have a file now: take them off the list"
+
+
+@pytest.mark.parametrize("name", ["small.yaml", "rich.yaml", "town.yaml", "rich.yaml?count=2&length=4"])
+def test_the_files_that_the_mistakes_were_made_in_are_right(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(FOLDER)
+    assert check(name).diagnostics == ()
+
+
+# -- the pages -----------------------------------------------------------------------------------------------------
+
+PAGES = Path(__file__).parents[2] / "docs" / "diagnostics"
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+NAMED = re.compile(r"# ([\w/]+\.yaml)\n")
+
+
+def shown(page: str, part: str, folder: Path) -> CheckResult:
+    """What is found in the files, or the name, that a part of a page shows."""
+    shutil.copy(PAGES / "start.yaml", folder)
+    (folder / "example.yaml").write_text("scenario: example\nextends: start.yaml\n", encoding="utf-8")
+    name = "example.yaml"
+    for language, text in BLOCK.findall(part):
+        if language == "yaml":
+            named = NAMED.match(text)
+            (folder / (named[1] if named else name)).write_text(text, encoding="utf-8")
+        elif language == "console":
+            program, command, *options, name = shlex.split(text.removeprefix("$ "))
+            assert (program, command) == ("socialai", "validate"), page
+            assert options in ([], ["--deep"]), page
+            if options:
+                return tried_out(name)
+    return check(name)
+
+
+def tried_out(name: str) -> CheckResult:
+    """What is found in a file, and what trying it out in a few rooms shows."""
+    result = check(name)
+    found = [
+        finding
+        for scenario, called in scenarios_of(name)
+        for finding in check_scenario(scenario, called, Effort(4, 0, 2000), deep=True).findings()
+    ]
+    return replace(result, diagnostics=(*result.diagnostics, *found))
+
+
+def parts(code: str) -> tuple[str, str, str]:
+    """A page in three: what stands before the examples, the wrong one and the right one."""
+    head, wrong, right = re.split(
+        r"^## (?:Wrong|Right)\n", (PAGES / f"{code}.md").read_text("utf-8"), flags=re.MULTILINE
+    )
+    return head, wrong, right
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_a_page_shows_its_finding_and_how_it_goes(
+    code: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, update_goldens: bool
+) -> None:
+    """Its wrong example gives that finding alone, in the words of the page; its right one gives none."""
+    monkeypatch.chdir(tmp_path)
+    head, wrong, right = parts(code)
+    assert head.startswith(f"# {code}: {CODES[code]}\n")
+    result = shown(code, wrong, tmp_path)
+    assert [d.code for d in result.diagnostics] == [code], [str(d) for d in result.diagnostics]
+    said = render_text(result.diagnostics, result.sources) + "\n"
+    page = PAGES / f"{code}.md"
+    if update_goldens:
+        text = page.read_text(encoding="utf-8")
+        page.write_text(
+            re.sub(r"(?s)```text\n.*?```", lambda _: f"```text\n{said}```", text, count=1), "utf-8"
+        )
+    assert f"```text\n{said}```" in parts(code)[1], "if the new text is meant, run pytest --update-goldens"
+    for file in tmp_path.iterdir():
+        shutil.rmtree(file) if file.is_dir() else file.unlink()
+    assert [str(d) for d in shown(code, right, tmp_path).diagnostics] == []
+
+
+def test_every_code_has_its_page_and_its_line_in_the_index() -> None:
+    """In the order of the catalogue."""
+    assert {path.stem for path in PAGES.glob("[SW]*.md")} == set(CODES)
+    index = (PAGES / "index.md").read_text(encoding="utf-8")
+    assert re.findall(r"^\| \[([SW]\d+)\]\(\1\.md\) \| (.+) \|$", index, re.MULTILINE) == list(CODES.items())
