@@ -1,4 +1,4 @@
-"""Measures what `make bench` compares our environments with."""
+"""The measurements of peers for `make bench`."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, Final

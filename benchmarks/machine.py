@@ -1,4 +1,4 @@
-"""This module says what machine a measurement was taken on, and keeps one on as many cores as it is about."""
+"""The machine of a measurement: its description, and the cores that a measurement may use."""
 
 import os
 import platform

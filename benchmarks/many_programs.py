@@ -1,4 +1,4 @@
-"""This module collects different programs for a batch that plays many of them."""
+"""Collects different programs for a batch that plays many of them."""
 
 from collections.abc import Iterator
 from pathlib import Path

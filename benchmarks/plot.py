@@ -1,4 +1,4 @@
-"""This module draws what `make bench` measured: steps per second over the number of environments."""
+"""The figure of `make bench`: steps per second over the number of environments."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""This module measures how fast something runs: repetitions of about the same length, by CPU time and clock."""
+"""Measures speed: repetitions of about the same length, by CPU time and by the clock."""
 
 import time
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What `make bench ARGS=--train` measured, as text."""
+"""The report of `make bench ARGS=--train`, as text."""
 
 from __future__ import annotations
 

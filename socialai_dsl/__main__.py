@@ -1,4 +1,4 @@
-"""This module is `python -m socialai_dsl COMMAND ...`, the same as `socialai COMMAND ...`."""
+"""`python -m socialai_dsl COMMAND ...`, the same as `socialai COMMAND ...`."""
 
 import sys
 

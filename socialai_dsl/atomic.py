@@ -1,4 +1,4 @@
-"""Small files written so that a reader never sees half of one."""
+"""Atomic writes of small files: a reader never sees half of one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The words of the language and their numbers, and what counts of a text: the one home of both.
+"""The words of the language with their numbers, and the normalisation of texts: the one home of both.
 
 A word's number is its place: `COLORS[2]` is `blue`, and 2 in registers and in the colour channel of the picture.
 """

@@ -1,4 +1,4 @@
-"""This module writes the comparisons with the paper's code as a page of documentation."""
+"""The page of documentation with the comparisons to the paper's code."""
 
 from collections.abc import Mapping
 from typing import Final

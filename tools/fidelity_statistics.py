@@ -1,4 +1,4 @@
-"""This module compares what two samples of episodes came to, and says whether they can be of one environment."""
+"""Tests whether two samples of episodes can be of one environment."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""This module draws the rooms of a scenario at the start of an episode, for its data sheet."""
+"""The pictures of a data sheet: rooms of a scenario at the start of an episode."""
 
 from typing import TYPE_CHECKING, Final
 

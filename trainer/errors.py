@@ -1,4 +1,4 @@
-"""The ways in which training can be refused or stopped."""
+"""The errors that refuse or stop training."""
 
 import torch
 

@@ -1,4 +1,4 @@
-"""Loads networks, bonuses, curricula and guides of the user's own: `mine:Net` is class `Net` of `mine.py`."""
+"""Loads the user's own networks, bonuses, curricula and guides: `mine:Net` is class `Net` of `mine.py`."""
 
 from __future__ import annotations
 

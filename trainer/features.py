@@ -1,4 +1,4 @@
-"""Features of frames while acting, each distinct frame computed once.
+"""Features of frames while acting; each distinct frame is computed once.
 
 Of 8,192 frames of a rollout a few hundred images and histories are distinct. Both are kept in tables; a history is
 encoded from its longest known beginning, the features of a pair of the two are computed once.

@@ -1,4 +1,4 @@
-"""What a run writes while it trains: starts, a row of figures for each update, TensorBoard events, W&B."""
+"""The records of a training run: starts, a row of figures for each update, TensorBoard events, W&B."""
 
 from __future__ import annotations
 

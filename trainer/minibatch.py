@@ -1,4 +1,4 @@
-"""Minibatches of a rollout: whole environments, with each of their distinct frames computed once."""
+"""Minibatches of a rollout: whole environments, each distinct frame computed once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rollouts: the environments are played with the current policy, and what an update needs is kept."""
+"""Rollouts: plays the environments with the current policy and keeps what an update needs."""
 
 from __future__ import annotations
 

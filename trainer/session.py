@@ -1,4 +1,4 @@
-"""Everything a training run has to remember, and how that goes into a checkpoint and comes back."""
+"""The state of a training run, into a checkpoint and back."""
 
 from __future__ import annotations
 

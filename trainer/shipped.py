@@ -1,4 +1,4 @@
-"""The trained agents that come with the product: which there are, and where the folder of `shipped:NAME` is."""
+"""The trained agents that ship: their names, and the folder behind `shipped:NAME`."""
 
 from __future__ import annotations
 

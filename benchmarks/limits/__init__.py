@@ -1,4 +1,4 @@
-"""This package holds TalkItOut written by hand, in C and for Numba: how fast an engine that can do nothing else is."""
+"""TalkItOut written by hand, in C and for Numba: the speed limit of an engine that does nothing else."""
 
 from benchmarks.limits.compiled_c import CompiledC, has_compiler, has_permutes
 from benchmarks.limits.compiled_numba import CompiledNumba

@@ -1,4 +1,4 @@
-"""This module compiles the C version of TalkItOut with the system's compiler and calls it."""
+"""Compiles the C version of TalkItOut with the system's compiler and calls it."""
 
 from __future__ import annotations
 

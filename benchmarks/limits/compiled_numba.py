@@ -1,4 +1,4 @@
-"""This module is TalkItOut with everything hard-wired for Numba; what it leaves out is told in `talkitout.c`."""
+"""TalkItOut hard-wired for Numba; `talkitout.c` says what it leaves out."""
 
 from __future__ import annotations
 

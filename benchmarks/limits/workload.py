@@ -1,4 +1,4 @@
-"""This module is what the hard-coded versions of TalkItOut share: buffers, and how they are called."""
+"""Buffers and calls that the hard-wired versions of TalkItOut share."""
 
 from __future__ import annotations
 

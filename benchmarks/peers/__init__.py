@@ -1,4 +1,4 @@
-"""This package holds the engines that `socialai bench` runs beside ours: of other projects, and hand-written."""
+"""The engines that `socialai bench` runs beside ours: other projects', and hand-written ones."""
 
 from __future__ import annotations
 

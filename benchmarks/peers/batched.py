@@ -1,4 +1,4 @@
-"""This module plays batches of envpool, on one thread, with a call from Python for each step of the batch."""
+"""Batches of envpool, on one thread, with a call from Python for each step of the batch."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""This module plays environments written in JAX, as they are meant to be run: a rollout is one compiled loop.
+"""Environments written in JAX, run as they are meant to be: a rollout is one compiled loop.
 
 Nothing crosses from Python between the steps of a rollout. Observations, rewards and ends are summed up, so that the
 compiler cannot leave them out.

@@ -1,4 +1,4 @@
-"""This module plays single environments of other projects: one call from Python for each step, resets included."""
+"""Single environments of other projects: one call from Python for each step, resets included."""
 
 from __future__ import annotations
 

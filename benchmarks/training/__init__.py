@@ -1,4 +1,4 @@
-"""This package holds the trainers that `socialai bench --train` runs beside ours, each with its settings."""
+"""The trainers that `socialai bench --train` runs beside ours, each with its settings."""
 
 from __future__ import annotations
 

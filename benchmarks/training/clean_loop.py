@@ -1,4 +1,4 @@
-"""This module is a single-file style LSTM PPO, as widely copied loops are written: one pass per whole minibatch.
+"""A single-file LSTM PPO in the style of widely copied loops: one pass per whole minibatch.
 
 Differs from `plain_loop` as those loops do: the network without BatchNorm sees a minibatch's frames in one call and
 only the LSTM goes step by step; minibatches are whole environments; one ratio of the whole action; advantages are

@@ -1,4 +1,4 @@
-"""This module makes histories long: real environments whose dialogue is replaced by somebody who keeps talking."""
+"""Real environments whose dialogue is replaced by a line in every second step, for long histories."""
 
 from __future__ import annotations
 

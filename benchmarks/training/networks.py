@@ -1,4 +1,4 @@
-"""This module holds the peers' networks in plain PyTorch: every frame's image and whole history, every time."""
+"""The peers' networks in plain PyTorch, which read every frame's image and whole history anew."""
 
 from __future__ import annotations
 

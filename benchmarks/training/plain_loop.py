@@ -1,4 +1,4 @@
-"""This module is the SocialAI 1.0 training loop written plainly, a stand-in for the paper's research code.
+"""The SocialAI 1.0 training loop written plainly, a stand-in for the paper's research code.
 
 What it does, and in which steps, follows the paper: the network with BatchNorm, in training mode while acting too;
 16 environments and 40 steps; the history encoded from its first word for every frame; four epochs over chunks of ten

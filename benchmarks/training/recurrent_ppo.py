@@ -1,4 +1,4 @@
-"""This module runs sb3-contrib's RecurrentPPO on our environments, with a features extractor that is a peer's trunk."""
+"""sb3-contrib's RecurrentPPO on our environments, with a peer's trunk as its features extractor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""This module holds the sizes of a peer's rollouts and the parts of PPO that the peers' loops share."""
+"""Sizes of a peer's rollouts, and the parts of PPO that the peers' loops share."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What can happen in a scenario, tried on its rooms: searches, claims, guesses, coverage."""
+"""Analyses of scenarios by play: searches, claims, guesses, coverage."""

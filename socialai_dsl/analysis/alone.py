@@ -1,4 +1,4 @@
-"""What an agent can get without the others: a lower bound, by twins that look alike to whoever sees no NPC.
+"""A lower bound on success without others, by twins that look alike to an agent that perceives no NPC.
 
 A scenario that is meant to need social skill is solved only by luck where the NPCs are neither seen nor heard. How
 good that luck is can be bounded from below by a policy that is found by search:

@@ -1,4 +1,4 @@
-"""What of a scenario never happens: states, rules and outcomes that nothing the agent does brings about."""
+"""Finds states, rules and outcomes that no action of the agent brings about."""
 
 from __future__ import annotations
 

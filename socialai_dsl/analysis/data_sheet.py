@@ -1,4 +1,4 @@
-"""The data sheet of a scenario: what its file says, in tables, and what was measured."""
+"""The data sheet of a scenario: its file in tables, and its measurements."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path

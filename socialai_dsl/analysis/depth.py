@@ -1,4 +1,4 @@
-"""How hard a scenario is and what it takes: shortest successes, what its script solves, what is possible alone."""
+"""The difficulty of a scenario: shortest successes, its script's success, success without others."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much is tried, for how long, and who is told how far it is."""
+"""The budget of an analysis: rooms, states and time, and the report of its progress."""
 
 from __future__ import annotations
 

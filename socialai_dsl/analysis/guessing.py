@@ -1,4 +1,4 @@
-"""How many of several rooms that look alike one and the same behaviour can solve.
+"""The number of rooms, of several that look alike, that one behaviour can solve.
 
 The rooms are played in lockstep: as long as everything that the agent sees and hears is the same in all of them, it
 cannot but do the same in all. So a search over the states of all rooms together finds the most that any policy solves.

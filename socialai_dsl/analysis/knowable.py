@@ -1,4 +1,4 @@
-"""Whether an agent that perceives all it can may know what its success depends on, and from which step on.
+"""Whether and when an agent that perceives everything it can may know what its success depends on.
 
 Of each room *alternatives* are drawn that differ from it in one draw (and in what follows from it), or in what chance
 does during the episode. Where a success of the room is none in an alternative that looks the same, the agent has to

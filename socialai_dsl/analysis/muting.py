@@ -1,4 +1,4 @@
-"""A scenario in which some members of the cast are silent and still, and nothing else is changed."""
+"""Programs in which some members of the cast are silent and still, and nothing else differs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the agent's script acts on what it has perceived alone: it is played in twins that look alike so far."""
+"""Whether the agent's script acts on its perceptions alone, by play in twins that look alike so far."""
 
 from __future__ import annotations
 

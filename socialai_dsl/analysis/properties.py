@@ -1,4 +1,4 @@
-"""Whether what a scenario claims about itself is so: each entry of `check`, tried in rooms that are drawn.
+"""Tries the claims of a scenario, one function for each property of `check`, in drawn rooms.
 
 A claim rests on the rooms in which it says anything. One that rests on none fails, and says what there was nothing of.
 """

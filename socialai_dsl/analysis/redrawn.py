@@ -1,4 +1,4 @@
-"""Programs that draw otherwise at some sites, and else are the same; and what each site draws, in words."""
+"""Programs that differ only in the draws at some sites, and those draws in words."""
 
 from __future__ import annotations
 

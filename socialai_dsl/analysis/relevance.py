@@ -1,4 +1,4 @@
-"""Which registers decide how an episode can go on: two states that agree on them are one state to a search.
+"""The registers that decide how an episode can continue; states that agree on them are one state to a search.
 
 Everything a program does after a reset lies in the code at a few addresses. What no instruction there reads, such as
 the time or what was heard so far, cannot matter. Where it is in doubt a register counts as read.

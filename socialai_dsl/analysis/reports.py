@@ -1,4 +1,4 @@
-"""What is reported of a claim: a verdict, the rooms it rests on, and what was found, in words."""
+"""The report of a claim: a verdict, the rooms it rests on, and the evidence in words."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rooms that are drawn, and what is known of each: who is missing, and whether anybody can succeed in it."""
+"""Drawn rooms with known facts: members that are absent, and whether a success exists."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a room can be solved at all: a search through everything that the agent can do in it.
+"""Breadth-first search through the agent's actions for whether a room can be solved.
 
 States are searched breadth first and played on in batches by the engine itself, so the search knows no rule of its
 own. Two states are one if they agree on everything that decides how they go on (`relevance`), whatever the time: the

@@ -1,4 +1,4 @@
-"""This module counts how often each rule, state and outcome came about while environments were played.
+"""Counts of rules, states and outcomes over played episodes.
 
 The engine counts rules and outcomes anyway. How often a state was entered follows from the rules that lead to it; which
 entries of `steps` a frame has gone through, from its register before and after each step. Training pays for none of it.

@@ -1,4 +1,4 @@
-"""Rooms that differ only in the value of one draw: what is seen and heard in them under the same actions; who tells."""
+"""Rooms that differ only in one draw: the first difference in sight or sound under equal actions, and its source."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an editor is told: what a word means, where it is declared, what can be written next."""
+"""Answers for editors: meanings, declarations, completions."""
 
 from __future__ import annotations
 

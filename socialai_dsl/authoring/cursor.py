@@ -1,4 +1,4 @@
-"""Where in a document a position is, also while a line is still being written."""
+"""The place of a position in a document, also in an unfinished line."""
 
 from __future__ import annotations
 

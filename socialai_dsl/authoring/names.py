@@ -1,4 +1,4 @@
-"""The names that a document declares, and which of them a word at a place means."""
+"""The names that a document declares, and the one that a word at a place means."""
 
 from __future__ import annotations
 

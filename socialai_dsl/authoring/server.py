@@ -1,4 +1,4 @@
-"""The language server: what editors ask and are told, over the Language Server Protocol."""
+"""The language server, over the Language Server Protocol."""
 
 from __future__ import annotations
 

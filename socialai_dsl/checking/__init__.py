@@ -1,1 +1,1 @@
-"""Resolved files to what they mean, or to what is wrong with them: one module for each kind of file."""
+"""Checks resolved files, one module for each kind: from data to meaning, or to findings."""

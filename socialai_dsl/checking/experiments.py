@@ -1,4 +1,4 @@
-"""An experiment's file to its conditions, or to what is wrong with them; their scenarios are checked by `frontend`."""
+"""Checks an experiment's file: from its data to its conditions. `frontend` checks their scenarios."""
 
 from __future__ import annotations
 

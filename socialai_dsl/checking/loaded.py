@@ -1,4 +1,4 @@
-"""What is right and can be compiled: scenarios, and suites of them."""
+"""Scenarios and suites without mistakes, ready to be compiled."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A scenario's file to its meaning: parameters put in, groups of the cast written out, the shape, then what it says."""
+"""Checks a scenario's file: parameters put in, groups of the cast written out, then shape and meaning."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A suite's file to its members, their meaning, and the action space they share."""
+"""Checks a suite's file: its members, their meaning, and their shared action space."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From what is typed to a run's configuration, and from that to a trained agent."""
+"""Trains agents from the command line: from typed options to a configuration, from that to an agent."""
 
 import argparse
 import json

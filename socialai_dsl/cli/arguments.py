@@ -1,4 +1,4 @@
-"""This module reads numbers from the command line."""
+"""Reads numbers from the command line."""
 
 import argparse
 import math

@@ -1,4 +1,4 @@
-"""This module measures what a scenario's success is set beside: its script, chance, and whoever meets no NPC."""
+"""Baselines of a scenario: its script, chance, and an agent that meets no NPC."""
 
 from collections.abc import Iterable
 from dataclasses import asdict

@@ -1,4 +1,4 @@
-"""This module is `socialai check`: what scenarios claim about themselves is tried in rooms that are drawn."""
+"""`socialai check`: tries the claims of scenarios in drawn rooms."""
 
 import argparse
 import json

@@ -1,4 +1,4 @@
-"""This module puts what `socialai check` found into lines for people and objects for tools."""
+"""The findings of `socialai check`: lines for people, objects for tools."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass

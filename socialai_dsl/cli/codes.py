@@ -1,4 +1,4 @@
-"""This module is `socialai codes`: it lists the codes of findings, or prints the page of one of them."""
+"""`socialai codes`: lists the codes of findings, or prints the page of one."""
 
 import argparse
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""This module is `socialai coverage`: how often everything in a scenario came about while agents played it."""
+"""`socialai coverage`: counts how often every rule, state and outcome of a scenario happened in play."""
 
 import argparse
 import json

@@ -1,4 +1,4 @@
-"""This module is `socialai curves`: the learning curves of several runs in one picture and one table."""
+"""`socialai curves`: draws the learning curves of several runs and prints their tables."""
 
 import argparse
 import math

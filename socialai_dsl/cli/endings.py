@@ -1,4 +1,4 @@
-"""This module puts the ways an episode can end into words: the line of the scenario's file that decides it."""
+"""Endings of episodes in words: the line of the scenario's file that decided."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

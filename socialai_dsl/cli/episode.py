@@ -1,4 +1,4 @@
-"""This module records one episode for people: a film with its dialogue, and a transcript."""
+"""Records one episode for people: a film with its dialogue, and a transcript."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""This module names the ways a command can end, and the errors that end it."""
+"""Exit codes of commands, and the errors that end one."""
 
 from collections.abc import Iterable
 from enum import IntEnum

@@ -1,4 +1,4 @@
-"""This module is `socialai evaluate`: play the test set with a trained agent, a script, chance or a language model."""
+"""`socialai evaluate`: plays the test set with a trained agent, a script, chance or a language model."""
 
 import argparse
 import json

@@ -1,4 +1,4 @@
-"""This module plays the test set with an agent and keeps what is needed to count, describe and record its episodes."""
+"""Plays the test set with an agent and keeps the data to count, describe and record its episodes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""This module shows what an evaluation found: the table on the terminal, and the folder with its episodes."""
+"""The result of an evaluation: a table on the terminal, and a folder of episodes."""
 
 import csv
 import io

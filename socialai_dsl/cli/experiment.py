@@ -1,4 +1,4 @@
-"""This module is `socialai experiment`: many runs from one file, on one machine or many."""
+"""`socialai experiment`: many runs from one file, on one machine or many."""
 
 import argparse
 import json

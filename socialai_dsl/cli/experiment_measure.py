@@ -1,4 +1,4 @@
-"""This module measures for a moment how fast networks learn on this machine, where nothing tells."""
+"""Short measurements of how fast networks learn on this machine, for estimates."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""How far all runs of an experiment are: a line for each worker on a terminal, plain lines elsewhere."""
+"""The progress of an experiment's runs: a line for each worker on a terminal, plain lines elsewhere."""
 
 import time
 from collections import Counter

@@ -1,4 +1,4 @@
-"""This module is `socialai experiment run`: it works on an experiment's runs until they have come to their ends."""
+"""`socialai experiment run`: works on an experiment's runs until all have ended."""
 
 import contextlib
 import json

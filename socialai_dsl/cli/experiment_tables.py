@@ -1,4 +1,4 @@
-"""This module shows an experiment's runs: what is planned, how long it will take, how far it is."""
+"""The tables of an experiment's runs: plan, estimated time, progress."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence

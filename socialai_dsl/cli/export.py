@@ -1,4 +1,4 @@
-"""This module is `socialai export`: a trained agent as a folder that can be given to others."""
+"""`socialai export`: writes a trained agent as a folder for others."""
 
 import argparse
 import shutil

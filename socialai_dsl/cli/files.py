@@ -1,4 +1,4 @@
-"""This module finds the files that commands on files are given: paths, folders of them, standard input."""
+"""Finds the files that a command is given: paths, folders, standard input."""
 
 import sys
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""This module is `socialai fmt`: it rewrites scenario files in one style; their meaning and comments stay."""
+"""`socialai fmt`: rewrites scenario files in one style, keeping their meaning and comments."""
 
 import argparse
 import difflib

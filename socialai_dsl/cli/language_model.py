@@ -1,4 +1,4 @@
-"""This module lets `socialai evaluate llm:MODEL` play test episodes: options, progress, and what came of it."""
+"""Test episodes of `socialai evaluate llm:MODEL`: options, progress, results."""
 
 import argparse
 import os

@@ -1,4 +1,4 @@
-"""What an agent has learnt so far, in words, from the rates at which rules fire and episodes end."""
+"""The stage of a training agent in words, from the rates at which rules fire and episodes end."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Final

@@ -1,4 +1,4 @@
-"""This module is `socialai lsp`: a language server for editors, on standard input and output."""
+"""`socialai lsp`: a language server on standard input and output."""
 
 import argparse
 from typing import Final

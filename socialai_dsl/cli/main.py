@@ -1,4 +1,4 @@
-"""This module reads the command line, runs one command and turns whatever happens into an exit code."""
+"""The entry point: reads the command line, runs one command, turns the result into an exit code."""
 
 import argparse
 import gc

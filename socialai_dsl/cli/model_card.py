@@ -1,4 +1,4 @@
-"""Model cards: what an agent is, how well it does, and how to load it, beside its weights."""
+"""Model cards: an agent's training, its results, and how to load it."""
 
 import json
 from collections.abc import Mapping, Sequence

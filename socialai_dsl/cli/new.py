@@ -1,4 +1,4 @@
-"""This module is `socialai new`: it writes a commented scenario to start from, with a script that solves it."""
+"""`socialai new`: writes a commented scenario to start from, with a script that solves it."""
 
 import argparse
 import re

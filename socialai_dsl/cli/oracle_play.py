@@ -1,4 +1,4 @@
-"""This module lets a scenario's own script play many rooms and looks into those that it does not solve."""
+"""Plays many rooms with a scenario's own script, and searches those that it does not solve."""
 
 import math
 from dataclasses import dataclass

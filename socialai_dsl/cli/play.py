@@ -1,4 +1,4 @@
-"""This module is `socialai play`: a person plays a scenario in the terminal, moving and speaking."""
+"""`socialai play`: a person plays a scenario in the terminal."""
 
 import argparse
 import os

@@ -1,4 +1,4 @@
-"""This module is the screen on which somebody plays: the room, the view, what was said, and a line to speak."""
+"""The screen of a person's game: the room, the view, the dialogue, and a line to type."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar, Final

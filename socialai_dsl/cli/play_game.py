@@ -1,4 +1,4 @@
-"""This module is a game as somebody plays it: where it stands, what was said, and every step back to its start."""
+"""A person's game: the episode so far, its dialogue, and every step back to its start."""
 
 from dataclasses import dataclass
 from typing import Any, Final

@@ -1,4 +1,4 @@
-"""How far a training run has come: a live bar on a terminal, plain lines elsewhere."""
+"""The progress of a training run: a live bar on a terminal, plain lines elsewhere."""
 
 import time
 from collections import deque

@@ -1,4 +1,4 @@
-"""This module plays a scenario at random and counts every episode alike, the long ones as well as the short."""
+"""Plays a scenario at random and counts every episode, long or short, once."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""This module is `socialai replay`: a page on which episodes of a scenario or of a run can be watched step by step."""
+"""`socialai replay`: writes a page that shows episodes step by step."""
 
 import argparse
 import json

@@ -1,4 +1,4 @@
-"""This module is `socialai report`: a page about an experiment, or about some runs, with its figures and tables."""
+"""`socialai report`: writes a page about an experiment or single runs, with figures and tables."""
 
 import argparse
 import sys

@@ -1,4 +1,4 @@
-"""This module prints the findings of a check for people, for tools and for code hosts."""
+"""Prints the findings of a check for people, for tools and for code hosts."""
 
 import json
 from collections.abc import Callable, Iterable, Sequence

@@ -1,4 +1,4 @@
-"""`socialai-run`: check a scenario, train an agent on it, evaluate it, leave a folder of results."""
+"""`socialai-run`: checks a scenario, trains an agent on it, evaluates it, leaves a folder of results."""
 
 import argparse
 import contextlib

@@ -1,4 +1,4 @@
-"""This module names a run's folder and reads its small files."""
+"""The name of a run's folder, and its small files."""
 
 import contextlib
 import json

@@ -1,4 +1,4 @@
-"""This module is `socialai schema`: it prints the JSON Schema of the language, for editors."""
+"""`socialai schema`: prints the JSON Schema of the language, for editors."""
 
 import argparse
 from typing import Final

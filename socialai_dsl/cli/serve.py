@@ -1,4 +1,4 @@
-"""This module is `socialai serve`: scenarios for trainers of language models."""
+"""`socialai serve`: serves scenarios to trainers of language models."""
 
 import argparse
 import socket

@@ -1,4 +1,4 @@
-"""This module is `socialai show`: it prints what a scenario is once everything it builds on is put together."""
+"""`socialai show`: prints a scenario with everything that it builds on."""
 
 import argparse
 import json

@@ -1,4 +1,4 @@
-"""This module is `socialai studio`: scenarios are written, seen and played in a browser on this machine."""
+"""`socialai studio`: opens the studio in a browser on this machine."""
 
 import argparse
 import contextlib

@@ -1,4 +1,4 @@
-"""This module knows what a stream that is written to can show."""
+"""The abilities of an output stream: colours, width, redrawing."""
 
 import os
 from collections.abc import Callable

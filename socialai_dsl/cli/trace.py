@@ -1,4 +1,4 @@
-"""This module is `socialai trace`: one episode step by step, with the rules that fired and why the others did not."""
+"""`socialai trace`: one episode step by step, with the rules that fired and why others did not."""
 
 import argparse
 import json

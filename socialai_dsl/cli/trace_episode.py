@@ -1,4 +1,4 @@
-"""This module plays one episode and asks after each step why things went as they did."""
+"""Plays one episode and asks for an explanation after each step."""
 
 import sys
 from collections.abc import Callable, Iterator, Sequence

@@ -1,4 +1,4 @@
-"""This module writes a trace for people: about 100 columns, the picture beside what was done, then the rules."""
+"""A trace as text: about 100 columns, the picture beside the action, then the rules."""
 
 import textwrap
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""This module reads what a player types: a movement, an utterance or both, completed and corrected."""
+"""Reads a player's line: a movement, an utterance or both, completed and corrected."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""This module is `socialai validate`: it checks scenario files and reports what is wrong with them."""
+"""`socialai validate`: checks scenario files and reports the findings."""
 
 import argparse
 import sys

@@ -1,4 +1,4 @@
-"""Choices to code: sets of cells, quantifiers over things, and values selected by conditions."""
+"""Choices to code: sets of cells, quantifiers, and values selected by conditions."""
 
 from __future__ import annotations
 

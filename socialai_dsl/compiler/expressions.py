@@ -1,4 +1,4 @@
-"""Terms and lines to code: conditions skip when false, values end in an operand, whatever may be heard has a number."""
+"""Terms and lines to code: a false condition skips, a value ends in an operand, a line becomes a number."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is known before code is emitted: utterance classes, terms simplified by facts, and what an episode changes."""
+"""Constant folding and facts: utterance classes, terms simplified, the registers that an episode changes."""
 
 from __future__ import annotations
 

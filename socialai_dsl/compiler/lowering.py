@@ -1,4 +1,4 @@
-"""The first two passes: where everything of a scenario is, then every part of it to code, each once."""
+"""The first two passes: allocation of everything in a scenario, then code for every part, each once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""This module lets a program note why rules did not fire: a program that does the same as another, and writes it down.
+"""Programs that also note why rules did not fire.
 
 Such a program has the registers of the program that it explains, and behind them some of its own. Wherever a part of
 a condition turns out false, code that the program itself does not have puts the number of that part into a register

@@ -1,4 +1,4 @@
-"""A program that does the same as a scenario's, and notes what its `probes` ask about.
+"""Programs that also note the values that `probes` ask about.
 
 The code of the probes stands at the start of a step, before time goes on. So one more step, which is then forgotten,
 tells what is to be asked at a moment, and what is right. The scenario's own program has none of this.

@@ -1,4 +1,4 @@
-"""The code of a reset: the room, then every draw and placement in its order, each left alone if a layout pins it."""
+"""Reset code: the room, then every draw and placement in order, except those that a layout pins."""
 
 from __future__ import annotations
 

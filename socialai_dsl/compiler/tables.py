@@ -1,4 +1,4 @@
-"""The last two passes: all tables of a program laid out, and the proof that no run of it leaves the engine's arrays.
+"""The last two passes: the layout of a program's tables, and the proof that it stays within its bounds.
 
 Every address is in range, every skip goes forward, every path ends; each operand is followed as an interval of values,
 so an entity, a line, a status or a coordinate that could be out of range is found before the program runs.

@@ -1,4 +1,4 @@
-"""The room as drawn: what each cell looks like, and which cells nobody can enter."""
+"""Boards: the look of each cell, and the cells that no body can enter."""
 
 import numpy as np
 

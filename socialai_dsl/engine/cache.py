@@ -1,4 +1,4 @@
-"""Where Numba keeps the engine's compiled code: private to the user, and never older than the package's sources.
+"""The folder of Numba's compiled code: private to the user, and named by the package's sources.
 
 The folder is named by a digest of all sources that the code is made from, and of Numba's settings. Numba itself tells
 processors and versions of its own apart.

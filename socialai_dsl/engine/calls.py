@@ -1,4 +1,4 @@
-"""What the engine can be asked for, and what it answers: numbers that its callers share with the compiled code."""
+"""The engine's tasks and return codes, shared with the compiled code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where entities are and how they stand to each other: the facts that tests and activities are made of."""
+"""Positions of entities and relations between them, as tests and activities need them."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""How the engine's functions are compiled: by Numba, into few entry points that Python calls.
+"""Compilation of the engine's functions by Numba, into few entry points that Python calls.
 
 With `NUMBA_DISABLE_JIT=1` all of them run as plain Python instead. None of them allocates memory.
 """

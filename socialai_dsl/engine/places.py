@@ -1,4 +1,4 @@
-"""Sets of cells: where something may be put and putting it there, and which of them is meant."""
+"""Sets of cells: choosing a cell and putting an entity there."""
 
 import numpy as np
 

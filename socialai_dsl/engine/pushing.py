@@ -1,4 +1,4 @@
-"""Things that are moved: put on a cell, pushed by who walks into them, rolling until something is in their way."""
+"""Moving objects: put on a cell, pushed by a body, rolling until something blocks them."""
 
 from socialai_dsl.engine.boards import draw_cell, is_deadly, is_in_the_way, is_solid, type_row
 from socialai_dsl.engine.entities import (

@@ -1,4 +1,4 @@
-"""What can be asked of rows without stepping them: what the agent's own frame would do now, digests of pictures.
+"""Queries of rows without a step: the script's next action, digests of pictures.
 
 These are compiled when they are first asked for.
 """

@@ -1,4 +1,4 @@
-"""The start of an episode: a room is drawn, or taken from a layout, and furnished."""
+"""The start of an episode: a room is drawn or taken from a layout, and furnished."""
 
 import numpy as np
 from numpy.typing import NDArray

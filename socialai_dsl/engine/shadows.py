@@ -1,4 +1,4 @@
-"""What is hidden behind what: the usual shadow casting of grid-worlds, row by row away from the viewer.
+"""Occlusion: the usual shadow casting of grid-worlds, row by row away from the viewer.
 
 A row of a view is a word, bit 0 its leftmost cell. Light that reaches a cell one can look through goes on along the row
 and lights the three cells before it in the next row.

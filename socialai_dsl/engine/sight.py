@@ -1,4 +1,4 @@
-"""What can be seen from where: view squares, and what stands between two cells. Bodies never stand in the way."""
+"""Lines of sight: view squares, and opaque cells between two cells. Bodies are never opaque."""
 
 import numpy as np
 

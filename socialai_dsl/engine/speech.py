@@ -1,4 +1,4 @@
-"""What is said reaches who is near: the agent's log and tokens, the inboxes of those who follow a frame."""
+"""Speech within earshot: the agent's log and tokens, the inboxes of NPCs."""
 
 from socialai_dsl.engine.boards import npcs_are_hidden
 from socialai_dsl.engine.entities import column, distance, field, is_present

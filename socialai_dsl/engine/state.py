@@ -1,4 +1,4 @@
-"""What a batch of environments is made of: few arrays, one row for each environment.
+"""The state of a batch of environments: few arrays, one row for each environment.
 
 `State` is all that persists and is all a snapshot needs, `Ports` is what goes in and out of a call, `Row` is what the
 functions of the engine see of one environment. Axis letters: E environments, R registers, L tokens, H x W canvas.

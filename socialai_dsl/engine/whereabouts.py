@@ -1,4 +1,4 @@
-"""Where an operand is that names an entity or a cell: a cell is always in the room and faces nowhere."""
+"""The position of an operand, an entity or a cell; a cell is always in the room and faces nowhere."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What the probes of a scenario ask at each moment of an episode, and what is right.
+"""The probes of a scenario at each moment of an episode, with their right answers.
 
 The episode is played beside its environment by programs that note what probes are about (`compiler.questions`). That
 both see the same is checked at every step.

@@ -1,4 +1,4 @@
-"""Whether registers from outside are ones a program can produce: the engine checks no index, so nobody else may lie."""
+"""Checks registers from outside: the engine checks no index, so a snapshot must hold possible values only."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The state of an environment in the scenario's own names: plain data that can be put back as a layout."""
+"""The state of an environment in the scenario's own names, as a layout."""
 
 from __future__ import annotations
 

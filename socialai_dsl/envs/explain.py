@@ -1,4 +1,4 @@
-"""Which rules fired in the last step, why the others did not, and who stood in the way.
+"""Explanations of the last step: rules that fired, reasons why others did not, and members in the way.
 
 The episode is played again by a program that notes what was asked and what was false (`compiler.notes`), on the same
 engine, from the same moment, with the same actions. That it ends in the same state is checked each time.

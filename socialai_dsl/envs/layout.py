@@ -1,4 +1,4 @@
-"""A known room instead of a drawn one: a layout in the scenario's own names to pinned registers."""
+"""Layouts: from a known room in the scenario's own names to pinned registers."""
 
 from __future__ import annotations
 

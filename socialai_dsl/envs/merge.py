@@ -1,4 +1,4 @@
-"""The programs of a batch: one action space, one vocabulary, and how each program is read in their terms."""
+"""The programs of a batch behind one action space and one vocabulary."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ids that Gymnasium knows: one for each shipped scenario, and one for any scenario by name or path."""
+"""The ids for Gymnasium: one for each shipped scenario, and one for any scenario by name or path."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One scenario as a Gymnasium environment, and an action as people write it."""
+"""The single Gymnasium environment, and the encoding of actions that are written in words."""
 
 from __future__ import annotations
 

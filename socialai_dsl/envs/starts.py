@@ -1,4 +1,4 @@
-"""The layouts that members of a suite start from, and whether they fit."""
+"""The layouts from which members of a suite start, and the check that they fit."""
 
 from __future__ import annotations
 

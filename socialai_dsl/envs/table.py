@@ -1,4 +1,4 @@
-"""A batch of environments with everything that single and vector environments share."""
+"""The batch of environments behind single and vector environments."""
 
 from __future__ import annotations
 

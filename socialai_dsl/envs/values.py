@@ -1,4 +1,4 @@
-"""A program's own registers in a layout: where each stands, and what its numbers stand for, as plain data and back."""
+"""A program's own registers in layouts: their addresses, and their numbers as plain data and back."""
 
 from __future__ import annotations
 

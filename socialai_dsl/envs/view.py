@@ -1,4 +1,4 @@
-"""This module puts what the agent sees into words and pictures of letters."""
+"""The agent's view as words and as pictures of letters."""
 
 from dataclasses import dataclass
 from typing import Final

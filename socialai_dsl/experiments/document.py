@@ -1,4 +1,4 @@
-"""What an experiment's folder says is to be run: conditions with every setting resolved, and runs with their ids."""
+"""An experiment as resolved conditions and runs with ids, as its folder records them."""
 
 from __future__ import annotations
 

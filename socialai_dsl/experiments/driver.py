@@ -1,4 +1,4 @@
-"""All runs of an experiment to their end, on any engine: what another command works on is waited for."""
+"""Brings all runs of an experiment to their ends, on any engine; runs of another command are waited for."""
 
 from __future__ import annotations
 

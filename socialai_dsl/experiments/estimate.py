@@ -1,4 +1,4 @@
-"""How long runs will take: from what runs of this experiment took, from a short measurement, or from what is usual."""
+"""Estimates of run times: from this experiment's runs, from a short measurement, or from usual figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An experiment's folder and those of its runs: what is to be done, how far each run is, what became of it."""
+"""The folders of an experiment and of its runs: tasks, progress, results."""
 
 from __future__ import annotations
 

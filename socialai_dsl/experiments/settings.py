@@ -1,4 +1,4 @@
-"""A run's configuration from what was asked for: what is automatic becomes a value."""
+"""A run's configuration with every automatic option resolved."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One run from where it stands to its end: locked, as processes of `socialai`, resumed, written down."""
+"""Brings one run to its end: locked, run as processes of `socialai`, resumed, recorded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Replies of language models as actions: what can be done and said, how it is asked for, and how a reply is read."""
+"""Actions of language models: instructions, constraints, and the reader of replies."""
 
 from __future__ import annotations
 

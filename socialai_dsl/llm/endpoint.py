@@ -1,4 +1,4 @@
-"""Asking a model behind an OpenAI-compatible endpoint, until it answers or it is clear that it will not."""
+"""Requests to an OpenAI-compatible endpoint, with retries until an answer or a final error."""
 
 from __future__ import annotations
 

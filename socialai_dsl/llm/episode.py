@@ -1,4 +1,4 @@
-"""An episode in text: observations go out as text, replies come in and are played."""
+"""Episodes in text: observations go out as text, replies come in and are played."""
 
 from __future__ import annotations
 

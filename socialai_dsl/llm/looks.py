@@ -1,4 +1,4 @@
-"""What a cell of the picture shows, in words."""
+"""Cells of the picture in words."""
 
 from __future__ import annotations
 

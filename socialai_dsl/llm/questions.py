@@ -1,4 +1,4 @@
-"""Questions of probes in words: how they are put to a model, and how its reply is read."""
+"""Probes in words: the text of a question, and the reader of its answer."""
 
 from __future__ import annotations
 

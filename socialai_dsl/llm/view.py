@@ -1,4 +1,4 @@
-"""What the agent sees and hears, as text: no more and no less than its observation holds."""
+"""The agent's observation as text, no more and no less."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""From a scenario's name to plain data with positions: reading YAML, `extends` and variants."""
+"""The loader: from a scenario's name to plain data with positions, through YAML, `extends` and variants."""

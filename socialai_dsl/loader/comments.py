@@ -1,4 +1,4 @@
-"""The comments of a file: what YAML's events leave out, found between the places that they name."""
+"""The comments of a YAML file, found between the places that the parser's events name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The files one scenario may be made of: found by name, read once, counted, and kept as trees that know places."""
+"""The files that one scenario may be made of: found by name, read once, counted, kept as positioned trees."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where each character of a scalar's value stands in the file, whatever way the scalar is written."""
+"""The place in the file of each character of a scalar's value, for every style of scalar."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files as text, and YAML text to plain data with positions, from the parser's events and within fixed limits."""
+"""YAML text to plain data with positions, from the parser's events and within fixed limits."""
 
 from __future__ import annotations
 

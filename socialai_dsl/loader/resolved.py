@@ -1,4 +1,4 @@
-"""From a scenario's name to its data: `extends`, variants and the files it names, put together as one tree."""
+"""A scenario's data as one tree: `extends`, variants and the files that it names put together."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which scenarios ship, and which of the other files are only variants of them."""
+"""The scenarios that ship, without the files that are only variants of them."""
 
 from functools import cache
 from pathlib import Path

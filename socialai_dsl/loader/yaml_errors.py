@@ -1,4 +1,4 @@
-"""What the YAML parser's errors mean to an author."""
+"""The YAML parser's errors in words for authors."""
 
 from __future__ import annotations
 

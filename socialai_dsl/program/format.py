@@ -1,4 +1,4 @@
-"""The numbers of a program: what stands in which word of its header, its tables and an environment's registers."""
+"""The layout of a program in words: its header, its tables, and an environment's registers."""
 
 from __future__ import annotations
 

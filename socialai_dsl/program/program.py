@@ -1,4 +1,4 @@
-"""A compiled scenario: its words, what the scenario calls them, and how it reads as text."""
+"""A compiled scenario: its words, the scenario's names for them, and its listing."""
 
 from __future__ import annotations
 

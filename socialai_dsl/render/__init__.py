@@ -1,1 +1,1 @@
-"""Pictures and text pictures of what is in the room, from cells as the observation has them."""
+"""The room as pictures and as text, from the cells of an observation."""

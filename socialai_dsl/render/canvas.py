@@ -1,4 +1,4 @@
-"""This module gives the tiles a small square canvas with soft edges and the colours they share."""
+"""A small square canvas with soft edges for tiles, and their colours."""
 
 from typing import Final, TypeAlias
 

@@ -1,4 +1,4 @@
-"""This module draws who stands in a cell: the agent as an arrow, NPCs as faces whose hat tells their kind."""
+"""Figures in cells: the agent as an arrow, NPCs as faces whose hat tells their kind."""
 
 from collections.abc import Callable
 from typing import Final

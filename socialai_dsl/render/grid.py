@@ -1,4 +1,4 @@
-"""This module turns what a room looks like now into pictures and text, without a display."""
+"""The room as pictures and text, without a display."""
 
 from collections.abc import Container, Mapping
 from typing import Final

@@ -1,4 +1,4 @@
-"""This module sets the room beside what is said in it: one picture for an episode's film."""
+"""A frame of an episode's film: the room, and the dialogue beside it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

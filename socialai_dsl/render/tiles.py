@@ -1,4 +1,4 @@
-"""This module draws one cell of the room: what lies on it, and with the figures, who stands on it."""
+"""Tiles: one cell of the room with its object and its figure."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Episodes for people to look at: the trace of a played episode, and the page that shows it."""
+"""Replays: the trace of a played episode, and the page that shows it."""
 
 from socialai_dsl.replay.document import FORMAT, Thought, Trace, trace_schema
 from socialai_dsl.replay.tracing import Tracer, trace_of

@@ -1,4 +1,4 @@
-"""The trace format `socialai-trace/1`: everything that is shown of one episode, as JSON.
+"""The trace format `socialai-trace/1`: one episode as JSON, with everything that a page shows.
 
 A trace is small because it repeats nothing: cells, reasons and rules are numbered, and a moment says what differs
 from the moment before it. `static/trace.js` is the reader.

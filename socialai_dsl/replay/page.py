@@ -1,4 +1,4 @@
-"""The replay: recorded episodes as one HTML file that loads nothing from elsewhere."""
+"""The replay page: episodes as one HTML file that loads nothing from elsewhere."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The scripts and style sheets of pages, which are plain files beside this module."""
+"""The scripts and style sheets of pages, plain files beside this module."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `describe` says of a room, by address, and who is in it."""
+"""The values of `describe` by address, and the members in the room."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was done and heard in a step, in words."""
+"""A step in words: the action and the lines heard."""
 
 from __future__ import annotations
 

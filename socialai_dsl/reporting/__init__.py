@@ -1,1 +1,1 @@
-"""From the folder of an experiment to a report: reads what runs left, computes, draws, and writes pages and tables."""
+"""Reports: from the folder of an experiment to figures, tables and pages."""

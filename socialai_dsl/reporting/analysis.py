@@ -1,4 +1,4 @@
-"""From what runs left to what a report says: spread over seeds, comparisons, aggregates, and what is too short."""
+"""The figures of a report: spread over seeds, comparisons, aggregates, and runs that are too short."""
 
 from __future__ import annotations
 

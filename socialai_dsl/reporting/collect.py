@@ -1,4 +1,4 @@
-"""This module reads the folder of an experiment: conditions and runs, whatever state they are in.
+"""Reads the folder of an experiment: conditions and runs in whatever state they are.
 
 A report has to be made of what is there. So nothing in a run's folder is an error: what is missing or cannot be read
 is a problem of that run, which the report names.

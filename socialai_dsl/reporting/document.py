@@ -1,4 +1,4 @@
-"""A report as blocks, before it is HTML or Markdown: headings, text, tables, figures, and what is folded away."""
+"""A report as blocks, before it is HTML or Markdown: headings, text, tables, figures, folded parts."""
 
 from __future__ import annotations
 

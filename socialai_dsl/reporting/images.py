@@ -1,4 +1,4 @@
-"""The figures of a report while it is made, each under its name."""
+"""The figures of a report while it is made, by name."""
 
 from __future__ import annotations
 

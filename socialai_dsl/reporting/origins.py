@@ -1,4 +1,4 @@
-"""Blocks about where figures come from: who does not learn, the runs, what they ran on, how it was computed."""
+"""Blocks about origins: baselines, the runs, their machines, the methods."""
 
 from __future__ import annotations
 

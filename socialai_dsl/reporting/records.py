@@ -1,4 +1,4 @@
-"""The files that an experiment and its runs leave, as models: what a report reads of them, and nothing else."""
+"""The files of an experiment and its runs as models of exactly what a report reads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""This module puts the learning curves of several seeds on one grid of frames."""
+"""Learning curves of several seeds on one grid of frames."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

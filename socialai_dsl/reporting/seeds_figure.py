@@ -1,4 +1,4 @@
-"""This module draws the learning curves of several conditions, each with its seeds, side by side."""
+"""The figure of several conditions' learning curves, side by side, each with its seeds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

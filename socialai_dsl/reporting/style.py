@@ -1,4 +1,4 @@
-"""The look of all figures of a report: colours that colour-blind people can tell apart, sizes, number formats."""
+"""The look of all figures of a report: colours for colour-blind readers, sizes, number formats."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a report writes figures: counts, times, means with their spread, and what is not known."""
+"""Figures in words: counts, times, means with their spread, unknown values."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What an author may write, as pydantic models: shape only, meaning is checked by `semantics`."""
+"""The shape of files as pydantic models; `semantics` checks meaning."""

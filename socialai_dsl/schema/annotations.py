@@ -1,4 +1,4 @@
-"""The models, looked at: what keys and what kind of value belong at a place, in words for authors."""
+"""Questions about the models: the keys and kinds of values that belong at a place, in words for authors."""
 
 from __future__ import annotations
 

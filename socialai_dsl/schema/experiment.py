@@ -1,4 +1,4 @@
-"""An experiment file as models: which agents learn or play which scenarios, how often, and what was found elsewhere."""
+"""An experiment file as models: agents, scenarios, seeds, and published figures."""
 
 from __future__ import annotations
 

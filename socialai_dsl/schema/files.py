@@ -1,4 +1,4 @@
-"""Whole files as authors write them: the models, with what the loader resolves before they are made."""
+"""Whole files as models, with the keys that the loader resolves first."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Data to models, and what pydantic finds wrong with it in words for authors, at the place in the file."""
+"""Data to models, with pydantic's errors in words for authors, at the place in the file."""
 
 from __future__ import annotations
 

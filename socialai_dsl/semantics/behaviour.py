@@ -1,4 +1,4 @@
-"""Frames as their members play them, and rules of the world: every rule, activity and effect with its values."""
+"""Frames as their members follow them, and rules of the world: every rule, activity and effect resolved."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A scenario and its positions to a checked scenario: all mistakes of meaning, found in one go."""
+"""A scenario's models and positions to a checked scenario, or to all mistakes of meaning at once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The inhabitants of a scenario: numbers, names and voices, kinds and statuses, and the names nobody may take twice."""
+"""The inhabitants of a scenario: numbers, names, voices, kinds, statuses, and reserved names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Placements without a free cell: certain ones, those the least favourable room lacks, and absences in drawn rooms.
+"""Placements that may find no free cell, in all rooms of a size or in drawn ones.
 
 In drawn rooms, what cannot be told without the engine, such as what can be reached, counts as favourable, so that
 somebody who is found missing really is.

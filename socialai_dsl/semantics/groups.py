@@ -1,4 +1,4 @@
-"""What has several members: groups and quantifiers, subjects of verbs, tables, sequences and memories."""
+"""Groups: quantifiers, subjects of verbs, tables, sequences and memories."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is true of objects: what contains and what unlocks what, their statuses, and what members believe of them."""
+"""Facts about objects: containment, links, statuses, and beliefs about them."""
 
 from __future__ import annotations
 

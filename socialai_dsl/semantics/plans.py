@@ -1,4 +1,4 @@
-"""What a checked scenario says: places, activities, rules, frames and all the rest, every name resolved."""
+"""A checked scenario as plans: places, activities, rules, frames, every name resolved."""
 
 from __future__ import annotations
 

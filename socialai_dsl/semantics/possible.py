@@ -1,4 +1,4 @@
-"""Flow and conditions: states never entered, rules never reached, and what can never be so, whatever happens."""
+"""Flow and conditions: states never entered, rules never reached, conditions that can never hold."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The entries of `probes`: when a language model is asked what, what is right, and what can be answered."""
+"""The entries of `probes`: when each is asked, its text, its right answer, its possible answers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Syntax trees to terms: every name looked up, every type checked, words read as what is expected of them."""
+"""Syntax trees to terms: names looked up, types checked, words read by the expected type."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a bare name, an attribute and a condition without brackets mean."""
+"""The meaning of bare names, attributes and conditions without brackets."""
 
 from __future__ import annotations
 

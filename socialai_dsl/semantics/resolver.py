@@ -1,4 +1,4 @@
-"""What resolves the expressions of a scenario, as the parts of the language see it; `resolve` is the whole."""
+"""The interface of the resolver, as the parts of the language see it; `resolve` implements it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What surrounds an expression: where its mistakes are reported and in which words, and what a name means there."""
+"""The scope of an expression: the meaning of names, and the place and wording of its mistakes."""
 
 from __future__ import annotations
 

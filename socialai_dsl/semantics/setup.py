@@ -1,4 +1,4 @@
-"""What a reset makes: the room, where things are put, and every draw in the order it is done."""
+"""The plan of a reset: the room, the placements, and every draw in its order."""
 
 from __future__ import annotations
 

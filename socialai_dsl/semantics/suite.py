@@ -1,4 +1,4 @@
-"""One action space for the members of a suite, and how each member's utterances are found in it."""
+"""One action space for the members of a suite, with maps to each member's utterances."""
 
 from __future__ import annotations
 

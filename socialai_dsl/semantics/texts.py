@@ -1,4 +1,4 @@
-"""Texts: which utterances they mean where something is heard, the lines that are said, and who said what."""
+"""Texts: the utterances that can be heard, the lines that are said, and their speakers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A window's own process, asked one question at a time; one that hangs or dies is replaced."""
+"""The process of a window, asked one question at a time; one that hangs or dies is replaced."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The opened folder: the scenarios in it, and nothing outside of it."""
+"""The opened folder: its scenarios, and nothing outside of it."""
 
 from __future__ import annotations
 

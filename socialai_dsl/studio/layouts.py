@@ -1,4 +1,4 @@
-"""Layouts as an author writes them: into a member of a suite, or as a new suite that begins in a known room."""
+"""Layouts as text: written into a member of a suite, or as a new suite that begins in a known room."""
 
 from __future__ import annotations
 

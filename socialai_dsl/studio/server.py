@@ -1,4 +1,4 @@
-"""What a browser talks to: one page, a websocket for the scenario and its game, and one for the language server."""
+"""The server of the studio: one page, a websocket for the scenario and its game, one for the language server."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One window's scenario and game: it is drawn from the text in the editor, and played with steps back."""
+"""A window's scenario and game: drawn from the text in the editor, played with steps back."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Curricula: which members of a suite are played while training, by what the agent can do so far."""
+"""Curricula: the choice of a suite's members while training, by the agent's success."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Curricula that are written down: phases, each with what is played and until when."""
+"""Curricula as files of phases, each with its members and its end."""
 
 from __future__ import annotations
 

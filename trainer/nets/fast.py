@@ -1,4 +1,4 @@
-"""The default network: cells read in the light of the dialogue, no convolutions, for ordinary CPUs."""
+"""The default network, without convolutions, for ordinary CPUs: cells are read in the light of the dialogue."""
 
 from __future__ import annotations
 

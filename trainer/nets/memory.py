@@ -1,4 +1,4 @@
-"""Memories of a network: what it carries from step to step, emptied whenever an episode starts."""
+"""Memories of a network, carried from step to step and emptied at the start of an episode."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Readers: from the tokens of the engine to the words that a dialogue encoder knows."""
+"""Readers: from the engine's tokens to the words that a dialogue encoder knows."""
 
 from __future__ import annotations
 

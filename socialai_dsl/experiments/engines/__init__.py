@@ -1,4 +1,4 @@
-"""Where runs are worked on: one module for each way, all with the one protocol of this package."""
+"""Engines, the places where runs are worked on: one module for each, all with the one protocol of this package."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs on this machine: so many at once, each a process of its own."""
+"""Runs on this machine, several at once, each a process of its own."""
 
 from __future__ import annotations
 
