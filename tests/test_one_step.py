@@ -1448,6 +1448,35 @@ def test_5_56_put_to_what_is_not_in_the_room(play: Folder) -> None:
     assert (run.at("ball"), run.at("ann"), run.at("coin")) == ([3, 3], [5, 5], None)
 
 
+@pytest.mark.parametrize("choice", CHOICES)
+def test_5_57_of_a_conditional_value_only_what_is_taken_is_asked_for(play: Folder, choice: str) -> None:
+    run = play(f"""
+        objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]]}}}}
+        frames:
+          look:
+            let: {{a: 0, b: 0, c: 0, d: 0, e: 0}}
+            states:
+              s:
+                do: go_next_to({choice} if t == 1 else agent)
+                then:
+                  - when: t == 1
+                    set:
+                      a: 2 if agent.x == 1 else {choice}.x
+                      b: 3 if not (agent.x == 1 or {choice}.open) else 4
+                  - when: 1 == (1 if {choice}.open else 1)
+                    set: {{c: 1}}
+                  - set:
+                      d: 1 if agent.x == 3 else {choice}.x
+                  - set: {{e: 1}}
+        cast: {{ann: {{at: [5, 1], facing: left, frame: look}}}}
+    """).step()
+    assert [run.value(f"ann.{name}") for name in "abcde"] == [2, 4, 0, 0, 0]
+    assert run.at("ann") == [5, 1], "there is nothing to go to"
+    run.step()
+    assert [run.value(f"ann.{name}") for name in "abcde"] == [2, 4, 0, 0, 1]
+    assert run.at("ann") == [4, 1]
+
+
 # -- 6. memories -----------------------------------------------------------------------------------
 
 

@@ -56,6 +56,8 @@ _WORDS: Final = {
     "colors": "red, green, blue, purple, yellow, grey",
     "nouns": "the nouns of the grammar",
     "random": "drawn",
+    "if": "`a if condition else b`: a where the condition holds, else b",
+    "else": "`a if condition else b`: a where the condition holds, else b",
 }
 
 Kind = Literal["key", "name", "verb", "word", "file"]

@@ -572,7 +572,9 @@ def selected_value(to: Emitter, term: Select) -> int:
         to.block.emit(Op.LOAD, result, to.value(value))
         to.block.release(mark)
 
-    if switch is not None and all(isinstance(value, Const | Read) for value in switch.cases):
+    if switch is not None and all(
+        isinstance(value, Const | Read) and not may_find_nothing(value) for value in switch.cases
+    ):
         _overwrite(to, switch, take)
     else:
         _branches(to, term, switch, take)

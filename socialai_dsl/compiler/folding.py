@@ -226,7 +226,8 @@ def _decide_select(term: terms.Select) -> Term:
         elif condition.value:
             default = value
             break
-    if all(value == default for _, value in kept) and (not kept or isinstance(default, Const)):
+    is_default = isinstance(default, Const) and not any(may_find_nothing(asked) for asked, _ in kept)
+    if all(value == default for _, value in kept) and (not kept or is_default):
         return default
     conditions, values = zip(*kept, strict=True)
     return replace(term, conditions=conditions, values=values, default=default)

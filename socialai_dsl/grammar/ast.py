@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
 from functools import cache, lru_cache
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final, Literal, TypeVar
 
@@ -239,6 +240,15 @@ class Negative(Node):
 
 
 @dataclass(frozen=True, slots=True)
+class Conditional(Node):
+    """`value if condition else other`."""
+
+    value: Expr
+    condition: Expr
+    other: Expr
+
+
+@dataclass(frozen=True, slots=True)
 class Placed(Node):
     """`region where condition`, in a `place:`."""
 
@@ -263,6 +273,7 @@ Expr = (
     | Interval
     | Arithmetic
     | Negative
+    | Conditional
     | Placed
 )
 
@@ -325,23 +336,47 @@ def parse_expression(text: str) -> Expr:
 def parse_text(text: str) -> Text:
     """A text with `<...>` parts, each an expression; offsets inside count from the start of `text`."""
     parts: list[str | Expr] = []
-    rest = 0
-    for match in re.finditer(r"<([^<>]*)>", text):
-        if match.start() > rest:
-            parts.append(text[rest : match.start()])
-        parts.append(_parse_slot(match.group(1), match.start() + 1))
-        rest = match.end()
-    if rest < len(text):
-        parts.append(text[rest:])
-    for part in _plain_pieces(text):
-        if "<" in part.group() or ">" in part.group():
-            offset = part.start() + re.search("[<>]", part.group()).start()  # type: ignore[union-attr]
-            raise ParseProblem("S202", "a `<` or `>` without its partner: a slot is written <name>", offset)
+    rest, stray = 0, None
+    for start, end in [*_slots(text), (len(text), len(text))]:
+        between = text[rest:start]
+        if stray is None and (found := re.search("[<>]", between)) is not None:
+            stray = rest + found.start()
+        if between:
+            parts.append(between)
+        if start < end:
+            parts.append(_parse_slot(text[start + 1 : end - 1], start + 1))
+        rest = end
+    if stray is not None:
+        raise ParseProblem("S202", "a `<` or `>` without its partner: a slot is written <name>", stray)
     return Text(tuple(parts), at=0)
 
 
-def _plain_pieces(text: str) -> list[re.Match[str]]:
-    return list(re.finditer(r"[^<>]+|[<>]", re.sub(r"<[^<>]*>", lambda m: " " * len(m.group()), text)))
+_MOST_ENDS = 8
+"""So many comparisons and ends of slots after a `<` are tried as the end of its slot."""
+
+
+def _slots(text: str) -> Iterator[tuple[int, int]]:
+    """Where the slots of a text begin and end; only that of a conditional value can have `<` and `>` in it."""
+    place = text.find("<")
+    while place >= 0:
+        ends = [found.end() for found in islice(re.finditer(">", text[place:]), _MOST_ENDS)]
+        inner = (text[place + 1 : place + end - 1] for end in ends)
+        asks = [end for end, slot in zip(ends, inner, strict=True) if re.search(r"\bif\b", slot)]
+        whole = next((end for end in asks if _is_expression(text[place + 1 : place + end - 1])), None)
+        if whole is None:
+            plain = re.match("<[^<>]*>", text[place:])
+            whole = plain.end() if plain is not None else None
+        if whole is not None:
+            yield place, place + whole
+        place = text.find("<", place + (whole or 1))
+
+
+def _is_expression(text: str) -> bool:
+    try:
+        parse_expression(text)
+    except ParseProblem:
+        return False
+    return True
 
 
 def _parse_slot(inner: str, offset: int) -> Expr:
@@ -444,6 +479,9 @@ class _ToAst(Transformer_NonRecursive):  # type: ignore[type-arg]
     def any_of(self, meta: Any, items: list[Any]) -> Any:
         return self._made(Logic("or", tuple(items), at=meta.start_pos))
 
+    def conditional(self, meta: Any, items: list[Any]) -> Any:
+        return self._made(Conditional(*items, at=meta.start_pos))
+
     def placed(self, meta: Any, items: list[Any]) -> Any:
         return self._made(Placed(*items, at=meta.start_pos))
 
@@ -452,6 +490,8 @@ def _depth_of(node: Expr) -> int:
     # Children were checked when they were made, so this recursion is bounded by MAX_DEPTH.
     return 1 + max((_depth_of(child) for child in node.children()), default=0)
 
+
+_CONDITIONAL = "`a if condition else b`"
 
 _SYMBOLS = {
     "&&": "write `and`",
@@ -464,6 +504,7 @@ _SYMBOLS = {
     "{": "a slot is written <name>",
     "[": "alternatives are written a | b",
     ";": "one expression at a time",
+    "?": f"a value that depends is written {_CONDITIONAL}",
 }
 
 
@@ -475,6 +516,8 @@ def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
     if isinstance(error, UnexpectedEOF) or (
         isinstance(error, UnexpectedToken) and error.token.type == "$END"
     ):
+        if isinstance(error, UnexpectedToken) and "ELSE" in error.expected:
+            return ParseProblem("S210", f"`if` without `else`: write {_CONDITIONAL}", len(text))
         return ParseProblem(
             "S210", "the expression ends too early: something is missing at its end", len(text)
         )
@@ -489,6 +532,8 @@ def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
     if token.type == "RPAR":
         return ParseProblem("S202", "something is missing before this bracket", offset)
     hint = words = None
+    if token.type in ("IF", "ELSE"):
+        hint = f"a value that depends is written {_CONDITIONAL}"
     if token.type == "NAME":
         words = next(found[0] for found in _SEVERAL.finditer(text) if found.start() <= offset < found.end())
         hint = "between two names stands a dot, an operator, or a word such as `and`: `agent.next_to(exit)`"
@@ -496,15 +541,15 @@ def _explain(text: str, error: UnexpectedInput) -> ParseProblem:
 
 
 _SEVERAL = re.compile(
-    r"\b(?!(?:and|or|not|in|where|to)\b)[\w']+(?: +(?!(?:and|or|not|in|where|to)\b)[\w']+)*"
+    r"\b(?!(?:and|or|not|in|where|to|if|else)\b)[\w']+(?: +(?!(?:and|or|not|in|where|to|if|else)\b)[\w']+)*"
 )
 """Words with nothing but blanks between them."""
 
-_WORDS = re.compile(r"\"[^\"]*\"|[<>=!]=|[<>()]|,|\b(?:and|or|not|where|to)\b|[^<>=!()\",\s]+|\s+|.")
+_WORDS = re.compile(r"\"[^\"]*\"|[<>=!]=|[<>()]|,|\b(?:and|or|not|where|to|if|else)\b|[^<>=!()\",\s]+|\s+|.")
 """The pieces of an expression, as far as they say where a comparison begins and ends."""
 
 _COMPARES = frozenset({"==", "!=", "<=", ">=", "<", ">"})
-_BOUNDS = frozenset({"and", "or", "not", "where", "to", ","})
+_BOUNDS = frozenset({"and", "or", "not", "where", "to", "if", "else", ","})
 
 
 def _unchained(text: str, offset: int) -> str:
@@ -575,7 +620,7 @@ def _check_brackets(text: str) -> None:
         raise ParseProblem("S202", "a bracket is not closed", opened[-1])
 
 
-_OR, _AND, _NOT, _COMPARED, _CHOICE, _RANGE, _SUM, _PRODUCT, _UNARY, _ATOM = range(10)
+_IF, _OR, _AND, _NOT, _COMPARED, _CHOICE, _RANGE, _SUM, _PRODUCT, _UNARY, _ATOM = range(11)
 _ARITHMETIC: Final = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "//": _PRODUCT, "%": _PRODUCT}
 
 
@@ -642,6 +687,9 @@ class _Writer:
                 return f"{self._inside(left, own)} {op} {self._inside(right, own + 1)}"
             case Negative(operand=operand):
                 return f"-{self._inside(operand, own)}"
+            case Conditional(value=value, condition=condition, other=other):
+                asked = f"{self._inside(value, _OR)} if {self._inside(condition, _OR)}"
+                return f"{asked} else {self._inside(other, own)}"
         raise AssertionError(f"internal: no text for {type(node).__name__}")
 
     def _inside(self, node: Expr, least: int) -> str:
@@ -666,5 +714,7 @@ def _strength(node: Expr) -> int:
             return _ARITHMETIC[op]
         case Negative():
             return _UNARY
+        case Conditional():
+            return _IF
         case _:
             return _ATOM

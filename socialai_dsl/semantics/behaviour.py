@@ -129,9 +129,13 @@ def _head(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[str, tuple[
             return name, ()
         case ast.Call(name=name, args=args, subject=None):
             return name, args
-    raise resolver.fail(
-        "S205", f"`{quoted(node)}` is not an activity", node, scope, hint="activities are " + ", ".join(ACTIVITIES)
-    )  # fmt: skip
+    hint = "activities are " + ", ".join(ACTIVITIES)
+    if isinstance(node, ast.Conditional):
+        when = quoted(node.condition)
+        hint = (
+            f"what it is about can depend, `go_to(a if c else b)`; else `first: [{{when: {when}, do: ...}}]`"
+        )
+    raise resolver.fail("S205", f"`{quoted(node)}` is not an activity", node, scope, hint=hint)
 
 
 def _unknown(

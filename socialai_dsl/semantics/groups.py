@@ -414,6 +414,8 @@ def _values_named(resolver: Resolver, node: ast.Expr) -> frozenset[int]:
             return frozenset({COLOR.low + COLOR.words.index(word)})
         case ast.Call(name="pick", args=(ast.Alternatives(options=options),), subject=None):
             return frozenset().union(*(_values_named(resolver, option) for option in options))
+        case ast.Conditional(value=value, other=other):
+            return _values_named(resolver, value) | _values_named(resolver, other)
         case ast.Call(name="permuted", args=(ast.Attribute(name="color") as colors,), subject=None):
             return _values_named(resolver, colors)
         case ast.Attribute(subject=ast.Name(id=name), name="color") if name in resolver.symbols.objects:

@@ -10,6 +10,7 @@ from typing import Any, cast
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups, object_facts, resolve_names, texts
+from socialai_dsl.semantics.conditional import conditional
 from socialai_dsl.semantics.groups import check_moment, check_points, check_toggled, must_be_agent, subject_of
 from socialai_dsl.semantics.resolve_names import toggled_by, without_arguments
 from socialai_dsl.semantics.resolver import ENTITY, INT, WORDED, Resolver, same_kind, text_value
@@ -423,6 +424,8 @@ class ScenarioResolver(Resolver):
                 return self.fit(self._membership(node, scope), expected, node, scope)
             case ast.Arithmetic() | ast.Negative():
                 return self.fit(self._arithmetic(node, scope), expected, node, scope)
+            case ast.Conditional():
+                return self.fit(conditional(self, node, expected, scope), expected, node, scope)
             case ast.Alternatives() | ast.Interval():
                 raise self.fail(
                     "S204", f"`{quoted(node)}` is a choice of several, here one is needed", node, scope,

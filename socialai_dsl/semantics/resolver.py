@@ -589,7 +589,15 @@ class Resolver(ABC):
             if register is not None:
                 return self.registers.is_wordy(register)
             return not self._names_something(node.id, scope)
+        if isinstance(node, ast.Conditional):
+            return self.lead(node, scope) is None
         return isinstance(node, ast.Text)
+
+    def lead(self, node: ast.Expr, scope: Scope) -> ast.Expr | None:
+        """Of the values that an expression chooses from the first that has a type of its own, if one has."""
+        if isinstance(node, ast.Conditional):
+            return self.lead(node.value, scope) or self.lead(node.other, scope)
+        return None if self.is_bare(node, scope) else node
 
     def _register_of(self, node: ast.Name, scope: Scope) -> str | None:
         if node.id in scope.variables:
@@ -635,6 +643,8 @@ class Resolver(ABC):
                 return self.is_wordy(only, scope)
             case ast.Quantifier(name="pick" | "first", group=group):
                 return self.is_wordy(group, scope)
+            case ast.Conditional(value=value, other=other):
+                return self.is_wordy(value, scope) or self.is_wordy(other, scope)
         return False
 
 

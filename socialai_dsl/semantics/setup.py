@@ -154,9 +154,10 @@ def _head(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[str, tuple[
             return name, ()
         case ast.Call(name=name, args=args, subject=None):
             return name, args
-    raise resolver.fail(
-        "S204", f"`{quoted(node)}` is not a place", node, scope, hint="places are " + ", ".join(PLACES)
-    )
+    hint = "places are " + ", ".join(PLACES)
+    if isinstance(node, ast.Conditional):
+        hint = "a number in it can depend, `row(2 if c else 4)`, or its condition, `anywhere where (... if c else ...)`"
+    raise resolver.fail("S204", f"`{quoted(node)}` is not a place", node, scope, hint=hint)
 
 
 def _takes(resolver: Resolver, node: ast.Expr, args: tuple[ast.Expr, ...], count: int, scope: Scope) -> None:

@@ -224,6 +224,6 @@ WORDS: Final = frozenset(
     + ["speaker", "objects", "believes", "permuted"]
     + ["here", "it", "self", "t", "W", "H", "cells", "colors", "nouns", "toward", "random", "distinct", "ever"]
     + [FINISHED, *COLORS, *DIRECTIONS, *ACTIONS, *SIDES]
-    + ["and", "or", "not", "in", "where", "to", "true", "false", "speaker", "room", "agent"]
+    + ["and", "or", "not", "in", "where", "to", "if", "else", "true", "false", "speaker", "room", "agent"]
 )  # fmt: skip
 """Words that mean something already, so that nothing an author declares may be called so."""

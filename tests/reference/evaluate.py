@@ -282,6 +282,11 @@ def _member(node: ast.Member, context: Context) -> bool:
     return any(same(left, item) for item in group) != node.negated
 
 
+def _conditional(node: ast.Conditional, context: Context) -> Any:
+    """Nothing is asked of the value that is not taken; of the other more than what it is like."""
+    return there(of(node.value if of(node.condition, context) else node.other, context))
+
+
 def _alternatives(node: ast.Alternatives, context: Context) -> list[Any]:
     """`a | b | 2 * c`: a list; a weight multiplies; a group among the alternatives gives its members."""
     items: list[Any] = []
@@ -472,4 +477,5 @@ HANDLERS: dict[type, Callable[[Any, Context], Any]] = {
     ast.Interval: _interval,
     ast.Arithmetic: _arithmetic,
     ast.Negative: lambda node, context: -there(of(node.operand, context)),
+    ast.Conditional: _conditional,
 }

@@ -210,6 +210,8 @@ class Vocabulary(Words):
         if isinstance(tree, ast.Alternatives):
             found = [self.options(option, member) or [] for option, _ in weighed(tree)]
             return list(dict.fromkeys(word for words_ in found for word in words_))
+        if isinstance(tree, ast.Conditional):
+            return self.chosen_options(tree, member)
         if isinstance(tree, ast.Quantifier) and tree.name in PICKING:
             return self.options(tree.group, member)
         if isinstance(tree, ast.Call) and tree.name in PICKING:
@@ -219,6 +221,18 @@ class Vocabulary(Words):
         if isinstance(tree, ast.Attribute):
             return self.values(tree, member) if tree.name in ("color", "facing", "name") else None
         return None
+
+    def chosen_options(self, tree: ast.Conditional, member: Who) -> list[str] | None:
+        """All words that a conditional value can be; None if all it can be are numbers that are computed."""
+        parts = (tree.value, tree.other)
+        found = [self.options(part, member) for part in parts]
+        if found == [None, None]:
+            return None
+        words_ = [
+            self.values(part, member) if known is None else known
+            for part, known in zip(parts, found, strict=True)
+        ]
+        return list(dict.fromkeys(word for some in words_ for word in some))
 
     def table_options(self, name: str) -> list[str]:
         """All that a table holds; a permuted one holds what the other does."""
@@ -282,6 +296,9 @@ class Vocabulary(Words):
             return self.bounds(tree.group, member)
         if isinstance(tree, ast.Call) and tree.name == "pick":
             return self.bounds(tree.args[0], member)
+        if isinstance(tree, ast.Conditional):
+            both = self.bounds(tree.value, member), self.bounds(tree.other, member)
+            return min(low for low, _ in both), max(high for _, high in both)
         if isinstance(tree, ast.Name):
             if tree.id == "t":
                 return 0, self.scenario.horizon

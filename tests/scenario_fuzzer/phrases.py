@@ -44,6 +44,7 @@ class Phrases:
 
     def __init__(self, rng: Random, declared: Declared) -> None:
         self.rng, self.declared = rng, declared
+        self.choices = 0
 
     def one_of(self, *options: str | Callable[[], str] | None) -> str:
         """One of these, made only then."""
@@ -53,6 +54,25 @@ class Phrases:
     def often(self, probability: float) -> bool:
         """Whether something happens."""
         return self.rng.random() < probability
+
+    def chosen(self, value: Callable[[], str], where: Where) -> str:
+        """A value, now and then one of two by a condition; seldom within another, for lines have an end."""
+        if not self.often(0.08 / 4**self.choices):
+            return value()
+        self.choices += 1
+        asked = self.plain_condition(where) if self.often(0.3) else self.short_condition(where)
+        made = f"({value()} if {asked} else {value()})"
+        self.choices -= 1
+        return made
+
+    def short_condition(self, where: Where) -> str:
+        """A condition of few words."""
+        return self.one_of(
+            f"agent.next_to({self.anchor(where)})",
+            f"{self.anchor(where)}.color == {self.rng.choice(COLORS)}",
+            f"agent.x > {self.rng.randint(1, 4)}",
+            None if where.reset else f"t % {self.rng.randint(2, 3)} == 0",
+        )
 
     # -- things, members, places -----------------------------------------------------------------------------
 
@@ -65,7 +85,7 @@ class Phrases:
         for group, count in known.groups.items():
             options += [lambda group=group, count=count: self.numbered(group, count, where)]
             options += [f"nearest(n in {group} to {self.anchor(where)})"] if not where.variables else []
-        return self.one_of(*options)
+        return self.chosen(lambda: self.one_of(*options), where)
 
     def numbered(self, group: str, count: int, where: Where) -> str:
         """One of a group by its number, which may be computed."""
@@ -100,7 +120,7 @@ class Phrases:
             ]
             if not where.still:
                 options += [f"pick({name})", lambda: f"pick(o in {name} where {self.plain_condition(inner)})"]
-        return self.one_of(*options)
+        return self.chosen(lambda: self.one_of(*options), where)
 
     def bound(self, variable: str, thing: Thing, where: Where) -> Where:
         """Inside a quantifier over a group."""
@@ -116,6 +136,10 @@ class Phrases:
 
     def entity(self, where: Where) -> str:
         """Somebody or something."""
+        return self.chosen(lambda: self.somebody_or_something(where), where)
+
+    def somebody_or_something(self, where: Where) -> str:
+        """An object or somebody in the room."""
         found = self.thing(where) if self.often(0.6) else None
         return found[0] if found else self.member(where)
 
@@ -182,7 +206,7 @@ class Phrases:
         if known.nouns_are_numbers:
             options += ["noun", "noun"] if where.noun else []
             options += ["agent.noun"] if not where.reset else []
-        return self.one_of(*options)
+        return self.chosen(lambda: self.one_of(*options), where)
 
     def counted(self, where: Where) -> str:
         """How many of a group."""
@@ -195,10 +219,14 @@ class Phrases:
         if where.frame is not None and not where.reset:
             options += where.frame.colors
         options += [lambda: f"{self.entity(where)}.color"] * 3
-        return self.one_of(*options)
+        return self.chosen(lambda: self.one_of(*options), where)
 
     def direction(self, where: Where) -> str:
         """A direction."""
+        return self.chosen(lambda: self.some_direction(where), where)
+
+    def some_direction(self, where: Where) -> str:
+        """A direction that is not chosen by a condition."""
         return self.one_of(
             *(where.frame.directions if where.frame else []),
             self.rng.choice(("right", "down", "left", "up")),
@@ -239,12 +267,8 @@ class Phrases:
 
     def plain_condition(self, where: Where) -> str:
         """A condition on places, looks, statuses and values."""
-        return self.one_of(
-            lambda: self.relation(where),
-            lambda: self.relation(where),
-            lambda: self.status(where),
-            lambda: self.comparison(where),
-        )
+        made = (self.relation, self.relation, self.status, self.comparison)
+        return self.chosen(lambda: self.rng.choice(made)(where), where)
 
     def relation(self, where: Where) -> str:
         """A condition between two things, or of somebody and a place."""
@@ -451,6 +475,8 @@ class Phrases:
             lambda: f"It is <{self.in_text(self.color, where)}>",
             lambda: f"I see <{self.in_text(self.counted, where)}>" if known.several else "I see nothing",
             lambda: f"Look <{self.in_text(self.direction, where)}>",
+            lambda: f'It is <{self.in_text(self.color, where)} if {self.short_condition(where)} else "gone">',
+            lambda: f'Well <"yes" if {self.short_condition(where)} else "no">',
         ]
         if where.frame is not None and not where.reset:
             options += [f"I have <{name}>" for name in where.frame.numbers]

@@ -114,14 +114,27 @@ def test_texts_have_parts_with_offsets_into_the_whole() -> None:
     assert text.plain is None
 
 
-@pytest.mark.parametrize(("text", "offset"), [("a < b", 2), ("a > b", 2), ("<>", 0), ("Is <x > 2> red", 9)])
+@pytest.mark.parametrize(
+    "slot",
+    ["1 if t > 3 else 2", "1 if t < 3 else 2", "1 if 2 < t and t >= 1 or t > 5 else 3 if t < 2 else 4"],
+)
+def test_a_conditional_value_in_a_text_may_compare(slot: str) -> None:
+    text = parse_text(f"Now <t> and <{slot}>, then <noun>.")
+    assert text.parts[3] == ast.moved(parse_expression(slot), lambda at: at + 13)
+    assert (text.parts[0], text.parts[4]) == ("Now ", ", then ")
+
+
+@pytest.mark.parametrize(
+    ("text", "offset"),
+    [("a < b", 2), ("a > b", 2), ("<>", 0), ("Is <x > 2> red", 9), ("Is <a if x > 2> red", 14)],
+)
 def test_stray_marks_in_texts(text: str, offset: int) -> None:
     with pytest.raises(ParseProblem) as caught:
         parse_text(text)
     assert (caught.value.code, caught.value.offset) == ("S202", offset)
 
 
-@given(st.text(alphabet='ab1 ().,|+-*/<>=!&"$_\n\tdoornotandinwhere', max_size=60))
+@given(st.text(alphabet='ab1 ().,|+-*/<>=!&"$_\n\tdoornotandinwhereifelse', max_size=60))
 def test_any_text_gives_a_tree_or_one_problem(text: str) -> None:
     for parse in (parse_expression, parse_text):
         places = offsets(parse, text)

@@ -41,6 +41,9 @@ def without_offsets(value: Any) -> Any:
         "opa(noun)",
         "pick(x in (a or b) where true)",
         "left_half where here.x > 2",
+        "5 if a or b else 8 if c else 10",
+        "(1 if a else 2) if (b if c else d) else (3 if e else 4)",
+        "2 * (a if b else c) + 1 < 3 and (d if e else f)",
     ],
 )
 def test_a_tree_survives(text: str) -> None:

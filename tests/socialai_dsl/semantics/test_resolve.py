@@ -18,6 +18,7 @@ from socialai_dsl.semantics.terms import (
     Operation,
     Quantified,
     Read,
+    Select,
     Type,
     Variable,
     World,
@@ -193,3 +194,66 @@ def test_a_status_is_a_word_after_the_dot(outcome_term):
 def test_both_mistakes_of_a_condition_are_found(mistakes):
     found = mistakes(outcome=[{"success": "agent.at(exitt) and agent.color == crimson"}])
     assert [line[:4] for line in found] == ["S201", "S201"]
+
+
+# -- conditional values
+
+
+def chosen(outcome_term, text, **sections):
+    """The term of a conditional value that is compared with something."""
+    return outcome_term(text, **sections).left
+
+
+def test_a_conditional_value_has_room_for_both(outcome_term):
+    number = chosen(outcome_term, "(5 if t > 2 else 8) == t")
+    assert number == Select(
+        Type("int", 5, 8),
+        (outcome_term("t > 2"),),
+        (Const(Type("int", 5, 5), 5),),
+        Const(Type("int", 8, 8), 8),
+    )
+    thing = chosen(outcome_term, "(agent if t > 2 else exit) == agent")
+    assert thing.type == Type("entity", 0, 5)
+
+
+def test_a_chain_of_else_is_one_choice(outcome_term):
+    number = chosen(outcome_term, "(1 if t == 0 else 2 if t == 1 else 3) == t")
+    assert [value.value for value in (*number.values, number.default)] == [1, 2, 3]
+
+
+def test_what_is_known_is_taken(outcome_term):
+    assert outcome_term("(5 if true else 8) == t").left == Const(Type("int", 5, 5), 5)
+    known = outcome_term("(1 if false else 2 if t == 1 else 3 if true else 4) == t").left
+    assert [value.value for value in (*known.values, known.default)] == [2, 3]
+
+
+def test_a_bare_word_is_what_the_other_value_is(outcome_term):
+    for text in ("exit.color if t > 2 else red", "red if t > 2 else exit.color"):
+        assert chosen(outcome_term, f"({text}) == guide.color").type == COLOR
+    assert outcome_term("exit.color == (red if t > 2 else blue)").right.type == COLOR
+    assert outcome_term("agent.facing == (left if t > 2 else up)").right.type == DIRECTION
+
+
+def test_a_text_beside_a_colour_or_a_number_makes_both_texts(outcome_term):
+    mixed = chosen(outcome_term, '(exit.color if t > 2 else "none") == "red"')
+    assert mixed.type == Type("text", 0, 6, (*COLOR.words, "none"))
+    assert chosen(outcome_term, '(3 if t > 2 else "none") == "none"').type.words == ("3", "none")
+
+
+def test_a_noun_beside_a_number_is_a_number_if_every_noun_is(outcome_term, mistakes):
+    grammar = {"templates": ["Take <noun>"], "nouns": [3, 5]}
+    assert chosen(outcome_term, "(agent.noun if t > 2 else 8) == 8", grammar=grammar).type == Type(
+        "int", 3, 8
+    )
+    (found,) = mistakes(outcome=[{"success": "(agent.noun if t > 2 else 8) == 8"}])
+    assert found.startswith("S204 `agent.noun` is a noun, but a number is expected here")
+
+
+def test_picks_of_a_conditional_value_are_numbered_in_source_order(outcome_term):
+    term = outcome_term("(pick(1 | 2) if pick(doors) == exit else pick(3 | 4)) == t").left
+    assert (term.values[0].ordinal, term.conditions[0].left.ordinal, term.default.ordinal) == (0, 1, 2)
+
+
+def test_both_sides_of_a_conditional_value_are_looked_at(mistakes):
+    found = mistakes(outcome=[{"success": "agent.at(exitt if t > 2 else exi)"}])
+    assert [text[:22] for text in found] == ["S201 unknown name `exi", "S201 unknown name `exi"]
