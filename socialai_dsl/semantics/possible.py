@@ -382,19 +382,19 @@ class Possible:
             op = {"==": "!=", "!=": "==", "<": ">=", "<=": ">"}[op]  # type: ignore[assignment]
         match str(op):
             case "==":
-                return any(value in b for value in a) if len(a) < len(b) else any(value in a for value in b)
+                return _meet(a, b)
             case "!=":
-                return not (len(a) == 1 == len(b) and a[0] == b[0])
+                return not a[0] == a[-1] == b[0] == b[-1]
             case "<":
-                return min(a) < max(b)
+                return a[0] < b[-1]
             case "<=":
-                return min(a) <= max(b)
+                return a[0] <= b[-1]
             case ">=":
-                return max(a) >= min(b)
-        return max(a) > min(b)
+                return a[-1] >= b[0]
+        return a[-1] > b[0]
 
     def _values(self, term: Term) -> Sequence[int]:
-        """All that a term can be, at most."""
+        """All that a term can be, at most, in ascending order. A range may have more members than `len` can count."""
         match term:
             case Const(value=value):
                 return (value,)
@@ -405,14 +405,11 @@ class Possible:
                 }
                 return sorted(found) or range(term.type.low, term.type.high + 1)
             case Select(values=values, default=default):
-                return sorted({v for part in (*values, default) for v in self._few(part)}) or (
-                    default.type.low,
-                )
+                parts = [self._values(part) for part in (*values, default)]
+                if any(part[-1] - part[0] > 256 for part in parts):
+                    return range(min(part[0] for part in parts), max(part[-1] for part in parts) + 1)
+                return sorted({value for part in parts for value in part})
         return range(term.type.low, term.type.high + 1)
-
-    def _few(self, term: Term) -> Sequence[int]:
-        values = self._values(term)
-        return values if len(values) <= 256 else (min(values), max(values))
 
     # -- words --
 
@@ -444,6 +441,14 @@ class Possible:
         low, high = entity.type.low, entity.type.high
         keys = dict.fromkeys(self._checked.entities[number].key for number in range(low, high + 1))
         return " or ".join(f"`{key}`" for key in keys)
+
+
+def _meet(a: Sequence[int], b: Sequence[int]) -> bool:
+    """Whether two ascending sequences have a member in common."""
+    if isinstance(a, range) and isinstance(b, range):
+        return a[0] <= b[-1] and b[0] <= a[-1]
+    few, others = (b, a) if isinstance(a, range) else (a, b)
+    return any(value in others for value in few)
 
 
 def _bounds(left: Term, right: Term) -> str:
