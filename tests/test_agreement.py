@@ -71,6 +71,13 @@ OFTEN = [name for name in NAMES if "?" not in name or name.partition("?")[0] not
 
 
 @pytest.mark.parametrize("name", OFTEN, ids=lambda name: Path(name).stem)
+def test_agreement_over_some_episodes(name: str) -> None:
+    steps = agree(name, 2, seed=10)
+    assert steps > 2
+
+
+@pytest.mark.thorough("plays up to 60 episodes of each scenario on the slow interpreter")
+@pytest.mark.parametrize("name", OFTEN, ids=lambda name: Path(name).stem)
 def test_agreement(name: str) -> None:
     steps = agree(name, episodes(name), seed=11)
     assert steps > episodes(name), "the episodes were too short to mean anything"

@@ -89,6 +89,7 @@ def test_the_page_shows_every_file() -> None:
     assert [section.splitlines()[0] for section in sections if "literalinclude" not in section] == []
 
 
+@pytest.mark.thorough("searches two rooms of each recipe")
 @pytest.mark.parametrize("path", PLAYED, ids=lambda path: path.stem)
 def test_success_is_knowable_unless_a_recipe_says_otherwise(path: Path) -> None:
     loaded = socialai_dsl.load(path)

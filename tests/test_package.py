@@ -49,14 +49,21 @@ def test_make_lists_its_targets() -> None:
         ["make", "help"], cwd=ROOT, capture_output=True, text=True, check=True, timeout=60
     )
     listed = {line.split()[0] for line in result.stdout.splitlines() if line}
-    assert {"run", "test", "test-long", "lint", "bench", "update-goldens"} <= listed
+    assert {"run", "test", "test-all", "test-long", "lint", "bench", "update-goldens"} <= listed
 
 
-@pytest.mark.slow
-def test_a_wheel_carries_the_scenarios_and_the_data_files(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "pip", "wheel", "-qq", "--no-deps", "-w", str(tmp_path), str(ROOT)]
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A wheel of the checkout."""
+    folder = tmp_path_factory.mktemp("wheel")
+    command = [sys.executable, "-m", "pip", "wheel", "-qq", "--no-deps", "-w", str(folder), str(ROOT)]
     subprocess.run(command, check=True, timeout=280)
-    (wheel,) = tmp_path.glob("*.whl")
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+@pytest.mark.thorough("builds a wheel")
+def test_a_wheel_carries_the_scenarios_and_the_data_files(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     sources = list((ROOT / "scenarios").rglob("*.yaml"))
     assert sources

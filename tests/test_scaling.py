@@ -12,6 +12,7 @@ import pytest
 from tests.fuzzing.bombs import DOCUMENTS, SCENARIOS
 from tests.fuzzing.playground import Playground
 from tests.fuzzing.scaling import MOST, ratio, read, seconds, work
+from tests.quick import one_in
 
 ROOT = Path(__file__).parents[1]
 
@@ -27,7 +28,14 @@ EFFORT = ("misspelt names among many", "places in rooms of many sizes")
 """All are compared with all, up to a fixed effort, which is beyond the sizes of the short test."""
 
 
-@pytest.mark.parametrize("name", [name for name in SCENARIOS if name not in EFFORT])
+@pytest.mark.parametrize(
+    "name",
+    one_in(
+        5,
+        [name for name in SCENARIOS if name not in EFFORT],
+        "counts the calls while it checks large files",
+    ),
+)
 def test_the_work_grows_with_the_scenario(name: str, place: Playground) -> None:
     """Functions called, which no load of the machine changes."""
     most = SCENARIOS[name].most

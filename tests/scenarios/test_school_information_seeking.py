@@ -352,6 +352,7 @@ class TestOutcome:
             assert image == Episode(name, MEETING).image.tolist()
 
 
+@pytest.mark.thorough("plays 40 rooms of every problem with every cue and introduction")
 @pytest.mark.parametrize("cue", CUES)
 @pytest.mark.parametrize("problem", PROBLEMS)
 def test_the_rooms_can_be_solved(problem: str, cue: str) -> None:
@@ -438,6 +439,7 @@ def leaves() -> dict[str, set[str]]:
     return found
 
 
+@pytest.mark.thorough("compiles the hundreds of scenarios of the suite")
 class TestSuite:
     def test_every_combination_is_played(self, leaves: dict[str, set[str]]) -> None:
         assert len(leaves[""]) == len(PROBLEMS) * len(INTRODUCTIONS) * len(CUES)

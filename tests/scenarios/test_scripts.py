@@ -7,6 +7,7 @@ import pytest
 import socialai_dsl as sd
 from socialai_dsl.analysis.perceiving import perceived
 from socialai_dsl.analysis.properties import Effort, solved_by_script
+from tests.quick import one_in
 
 ROOMS = 40
 PAPER = (
@@ -29,7 +30,7 @@ SCHOOL = tuple(
 )
 
 
-@pytest.mark.parametrize("name", [*PAPER, *NOVEL, *SCHOOL])
+@pytest.mark.parametrize("name", one_in(4, [*PAPER, *NOVEL, *SCHOOL], "plays many rooms of every scenario"))
 def test_a_script_acts_on_what_it_has_perceived(name: str) -> None:
     scripted = sd.load(f"{name}+oracle")
     assert isinstance(scripted, sd.LoadedScenario)

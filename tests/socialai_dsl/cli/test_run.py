@@ -1,6 +1,7 @@
 """`socialai-run` and `socialai evaluate` from end to end, on a scenario that trains in seconds."""
 
 import argparse
+import contextlib
 import json
 import shutil
 import sys
@@ -31,6 +32,16 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> 
     shutil.copy(DATA / "corridor.yaml", "corridor.yaml")
     capsys.readouterr()
     return tmp_path
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run; tests that go on from it take a copy."""
+    place = tmp_path_factory.mktemp("trained")
+    shutil.copy(DATA / "corridor.yaml", place)
+    with contextlib.chdir(place):
+        assert run_main(["corridor.yaml", *QUICK, "--out", "here"]) == 0
+    return place / "here"
 
 
 def result_of(run: str) -> dict[str, Any]:
@@ -87,22 +98,22 @@ def test_json_prints_the_result_and_nothing_else(capsys: Capture) -> None:
     assert json.loads(capsys.readouterr().out) == result_of("here")
 
 
-def test_a_run_is_resumed_and_says_no_to_another_scenario(capsys: Capture) -> None:
-    assert run_main(["corridor.yaml", *QUICK, "--out", "here"]) == 0
-    assert run_main(["--resume", "here", "--frames", "4000"]) == 0
-    assert result_of("here")["frames"] >= 4000
+def test_a_run_says_no_to_another_scenario(trained: Path, capsys: Capture) -> None:
+    shutil.copytree(trained, "here")
     assert run_main(["corridor.yaml", "--resume", "here"]) == 2
     assert run_main(["corridor.yaml", "--out", "here"]) == 2
     assert "holds a run already" in capsys.readouterr().err
 
 
-def test_a_resumed_run_equals_one_that_never_stopped() -> None:
-    assert run_main(["corridor.yaml", *QUICK, "--out", "stopped"]) == 0
+def test_a_resumed_run_equals_one_that_never_stopped(trained: Path) -> None:
+    shutil.copytree(trained, "stopped")
     assert run_main(["--resume", "stopped", "--frames", "4000"]) == 0
+    assert result_of("stopped")["frames"] >= 4000
     assert run_main(["corridor.yaml", *QUICK, "--frames", "4000", "--out", "straight"]) == 0
     assert result_of("stopped")["eval"] == result_of("straight")["eval"]
 
 
+@pytest.mark.thorough("trains the paper's network")
 def test_a_preset_brings_its_numbers_and_options_override_them() -> None:
     few = [
         "--net",
@@ -211,8 +222,8 @@ def test_an_oracle_needs_a_script(capsys: Capture) -> None:
     assert "corridor" in capsys.readouterr().err
 
 
-def test_a_trained_agent_is_evaluated_elsewhere(capsys: Capture) -> None:
-    assert run_main(["corridor.yaml", *QUICK, "--out", "here"]) == 0
+def test_a_trained_agent_is_evaluated_elsewhere(trained: Path, capsys: Capture) -> None:
+    shutil.copytree(trained, "here")
     own = result_of("here")["eval"]
     capsys.readouterr()
     command = ["evaluate", "here", "--on", "corridor.yaml", "--on", "corridor.yaml+unsocial"]
@@ -335,6 +346,7 @@ class Guide:
 """
 
 
+@pytest.mark.thorough("trains twice and evaluates")
 def test_parts_of_ones_own_work_from_the_scenario_s_folder(capsys: Capture) -> None:
     """Nothing is on Python's path; the command is given elsewhere."""
     Path("project").mkdir()
@@ -375,6 +387,7 @@ def test_parts_of_ones_own_that_are_wrong_are_said_in_one_line(option: str, caps
     assert not Path("here").exists(), "the same command can be given again"
 
 
+@pytest.mark.thorough("trains twice on a scenario of the paper")
 def test_a_scripted_scenario_is_guided_unless_another_recipe_is_asked_for(capsys: Capture) -> None:
     few = ["--frames", "2048", "--envs", "8", "--threads", "1", "--eval-episodes", "5", "--device", "cpu"]
     assert run_main(["help", *few, "--out", "here"]) == 0

@@ -30,6 +30,7 @@ from tests.socialai_dsl.compiler.workbench import (
     with_let,
     workbench,
     worth,
+    worths,
 )
 
 SIZES = [5, 32, 33, 62, 63, 200]
@@ -60,7 +61,7 @@ def test_count_first_any_and_all(size: int) -> None:
 def test_a_pick_takes_every_one_that_fits_and_no_other(size: int) -> None:
     few = Logic("or", tuple(Compare("==", ITEM, number(n)) for n in (10, 12, 9 + size)))
     pick = Quantified(NUMBER, "pick", "n", group(size), few)
-    assert {worth(pick, seed=seed) for seed in range(30)} == {10, 12, 9 + size}
+    assert set(worths(pick, range(30))) == {10, 12, 9 + size}
 
 
 @pytest.mark.parametrize(
@@ -87,8 +88,8 @@ def test_a_pick_of_all_but_one_draws_what_any_pick_does(first: int, size: int, i
         named = Logic("or", tuple(Compare("==", ITEM, number(n)) for n in numbers if n != one))
         if size > 1:
             same = Quantified(NUMBER, "pick", "n", items, named)
-            drawn = [worth(pick, seed=seed) for seed in range(12)]
-            assert drawn == [worth(same, seed=seed) for seed in range(12)]
+            drawn = worths(pick, range(12))
+            assert drawn == worths(same, range(12))
             assert one not in drawn
 
 

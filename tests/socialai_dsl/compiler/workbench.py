@@ -147,13 +147,26 @@ def step(env: ScenarioEnv, word: str = "none", pair: int | None = None) -> dict[
     return env.step(action)[4]
 
 
-def worth(
-    term: Term, layout: Mapping[str, Any] | None = None, checked: CheckedScenario | None = None, seed: int = 0
-) -> Any:
+def worth(term: Term, layout: Mapping[str, Any] | None = None, checked: CheckedScenario | None = None) -> Any:
     """What a term is worth at the end of a reset; of what is no truth, number or word its register."""
+    (answer,) = worths(term, range(1), layout, checked)
+    return answer
+
+
+def worths(
+    term: Term,
+    seeds: range,
+    layout: Mapping[str, Any] | None = None,
+    checked: CheckedScenario | None = None,
+) -> list[Any]:
+    """What a term is worth at the end of the reset of each seed."""
     type_ = BOOL if term.type.kind == "bool" else NUMBER
-    env = start(with_let(checked or workbench(), "let.answer", term, type_), layout, seed)
-    return env.describe()["let"]["answer"]
+    env = ScenarioEnv(compiled(with_let(checked or workbench(), "let.answer", term, type_)))
+    answers = []
+    for seed in seeds:
+        env.reset(seed=seed, options={"layout": dict(layout or {})})
+        answers.append(env.describe()["let"]["answer"])
+    return answers
 
 
 def code(program: Program, label: str) -> list[str]:

@@ -11,6 +11,7 @@ import socialai_dsl as sd
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.loader.resolved import shipped_names
 from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, Field, Flag, Header, Register
+from tests.quick import one_in
 
 DATA = Path(__file__).parents[2] / "data"
 WORKSHOP = f"{DATA}/workshop.yaml"
@@ -67,7 +68,7 @@ def differences(one: ScenarioEnv, other: ScenarioEnv) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", one_in(5, NAMES, "plays a dozen rooms of every scenario"))
 def test_every_moment_can_be_described_and_put_back(name: str) -> None:
     """The same state, the same picture, and with the same key of randomness the same future."""
     rng = np.random.default_rng(7)
@@ -95,7 +96,7 @@ def test_every_moment_can_be_described_and_put_back(name: str) -> None:
                 break
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", one_in(5, NAMES, "plays a dozen rooms of every scenario"))
 def test_a_described_room_is_a_layout_for_any_seed(name: str) -> None:
     env, other = sd.make(name), sd.make(name)
     for seed in range(10):

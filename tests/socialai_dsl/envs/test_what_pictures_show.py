@@ -25,6 +25,7 @@ from socialai_dsl.render import tiles
 from socialai_dsl.render.gestures import Gesture
 from socialai_dsl.render.tiles import draw_tile
 from socialai_dsl.replay.state import cast_of, played
+from tests.quick import one_in
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 PAPER = [name for name in shipped_names() if name != "social_env" and "+" not in name]
@@ -109,7 +110,7 @@ def test_pictures_of_cells_that_differ_for_the_agent_differ(name: str) -> None:
     env.close()
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", one_in(5, NAMES, "plays every scenario in three views"))
 def test_texts_of_rooms_that_differ_for_the_agent_differ(name: str) -> None:
     """What `render` prints, what a trace shows, and what a player has on the screen."""
     game = Game(name)
