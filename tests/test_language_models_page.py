@@ -10,6 +10,7 @@ import pytest
 
 from socialai_dsl.cli.main import main
 from tests.socialai_dsl.llm.endpoint import endpoint
+from tests.socialai_dsl.reporting.page_reader import Page
 
 pytest.importorskip("httpx", reason="language models need the extra llm")
 
@@ -28,33 +29,27 @@ def test_five_commands_lead_to_a_table(tmp_path: Path, monkeypatch: pytest.Monke
             words = shlex.split(command.replace("http://localhost:8080/v1", stub.url))[1:]
             named = [sorted(map(str, Path().glob(word))) if "*" in word else [word] for word in words]
             assert main([word for words in named for word in words]) == 0
-    report = (tmp_path / "report" / "report.md").read_text(encoding="utf-8")
-    assert "6 of 6 runs done" in report
-    asked = next(table for table in report.split("\n\n") if "by chance" in table)
-    (probe,) = [row.split("|")[1:-1] for row in asked.splitlines() if "promise" in row]
-    assert [cell.strip(" *`") for cell in probe[1:]] == [
-        "promise",
-        "20",
-        "0.000",
-        "0.500",
-        "0.000",
-    ]  # it answers nothing
-    header, _, *rows = next(table for table in report.split("\n\n") if "**talkitout**" in table).splitlines()
-    players = [cell.strip() for cell in header.strip("|").split("|")][1:]
+    report = Page((tmp_path / "report" / "index.html").read_text(encoding="utf-8"))
+    assert "6 of 6 runs done" in report.text
+    (probe,) = [row for row in report.table("by chance") if "promise" in row]
+    assert probe[1:] == ["promise", "20", "0.000", "0.500", "0.000"]  # it answers nothing
+    (_, *players), *rows = report.tables[0]
     assert set(players) == {"llm:qwen3-8b", "oracle", "random"}
-    for row in rows:
-        cells = dict(zip(players, row.strip("|").split("|")[1:], strict=True))
-        assert cells["oracle"].strip().startswith("1.000")
-        assert cells["llm:qwen3-8b"].strip().startswith("0.000")  # it gives up at once
-    assert [row.split("|")[1].strip(" *") for row in rows] == ["help", "talkitout"]
+    assert [row for row, *_ in rows] == ["help", "talkitout"]
+    for _, *cells in rows:
+        results = dict(zip(players, cells, strict=True))
+        assert results["oracle"].startswith("1.000")
+        assert results["llm:qwen3-8b"].startswith("0.000")  # it gives up at once
     with open("report/rooms.csv", newline="", encoding="utf-8") as file:
         pairs = {(row["first"], row["second"]): row for row in csv.DictReader(file)}
     assert len(pairs) == 6
     pair = pairs["help / oracle", "help / llm:qwen3-8b"]
     assert (pair["rooms"], pair["first_better"], pair["second_better"]) == ("20", "20", "0")
     assert float(pair["difference"]) == 1.0
-    assert r"| help / oracle | help / llm:qwen3-8b | 20 | 20 | 0 | +1.000 \[" in report
-    assert "| **help / llm:qwen3-8b** | 20 | 20 | 0.0% | 200 | 40 | – |" in report
+    (pairing,) = [row for row in report.table("rooms") if row[:2] == ["help / oracle", "help / llm:qwen3-8b"]]
+    assert pairing[2:5] == ["20", "20", "0"]
+    assert pairing[5].startswith("+1.000 [")
+    assert ["help / llm:qwen3-8b", "20", "20", "0.0%", "200", "40", "–"] in report.table("replies")
 
 
 def test_the_command_about_probes_prints_such_a_table(

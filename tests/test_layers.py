@@ -81,7 +81,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     ),
     "reporting": (
         {"experiments"},
-        {"numpy", "scipy", "matplotlib", "pydantic", "jinja2", "markupsafe", "pyarrow", CONFIG},
+        {"numpy", "pandas", "scipy", "matplotlib", "pydantic", "jinja2", "markupsafe", CONFIG},
     ),
     "sb3": (set(), {"numpy", "gymnasium", "stable_baselines3"}),
     "_gymnasium_hook": ({"envs"}, set()),

@@ -62,19 +62,22 @@ def _title(settings: dict[str, Any]) -> str:
 
 def _condition(title: str, runs: list[Path]) -> "Condition":
     import socialai_dsl
+    from socialai_dsl.cli.endings import endings_of
     from socialai_dsl.reporting.seeds import read_seeds
     from socialai_dsl.reporting.seeds_figure import Condition
 
     scenario = str(_read(runs[0], SETTINGS)["scenario"])
-    program = socialai_dsl.compile(socialai_dsl.load(scenario))
+    loaded = socialai_dsl.load(scenario)
+    endings = endings_of(loaded, socialai_dsl.compile(loaded))
     results = [_read(run, RESULT) for run in runs]
     try:
         seeds = read_seeds([run / "metrics.jsonl" for run in runs])
     except ValueError as error:
         raise UsageError(str(error)) from error
-    successes = frozenset(outcome.name for outcome in program.outcome_table if outcome.success)
+    successes = frozenset(ending.name for ending in endings if ending.success)
+    words = {ending.name: ending.text for ending in endings}
     tests = [(float(result["frames"]), float(result["eval"]["success_rate"])) for result in results]
-    return Condition(title, seeds, successes, tests)
+    return Condition(title, seeds, successes, words, tests)
 
 
 def _table(condition: "Condition") -> str:

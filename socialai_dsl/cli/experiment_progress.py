@@ -102,6 +102,7 @@ class RunsProgress:
         for run, share, speed in at_work[:room]:
             shown = f"{speed:,.0f} frames/s" if speed else ""
             left = clock(run.condition["frames"] * (1 - share) / speed) + " left" if speed else ""
+            left = "testing" if share == 1.0 else left
             table.add_row(Text(run.label), ProgressBar(1.0, share, width=28), f"{share:4.0%}", shown, left)
         return Group(table, *failures[-_FAILURES_SHOWN:], Text(self._sum(len(at_work))))
 

@@ -55,6 +55,7 @@ def _require_libraries() -> None:
     try:
         import jinja2  # noqa: F401
         import matplotlib  # noqa: F401
+        import pandas  # noqa: F401
         import scipy  # noqa: F401
     except ImportError as error:
         raise UsageError(f"reports need {error.name}: pip install 'socialai-dsl[report]'") from None
@@ -76,7 +77,7 @@ def _experiment(folders: list[Path]) -> "tuple[Experiment, Path]":
 def ceilings_of(
     experiment: "Experiment", out: Path, only_known: bool
 ) -> "tuple[dict[str, Ceilings], list[str]]":
-    """Who does not learn, by scenario: conditions tell, an earlier report told, or it is measured now and kept."""
+    """Baselines by scenario: conditions tell, an earlier report told, or it is measured now and kept."""
     from socialai_dsl.cli.agents import require_trainer
     from socialai_dsl.cli.ceilings import (
         FILE,
@@ -119,22 +120,24 @@ def ceilings_of(
 
 
 def _write(analysis: "Analysis", out: Path) -> None:
+    import importlib.util
     from importlib.metadata import version
 
-    from socialai_dsl.reporting.markdown import render_markdown
+    from socialai_dsl.reporting.analysis import tables
     from socialai_dsl.reporting.page import render_page
-    from socialai_dsl.reporting.sections import compose
-    from socialai_dsl.reporting.tables import as_csv, as_parquet, tables
+    from socialai_dsl.reporting.plots import figures
+    from socialai_dsl.reporting.style import saved
 
-    document = compose(analysis, version("socialai-dsl"), out)
-    figures = out / FIGURES
-    figures.mkdir(exist_ok=True)
-    for name, image in document.images.items():
-        (figures / f"{name}.svg").write_bytes(image.svg)
-        (figures / f"{name}.png").write_bytes(image.png)
-    for name, rows in tables(analysis).items():
-        write_text(out / f"{name}.csv", as_csv(rows))
-        if rows and (content := as_parquet(rows)) is not None:
-            (out / f"{name}.parquet").write_bytes(content)
-    write_text(out / "report.md", render_markdown(document, FIGURES))
-    write_text(out / "index.html", render_page(document))  # last, so that its presence means a whole report
+    folder = out / FIGURES
+    folder.mkdir(exist_ok=True)
+    drawings = {}
+    for name, figure in figures(analysis).items():
+        drawings[name] = saved(figure, "svg")
+        (folder / f"{name}.svg").write_bytes(drawings[name])
+        (folder / f"{name}.png").write_bytes(saved(figure, "png"))
+    for name, table in tables(analysis).items():
+        write_text(out / f"{name}.csv", table.to_csv(index=False) if len(table) else "")
+        if len(table) and importlib.util.find_spec("pyarrow") is not None:
+            table.to_parquet(out / f"{name}.parquet")
+    page = render_page(analysis, drawings, version("socialai-dsl"), out)
+    write_text(out / "index.html", page)  # last, so that its presence means a whole report

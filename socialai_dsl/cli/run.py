@@ -97,7 +97,7 @@ def _run(
     }
     _record(evaluation, folder, f"agent {config.agent}, seed {config.seed}")
     if config.trains:
-        _draw_curve(config, program, folder, result)
+        _draw_curve(config, folder, result)
         _write_card(config, loaded, folder, Path(agent), result)
     write_json(folder / RESULT, result)  # last, so that its presence means a complete run
     print(json.dumps(result, indent=2, ensure_ascii=False) if arguments.json else _table(result, folder))
@@ -188,12 +188,11 @@ def _resumed(arguments: argparse.Namespace) -> "RunConfig":
     return resumed
 
 
-def _draw_curve(config: "RunConfig", program: "Playable", folder: Path, result: dict[str, Any]) -> None:
+def _draw_curve(config: "RunConfig", folder: Path, result: dict[str, Any]) -> None:
     from socialai_dsl.reporting.curve import draw_learning_curve, read_curve
 
     test = (result["frames"], result["eval"]["success_rate"], *result["eval"]["success_interval"])
-    successes = frozenset(outcome.name for outcome in program.outcome_table if outcome.success)
-    curve = read_curve(folder / "metrics.jsonl", successes, test)
+    curve = read_curve(folder / "metrics.jsonl", result["eval"]["endings"], test)
     title = f"{scenario_folder_name(config.scenario)}, {config.agent}, seed {config.seed}"
     draw_learning_curve(curve, title, folder / "learning_curve.png")
 

@@ -13,8 +13,6 @@ from socialai_dsl.experiments.work import End, Outcome, finished
 
 SECONDS_BETWEEN_LOOKS: Final = 0.2
 SECONDS_BEFORE_ASKING_AGAIN: Final = 2.0
-_ATTEMPTS_OF_THE_ENGINE: Final = 5
-"""How often an engine may fail at a run, through no fault of the run's, before that is called a failure."""
 
 
 def drive(
@@ -28,53 +26,47 @@ def drive(
         engine: who works on them; stopped when the iterator is closed.
         ended: told of each run that has come to its end.
     """
-    known = {run.id: run for run in runs}
-    work: dict[str, Handle] = {}
-    failures: dict[str, int] = {}
-    # Runs that are to be given to the engine, and when.
-    waiting = dict.fromkeys(known, 0.0)
+    waiting, work = {run.id: run for run in runs}, dict[str, tuple[Run, Handle]]()
+    ask_again = time.monotonic()
     try:
         while work or waiting:
-            for identity in [identity for identity, handle in work.items() if handle.done()]:
-                outcome, message = _outcome(work.pop(identity), failures, identity)
+            for run, handle in [pair for pair in work.values() if pair[1].done()]:
+                del work[run.id]
+                outcome, message = _outcome(handle)
                 if outcome is Outcome.HELD:
-                    waiting[identity] = time.monotonic() + SECONDS_BEFORE_ASKING_AGAIN
+                    waiting[run.id] = run
                 else:
-                    ended(known[identity], outcome, message)
-            free = []
-            for identity in [identity for identity, moment in waiting.items() if moment <= time.monotonic()]:
-                waiting[identity] = time.monotonic() + SECONDS_BEFORE_ASKING_AGAIN
-                known_end, is_held = _known(known[identity])
-                if known_end is not None:
-                    ended(known[identity], *known_end)
-                elif not is_held:
-                    free.append(identity)
-                if known_end is not None or not is_held:
-                    del waiting[identity]
-            if free:
-                work |= zip(free, engine.submit(folder, free), strict=True)
+                    ended(run, outcome, message)
+            if time.monotonic() >= ask_again:
+                ask_again = time.monotonic() + SECONDS_BEFORE_ASKING_AGAIN
+                free = []
+                for run in list(waiting.values()):
+                    end = _known(run)
+                    if end is None:
+                        free.append(waiting.pop(run.id))
+                    elif end[0] is not Outcome.HELD:
+                        ended(waiting.pop(run.id), *end)
+                handles = engine.submit(folder, [run.id for run in free]) if free else []
+                work |= {run.id: (run, handle) for run, handle in zip(free, handles, strict=True)}
             yield
             time.sleep(SECONDS_BETWEEN_LOOKS)
     finally:
         engine.stop()
 
 
-def _known(run: Run) -> tuple[End | None, bool]:
-    """What came of a run, if that is known, and whether somebody works on it; then no engine is asked."""
+def _known(run: Run) -> End | None:
+    """What came of a run, or that another command works on it; None if it is to be given to the engine."""
     try:
-        return finished(run), is_locked(run.path)
+        return finished(run) or ((Outcome.HELD, "") if is_locked(run.path) else None)
     except (OSError, UnreadableError) as error:
-        return (Outcome.FAILED, said_of(error)), False
+        return Outcome.FAILED, said_of(error)
 
 
-def _outcome(handle: Handle, failures: dict[str, int], identity: str) -> End:
-    """What came of a run; what an engine failed at is tried again some times, since the run is as it was."""
+def _outcome(handle: Handle) -> End:
+    """What came of a run; or what the engine failed at, after as many tries as it makes. The run is as it was."""
     try:
-        outcome, message = handle.result()
-        return Outcome(outcome), message
+        end: End = handle.result()
     except Exception as error:
-        failures[identity] = failures.get(identity, 0) + 1
-        if failures[identity] < _ATTEMPTS_OF_THE_ENGINE:
-            return Outcome.HELD, ""
         said = str(error).strip().splitlines() or [""]
         return Outcome.FAILED, f"{type(error).__name__}: {said[-1]}"
+    return end

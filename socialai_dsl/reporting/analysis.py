@@ -1,28 +1,26 @@
-"""The figures of a report: spread over seeds, comparisons, aggregates, and runs that are too short."""
+"""The tables of a report: spread over seeds, comparisons, aggregates, and runs that are too short."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import combinations
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+import pandas as pd
 
-from socialai_dsl.reporting.collect import Condition, Experiment
-from socialai_dsl.reporting.records import Figures, Reference
+from socialai_dsl.reporting.collect import Condition, Experiment, Run
+from socialai_dsl.reporting.records import Ending
 from socialai_dsl.reporting.seeds import Seeds, align, mean_over_seeds
 from socialai_dsl.reporting.statistics import (
     Estimate,
-    Spread,
-    Test,
     area_under,
     bonferroni,
     bootstrapped_iqm,
     compare,
     frames_to,
+    mean_interval,
     paired_difference,
 )
 
@@ -33,7 +31,7 @@ RISING: Final = 0.05
 SOLVED: Final = 0.95
 """With such a success on the test episodes it does not matter whether a curve still rises."""
 
-_TABLES: Final = ("table2", None)
+TABLES: Final = ("table2", None)
 """Groups that are tables; any other is a case study, whose rows are compared as well as its columns."""
 
 TOGETHER: Final = 4
@@ -42,7 +40,7 @@ TOGETHER: Final = 4
 
 @dataclass(frozen=True)
 class Level:
-    """The success rate of somebody who does not learn.
+    """The success rate of a policy that does not learn.
 
     Attributes:
         value: 0 to 1. error: its standard error. source: how it is known, in a phrase.
@@ -68,119 +66,52 @@ class Ceilings:
     program_sha256: str = ""
 
 
-@dataclass(frozen=True)
-class Efficiency:
-    """How fast the seeds of a condition learned.
-
-    Attributes:
-        reached: for each of `THRESHOLDS` the frames of each seed, None where it never got there.
-        areas: of each seed the area under its curve.
-    """
-
-    reached: tuple[tuple[float | None, ...], ...]
-    areas: tuple[float, ...]
-
-
-@dataclass(frozen=True)
 class Summary:
     """What is known of a condition.
 
     Attributes:
-        condition: whose. success: on the test episodes, over the seeds that are done.
+        condition: its entry and runs. name, row, column: where it stands.
+        success: on the test episodes, a value for each seed that is done.
         tests: the same of its further tests, by scenario.
         seeds: learning curves; None if no run has one.
         short: why it is too early to judge it, in phrases; nothing if it is not.
     """
 
-    condition: Condition
-    success: Spread
-    tests: Mapping[str, Spread]
-    seeds: Seeds | None
-    short: tuple[str, ...]
+    def __init__(self, condition: Condition) -> None:
+        entry, done = condition.entry, [run.figures for run in condition.done if run.figures is not None]
+        curves = [updates for run in condition.runs if (updates := run.updates()) is not None]
+        self.condition, self.name = condition, entry.name
+        self.row, self.column = entry.row or entry.name, entry.column or entry.agent
+        self.success = pd.Series([figures.success_rate for figures in done], dtype=float)
+        self.tests = {
+            test: pd.Series(
+                [run.tests[test].success_rate for run in condition.runs if test in run.tests], dtype=float
+            )
+            for test in entry.tests
+        }
+        self.seeds = align(curves) if curves else None
+        self.short = _too_short(condition, self.success, self.seeds)
+        self.endings: dict[str, Ending] = {e.outcome: e for figures in done for e in figures.endings}
 
     @property
-    def name(self) -> str:
-        """The condition's."""
-        return self.condition.entry.name
-
-    @property
-    def reference(self) -> Reference | None:
-        """The published figure."""
-        return self.condition.entry.reference
-
-    @cached_property
     def successes(self) -> frozenset[str]:
         """Which outcomes are successes, as far as results tell; by their names where they are older."""
-        told = {e.outcome for f in self._figures for e in f.endings if e.success}
-        known = {e.outcome for f in self._figures for e in f.endings}
-        named = self.seeds.part("outcomes") if self.seeds is not None else {}
-        guessed = {name for name in named if name not in known and _own(name).startswith("success")}
-        return frozenset(told | guessed)
+        seen = self.seeds.means("outcomes") if self.seeds is not None else {}
+        guessed = {name for name in seen if name.rpartition(": ")[2].startswith("success")}
+        told = {name for name, ending in self.endings.items() if ending.success}
+        return frozenset(told | (guessed - self.endings.keys()))
 
     @property
-    def efficiency(self) -> Efficiency | None:
-        """How fast its seeds learned; None without curves."""
+    def areas(self) -> pd.Series:
+        """Of each seed the area under its curve, divided by its frames."""
+        curves = self.seeds.success if self.seeds is not None else ()
+        return pd.Series([area_under(curve) for curve in curves], dtype=float).dropna()
+
+    def reached(self, threshold: float) -> list[float | None]:
+        """The frames after which each seed's curve had reached so much; None where it never did."""
         if self.seeds is None:
-            return None
-        curves, frames = self.seeds.success, self.seeds.frames
-        areas = [area_under(curve) for curve in curves]
-        return Efficiency(
-            tuple(tuple(frames_to(frames, curve, level) for curve in curves) for level in THRESHOLDS),
-            tuple(area for area in areas if area is not None),
-        )
-
-    @property
-    def _figures(self) -> list[Figures]:
-        return [run.result.eval for run in self.condition.done if run.result is not None]
-
-
-def _own(outcome: str) -> str:
-    """`dance: success@12` -> `success@12`."""
-    return outcome.rpartition(": ")[2]
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """Two conditions side by side, with p after correction for all comparisons of their section."""
-
-    first: str
-    second: str
-    test: Test
-    adjusted: float | None
-
-
-@dataclass(frozen=True)
-class Pairing:
-    """Two conditions in the same rooms.
-
-    Attributes:
-        first, second: names of the conditions.
-        rooms: how many both played. ahead, behind: in how many of them the first, or the second, did better.
-        difference: of the success, first minus second.
-    """
-
-    first: str
-    second: str
-    rooms: int
-    ahead: int
-    behind: int
-    difference: Estimate
-
-
-@dataclass(frozen=True)
-class Aggregate:
-    """Interquartile mean of a column.
-
-    Attributes:
-        column: which. rows: how many rows have results there. estimate: over these.
-        common: over the rows in which every column has results; None if there are none.
-    """
-
-    column: str
-    rows: int
-    scores: int
-    estimate: Estimate
-    common: Estimate | None
+            return []
+        return [frames_to(self.seeds.frames, curve, threshold) for curve in self.seeds.success]
 
 
 @dataclass(frozen=True)
@@ -189,60 +120,53 @@ class Section:
 
     Attributes:
         group: as the experiment calls it. summaries: in order.
-        comparisons: of the columns of each row; in a case study also of the rows of each column.
-        pairings: those of them that played the same test episodes, as far as runs list them.
-        common_rows: see `Aggregate`.
+        comparisons: of the columns of each row; in a case study also of the rows of each column. p_bonferroni is
+            corrected for all of them.
+        rooms: those of the pairs that played the same test episodes, as far as runs list them.
+        columns: of a table, interquartile mean of each column, over its rows and over those that all columns have.
+        common_rows: in how many rows every column has results.
     """
 
     group: str | None
-    summaries: tuple[Summary, ...]
-    comparisons: tuple[Comparison, ...]
-    pairings: tuple[Pairing, ...] = ()
-    aggregates: tuple[Aggregate, ...] = ()
+    summaries: Sequence[Summary]
+    comparisons: Sequence[dict[str, Any]] = ()
+    rooms: Sequence[dict[str, Any]] = ()
+    columns: Sequence[dict[str, Any]] = ()
     common_rows: int = 0
 
     @property
     def is_table(self) -> bool:
         """Whether it has rows and columns."""
-        return self.group in _TABLES
+        return self.group in TABLES
 
-    @property
-    def rows(self) -> dict[str, list[Summary]]:
-        """The conditions by row."""
-        return self._by(row_of)
+    def by(self, key: str) -> dict[str, list[Summary]]:
+        """The conditions by `row` or `column`, in order."""
+        grouped: dict[str, list[Summary]] = {}
+        for summary in self.summaries:
+            grouped.setdefault(getattr(summary, key), []).append(summary)
+        return grouped
 
     @property
     def panels(self) -> dict[str, list[Summary]]:
         """The conditions that a figure shows together: those of a row; of a case study all, or those of a column."""
-        if self.is_table or len(self.rows) == 1:
-            return self.rows
-        return (
-            {self.group or "": list(self.summaries)}
-            if len(self.summaries) <= TOGETHER
-            else self._by(column_of)
-        )
-
-    @property
-    def columns(self) -> list[str]:
-        """Names of the columns, in order."""
-        return list(dict.fromkeys(column_of(summary) for summary in self.summaries))
+        if self.is_table or len(self.by("row")) == 1:
+            return self.by("row")
+        if len(self.summaries) <= TOGETHER:
+            return {self.group or "": list(self.summaries)}
+        return self.by("column")
 
     def label(self, summary: Summary) -> str:
         """What tells a condition from the others of its panel."""
-        if self.is_table or len(self.rows) == 1:
-            return column_of(summary)
-        return summary.name if len(self.summaries) <= TOGETHER else row_of(summary)
+        if self.is_table or len(self.by("row")) == 1:
+            return summary.column
+        return summary.name if len(self.summaries) <= TOGETHER else summary.row
 
     def pairs(self) -> list[tuple[Summary, Summary]]:
         """The conditions that are compared: those that share a row, and in a case study those that share a column."""
-        groups = [*self.rows.values(), *([] if self.is_table else self._by(column_of).values())]
-        return [pair for members in groups for pair in combinations(members, 2)]
-
-    def _by(self, key: Callable[[Summary], str]) -> dict[str, list[Summary]]:
-        grouped: dict[str, list[Summary]] = {}
-        for summary in self.summaries:
-            grouped.setdefault(key(summary), []).append(summary)
-        return grouped
+        keys = ["row"] if self.is_table else ["row", "column"]
+        return [
+            pair for key in keys for members in self.by(key).values() for pair in combinations(members, 2)
+        ]
 
 
 @dataclass(frozen=True)
@@ -255,9 +179,9 @@ class Analysis:
     """
 
     experiment: Experiment
-    sections: tuple[Section, ...]
+    sections: Sequence[Section]
     ceilings: Mapping[str, Ceilings]
-    notes: tuple[str, ...] = field(default_factory=tuple)
+    notes: Sequence[str] = ()
 
     @property
     def summaries(self) -> list[Summary]:
@@ -265,50 +189,25 @@ class Analysis:
         return [summary for section in self.sections for summary in section.summaries]
 
 
-def row_of(summary: Summary) -> str:
-    """The row of a condition's table."""
-    return summary.condition.entry.row or summary.name
-
-
-def column_of(summary: Summary) -> str:
-    """The column of a condition's table."""
-    return summary.condition.entry.column or summary.condition.entry.agent
-
-
 def analyse(experiment: Experiment, ceilings: Mapping[str, Ceilings], notes: Sequence[str] = ()) -> Analysis:
     """Compute all figures of a report. The learning curves are read here, one condition after the other."""
-    summaries = [_summarise(condition) for condition in experiment.conditions]
-    groups = list(dict.fromkeys(summary.condition.entry.group for summary in summaries))
-    groups.sort(key=lambda group: group not in _TABLES)
-    sections = tuple(
-        _section(group, [one for one in summaries if one.condition.entry.group == group]) for group in groups
-    )
-    return Analysis(experiment, sections, ceilings, tuple(notes))
+    grouped: dict[str | None, list[Summary]] = {}
+    for condition in experiment.conditions:
+        grouped.setdefault(condition.entry.group, []).append(Summary(condition))
+    groups = sorted(grouped, key=lambda group: group not in TABLES)
+    return Analysis(experiment, [_section(group, grouped[group]) for group in groups], ceilings, notes)
 
 
-def _summarise(condition: Condition) -> Summary:
-    success = Spread(tuple(run.figures.success_rate for run in condition.done if run.figures is not None))
-    tests = {
-        test: Spread(tuple(run.tests[test].success_rate for run in condition.runs if test in run.tests))
-        for test in condition.entry.tests
-    }
-    curves = [updates for run in condition.runs if (updates := run.updates()) is not None]
-    seeds = align(curves) if curves else None
-    return Summary(condition, success, tests, seeds, tuple(_too_short(condition, success, seeds)))
-
-
-def _too_short(condition: Condition, success: Spread, seeds: Seeds | None) -> list[str]:
+def _too_short(condition: Condition, success: pd.Series, seeds: Seeds | None) -> list[str]:
     reasons = []
     missing = len(condition.runs) - len(condition.done)
     if missing:
         reasons.append(f"{missing} of {len(condition.runs)} seeds without a result")
-    asked = condition.entry.frames
-    if asked is not None and any(run.frames < asked for run in condition.done):
-        least = min(run.frames for run in condition.done)
+    asked, least = condition.entry.frames, min((run.frames for run in condition.done), default=0)
+    if asked is not None and condition.done and least < asked:
         reasons.append(f"a seed stopped at {least:,} of {asked:,} frames")
     rise = still_rising(seeds) if seeds is not None else None
-    solved = success.n > 0 and success.mean >= SOLVED
-    if rise is not None and rise > RISING and not solved:
+    if rise is not None and rise > RISING and not success.mean() >= SOLVED:
         reasons.append(f"success still rises, by {rise:.2f} in the last fifth of training")
     return reasons
 
@@ -317,87 +216,162 @@ def still_rising(seeds: Seeds) -> float | None:
     """By how much the mean success of the last fifth of the bins exceeds that of the fifth before; None if unknown."""
     mean = mean_over_seeds(seeds.success)
     part = len(mean) // 5
-    if part == 0:
-        return None
-    last, before = mean[-part:], mean[-2 * part : -part]
-    if np.isnan(last).all() or np.isnan(before).all():
-        return None
-    return float(np.nanmean(last) - np.nanmean(before))
+    last, before = pd.Series(mean[-part:]).mean(), pd.Series(mean[-2 * part : -part]).mean()
+    return None if part == 0 or np.isnan(last - before) else float(last - before)
 
 
 def _section(group: str | None, summaries: Sequence[Summary]) -> Section:
-    bare = Section(group, tuple(_in_places_of_their_own(summaries)), ())
-    found = [
-        (first.name, second.name, compare(first.success.values, second.success.values))
-        for first, second in bare.pairs()
-        if first.success.n and second.success.n
-    ]
-    adjusted = bonferroni([test.p for *_, test in found])
-    comparisons = tuple(Comparison(*one, p) for one, p in zip(found, adjusted, strict=True))
-    pairings = tuple(pairing for pair in bare.pairs() if (pairing := pair_by_room(*pair)) is not None)
-    if not bare.is_table:
-        return Section(group, bare.summaries, comparisons, pairings)
-    aggregates, common = _aggregates(bare)
-    return Section(group, bare.summaries, comparisons, pairings, aggregates, common)
+    places = pd.Series([(summary.row, summary.column) for summary in summaries])
+    for summary, shared in zip(summaries, places.duplicated(keep=False), strict=True):
+        if shared:  # conditions that would share a place in the table get rows of their own
+            summary.row = summary.name
+    section = Section(group, summaries)
+    comparisons = [_comparison(*pair) for pair in section.pairs() if all(len(one.success) for one in pair)]
+    for one, p in zip(comparisons, bonferroni([one["p"] for one in comparisons]), strict=True):
+        one["p_bonferroni"] = p
+    rooms = [row for pair in section.pairs() if (row := pair_by_room(*pair)) is not None]
+    columns, common = _columns(section) if section.is_table else ([], 0)
+    return Section(group, summaries, comparisons, rooms, columns, common)
 
 
-def pair_by_room(first: Summary, second: Summary) -> Pairing | None:
+def _comparison(first: Summary, second: Summary) -> dict[str, Any]:
+    test = compare(list(first.success), list(second.success))
+    return {
+        "group": first.condition.entry.group,
+        "first": first.name,
+        "second": second.name,
+        "difference": test.difference,
+        "welch_t": test.t,
+        "degrees_of_freedom": test.degrees,
+        "p": test.p,
+        "p_bonferroni": None,
+        "hedges_g": test.g,
+    }
+
+
+def pair_by_room(first: Summary, second: Summary) -> dict[str, Any] | None:
     """Compare two conditions in the test episodes that both list; None without such.
 
     The same number is the same room only in the same program.
     """
-    digests = {
-        run.result.program_sha256
-        for summary in (first, second)
-        for run in summary.condition.done
-        if run.result is not None
-    }
-    one, other = first.condition.rooms, second.condition.rooms
-    common = sorted(one.keys() & other.keys())
-    if len(digests) != 1 or not common:
+    runs: list[Run] = [*first.condition.done, *second.condition.done]
+    rooms = pd.concat([first.condition.rooms, second.condition.rooms], axis=1, join="inner")
+    if len({run.result.program_sha256 for run in runs if run.result is not None}) != 1 or rooms.empty:
         return None
-    here, there = [one[number] for number in common], [other[number] for number in common]
-    return Pairing(
-        first.name,
-        second.name,
-        len(common),
-        sum(a > b for a, b in zip(here, there, strict=True)),
-        sum(a < b for a, b in zip(here, there, strict=True)),
-        paired_difference(here, there),
-    )
+    here, there = rooms.iloc[:, 0], rooms.iloc[:, 1]
+    difference = paired_difference(here, there)
+    return {
+        "group": first.condition.entry.group,
+        "first": first.name,
+        "second": second.name,
+        "rooms": len(rooms),
+        "first_better": int((here > there).sum()),
+        "second_better": int((here < there).sum()),
+        "difference": difference.value,
+        "difference_low": difference.low,
+        "difference_high": difference.high,
+    }
 
 
-def _in_places_of_their_own(summaries: Sequence[Summary]) -> list[Summary]:
-    """Conditions that would share a place in the table get rows of their own, by their names."""
-    taken = Counter((row_of(summary), column_of(summary)) for summary in summaries)
-    return [
-        summary if taken[row_of(summary), column_of(summary)] == 1 else _in_row(summary, summary.name)
-        for summary in summaries
-    ]
-
-
-def _in_row(summary: Summary, row: str) -> Summary:
-    entry = summary.condition.entry.model_copy(update={"row": row})
-    return replace(summary, condition=replace(summary.condition, entry=entry))
-
-
-def _aggregates(section: Section) -> tuple[tuple[Aggregate, ...], int]:
+def _columns(section: Section) -> tuple[list[dict[str, Any]], int]:
     """Interquartile means of the columns, and in how many rows all of them have results."""
-    scores: dict[str, dict[str, tuple[float, ...]]] = {}
+    scores: dict[str, dict[str, list[float]]] = {}
     for summary in section.summaries:
-        if summary.success.n:
-            scores.setdefault(column_of(summary), {})[row_of(summary)] = summary.success.values
-    common = [row for row in section.rows if scores and all(row in rows for rows in scores.values())]
-    return (
-        tuple(
-            Aggregate(
-                column,
-                len(rows),
-                sum(map(len, rows.values())),
-                bootstrapped_iqm(list(rows.values())),
-                bootstrapped_iqm([rows[row] for row in common]) if common else None,
-            )
-            for column, rows in scores.items()
+        if len(summary.success):
+            scores.setdefault(summary.column, {})[summary.row] = list(summary.success)
+    common = [row for row in section.by("row") if scores and all(row in rows for rows in scores.values())]
+    found = []
+    for column, rows in scores.items():
+        shared: Estimate | None = bootstrapped_iqm([rows[row] for row in common]) if common else None
+        estimate = bootstrapped_iqm(list(rows.values()))
+        runs = sum(map(len, rows.values()))
+        found.append({"column": column, "rows": len(rows), "runs": runs, "iqm": estimate, "common": shared})
+    return found, len(common)
+
+
+# -- tables for other programs -----------------------------------------------------------------------------------------
+
+
+def tables(analysis: Analysis) -> dict[str, pd.DataFrame]:
+    """Name of a table -> the table: runs, conditions, comparisons, rooms and outcomes."""
+    conditions, sections = analysis.experiment.conditions, analysis.sections
+    rows = {
+        "runs": [_run(condition, run) for condition in conditions for run in condition.runs],
+        "conditions": [_condition(summary) for summary in analysis.summaries],
+        "comparisons": [one for section in sections for one in section.comparisons],
+        "rooms": [one for section in sections for one in section.rooms],
+        "outcomes": [row for condition in conditions for row in _outcomes(condition)],
+    }
+    return {name: pd.DataFrame(some, dtype=object) for name, some in rows.items()}
+
+
+def _place(condition: Condition) -> dict[str, Any]:
+    entry = condition.entry
+    named = {name: getattr(entry, name) for name in ("group", "row", "column", "scenario", "agent")}
+    return {"condition": entry.name, **named}
+
+
+def _run(condition: Condition, run: Run) -> dict[str, Any]:
+    figures, result = run.figures, run.result
+    told = figures.model_dump() if figures else {}
+    return {
+        **_place(condition),
+        "id": run.id,
+        "seed": run.seed,
+        "state": run.state,
+        "frames": run.frames,
+        **{name: told.get(name) for name in ("success_rate", "mean_return", "mean_length")},
+        "test_episodes": told.get("episodes"),
+        **{name: told.get(name) for name in ("replies", "invalid_replies")},
+        "tokens": figures.prompt_tokens + figures.completion_tokens if figures else None,
+        "cost": told.get("cost"),
+        "train_seconds": result.train_seconds if result else None,
+        "frames_per_second": result.frames_per_second if result else None,
+        "tests": "; ".join(f"{name}={one.success_rate:.6g}" for name, one in run.tests.items()),
+        "program_sha256": result.program_sha256 if result else None,
+        "config_sha256": run.digest or None,
+        "problems": "; ".join(run.problems),
+    }
+
+
+def _condition(summary: Summary) -> dict[str, Any]:
+    success, reference = summary.success, summary.condition.entry.reference
+    low, high = mean_interval(list(success)) or (None, None)
+    return {
+        **_place(summary.condition),
+        "row": summary.row,
+        "column": summary.column,
+        "seeds": len(summary.condition.runs),
+        "seeds_done": len(success),
+        "success_mean": success.mean() if len(success) else None,
+        "success_std": success.std() if len(success) > 1 else None,
+        "success_low": low,
+        "success_high": high,
+        "published_mean": reference.mean if reference else None,
+        "published_std": reference.std if reference else None,
+        "published_source": reference.source if reference else None,
+        "area_mean": summary.areas.mean() if len(summary.areas) else None,
+        **{
+            f"seeds_reaching_{level:.2f}": sum(frames is not None for frames in summary.reached(level))
+            for level in THRESHOLDS
+        },
+        "tests": "; ".join(
+            f"{name}={rates.mean():.6g}" for name, rates in summary.tests.items() if len(rates)
         ),
-        len(common),
-    )
+        "too_short": "; ".join(summary.short),
+    }
+
+
+def _outcomes(condition: Condition) -> list[dict[str, Any]]:
+    """How often each outcome ended an episode and each rule fired in one, by run."""
+    rows = []
+    for run in condition.done:
+        assert run.figures is not None, "internal: a run that is done has figures"
+        endings = {ending.outcome: ending for ending in run.figures.endings}
+        who = {"condition": condition.entry.name, "id": run.id, "seed": run.seed}
+        for kind, rates in (("outcome", run.figures.outcomes), ("rule", run.figures.rules)):
+            for name, rate in rates.items():
+                ending = endings.get(name) if kind == "outcome" else None
+                place = {"file": getattr(ending, "file", None), "line": getattr(ending, "line", None)}
+                rows.append({**who, "kind": kind, "name": name, "per_episode": rate, **place})
+    return rows

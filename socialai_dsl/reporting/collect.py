@@ -6,7 +6,7 @@ is a problem of that run, which the report names.
 
 from __future__ import annotations
 
-import csv
+import contextlib
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
-from pydantic import BaseModel, TypeAdapter, ValidationError
+import pandas as pd
+from pydantic import TypeAdapter, ValidationError
 
 from socialai_dsl.experiments.folder import (
     EPISODES,
@@ -36,13 +37,19 @@ from socialai_dsl.reporting.records import (
     StartRecord,
     StatusRecord,
     UpdateRecord,
+    first_mistake,
 )
 from socialai_dsl.reporting.seeds import read_updates
 from trainer.config import HYPER, RunConfig, configure
 
 _SEED_KEYS: Final = frozenset({"seed"})
 
-Model = TypeVar("Model", bound=BaseModel)
+Content = TypeVar("Content")
+
+_RESULT: Final = TypeAdapter(ResultRecord)
+_STATUS: Final = TypeAdapter(StatusRecord)
+_TESTS: Final = TypeAdapter[Mapping[str, Figures]](dict[str, Figures])
+_SETTINGS: Final = TypeAdapter(dict[str, Any])
 
 
 @dataclass(frozen=True)
@@ -51,11 +58,10 @@ class Run:
 
     Attributes:
         id, seed: which. folder: where it lies.
-        state: `done`, `running`, `waiting`, `failed`, `cancelled`; `stopped` if it says that it
-            runs and nobody works on it;
-            `missing` where there is no folder.
+        state: `done`, `running`, `waiting`, `failed`, `cancelled`; `stopped` if it says that it runs and nobody works
+            on it; `missing` where there is no folder.
         message: what its status says. attempts: how often it was begun, as far as known.
-        result: of a finished run. rooms: number of a test episode -> its success, where the run lists its episodes.
+        result: of a finished run. rooms: success by number of the test episode, where the run lists its episodes.
         tests: scenario -> figures of its further tests.
         frames: made so far. digest: of its configuration without the seed; empty if it has none.
         starts: in what surroundings it ran.
@@ -69,7 +75,7 @@ class Run:
     message: str = ""
     attempts: int = 0
     result: ResultRecord | None = None
-    rooms: Mapping[int, bool] = field(default_factory=dict)
+    rooms: pd.Series = field(default_factory=lambda: pd.Series(dtype=float))
     tests: Mapping[str, Figures] = field(default_factory=dict)
     frames: int = 0
     digest: str = ""
@@ -102,11 +108,10 @@ class Condition:
         return tuple(run for run in self.runs if run.result is not None)
 
     @property
-    def rooms(self) -> dict[int, float]:
+    def rooms(self) -> pd.Series:
         """Success in each test episode that all its finished runs list, as the mean over them."""
         listed = [run.rooms for run in self.done]
-        common = set.intersection(*map(set, listed)) if listed else set()
-        return {number: sum(rooms[number] for rooms in listed) / len(listed) for number in sorted(common)}
+        return pd.concat(listed, axis=1, join="inner").mean(axis=1) if listed else pd.Series(dtype=float)
 
 
 @dataclass(frozen=True)
@@ -142,7 +147,7 @@ def read_experiment(folder: Path) -> Experiment:
     try:
         record = ExperimentRecord.model_validate_json(path.read_bytes())
     except ValidationError as error:
-        raise ValueError(f"{path}: {_first(error)}") from None
+        raise ValueError(f"{path}: {first_mistake(error)}") from None
     entries: dict[str, list[RunEntry]] = {entry.name: [] for entry in record.conditions}
     for run in record.runs:
         if run.condition not in entries:
@@ -227,20 +232,20 @@ def _read_run(folder: Path, name: str, seed: int) -> Run:
     if not folder.is_dir():
         return Run(name, seed, folder, "missing")
     problems: list[str] = []
-    status = _read(folder / STATUS, StatusRecord, problems)
-    result = _read(folder / RESULT, ResultRecord, problems)
+    status = _read(folder / STATUS, _STATUS, problems)
+    result = _read(folder / RESULT, _RESULT, problems)
     settings = _settings(folder, problems)
     frames = result.frames if result is not None else _frames_so_far(folder / METRICS, problems)
     return Run(
         name,
         seed,
         folder,
-        state=_state(folder, status, result, frames),
+        _state(folder, status, result, frames),
         message=(status.message or "") if status is not None else "",
         attempts=len(status.attempts) if status is not None else 0,
         result=result,
         rooms=_rooms(folder / EPISODES, problems),
-        tests=_tests(folder / TESTS, problems),
+        tests=_read(folder / TESTS, _TESTS, problems) or {},
         frames=frames,
         digest=_digest(settings) if settings is not None else "",
         starts=_starts(folder / "starts.jsonl"),
@@ -251,71 +256,45 @@ def _read_run(folder: Path, name: str, seed: int) -> Run:
 def _state(folder: Path, status: StatusRecord | None, result: ResultRecord | None, frames: int) -> str:
     """What the status says, unless whoever wrote it is gone; without a status, what the files tell."""
     if status is not None:
-        return "stopped" if status.state == "running" and _is_left(folder) else status.state
+        is_left = status.state == "running" and (folder / LOCK).exists() and not is_locked(folder)
+        return "stopped" if is_left else status.state
     if result is not None:
         return "done"
     return "running" if frames else "waiting"
 
 
-def _is_left(folder: Path) -> bool:
-    """Whether an experiment worked on a run, and nobody does any more."""
-    return (folder / LOCK).exists() and not is_locked(folder)
-
-
-def _read(path: Path, model: type[Model], problems: list[str]) -> Model | None:
-    """A file as a model; None if there is none, or, with a problem, none that can be read."""
+def _read(path: Path, form: TypeAdapter[Content], problems: list[str]) -> Content | None:
+    """A JSON file; None if there is none, or, with a problem, none that can be read."""
     try:
-        return model.model_validate_json(path.read_bytes())
+        return form.validate_json(path.read_bytes())
     except FileNotFoundError:
         return None
     except OSError as error:
         problems.append(f"{path.name} cannot be read ({error.strerror})")
     except ValidationError as error:
-        problems.append(f"{path.name} is damaged ({_first(error)})")
+        problems.append(f"{path.name} is damaged ({first_mistake(error)})")
     return None
 
 
-def _rooms(path: Path, problems: list[str]) -> dict[int, bool]:
+def _rooms(path: Path, problems: list[str]) -> pd.Series:
     """Success of each test episode that a run lists; nothing where it lists none."""
     try:
-        with open(path, newline="", encoding="utf-8") as file:
-            lines = csv.reader(file)
-            if next(lines)[:2] != ["episode", "success"]:
-                raise ValueError
-            return {int(number): bool(int(success)) for number, success, *_ in lines}
+        return pd.read_csv(path, usecols=["episode", "success"], dtype=int, index_col="episode")["success"]
     except FileNotFoundError:
-        return {}
+        pass
     except OSError as error:
         problems.append(f"{path.name} cannot be read ({error.strerror})")
-    except (ValueError, StopIteration, csv.Error):
+    except ValueError:  # which all of the parser's errors are
         problems.append(f"{path.name} is damaged")
-    return {}
-
-
-_TESTS: Final = TypeAdapter(dict[str, Figures])
-
-
-def _tests(path: Path, problems: list[str]) -> dict[str, Figures]:
-    try:
-        return _TESTS.validate_json(path.read_bytes())
-    except FileNotFoundError:
-        return {}
-    except OSError as error:
-        problems.append(f"{path.name} cannot be read ({error.strerror})")
-    except ValidationError as error:
-        problems.append(f"{path.name} is damaged ({_first(error)})")
-    return {}
+    return pd.Series(dtype=float)
 
 
 def _settings(folder: Path, problems: list[str]) -> dict[str, Any] | None:
-    try:
-        content = json.loads((folder / "config.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        content = None
-    if not isinstance(content, dict):
+    found: list[str] = []
+    settings = _read(folder / "config.json", _SETTINGS, found)
+    if settings is None:
         problems.append("config.json is missing or damaged")
-        return None
-    return content
+    return settings
 
 
 def _frames_so_far(metrics: Path, problems: list[str]) -> int:
@@ -333,16 +312,11 @@ def _frames_so_far(metrics: Path, problems: list[str]) -> int:
 
 def _starts(path: Path) -> tuple[StartRecord, ...]:
     """The lines that are whole; a killed process may have left others."""
-    try:
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        return ()
     starts = []
-    for line in lines:
-        try:
-            starts.append(StartRecord.model_validate_json(line))
-        except ValidationError:
-            continue
+    with contextlib.suppress(OSError):
+        for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+            with contextlib.suppress(ValidationError):
+                starts.append(StartRecord.model_validate_json(line))
     return tuple(starts)
 
 
@@ -356,9 +330,3 @@ def _without_seed(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _without_seed(part) for key, part in value.items() if key not in _SEED_KEYS}
     return value
-
-
-def _first(error: ValidationError) -> str:
-    first = error.errors()[0]
-    place = ".".join(str(part) for part in first["loc"])
-    return f"{place}: {first['msg']}" if place else first["msg"]

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,6 +13,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, PercentFormatter
 from numpy.typing import NDArray
+
+from socialai_dsl.reporting.style import shown
 
 BLUE: Final = "#2f62b8"
 RED: Final = "#c23b33"
@@ -24,6 +26,9 @@ _PALETTES: Final = (_SUCCESSES, _FAILURES, _GREYS)
 """The colours of each rank, see `_rank`."""
 
 
+Test = tuple[float, float, float, float]
+
+
 @dataclass(frozen=True)
 class Curve:
     """What was measured while a run learned, one entry per update.
@@ -32,7 +37,7 @@ class Curve:
         frames: frames seen so far.
         success: share of the training episodes that ended in this update and succeeded; nan where none ended.
         outcomes: outcome -> its share of those episodes.
-        successes: which outcomes are successes.
+        successes: which outcomes are successes. words: outcome -> what the scenario says of it.
         test: frames, success rate and both ends of its 95 % interval; None if it was not evaluated.
         agreement: share of the steps of a guide in which the agent would have done the same; nan where none led.
     """
@@ -41,21 +46,27 @@ class Curve:
     success: Sequence[float]
     outcomes: Mapping[str, Sequence[float]]
     successes: frozenset[str]
-    test: tuple[float, float, float, float] | None = None
+    words: Mapping[str, str] = field(default_factory=dict)
+    test: Test | None = None
     agreement: Sequence[float] = ()
 
 
-def read_curve(
-    metrics: Path, successes: frozenset[str], test: tuple[float, float, float, float] | None
-) -> Curve:
-    """The curve that a run's `metrics.jsonl` describes."""
+def read_curve(metrics: Path, endings: Sequence[Mapping[str, Any]], test: Test | None) -> Curve:
+    """The curve that a run's `metrics.jsonl` describes.
+
+    Args:
+        metrics: the file.
+        endings: how episodes can end, as `result.json` lists it: `outcome`, `success`, `text`.
+        test: see `Curve`.
+    """
     rows = [json.loads(line) for line in metrics.read_text(encoding="utf-8").splitlines()]
     names = list(dict.fromkeys(name for row in rows for name in row["outcomes"]))
     return Curve(
         [float(row["frames"]) for row in rows],
         [_number(row["success"]) for row in rows],
         {name: [_number(row["outcomes"].get(name)) for row in rows] for name in names},
-        successes,
+        frozenset(ending["outcome"] for ending in endings if ending["success"]),
+        {ending["outcome"]: ending["text"] for ending in endings},
         test,
         [_number(row.get("agreement")) for row in rows],
     )
@@ -67,13 +78,13 @@ def _number(value: float | None) -> float:
 
 def draw_learning_curve(curve: Curve, title: str, path: Path) -> None:
     """Write the picture: success over frames above, how episodes ended below."""
-    figure = Figure(figsize=(7.2, 5.4), dpi=130, layout="constrained")
+    figure = Figure(figsize=(7.2, 6.2), dpi=130, layout="constrained")
     FigureCanvasAgg(figure)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     figure.suptitle(title, fontsize=11, x=0.01, ha="left", weight="bold")
     _draw_success(above, curve)
     shares = {name: smooth(values, _window(curve)) for name, values in curve.outcomes.items()}
-    draw_outcomes(below, curve.frames, shares, curve.successes, _BESIDE)
+    draw_outcomes(below, curve.frames, shares, curve.successes, curve.words, _BELOW)
     below.set_ylabel("episodes ended by", fontsize=9)
     for axes in (above, below):
         axes.set_ylim(0, 1)
@@ -145,7 +156,7 @@ def _draw_success(axes: Axes, curve: Curve) -> None:
     axes.legend(loc="lower right" if led else "upper left", fontsize=8, frameon=False)
 
 
-_BESIDE: Final = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5), "reverse": True}
+_BELOW: Final = {"loc": "upper left", "bbox_to_anchor": (0.0, -0.28)}
 
 
 def draw_outcomes(
@@ -153,6 +164,7 @@ def draw_outcomes(
     frames: Sequence[float] | NDArray[np.float64],
     shares: Mapping[str, NDArray[np.float64]],
     successes: frozenset[str],
+    words: Mapping[str, str],
     legend: Mapping[str, Any],
 ) -> None:
     """Stack the ways episodes ended, successes at the bottom.
@@ -162,6 +174,7 @@ def draw_outcomes(
         frames: (B,), frames seen so far.
         shares: outcome -> (B,), its share of the episodes.
         successes: which outcomes are successes.
+        words: outcome -> what the scenario says of it, which names it where it is known.
         legend: where it stands, as options of matplotlib's.
     """
     shares = {name: values for name, values in shares.items() if np.nanmax(values, initial=0.0) > 0}
@@ -172,7 +185,7 @@ def draw_outcomes(
         frames,
         [values for _, _, values in drawn],
         colors=[colour for colour, _, _ in drawn],
-        labels=[name for _, name, _ in drawn],
+        labels=[shown(words.get(name, name), 64) for _, name, _ in drawn],
         linewidth=0,
     )
     axes.legend(fontsize=7, frameon=False, **legend)

@@ -1,38 +1,464 @@
-"""A report as one HTML page: no script, nothing from elsewhere, everything from files escaped."""
+"""A report as one HTML page: no script, nothing from elsewhere, everything from files escaped.
+
+The template `page.html.jinja` has the words; this module makes the tables that stand between them.
+"""
 
 from __future__ import annotations
 
 import base64
+import math
+import os
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
-from typing import Final
+from pathlib import Path
+from typing import Any, Final
+from urllib.parse import quote
 
 import jinja2
+import pandas as pd
 from markupsafe import Markup
 
-from socialai_dsl.reporting.document import Document
+from socialai_dsl.experiments.folder import REPLAY
+from socialai_dsl.reporting.analysis import (
+    RISING,
+    SOLVED,
+    THRESHOLDS,
+    Analysis,
+    Ceilings,
+    Level,
+    Section,
+    Summary,
+)
+from socialai_dsl.reporting.collect import Run
+from socialai_dsl.reporting.records import Reference
+from socialai_dsl.reporting.statistics import ALPHA, RESAMPLES, Estimate, mean_interval
 
-_PLACE: Final = "socialai_dsl.reporting"
+_TITLES: Final[dict[str | None, str]] = {"table2": "Table 2", None: "Conditions"}
+_NONE: Final = "–"
+_RULES_SHOWN: Final = 12
+_DIGEST: Final = 12
+
+Rows = list[dict[str, Any]]
+"""A table of the page: what stands under each heading, as text; lines after the first are smaller print."""
 
 
-def render_page(document: Document) -> str:
-    """The page. Figures are SVG images in it, in which a browser runs and loads nothing."""
+def render_page(analysis: Analysis, drawings: Mapping[str, bytes], version: str, place: Path) -> str:
+    """The page. Figures are SVG images in it, in which a browser runs and loads nothing.
+
+    Args:
+        analysis: its figures.
+        drawings: name -> SVG.
+        version: of the package that makes it.
+        place: the folder where it will lie.
+    """
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    environment.filters["kind"] = lambda block: type(block).__name__
-    environment.filters["slug"] = slug
-    template = environment.from_string(_text("page.html.jinja"))
-    images = {name: (_address(one.svg), _address(one.narrow)) for name, one in document.images.items()}
-    # The style sheet is ours.
-    return template.render(document=document, images=images, style=Markup(_text("page.css"))) + "\n"
+    environment.filters |= {"spread": spread, "signed": signed, "count_of": count_of}
+    template = environment.from_string(
+        files("socialai_dsl.reporting").joinpath("page.html.jinja").read_text(encoding="utf-8")
+    )
+    images = {
+        name: f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}" for name, svg in drawings.items()
+    }
+    sections = [
+        _section(f"part{number}", section, drawings)
+        for number, section in enumerate(analysis.sections, start=1)
+    ]
+    page = template.render(
+        experiment=analysis.experiment,
+        images=images,
+        lead=_lead(analysis),
+        remarks=list(_remarks(analysis)),
+        sections=sections,
+        endings=[one for section in sections for one in section["endings"]],
+        baselines=_baselines(analysis.ceilings),
+        runs=_runs(analysis, place),
+        facts=_facts(analysis, version),
+        identities=[
+            _identity(summary, analysis.ceilings.get(summary.condition.entry.scenario))
+            for summary in analysis.summaries
+        ],
+        interval=_interval_example(analysis),
+        alpha=ALPHA,
+        resamples=f"{RESAMPLES:,}",
+        rising=RISING,
+        solved=SOLVED,
+        digest=_DIGEST,
+    )
+    return page + "\n"
 
 
-def slug(text: str) -> str:
-    """A name for links: letters, digits and hyphens."""
-    return "".join(letter if letter.isascii() and letter.isalnum() else "-" for letter in text)
+# -- how figures are written -------------------------------------------------------------------------------------------
 
 
-def _text(name: str) -> str:
-    return files(_PLACE).joinpath(name).read_text(encoding="utf-8")
+def spread(values: Sequence[float] | pd.Series) -> str:
+    """Mean ± standard deviation; the mean alone of one seed; a dash without any."""
+    known = pd.Series(values, dtype=float)
+    if known.empty:
+        return _NONE
+    return f"{known.mean():.3f}" + (f" ± {known.std():.3f}" if len(known) > 1 else "")
 
 
-def _address(svg: bytes) -> str:
-    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
+def signed(value: float | None, form: str = "+.3f") -> str:
+    """A number with a real minus sign, or a dash where there is none."""
+    return _NONE if value is None or math.isnan(value) else format(value, form).replace("-", "\u2212")
+
+
+def count_of(number: int, noun: str) -> str:
+    """`3 runs`, `1 run`."""
+    return f"{number:,} {noun}" + ("" if number == 1 else "s")
+
+
+def _interval(estimate: Estimate | None, form: str = ".3f") -> str:
+    if estimate is None:
+        return _NONE
+    value, low, high = (signed(part, form) for part in estimate)
+    return f"{value} [{low}, {high}]"
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 60:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 3600 else f"{seconds / 3600:.1f} h"
+
+
+# -- what there is -----------------------------------------------------------------------------------------------------
+
+
+def _lead(analysis: Analysis) -> str:
+    """What there is and what it says, in a few sentences of figures."""
+    runs, summaries = analysis.experiment.runs, analysis.summaries
+    states = Counter(_state_of(run) for run in runs)
+    finished = states.pop("done", 0)
+    others = f" ({', '.join(f'{count} {state}' for state, count in states.items())})" if states else ""
+    trained = [run.result for run in runs if run.result is not None]
+    frames, seconds = sum(r.frames for r in trained), sum(r.train_seconds for r in trained)
+    parts = [
+        f"{finished} of {len(runs)} runs done{others}, in {count_of(len(summaries), 'condition')}; "
+        f"{frames:,} frames trained in {_duration(seconds)} of run time."
+    ]
+    referred = [(s.success, s.condition.entry.reference) for s in summaries if len(s.success)]
+    close = [_agrees(success, reference) for success, reference in referred if reference is not None]
+    if close:
+        parts.append(
+            f"Of {count_of(len(close), 'condition')} with a published figure, {sum(close)} have it within one "
+            "published standard deviation of the mean, or within 0.05 where none was published."
+        )
+    tested = [c["p_bonferroni"] for s in analysis.sections for c in s.comparisons if c["p"] is not None]
+    if tested:
+        found = sum(p < ALPHA for p in tested)
+        differs = "differs" if found == 1 else "differ"
+        parts.append(
+            f"Of {count_of(len(tested), 'comparison')}, {found} {differs} at p < {ALPHA} after correction."
+        )
+    short = sum(bool(s.short) for s in summaries)
+    if short:
+        parts.append(f"{count_of(short, 'condition')} {'is' if short == 1 else 'are'} too short to judge.")
+    return " ".join(parts)
+
+
+def _agrees(success: pd.Series, reference: Reference) -> bool:
+    return bool(abs(success.mean() - reference.mean) <= (0.05 if reference.std is None else reference.std))
+
+
+def _state_of(run: Run) -> str:
+    if run.state == "done" and run.result is None:
+        return "without a result"
+    return "not begun" if run.state == "missing" else run.state
+
+
+def _remarks(analysis: Analysis) -> Iterator[str]:
+    """What is wrong with runs or conditions, if anything."""
+    yield from analysis.notes
+    for run in analysis.experiment.runs:
+        failed = [run.message or "failed"] if run.state == "failed" else []
+        if failed or run.problems:
+            yield f"run {run.id}: {'; '.join([*failed, *run.problems])}"
+    for summary in analysis.summaries:
+        configurations = {run.digest for run in summary.condition.runs if run.digest}
+        for what, values in (("configuration", configurations), ("program", set(_programs(summary)))):
+            if len(values) > 1:
+                yield f"{summary.name}: its runs are of {len(values)} different {what}s"
+
+
+def _programs(summary: Summary) -> list[str]:
+    digests = [run.result.program_sha256 for run in summary.condition.done if run.result is not None]
+    return list(dict.fromkeys(digests))
+
+
+# -- a table of conditions, or a case study ----------------------------------------------------------------------------
+
+
+def _section(anchor: str, section: Section, drawings: Mapping[str, bytes]) -> dict[str, Any]:
+    title = _TITLES[section.group] if section.is_table else f"Case study: {section.group}"
+    columns = list(section.by("column"))
+    grid = {
+        row: [next((s for s in members if s.column == column), None) for column in columns]
+        for row, members in section.by("row").items()
+    }
+    panels = list(section.panels.items())
+    drawn = [(f"{anchor}-curves{place}", panel) for place, (panel, _) in enumerate(panels, start=1)]
+    return {
+        "anchor": anchor,
+        "title": title,
+        "columns": columns,
+        "grid": grid,
+        "published": [row for summary in section.summaries for row in _published(summary)],
+        "probes": [row for summary in section.summaries for row in _probes(summary)],
+        "tests": sum(one["p"] is not None for one in section.comparisons),
+        "comparisons": [_comparison(one) for one in section.comparisons],
+        "rooms": [_pairing(one) for one in section.rooms],
+        "models": [row for summary in section.summaries for row in _replies(summary)],
+        "iqm": _iqm(section),
+        "curves": [(name, panel) for name, panel in drawn if name in drawings],
+        "efficiency": [_efficiency(summary) for summary in section.summaries if summary.seeds is not None],
+        "endings": [
+            (
+                panel if section.is_table else f"{title}: {panel}",
+                [
+                    _endings(f"{anchor}-endings{place}-{number}", s)
+                    for number, s in enumerate(members, start=1)
+                ],
+            )
+            for place, (panel, members) in enumerate(panels, start=1)
+            if any(s.endings or s.seeds is not None for s in members)
+        ],
+    }
+
+
+def _published(summary: Summary) -> Iterator[dict[str, Any]]:
+    entry = summary.condition.entry
+    for test, reference in [("", entry.reference), *entry.test_references.items()]:
+        if reference is not None:
+            yield {
+                "condition": f"{summary.name} on {test}" if test else summary.name,
+                "mean": f"{reference.mean:.3f}",
+                "standard deviation": signed(reference.std, ".3f"),
+                "source": reference.source,
+                "note": reference.note,
+            }
+
+
+def _probes(summary: Summary) -> Iterator[dict[str, Any]]:
+    """What a language model knows when it is asked, beside what it does."""
+    found: dict[str, Rows] = {}
+    for run in summary.condition.done:
+        for name, one in run.figures.probes.items() if run.figures is not None else ():
+            chance = one.asked * (one.chance or 0.0)
+            found.setdefault(name, []).append({"asked": one.asked, "right": one.right, "chance": chance})
+    for name, rows in found.items():
+        sums = pd.DataFrame(rows).sum()
+        yield {
+            "condition": summary.name,
+            "probe": name,
+            "asked": f"{sums.asked:.0f}",
+            "right": f"{sums.right / sums.asked:.3f}" if sums.asked else _NONE,
+            "by chance": f"{sums.chance / sums.asked:.3f}" if sums.asked else _NONE,
+            "success": f"{summary.success.mean():.3f}",
+        }
+
+
+def _comparison(one: Mapping[str, Any]) -> dict[str, str]:
+    adjusted = one["p_bonferroni"]
+    found = "differs" if adjusted is not None and adjusted < ALPHA else "not shown to differ"
+    return {
+        "first": one["first"],
+        "second": one["second"],
+        "difference": signed(one["difference"]),
+        "t": signed(one["welch_t"], "+.2f"),
+        "df": signed(one["degrees_of_freedom"], ".1f"),
+        "p": _p(one["p"]),
+        "p corrected": _p(adjusted),
+        "Hedges' g": signed(one["hedges_g"], "+.2f"),
+        "verdict": "not testable" if adjusted is None else found,
+    }
+
+
+def _p(value: float | None) -> str:
+    return "< 0.0001" if value is not None and value < 1e-4 else signed(value, ".4f")
+
+
+def _pairing(one: Mapping[str, Any]) -> dict[str, str]:
+    difference = Estimate(one["difference"], one["difference_low"], one["difference_high"])
+    counts = {name.replace("_", " "): f"{one[name]:,}" for name in ("rooms", "first_better", "second_better")}
+    return {
+        "first": one["first"],
+        "second": one["second"],
+        **counts,
+        "difference": _interval(difference, "+.3f"),
+    }
+
+
+def _replies(summary: Summary) -> Iterator[dict[str, str]]:
+    """What language models replied, and what it took."""
+    found = [run.figures for run in summary.condition.done if run.figures and run.figures.replies]
+    if not found:
+        return
+    table = pd.DataFrame([figures.model_dump() for figures in found])
+    about = "about " if table.tokens_estimated.any() else ""
+    yield {
+        "condition": summary.name,
+        "episodes": f"{table.episodes.sum():,}",
+        "replies": f"{table.replies.sum():,}",
+        "invalid": f"{table.invalid_replies.sum() / table.replies.sum():.1%}",
+        "tokens read": f"{about}{table.prompt_tokens.sum():,}",
+        "tokens written": f"{about}{table.completion_tokens.sum():,}",
+        "cost": f"${table.cost.sum():.4f}" if table.cost.notna().all() else _NONE,
+    }
+
+
+def _iqm(section: Section) -> Rows:
+    if all(one["rows"] < 2 for one in section.columns):
+        return []
+    common = f"of the {count_of(section.common_rows, 'row')} in common"
+    return [
+        {
+            "column": one["column"],
+            "rows": str(one["rows"]),
+            "runs": str(one["runs"]),
+            "interquartile mean": _interval(one["iqm"]),
+            common: _interval(one["common"]),
+        }
+        for one in section.columns
+    ]
+
+
+def _efficiency(summary: Summary) -> dict[str, str]:
+    reached = {f"{level:.0%}": _reached(summary.reached(level)) for level in THRESHOLDS}
+    return {"condition": summary.name, "area": spread(summary.areas), **reached}
+
+
+def _reached(frames: Sequence[float | None]) -> str:
+    there = pd.Series(frames, dtype=float).dropna()
+    if there.empty:
+        return "never"
+    median = there.median()
+    said = f"{median / 1e6:.2f} M" if median >= 1e5 else f"{median:,.0f}"
+    return f"{said}\n{len(there)} of {len(frames)}"
+
+
+def _endings(drawing: str, summary: Summary) -> dict[str, Any]:
+    """How episodes of a condition ended and which rules fired, by the line of the scenario's file."""
+    done = [run.figures for run in summary.condition.done if run.figures is not None]
+    outcomes = pd.DataFrame([figures.outcomes for figures in done]).fillna(0.0)
+    rules = pd.DataFrame([figures.rules for figures in done]).fillna(0.0)
+    ended = sorted(
+        (name for name in outcomes if outcomes[name].mean() > 0),
+        key=lambda name: (name not in summary.successes, -outcomes[name].mean()),
+    )
+    fired = sorted((name for name in rules if rules[name].mean() > 0), key=lambda name: -rules[name].mean())
+    more = f" ({len(fired) - _RULES_SHOWN} more fired)" if len(fired) > _RULES_SHOWN else ""
+    return {
+        "name": summary.name,
+        "drawing": drawing,
+        "endings": [
+            {"ended by": _ending(summary, name), "of the episodes": spread(outcomes[name])} for name in ended
+        ],
+        "rules": [
+            {f"rule{more}": name, "firings per episode": spread(rules[name])} for name in fired[:_RULES_SHOWN]
+        ],
+    }
+
+
+def _ending(summary: Summary, name: str) -> str:
+    ending = summary.endings.get(name)
+    if ending is None:
+        return name
+    return f"{ending.text}\n{ending.file}:{ending.line}" if ending.file is not None else ending.text
+
+
+# -- where figures come from -------------------------------------------------------------------------------------------
+
+
+def _baselines(ceilings: Mapping[str, Ceilings]) -> Rows:
+    rows = [
+        {
+            "scenario": name,
+            "own script": _level(one.oracle),
+            "random": _level(one.random),
+            "without NPCs, at least": _level(one.alone),
+        }
+        for name, one in ceilings.items()
+    ]
+    return [row for row in rows if set(row.values()) != {row["scenario"], _NONE}]
+
+
+def _level(level: Level | None) -> str:
+    return _NONE if level is None else f"{level.value:.3f} ± {level.error:.3f}\n{level.source}"
+
+
+def _runs(analysis: Analysis, place: Path) -> Rows:
+    return [
+        {
+            "condition": condition.entry.name,
+            "seed": str(run.seed),
+            "state": _state_of(run),
+            "frames": f"{run.frames:,}",
+            "success": signed(getattr(run.figures, "success_rate", None), ".3f"),
+            "return": signed(getattr(run.figures, "mean_return", None), ".3f"),
+            "length": signed(getattr(run.figures, "mean_length", None), ".1f"),
+            "time": _NONE if run.result is None else _duration(run.result.train_seconds),
+            "frames/s": signed(getattr(run.result, "frames_per_second", None) or None, ",.0f"),
+            "folder": run.id,
+            "episodes": _replay(run, place),
+        }
+        for condition in analysis.experiment.conditions
+        for run in condition.runs
+    ]
+
+
+def _replay(run: Run, place: Path) -> str:
+    """A link to the page on which episodes of a run can be watched."""
+    page = run.folder / REPLAY
+    if not page.is_file():
+        return _NONE
+    return Markup('<a href="{}">watch</a>').format(quote(Path(os.path.relpath(page, place)).as_posix()))
+
+
+def _facts(analysis: Analysis, version: str) -> Rows:
+    """Versions, machines, times and digests."""
+    runs = analysis.experiment.runs
+    results = [run.result for run in runs if run.result is not None]
+    facts = [("report made by", f"socialai-dsl {version}")]
+    if analysis.experiment.source_sha256:
+        facts.append(("experiment file, SHA-256", analysis.experiment.source_sha256))
+    for package in dict.fromkeys(package for result in results for package in result.versions):
+        counts = Counter(result.versions[package] for result in results if package in result.versions)
+        several = ", ".join(f"{value} ({count_of(count, 'run')})" for value, count in counts.most_common())
+        facts.append((package, several if len(counts) > 1 else next(iter(counts))))
+    for machine, count in Counter(_machine(run) for run in runs if run.starts).most_common():
+        facts.append(("ran on", f"{machine} ({count_of(count, 'run')})"))
+    seconds = sum(result.train_seconds for result in results)
+    facts.append(("training time", f"{_duration(seconds)}, all runs together, one after the other"))
+    return [{"what": name, "which": value} for name, value in facts]
+
+
+def _machine(run: Run) -> str:
+    start = run.starts[-1]
+    threads = count_of(start.threads, "thread") if start.threads else "threads not recorded"
+    processes = f", {start.processes} processes" if start.processes > 1 else ""
+    return f"{start.device}, {start.cpu} instructions, {threads}{processes}"
+
+
+def _identity(summary: Summary, ceilings: Ceilings | None) -> dict[str, str]:
+    programs = _programs(summary)
+    configurations = dict.fromkeys(run.digest for run in summary.condition.runs if run.digest)
+    measured = ceilings.program_sha256 if ceilings is not None else ""
+    changed = "\nthe scenario has changed since" if measured and programs and measured not in programs else ""
+    return {
+        "condition": summary.name,
+        "scenario": summary.condition.entry.scenario,
+        "program": (" ".join(p[:_DIGEST] for p in programs) or _NONE) + changed,
+        "configuration": " ".join(c[:_DIGEST] for c in configurations) or _NONE,
+    }
+
+
+def _interval_example(analysis: Analysis) -> str:
+    """The interval of the condition with the widest one, as a warning."""
+    found = [(s, mean_interval(list(s.success))) for s in analysis.summaries]
+    wide = [(s, interval) for s, interval in found if interval is not None]
+    if not wide:
+        return "here no condition has two seeds, so nothing is known about spread."
+    summary, (low, high) = max(wide, key=lambda pair: pair[1][1] - pair[1][0])
+    seeds = count_of(len(summary.success), "seed")
+    return f"Student's 95 % interval is widest for {summary.name}, {low:.2f} to {high:.2f} with {seeds}."

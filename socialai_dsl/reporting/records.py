@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 _Words = Annotated[str, BeforeValidator(lambda value: "" if value is None else value)]
 """A text that may be left out, or null, which is the same."""
@@ -158,3 +158,10 @@ class UpdateRecord(_Record):
     success: float | None
     outcomes: dict[str, float | None]
     rules: dict[str, float | None]
+
+
+def first_mistake(error: ValidationError) -> str:
+    """Where the first mistake of a file is, and what."""
+    first = error.errors()[0]
+    place = ".".join(str(part) for part in first["loc"])
+    return f"{place}: {first['msg']}" if place else first["msg"]

@@ -1,14 +1,17 @@
 """Learning curves of several seeds on one grid of frames."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from socialai_dsl.reporting.records import UpdateRecord
+from socialai_dsl.reporting.records import UpdateRecord, first_mistake
 
 Float = NDArray[np.float64]
 
@@ -36,10 +39,14 @@ class Seeds:
         bins = np.arange(len(self.frames))
         return float(self.frames[np.where(np.isnan(self.success), 0, bins).max(1).min()])
 
-    def part(self, kind: str) -> dict[str, Float]:
-        """The rates of `outcomes` or of `rules`, by their own names."""
+    def means(self, kind: str) -> dict[str, Float]:
+        """Mean over the seeds of the rates of `outcomes` or of `rules`, by their own names, (B,) each."""
         start = f"{kind}/"
-        return {name.removeprefix(start): rate for name, rate in self.rates.items() if name.startswith(start)}
+        return {
+            name.removeprefix(start): mean_over_seeds(rate)
+            for name, rate in self.rates.items()
+            if name.startswith(start)
+        }
 
 
 def read_seeds(metrics: Sequence[Path], bins: int = 40) -> Seeds:
@@ -58,10 +65,7 @@ def read_updates(metrics: Path) -> list[UpdateRecord]:
         OSError: the file cannot be read.
         ValueError: it is empty, or holds something else.
     """
-    text = metrics.read_text(encoding="utf-8")
-    lines = text.splitlines()
-    if text and not text.endswith("\n"):
-        lines.pop()
+    lines = metrics.read_text(encoding="utf-8").split("\n")[:-1]
     if not lines:
         raise ValueError(f"{metrics}: expected at least one update, got an empty file")
     updates = []
@@ -69,9 +73,7 @@ def read_updates(metrics: Path) -> list[UpdateRecord]:
         try:
             updates.append(UpdateRecord.model_validate_json(line))
         except ValidationError as error:
-            first = error.errors()[0]
-            place = ".".join(str(part) for part in first["loc"])
-            what = f"{place}: {first['msg']}" if place else first["msg"]
+            what = first_mistake(error)
             raise ValueError(f"{metrics}:{number}: expected an update as JSON, {what}") from None
     return updates
 
@@ -85,44 +87,30 @@ def align(runs: Sequence[Sequence[UpdateRecord]], bins: int = 40) -> Seeds:
     """
     end = max(updates[-1].frames for updates in runs)
     edges = np.linspace(0, end, min(bins, max(len(updates) for updates in runs)) + 1)
-    flat = [[_flat(update) for update in updates] for updates in runs]
-    names = list(dict.fromkeys(name for updates in flat for update in updates for name in update))
-    return Seeds(
-        edges[1:],
-        np.stack([_binned(updates, [update.success for update in updates], edges) for updates in runs]),
-        {
-            name: np.stack(
-                [
-                    _binned(updates, [rates.get(name) for rates in some], edges)
-                    for updates, some in zip(runs, flat, strict=True)
-                ]
-            )
-            for name in names
-        },
-    )
+    rates = [pd.DataFrame([_flat(update) for update in updates]) for updates in runs]
+    names = list(dict.fromkeys(name for table in rates for name in table))
+    binned = [
+        _binned(updates, table.reindex(columns=names), edges)
+        for updates, table in zip(runs, rates, strict=True)
+    ]
+    by_name = {name: np.stack([table[name].to_numpy() for table in binned]) for name in names}
+    return Seeds(edges[1:], by_name.pop("success"), by_name)
 
 
 def mean_over_seeds(rates: Float) -> Float:
     """Mean over the seeds that had an episode, (S, B) to (B,); nan where none had."""
-    known = ~np.isnan(rates)
-    total = np.where(known, rates, 0.0).sum(0)
-    return np.where(known.any(0), total / np.maximum(known.sum(0), 1), np.nan)
+    return np.asarray(pd.DataFrame(rates).mean())
 
 
 def _flat(update: UpdateRecord) -> dict[str, float | None]:
-    return {
-        f"{kind}/{name}": rate
-        for kind, rates in (("outcomes", update.outcomes), ("rules", update.rules))
-        for name, rate in rates.items()
-    }
+    outcomes = {f"outcomes/{name}": rate for name, rate in update.outcomes.items()}
+    return {"success": update.success, **outcomes, **{f"rules/{n}": rate for n, rate in update.rules.items()}}
 
 
-def _binned(updates: Sequence[UpdateRecord], rates: Sequence[float | None], edges: Float) -> Float:
-    """Rates per episode in each bin (B,), from the rates per episode of each update."""
+def _binned(updates: Sequence[UpdateRecord], rates: pd.DataFrame, edges: Float) -> pd.DataFrame:
+    """Rates per episode in each bin, from the rates per episode of each update."""
     place = np.searchsorted(edges[1:], [update.frames for update in updates])
-    kept = place < len(edges) - 1
-    episodes = np.array([update.episodes for update in updates], np.float64)
-    counts = episodes * np.array([rate or 0.0 for rate in rates])
-    total = np.bincount(place[kept], episodes[kept], len(edges) - 1)
-    count = np.bincount(place[kept], counts[kept], len(edges) - 1)
-    return np.where(total > 0, count / np.maximum(total, 1), np.nan)
+    episodes = pd.Series([update.episodes for update in updates], dtype=float)
+    counts = rates.astype(float).fillna(0.0).mul(episodes, axis=0).groupby(place).sum()
+    total = episodes.groupby(place).sum()
+    return counts.div(total.where(total > 0), axis=0).reindex(range(len(edges) - 1))

@@ -1,6 +1,6 @@
 """The figure of several conditions' learning curves, side by side, each with its seeds."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -25,13 +25,14 @@ class Condition:
     Attributes:
         title: what was run, without the seed.
         seeds: what was measured while it learned.
-        successes: which outcomes are successes.
+        successes: which outcomes are successes. words: outcome -> what the scenario says of it.
         tests: frames and success rate of each seed's evaluation.
     """
 
     title: str
     seeds: Seeds
     successes: frozenset[str]
+    words: Mapping[str, str]
     tests: Sequence[tuple[float, float]]
 
 
@@ -44,8 +45,8 @@ def draw_conditions(conditions: Sequence[Condition], path: Path) -> None:
         success, outcomes, rules = column
         success.set_title(condition.title, fontsize=10, loc="left", weight="bold")
         _draw_success(success, condition)
-        means = {name: mean_over_seeds(rate) for name, rate in condition.seeds.part("outcomes").items()}
-        draw_outcomes(outcomes, condition.seeds.frames, means, condition.successes, _BELOW)
+        means = condition.seeds.means("outcomes")
+        draw_outcomes(outcomes, condition.seeds.frames, means, condition.successes, condition.words, _BELOW)
         _draw_rules(rules, condition.seeds)
         for axes in column:
             if condition.seeds.shortest < condition.seeds.frames[-1]:
@@ -65,7 +66,7 @@ def draw_conditions(conditions: Sequence[Condition], path: Path) -> None:
     figure.savefig(path)
 
 
-_BELOW: Final = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.1), "ncols": 3}
+_BELOW: Final = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.1), "ncols": 1}
 
 
 def _draw_success(axes: Axes, condition: Condition) -> None:
@@ -91,7 +92,7 @@ def _draw_success(axes: Axes, condition: Condition) -> None:
 
 def _draw_rules(axes: Axes, seeds: Seeds) -> None:
     """The rules that fired most, one line each."""
-    means = {name: mean_over_seeds(rate) for name, rate in seeds.part("rules").items()}
+    means = seeds.means("rules")
     peaks = {name: float(np.nanmax(rate, initial=0.0)) for name, rate in means.items()}
     names = [name for name in sorted(peaks, key=lambda name: -peaks[name]) if peaks[name] > 0][:_RULES_SHOWN]
     for name in names:

@@ -1,4 +1,4 @@
-"""The statistics of a report: means and spread over seeds, Welch's test, effect sizes, interquartile means.
+"""The statistics of a report: Welch's test, effect sizes, interquartile means, intervals.
 
 Sources: B. L. Welch (1947) for the test; L. V. Hedges (1981) for the unbiased effect size; R. Agarwal et al. (2021),
 "Deep reinforcement learning at the edge of the statistical precipice", for interquartile means over tasks and seeds
@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,34 +24,15 @@ LEVEL: Final = 0.95
 ALPHA: Final = 0.05
 
 
-@dataclass(frozen=True)
-class Spread:
-    """Values of several seeds.
+class Estimate(NamedTuple):
+    """A figure with its interval, `LEVEL` of it."""
 
-    Attributes:
-        values: one for each seed.
-    """
-
-    values: tuple[float, ...]
-
-    @property
-    def n(self) -> int:
-        """How many seeds."""
-        return len(self.values)
-
-    @property
-    def mean(self) -> float:
-        """Their mean; nan without any."""
-        return float(np.mean(self.values)) if self.values else math.nan
-
-    @property
-    def std(self) -> float | None:
-        """Their sample standard deviation (n - 1); None with fewer than two."""
-        return float(np.std(self.values, ddof=1)) if self.n > 1 else None
+    value: float
+    low: float
+    high: float
 
 
-@dataclass(frozen=True)
-class Test:
+class Test(NamedTuple):
     """A comparison of two groups of seeds.
 
     Attributes:
@@ -63,10 +43,10 @@ class Test:
     """
 
     difference: float
-    t: float | None
-    degrees: float | None
-    p: float | None
-    g: float | None
+    t: float | None = None
+    degrees: float | None = None
+    p: float | None = None
+    g: float | None = None
 
 
 def compare(first: Sequence[float], second: Sequence[float]) -> Test:
@@ -78,20 +58,15 @@ def compare(first: Sequence[float], second: Sequence[float]) -> Test:
     if not len(first) or not len(second):
         raise ValueError(f"got groups of {len(first)} and {len(second)}, expected at least one value in each")
     difference = float(np.mean(first) - np.mean(second))
-    enough = min(len(first), len(second)) > 1
-    if not enough or (_constant(first) and _constant(second)):
-        return Test(difference, None, None, None, None)
+    if min(len(first), len(second)) < 2 or len(set(first)) == len(set(second)) == 1:
+        return Test(difference)
     with warnings.catch_warnings():
         # One group may be all alike, as where every seed solves everything; the other's variance then decides.
         warnings.filterwarnings("ignore", message="Precision loss occurred")
-        result = stats.ttest_ind(first, second, equal_var=False)
+        test = stats.ttest_ind(first, second, equal_var=False)
     return Test(
-        difference, float(result.statistic), float(result.df), float(result.pvalue), hedges_g(first, second)
+        difference, float(test.statistic), float(test.df), float(test.pvalue), hedges_g(first, second)
     )
-
-
-def _constant(values: Sequence[float]) -> bool:
-    return len(set(values)) == 1
 
 
 def hedges_g(first: Sequence[float], second: Sequence[float]) -> float | None:
@@ -117,15 +92,6 @@ def bonferroni(ps: Sequence[float | None]) -> list[float | None]:
     return [None if p is None else min(1.0, p * tests) for p in ps]
 
 
-@dataclass(frozen=True)
-class Estimate:
-    """A figure with its interval, `LEVEL` of it."""
-
-    value: float
-    low: float
-    high: float
-
-
 def interquartile_mean(scores: Sequence[Sequence[float]]) -> float:
     """Mean of the middle half of all scores together; the lowest and the highest quarter are left out.
 
@@ -135,8 +101,8 @@ def interquartile_mean(scores: Sequence[Sequence[float]]) -> float:
     Raises:
         ValueError: there are none.
     """
-    together = np.concatenate([np.asarray(task, np.float64) for task in scores]) if scores else np.empty(0)
-    if not len(together):
+    together = [score for task in scores for score in task]
+    if not together:
         raise ValueError("scores: got none, expected at least one")
     return float(stats.trim_mean(together, 0.25))
 
@@ -155,11 +121,9 @@ def bootstrapped_iqm(
     """
     generator = np.random.default_rng(seed)
     tasks = [np.asarray(task, np.float64) for task in scores]
-    drawn = np.concatenate(
-        [task[generator.integers(0, len(task), (resamples, len(task)))] for task in tasks], axis=1
-    )
-    tail = (1 - LEVEL) / 2
-    low, high = np.quantile(stats.trim_mean(drawn, 0.25, axis=1), [tail, 1 - tail])
+    drawn = [task[generator.integers(0, len(task), (resamples, len(task)))] for task in tasks]
+    means = stats.trim_mean(np.concatenate(drawn, axis=1), 0.25, axis=1)
+    low, high = np.quantile(means, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
     return Estimate(interquartile_mean(scores), float(low), float(high))
 
 
@@ -167,7 +131,7 @@ def mean_interval(values: Sequence[float]) -> tuple[float, float] | None:
     """Student's interval, `LEVEL` of it, of the mean of what more seeds would give; None with fewer than two."""
     if len(values) < 2:
         return None
-    half = stats.t.ppf((1 + LEVEL) / 2, len(values) - 1) * np.std(values, ddof=1) / math.sqrt(len(values))
+    half = stats.t.ppf((1 + LEVEL) / 2, len(values) - 1) * stats.sem(values)
     return float(np.mean(values) - half), float(np.mean(values) + half)
 
 
@@ -201,7 +165,7 @@ def frames_to(frames: Float, success: Float, threshold: float) -> float | None:
         success: (B,), nan where no episode ended.
         threshold: 0 to 1.
     """
-    reached = np.flatnonzero(np.nan_to_num(success, nan=-1.0) >= threshold)
+    reached = np.flatnonzero(success >= threshold)  # which nan never is
     return float(frames[reached[0]]) if len(reached) else None
 
 

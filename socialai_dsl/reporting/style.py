@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import io
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from typing import Any, Final
 
 import matplotlib
@@ -19,7 +18,9 @@ COLOURS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E
 MARKERS: Final = ("o", "s", "^", "D", "v", "P", "X")
 INK: Final = "#1f2430"
 MUTED: Final = "#6b7280"
-RULE: Final = "#e3e6eb"
+
+WIDTH: Final = 4.6
+"""Inches of every figure: the page sets as many side by side as there is room for, on a telephone one."""
 
 _SETTINGS: Final[dict[Any, Any]] = {
     "font.family": "DejaVu Sans",
@@ -35,10 +36,10 @@ _SETTINGS: Final[dict[Any, Any]] = {
     "axes.grid": True,
     "axes.grid.axis": "y",
     "axes.axisbelow": True,
-    "grid.color": RULE,
+    "grid.color": "#e3e6eb",
     "grid.linewidth": 0.8,
     "legend.frameon": False,
-    "legend.fontsize": 8.5,
+    "legend.fontsize": 8.0,
     "text.color": INK,
     "text.parse_math": False,  # names come from files; a dollar sign in one is a dollar sign
     "xtick.color": MUTED,
@@ -59,18 +60,16 @@ def marker(index: int) -> str:
     return MARKERS[index % len(MARKERS)]
 
 
-@contextmanager
-def styled() -> Iterator[None]:
-    """Draw and save in the report's style."""
-    with matplotlib.rc_context(_SETTINGS):
-        yield
+def styled() -> AbstractContextManager[None]:
+    """Draw in the report's style."""
+    return matplotlib.rc_context(_SETTINGS)
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """A figure of this size, in inches."""
-    figure = Figure(figsize=(width, height), layout="constrained")
+def new_axes(height: float) -> tuple[Figure, Axes]:
+    """A figure of this height, in inches, with one panel."""
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
     FigureCanvasAgg(figure)
-    return figure
+    return figure, figure.subplots()
 
 
 def rates(axes: Axes, along: str = "y") -> None:
@@ -90,16 +89,12 @@ def frames(axes: Axes, end: float) -> None:
 def saved(figure: Figure, form: str) -> bytes:
     """The figure as `svg` or `png`, the same bytes for the same figure."""
     stream = io.BytesIO()
-    with warnings.catch_warnings():
+    metadata = {"Date": None, "Creator": None} if form == "svg" else {"Software": None}
+    with styled(), warnings.catch_warnings():
         # Names come from files; a letter that the font lacks is drawn as a box.
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
-        _save(figure, form, stream)
+        figure.savefig(stream, format=form, dpi=150, metadata=metadata)
     return stream.getvalue()
-
-
-def _save(figure: Figure, form: str, stream: io.BytesIO) -> None:
-    metadata = {"Date": None, "Creator": None} if form == "svg" else {"Software": None}
-    figure.savefig(stream, format=form, dpi=150, metadata=metadata)
 
 
 def shown(name: str, width: int = 48) -> str:

@@ -34,8 +34,8 @@ def test_a_bin_counts_episodes_and_does_not_average_rates(tmp_path: Path) -> Non
     seeds = read_seeds([write_metrics(tmp_path / "m.jsonl", rows)], bins=2)
     assert seeds.frames.tolist() == [200, 400]
     assert seeds.success.tolist() == [[(5 + 3) / 40, 1.0]]
-    assert seeds.part("rules")["ask"].tolist() == [[20 / 40, 1.0]]
-    assert list(seeds.part("outcomes")) == ["success@9", "timeout"]
+    assert seeds.rates["rules/ask"].tolist() == [[20 / 40, 1.0]]
+    assert list(seeds.means("outcomes")) == ["success@9", "timeout"]
 
 
 def test_a_bin_without_episodes_is_unknown(tmp_path: Path) -> None:

@@ -27,15 +27,14 @@ def test_everything_is_written(folder: Path, capsys: Capture) -> None:
     assert f"written to {out / 'index.html'}" in capsys.readouterr().out
     names = {path.name for path in out.iterdir()} - {path.name for path in out.glob("*.parquet")}
     assert names == {
-        "index.html", "report.md", "figures",
+        "index.html", "figures",
         "runs.csv", "conditions.csv", "comparisons.csv", "rooms.csv", "outcomes.csv",
     }  # fmt: skip
-    markdown = (out / "report.md").read_text(encoding="utf-8")
-    for name in ("part1-success", "part1-curves"):
-        assert f"(figures/{name}.svg)" in markdown
+    page = (out / "index.html").read_text(encoding="utf-8")
+    for name in ("part1-success", "part1-curves1", "part1-endings1-1"):
         assert (out / "figures" / f"{name}.svg").is_file()
         assert (out / "figures" / f"{name}.png").is_file()
-    assert "Help / oracle, 500 episodes" in markdown, "a condition tells what the script gets"
+    assert "Help / oracle, 500 episodes" in page, "a condition tells what the script gets"
 
 
 def test_who_does_not_learn_is_measured_once(
@@ -77,7 +76,7 @@ def test_runs_without_an_experiment(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     runs = [write_run(tmp_path / name, "help", seed, 0.5) for seed, name in enumerate("ab")]
     monkeypatch.chdir(tmp_path)
     assert main(["report", *map(str, runs), "--no-ceilings", "--out", "there"]) == 0
-    assert "2 of 2 seeds" in (tmp_path / "there" / "report.md").read_text(encoding="utf-8")
+    assert "2 of 2 seeds" in (tmp_path / "there" / "index.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -89,7 +89,7 @@ def test_a_damaged_list_of_episodes_is_a_problem(folder: Path, content: str) -> 
     (folder / "runs" / "c0-s2" / "episodes.csv").write_text(content, encoding="latin-1")
     damaged = runs(folder)[2]
     assert damaged.problems == ("episodes.csv is damaged",)
-    assert (damaged.rooms, damaged.state) == ({}, "done")
+    assert (damaged.rooms.empty, damaged.state) == (True, "done")
 
 
 def test_a_folder_in_place_of_a_file_is_a_problem_too(folder: Path) -> None:

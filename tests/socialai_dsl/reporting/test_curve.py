@@ -27,7 +27,7 @@ def test_smoothing_knows_nothing_before_the_first_value() -> None:
         Curve(
             [100, 200, 300], [NAN, 0.2, 0.4], {"success@3": [NAN, 0.2, 0.4], "timeout": [NAN, 0.8, 0.6]}, WINS
         ),
-        Curve([100], [0.5], {}, WINS, test=(100, 0.5, 0.46, 0.54)),
+        Curve([100], [0.5], {}, WINS, {}, (100, 0.5, 0.46, 0.54)),
         Curve([], [], {}, WINS),
         Curve([100, 200], [NAN, NAN], {"success@3": [NAN, NAN]}, WINS),
     ],
@@ -42,11 +42,12 @@ def test_a_picture_is_written(curve: Curve, tmp_path: Path) -> None:
 def test_of_many_outcomes_the_most_frequent_are_drawn_and_the_rest_is_one() -> None:
     axes = Figure().subplots()
     shares = {f"failure@{k}": np.full(3, (k + 1) / 45.0) for k in range(9)}
-    draw_outcomes(axes, [0, 1, 2], shares, frozenset(), {})
+    words = {"failure@7": "failure: agent.at(wrong)", "failure@0": "never drawn alone"}
+    draw_outcomes(axes, [0, 1, 2], shares, frozenset(), words, {})
     legend = axes.get_legend()
     assert legend is not None
     assert [text.get_text() for text in legend.get_texts()] == [
-        *("failure@8", "failure@7", "failure@6", "6 more failures"),
+        *("failure@8", "failure: agent.at(wrong)", "failure@6", "6 more failures"),
     ]
     top = max(path.vertices[:, 1].max() for area in axes.collections for path in area.get_paths())  # type: ignore[index]
     assert top == pytest.approx(1.0)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from socialai_dsl.reporting.statistics import (
-    Spread,
     area_under,
     bonferroni,
     bootstrapped_iqm,
@@ -16,15 +15,6 @@ from socialai_dsl.reporting.statistics import (
     mean_interval,
     paired_difference,
 )
-
-
-def test_mean_and_sample_standard_deviation() -> None:
-    spread = Spread((0.2, 0.4, 0.9))
-    assert spread.mean == pytest.approx(0.5)
-    # Deviations -0.3, -0.1, 0.4: squares 0.09 + 0.01 + 0.16 = 0.26, over n - 1 = 2.
-    assert spread.std == pytest.approx(math.sqrt(0.13))
-    assert Spread((0.2,)).std is None
-    assert math.isnan(Spread(()).mean)
 
 
 def test_welch_with_unequal_variances() -> None:
