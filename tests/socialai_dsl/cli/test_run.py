@@ -66,6 +66,7 @@ def test_a_run_leaves_everything_it_promises(capsys: Capture) -> None:
         "episode.html",
         "transcript.txt",
         "result.json",
+        "run.lock",
     }
     result = result_of(str(run))
     assert set(result) == {
