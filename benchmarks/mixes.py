@@ -20,17 +20,17 @@ Actions = NDArray[np.int64]
 
 
 def random_actions(envs: Any, seed: int) -> Actions:
-    """Uniform actions, int64 (BATCHES, E, 4)."""
+    """Uniform actions, int64 (BATCHES, E, 3 + slots)."""
     sizes = envs.single_action_space.nvec
     generator = np.random.default_rng(seed)
-    return generator.integers(0, sizes, (BATCHES, envs.num_envs, 4))
+    return generator.integers(0, sizes, (BATCHES, envs.num_envs, len(sizes)))
 
 
 def walk_actions(envs: Any, allowed: "Allowed", seed: int) -> Actions:
-    """Walking and harmless talk, int64 (BATCHES, E, 4)."""
+    """Walking and harmless talk, int64 (BATCHES, E, 3 + slots)."""
     shape = (BATCHES, envs.num_envs)
     generator = np.random.default_rng(seed)
-    actions = np.zeros((*shape, 4), np.int64)
+    actions = np.zeros((*shape, len(envs.single_action_space.nvec)), np.int64)
     actions[..., 0] = generator.choice(allowed.primitives, shape)
     if len(allowed.utterances):
         actions[..., 1] = generator.integers(0, 2, shape)
@@ -44,7 +44,7 @@ class Allowed:
     Attributes:
         primitives: int64 (P',), indices of left, right, forward and none, without those that end most episodes
             in the step in which they are done.
-        utterances: int64 (U, 2), pairs (template, noun) that never ended an episode when said standing still.
+        utterances: int64 (U, 1 + slots), templates and words that never ended an episode when said standing still.
     """
 
     def __init__(self, name: str, seed: int = 0) -> None:
@@ -63,7 +63,7 @@ class Allowed:
     ) -> Actions:
         used, ended = np.zeros(count), np.zeros(count)
         for _ in range(_PROBE_STEPS):
-            actions = np.zeros((_PROBE_ENVS, 4), np.int64)
+            actions = np.zeros(envs.action_space.shape, np.int64)
             actions[:, 0] = generator.choice(walking, _PROBE_ENVS)
             *_, terminations, _, _ = envs.step(actions)
             used += np.bincount(actions[:, 0], minlength=count)
@@ -72,40 +72,45 @@ class Allowed:
         return walking[ended[walking] < 0.3 * used[walking]]
 
     def _probe_utterances(self, envs: Any, sizes: list[int], generator: np.random.Generator) -> Actions:
-        templates, nouns = sizes[2], sizes[3]
-        ended = np.zeros(templates * nouns, bool)
+        spoken = sizes[2:]
+        ended = np.zeros(np.prod(spoken), bool)
         still = sizes[0] - 1
         for step in range(2 * _PROBE_STEPS):
-            actions = np.zeros((_PROBE_ENVS, 4), np.int64)
-            pairs = generator.integers(0, templates * nouns, _PROBE_ENVS)
+            actions = np.zeros(envs.action_space.shape, np.int64)
+            said = generator.integers(0, len(ended), _PROBE_ENVS)
             if step % 2:
                 actions[:, 0], actions[:, 1] = still, 1
-                actions[:, 2], actions[:, 3] = pairs // nouns, pairs % nouns
+                actions[:, 2:] = np.stack(np.unravel_index(said, spoken), axis=1)
             else:
                 actions[:, 0] = generator.choice(self.primitives, _PROBE_ENVS)
             *_, terminations, _, _ = envs.step(actions)
             if step % 2:
-                ended[pairs[terminations]] = True
+                ended[said[terminations]] = True
         harmless = np.flatnonzero(~ended)
-        return np.stack([harmless // nouns, harmless % nouns], axis=1).astype(np.int64)
+        return np.stack(np.unravel_index(harmless, spoken), axis=1).astype(np.int64)
 
 
 def translated(actions: Actions, name: str, program: Any) -> Actions:
     """Actions of a scenario as environments that play several with it take them: words are matched by spelling.
 
     Args:
-        actions: int64 (..., 4), in the scenario's own action space.
+        actions: int64 (..., 3 + slots), in the scenario's own action space.
         name: the scenario.
         program: what the environments play.
     """
     own: Any = socialai_dsl.compile(socialai_dsl.load(name))
-    pairs = (
-        ((*own.actions, "none"), (*program.actions, "none")),
-        (own.templates, program.templates),
-        (own.nouns, program.nouns),
-    )
-    result = actions.copy()
-    for column, (words, known) in zip((0, 2, 3), pairs, strict=True):
+    slots = {slot.name: (place, slot.words) for place, slot in enumerate(program.sentences.slots, 3)}
+    columns = [
+        (0, 0, (*own.actions, "none"), (*program.actions, "none")),
+        (2, 2, own.templates, program.templates),
+        *(
+            (i, slots[slot.name][0], slot.words, slots[slot.name][1])
+            for i, slot in enumerate(own.sentences.slots, 3)
+        ),
+    ]
+    result = np.zeros((*actions.shape[:-1], 3 + len(slots)), np.int64)
+    result[..., 1] = actions[..., 1]
+    for source, target, words, known in columns:
         places = np.array([known.index(word) for word in words], np.int64)
-        result[..., column] = places[actions[..., column]]
+        result[..., target] = places[actions[..., source]]
     return result

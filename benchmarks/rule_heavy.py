@@ -24,8 +24,8 @@ class RuleHeavy:
 
     Attributes:
         start: a snapshot, from which they are to be played.
-        actions: int64 (T, E, 4). T is a whole number of horizons, if they are not too long: what is chosen ends no
-            episode but time does, and resets must be as frequent in what is measured as they are in the long run.
+        actions: int64 (T, E, 3 + slots). T is a whole number of horizons, if they are not too long: what is chosen ends
+            no episode but time does, and resets must be as frequent in what is measured as they are in the long run.
         fired: rules of the scenario that fired, per environment and step.
     """
 
@@ -53,17 +53,19 @@ def rule_heavy_actions(envs: Any, allowed: Allowed, seed: int) -> RuleHeavy:
 
 
 def _what_rules_wait_for(program: Program, allowed: Allowed) -> Actions:
-    """The harmless utterances that some rule waits for, int64 (U, 2); all harmless ones if there are none."""
-    first, nouns = program.header(Header.CLASS_AT), len(program.nouns)
-    pairs = allowed.utterances
-    classes = program.words[first + pairs[:, 0] * nouns + pairs[:, 1]]
-    return pairs[classes > 1] if (classes > 1).any() else pairs
+    """The harmless utterances that some rule waits for, int64 (U, 1 + slots); all harmless ones if there are none."""
+    spoken, table, sentences = allowed.utterances, program.table(Header.CLASS_AT), program.sentences
+    used = np.array(sentences.used)[spoken[:, 0]]
+    lacking = np.array([len(slot.words) for slot in sentences.slots])
+    fillings = (np.where(used, spoken[:, 1:], lacking) * sentences.strides).sum(1)
+    classes = table[spoken[:, 0], fillings]
+    return spoken[classes > 1] if (classes > 1).any() else spoken
 
 
 def _best(envs: Any, allowed: Allowed, spoken: Actions, generator: np.random.Generator) -> Actions:
     """Of some random actions for each environment one that is answered and ends nothing; what is tried is undone."""
     now = envs.snapshot()
-    best = np.zeros((envs.num_envs, 4), np.int64)
+    best = np.zeros(envs.action_space.shape, np.int64)
     merit = np.full(envs.num_envs, -1)
     for _ in range(_TRIED):
         tried = np.zeros_like(best)

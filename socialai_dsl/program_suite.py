@@ -11,6 +11,7 @@ from itertools import chain
 from typing import Any
 
 from socialai_dsl.program import Flag, Header, Outcome, Program
+from socialai_dsl.vocabulary import NOUN, Sentences, Slot
 
 Positions = tuple[int, ...]
 """For each word of the shared list a member's own index, -1 if it has no such word."""
@@ -25,10 +26,9 @@ class ProgramSuite:
         programs: in the order of the suite.
         members: the name of each program in layouts, infos and counters.
         actions: words of the shared body actions, by index.
-        templates: the shared templates, by index.
-        nouns: the shared nouns, by index.
+        sentences: what can be said, with shared templates and slots.
         template_maps: for each program its own index of each shared template, -1 without one.
-        noun_maps: for each program its own index of each shared noun, -1 without one.
+        slot_maps: for each program and shared slot its own index of each word, -1 without one.
         labels: parameters and values of members that are leaves of a tree or were swept over.
         weights: relative probability of each program in an episode; all equal if empty.
         starts: the layout that each member's episodes start from, None where they are drawn; empty if none has one.
@@ -39,14 +39,23 @@ class ProgramSuite:
     programs: tuple[Program, ...]
     members: tuple[str, ...]
     actions: tuple[str, ...]
-    templates: tuple[str, ...]
-    nouns: tuple[str, ...]
+    sentences: Sentences
     template_maps: tuple[Positions, ...]
-    noun_maps: tuple[Positions, ...]
+    slot_maps: tuple[tuple[Positions, ...], ...]
     labels: tuple[Mapping[str, str], ...] = ()
     weights: tuple[int, ...] = ()
     starts: tuple[Mapping[str, Any] | None, ...] = ()
     in_sequence: bool = False
+
+    @property
+    def templates(self) -> tuple[str, ...]:
+        """The templates of what can be said."""
+        return self.sentences.templates
+
+    @property
+    def nouns(self) -> tuple[str, ...]:
+        """What `<noun>` can be; of a grammar with `slots` the words of each, one slot after the other."""
+        return tuple(word for slot in self.sentences.slots for word in slot.words)
 
     @cached_property
     def vocabulary(self) -> tuple[str, ...]:
@@ -74,10 +83,13 @@ class ProgramSuite:
         digest = sha256()
         for program in self.programs:
             digest.update(program.sha256.encode())
-        for words in (self.members, self.actions, self.templates, self.nouns):
+        slots = self.sentences.slots
+        for words in (self.members, self.actions, self.templates, *(slot.words for slot in slots)):
             digest.update("\x1f".join(words).encode())
             digest.update(b"\x1e")
-        digest.update(repr((self.template_maps, self.noun_maps)).encode())
+        names = [slot.name for slot in slots]
+        slot_maps = tuple(own for (own,) in self.slot_maps) if names == [NOUN] else (names, self.slot_maps)
+        digest.update(repr((self.template_maps, slot_maps)).encode())
         if any(weight != 1 for weight in self.weights):
             digest.update(repr(self.weights).encode())
         if any(start is not None for start in self.starts):
@@ -86,11 +98,10 @@ class ProgramSuite:
             digest.update(b"in sequence")
         return digest.hexdigest()
 
-    def live(self, number: int) -> tuple[frozenset[int], frozenset[int]]:
-        """Indices of the templates and of the nouns that mean something while one program is played."""
-        own = self.template_maps[number], self.noun_maps[number]
-        templates, nouns = (frozenset(i for i, at in enumerate(one) if at >= 0) for one in own)
-        return templates, nouns
+    def live(self, number: int) -> tuple[frozenset[int], ...]:
+        """Indices of the templates, then of the words of each slot, that mean something while one program is played."""
+        own = self.template_maps[number], *self.slot_maps[number]
+        return tuple(frozenset(i for i, at in enumerate(one) if at >= 0) for one in own)
 
     def listing(self) -> str:
         """The programs as text, one behind the other."""
@@ -124,20 +135,31 @@ def outcome_name(info: Mapping[str, Any]) -> str:
 
 
 def mixture(playables: Sequence[Playable]) -> ProgramSuite:
-    """Programs and suites as one suite: templates and nouns are shared by text, each member keeps its own pairs."""
+    """Programs and suites as one suite: templates, slots and words are shared by text, each keeps its sentences."""
     templates = _union(playable.templates for playable in playables)
-    nouns = _union(playable.nouns for playable in playables)
+    names = _union([slot.name for slot in playable.sentences.slots] for playable in playables)
+    slots = [
+        Slot(
+            name,
+            _union(s.words for playable in playables for s in playable.sentences.slots if s.name == name),
+        )
+        for name in names
+    ]
     parts = [part for playable in playables for part in _parts(playable)]
     actions = _union(playable.actions for playable in playables)
+    template_maps = tuple(_positions(templates, part.templates) for part in parts)
+    slot_maps = tuple(
+        tuple(_positions(slot.words, part.slots.get(slot.name, {})) for slot in slots) for part in parts
+    )
+    own = [part.program.sentences for part in parts]
     return ProgramSuite(
         " | ".join(dict.fromkeys(playable.name for playable in playables)),
         tuple(part.program for part in parts),
         _distinct([part.name for part in parts]),
         actions,
-        templates,
-        nouns,
-        tuple(_positions(templates, part.templates) for part in parts),
-        tuple(_positions(nouns, part.nouns) for part in parts),
+        Sentences.shared(templates, slots, list(zip(own, template_maps, strict=True))),
+        template_maps,
+        slot_maps,
     )
 
 
@@ -151,27 +173,33 @@ def _distinct(names: Sequence[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """A program of a mixture: what it is called, and its own index of each text that can be said in it."""
+    """A program of a mixture: what it is called, and its own index of each template and each word of its slots."""
 
     name: str
     program: Program
     templates: Mapping[str, int]
-    nouns: Mapping[str, int]
+    slots: Mapping[str, Mapping[str, int]]
 
 
 def _parts(playable: Playable) -> list[_Part]:
     if isinstance(playable, Program):
         templates = {word: i for i, word in enumerate(playable.templates)}
-        return [_Part(playable.name, playable, templates, {w: i for i, w in enumerate(playable.nouns)})]
+        slots = {
+            slot.name: {word: i for i, word in enumerate(slot.words)} for slot in playable.sentences.slots
+        }
+        return [_Part(playable.name, playable, templates, slots)]
     return [
         _Part(
             prefixed(playable.name, member),
             program,
             {word: i for word, i in zip(playable.templates, own_templates, strict=True) if i >= 0},
-            {word: i for word, i in zip(playable.nouns, own_nouns, strict=True) if i >= 0},
+            {
+                slot.name: {word: i for word, i in zip(slot.words, own, strict=True) if i >= 0}
+                for slot, own in zip(playable.sentences.slots, own_slots, strict=True)
+            },
         )
-        for member, program, own_templates, own_nouns in zip(
-            playable.members, playable.programs, playable.template_maps, playable.noun_maps, strict=True
+        for member, program, own_templates, own_slots in zip(
+            playable.members, playable.programs, playable.template_maps, playable.slot_maps, strict=True
         )
     ]
 

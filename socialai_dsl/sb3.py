@@ -31,7 +31,7 @@ class SB3VecEnv(VecEnv):
         if mode is not AutoresetMode.SAME_STEP:
             raise ValueError(f"envs: got autoreset_mode {mode}; expected SameStep")
         self.envs = envs
-        self._actions: NDArray[np.int64] = np.zeros((envs.num_envs, 4), np.int64)
+        self._actions: NDArray[np.int64] = np.zeros((), np.int64)
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> dict[str, NDArray[Any]]:

@@ -1,4 +1,4 @@
-"""The words of the language with their numbers, and the normalisation of texts: the one home of both.
+"""The words of the language with their numbers, the normalisation of texts, and the sentences of an agent.
 
 A word's number is its place: `COLORS[2]` is `blue`, and 2 in registers and in the colour channel of the picture.
 """
@@ -6,6 +6,11 @@ A word's number is its place: `COLORS[2]` is `blue`, and 2 in registers and in t
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from math import prod
 from typing import Final, Literal, get_args
 
 COLORS: Final = ("red", "green", "blue", "purple", "yellow", "grey")
@@ -50,3 +55,161 @@ def is_plain(text: str, marks: str = "'-.") -> bool:
 def is_number(word: str) -> bool:
     """Whether a word is a whole number."""
     return word.removeprefix("-").isdecimal()
+
+
+# -- what an agent can say -----------------------------------------------------------------------------------
+
+
+NOUN: Final = "noun"
+"""The slot of a grammar that has `nouns`, and no other."""
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """What can stand in place of `<name>` in a template."""
+
+    name: str
+    words: tuple[str, ...]
+
+    @property
+    def place(self) -> str:
+        """How templates write it."""
+        return f"<{self.name}>"
+
+
+@dataclass(frozen=True)
+class Sentences:
+    """Everything that can be said: templates, and what stands in their slots.
+
+    Choices are indices into the words of each slot. A filling is one number for all of them, with a digit for each
+    slot, the last slot's the least; the digit of a slot that a template lacks is one more than its last word's. Of a
+    grammar with `nouns` the filling is the noun, of templates without `<noun>` as well.
+
+    Attributes:
+        templates: each with its slots. slots: in the order of the heads.
+        used: for each template, whether it takes notice of each slot.
+    """
+
+    templates: tuple[str, ...]
+    slots: tuple[Slot, ...]
+    used: tuple[tuple[bool, ...], ...]
+
+    @classmethod
+    def of(cls, templates: Sequence[str], slots: Sequence[Slot]) -> Sentences:
+        """The sentences of a grammar."""
+        used = (
+            tuple(slot.name == NOUN or slot.place in template for slot in slots) for template in templates
+        )
+        return cls(tuple(templates), tuple(slots), tuple(used))
+
+    @classmethod
+    def shared(
+        cls,
+        templates: Sequence[str],
+        slots: Sequence[Slot],
+        parts: Sequence[tuple[Sentences, Sequence[int]]],
+    ) -> Sentences:
+        """The sentences of several grammars: a template takes notice of a slot if it does so in one of them.
+
+        Args:
+            templates: of all of them.
+            slots: of all of them.
+            parts: each grammar with its own index of each template, -1 if it has no such.
+        """
+        used = []
+        for place in range(len(templates)):
+            found = [False] * len(slots)
+            for own, template_map in parts:
+                if template_map[place] < 0:
+                    continue
+                names = {
+                    slot.name
+                    for slot, is_used in zip(own.slots, own.used[template_map[place]], strict=True)
+                    if is_used
+                }
+                found = [known or slot.name in names for known, slot in zip(found, slots, strict=True)]
+            used.append(tuple(found))
+        return cls(tuple(templates), tuple(slots), tuple(used))
+
+    def text(self, template: int, choices: Sequence[int]) -> str:
+        """A sentence; the choice for a slot that the template lacks does not count."""
+        text = self.templates[template]
+        for slot, choice in zip(self.slots, choices, strict=True):
+            text = text.replace(slot.place, slot.words[choice])
+        return text
+
+    def each(self) -> Iterator[tuple[int, tuple[int, ...]]]:
+        """Every template with all choices for its slots, 0 for the others."""
+        for template, used in enumerate(self.used):
+            ranges = (
+                range(len(slot.words) if is_used else 1)
+                for slot, is_used in zip(self.slots, used, strict=True)
+            )
+            for choices in product(*ranges):
+                yield template, choices
+
+    @property
+    def nouns(self) -> tuple[str, ...]:
+        """What `<noun>` can be; nothing of a grammar with other slots alone."""
+        return next((slot.words for slot in self.slots if slot.name == NOUN), ())
+
+    @cached_property
+    def radices(self) -> tuple[int, ...]:
+        """How many digits each slot has in a filling."""
+        return tuple(len(slot.words) + (slot.name != NOUN) for slot in self.slots)
+
+    @cached_property
+    def strides(self) -> tuple[int, ...]:
+        """What the digit of each slot counts in a filling."""
+        return tuple(prod(self.radices[i + 1 :]) for i in range(len(self.radices)))
+
+    @property
+    def fillings(self) -> int:
+        """How many fillings there are."""
+        return prod(self.radices)
+
+    def filling(self, choices: Sequence[int | None]) -> int:
+        """The number of some choices; None is a slot that the template lacks."""
+        digits = (
+            len(slot.words) if choice is None else choice
+            for slot, choice in zip(self.slots, choices, strict=True)
+        )
+        return sum(digit * stride for digit, stride in zip(digits, self.strides, strict=True))
+
+    def choices(self, filling: int) -> tuple[int | None, ...]:
+        """The choices of a filling, None for a slot that the template lacks; of -1, which is silence, None for all."""
+        digits = (filling // stride % radix for stride, radix in zip(self.strides, self.radices, strict=True))
+        return tuple(
+            digit if filling >= 0 and digit < len(slot.words) else None
+            for digit, slot in zip(digits, self.slots, strict=True)
+        )
+
+    def both(self, filling: int, other: int) -> int:
+        """What two fillings of one text say together; where they differ, what the other says."""
+        found = zip(self.choices(filling), self.choices(other), strict=True)
+        return self.filling([a if b is None else b for a, b in found])
+
+    def pairs(self) -> Iterator[tuple[int, int]]:
+        """Template and filling of every sentence, in the order of `each`."""
+        for template, choices in self.each():
+            used = self.used[template]
+            yield (
+                template,
+                self.filling([c if is_used else None for c, is_used in zip(choices, used, strict=True)]),
+            )
+
+    def said(self, template: int, filling: int) -> str | None:
+        """The sentence of a template and a filling; None where the filling is not one of the template's."""
+        choices = self.choices(filling)
+        if tuple(choice is not None for choice in choices) != self.used[template]:
+            return None
+        return self.text(template, [choice or 0 for choice in choices])
+
+    def heads(self, template: int, filling: int) -> tuple[int, ...]:
+        """A sentence as the last heads of an action: template, then a word for each slot, 0 for those it lacks."""
+        return template, *(choice or 0 for choice in self.choices(filling))
+
+    def by_number(self) -> tuple[str, ...]:
+        """The sentence of each template and filling, row by row; empty where the two do not go together."""
+        numbers = product(range(len(self.templates)), range(self.fillings))
+        return tuple(self.said(template, filling) or "" for template, filling in numbers)

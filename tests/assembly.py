@@ -29,6 +29,7 @@ from socialai_dsl.program import (
     TypeColumn,
     pack_cell,
 )
+from socialai_dsl.vocabulary import Sentences, Slot
 
 EMPTY, WALL, DOOR, LAVA, NPC = 1, 2, 4, 9, 11
 GENERATOR, MARBLE, PLATFORM = 15, 16, 17
@@ -212,8 +213,9 @@ class Assembly:
             words=np.array(words, np.int32),
             name="assembled",
             actions=("left", "right", "forward", "pickup", "drop", "toggle", "done"),
-            templates=("Where is <noun>", "Open <noun>"),
-            nouns=("you", "sesame", "the exit"),
+            sentences=Sentences.of(
+                ("Where is <noun>", "Open <noun>"), (Slot("noun", ("you", "sesame", "the exit")),)
+            ),
             entities=self._names(),
             registers=(),
             lines=tuple(text for text, _, _ in self.lines),
@@ -389,7 +391,8 @@ def part_of(program: Program) -> Part:
         outcomes=range(len(program.outcome_table)),
         actions=[*range(7), Body.NONE],
         templates=range(2),
-        nouns=range(3),
+        slots=[range(3)],
+        strides=[[0, 1], [0, 1]],
         tokens=range(len(program.vocabulary)),
         successes=[outcome.success for outcome in program.outcome_table],
     )

@@ -50,7 +50,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "frontend": (TEXT_SIDE, set()),
     "authoring": (TEXT_SIDE, {"pydantic", "yaml", "pygls", "lsprotocol"}),
     "program": ({"source", "vocabulary"}, {"numpy"}),
-    "program_suite": ({"program"}, set()),
+    "program_suite": ({"program", "vocabulary"}, set()),
     "compiler": (
         TEXT_SIDE - {"loader", "library", "checking", "frontend"} | {"program"},
         {"numpy"},

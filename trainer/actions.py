@@ -1,11 +1,11 @@
-"""Actions of four heads: samples, log-probabilities and entropies from logits (..., A)."""
+"""Actions of H heads: samples, log-probabilities and entropies from logits (..., A). `used` is `NetSpec.used`."""
 
 from __future__ import annotations
 
 import torch
 from torch import Tensor
 
-SPEAK, TEMPLATE = 1, 2  # positions of these heads; the noun follows the template
+SPEAK, TEMPLATE, SLOTS = 1, 2, 3  # positions of these heads
 
 
 def gumbel_noise(shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
@@ -15,24 +15,21 @@ def gumbel_noise(shape: tuple[int, ...], generator: torch.Generator) -> Tensor:
 
 
 def choose(logits: Tensor, sizes: tuple[int, ...]) -> Tensor:
-    """The best choice of each head, int64 (..., 4); a sample if noise was added to the logits (..., sum of sizes)."""
+    """The best choice of each head, int64 (..., H); a sample if noise was added to the logits (..., sum of sizes)."""
     return torch.stack([part.argmax(-1) for part in torch.split(logits, list(sizes), -1)], -1)
 
 
-def spoken_mask(actions: Tensor) -> Tensor:
-    """Which heads took part in each action, float (..., 4): template and noun only when something was said."""
+def spoken_mask(actions: Tensor, used: Tensor | None) -> Tensor:
+    """Which heads took part in each action, float (..., H): if something was said the template and its slots."""
     mask = torch.ones(actions.shape, device=actions.device)
     mask[..., TEMPLATE:] = actions[..., SPEAK : SPEAK + 1].to(mask.dtype)
+    if used is not None:
+        mask[..., SLOTS:] *= used.to(mask)[actions[..., TEMPLATE]]
     return mask
 
 
-def log_probs(logits: Tensor, actions: Tensor, sizes: tuple[int, ...]) -> Tensor:
-    """Log-probability of each head's choice, (..., 4), before masking."""
-    return log_probs_and_entropies(logits, actions, sizes)[0]
-
-
 def log_probs_and_entropies(logits: Tensor, actions: Tensor, sizes: tuple[int, ...]) -> tuple[Tensor, Tensor]:
-    """Log-probability of each head's choice and each head's entropy in nats, both (..., 4), before masking."""
+    """Log-probability of each head's choice and each head's entropy in nats, both (..., H), before masking."""
     chosen, entropies = [], []
     for head, part in enumerate(torch.split(logits, list(sizes), -1)):
         logs = torch.log_softmax(part, -1)
@@ -41,16 +38,13 @@ def log_probs_and_entropies(logits: Tensor, actions: Tensor, sizes: tuple[int, .
     return torch.cat(chosen, -1), torch.stack(entropies, -1)
 
 
-def joint_entropy(logits: Tensor, entropies: Tensor, sizes: tuple[int, ...]) -> Tensor:
-    """Entropy of the whole action in nats, (N,): H(primitive) + H(speak) + p(speak) (H(template) + H(noun)).
+def joint_entropy(logits: Tensor, entropies: Tensor, sizes: tuple[int, ...], used: Tensor | None) -> Tensor:
+    """Entropy of the whole action in nats, (N,): H(body) + H(speak) + p(speak) (H(template) + sum of p(has s) H(s)).
 
-    The heads are independent, and silence is one action whatever template and noun would have been.
-
-    Args:
-        logits: (N, A).
-        entropies: (N, 4), of each head.
-        sizes: choices of each head.
+    The heads are independent, and what a template lacks, and in silence all that would have been said, is no choice.
+    Logits are (N, A), entropies (N, H) of each head; p(has s) is the chance of a template that has the slot s.
     """
-    first = sum(sizes[:SPEAK])
-    speaks = torch.softmax(logits[:, first : first + sizes[SPEAK]], -1)[:, 1]  # (N,)
-    return entropies[:, :TEMPLATE].sum(-1) + speaks * entropies[:, TEMPLATE:].sum(-1)
+    _, speak, template, *_ = torch.split(logits, list(sizes), -1)
+    chances = 1 if used is None else torch.softmax(template, -1) @ used.to(logits)  # (N, slots)
+    said = torch.cat((entropies[:, TEMPLATE:SLOTS], chances * entropies[:, SLOTS:]), -1).sum(-1)  # (N,)
+    return entropies[:, :TEMPLATE].sum(-1) + torch.softmax(speak, -1)[:, 1] * said

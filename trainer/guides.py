@@ -18,7 +18,7 @@ class Lead(NamedTuple):
     """A guide's part in one step of E environments: NumPy arrays, or tensors (T, E, ...) for a rollout.
 
     Attributes:
-        actions: int64 (E, 4), the guide's own choice.
+        actions: int64 (E, H), the guide's own choice.
         led: bool (E,), true where the guide's action is played instead of the policy's; the policy gradient skips these
             steps. A guide hands an environment over at most once in an episode, after which the policy decides alone;
             otherwise generalised advantage estimation would be biased.
@@ -74,7 +74,7 @@ class ScriptGuide:
         if self._led.any():
             actions = np.asarray(envs.scripted_actions(), np.int64)
         else:
-            actions = np.zeros((len(starts), 4), np.int64)
+            actions = np.zeros((len(starts), *envs.single_action_space.shape), np.int64)
         return Lead(actions, self._led.copy(), self._led.astype(np.float32))
 
     def state(self) -> dict[str, Any]:

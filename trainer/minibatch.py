@@ -24,7 +24,7 @@ class Batch(NamedTuple):
     """Frames that the loss is taken over: N of a minibatch, or (T, E) of a whole rollout in the place of N.
 
     Attributes:
-        actions: int64 (N, 4). log_probs: float32 (N, 4), of the acting policy, before masking.
+        actions: int64 (N, H). log_probs: float32 (N, H), of the acting policy, before masking.
         values: float32 (N,), of the acting critic.
         advantages: float32 (N,). returns: float32 (N,), the targets of the value.
         lead: what a guide did and advised, (N, ...); None without a guide.

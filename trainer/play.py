@@ -94,7 +94,7 @@ class CheckpointPolicy:
 
     @torch.no_grad()
     def act(self, observation: Observation) -> Int64:
-        """Choose actions, int64 (E, 4), as `Policy.act` does; a single observation gives one action, int64 (4,)."""
+        """Choose actions, int64 (E, heads), as `Policy.act` does; of a single observation one, int64 (heads,)."""
         alone = observation["tokens"].ndim == 1
         logits, _ = self._look(observation, alone)
         if not self._greedy:

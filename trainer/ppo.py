@@ -1,7 +1,7 @@
 """Proximal policy optimisation, top to bottom: advantages, loss, update of a rollout, training loop.
 
 Sources: Schulman et al. 2017 (PPO), Schulman et al. 2016 (GAE). Axes: T steps of a rollout, E environments, N frames of
-a minibatch, A choices of all heads side by side.
+a minibatch, H heads, A choices of all of them side by side.
 """
 
 from __future__ import annotations
@@ -109,12 +109,13 @@ def ppo_loss(
     sizes: tuple[int, ...],
     config: RunConfig,
     entropy_coef: float,
+    used: Tensor | None = None,
 ) -> LossParts:
-    """PPO's clipped loss (Schulman et al. 2017, equations 7 and 9) for an action of four heads.
+    """PPO's clipped loss (Schulman et al. 2017, equations 7 and 9) for an action of several heads.
 
-    Template and noun count in the ratio only where something was said. With `loss="joint"` the ratio is that of the
+    What was said counts in the ratio: the template and its slots. With `loss="joint"` the ratio is that of the
     whole action and the entropy that of the joint distribution. With `"per_head"` each head has its own ratio, clip,
-    entropy and value term, masked, and the four are averaged, as in the released SocialAI code.
+    entropy and value term, masked, and they are averaged, as in the released SocialAI code.
 
     Frames that a guide led have no policy and no entropy term: PPO's ratio means nothing where another policy acted.
     What a guide does or advises is imitated by a weighted cross-entropy: behaviour cloning (Pomerleau 1991).
@@ -126,22 +127,23 @@ def ppo_loss(
         sizes: choices of each head.
         config: coefficients.
         entropy_coef: the entropy's weight at this time of the run.
+        used: which slots a template has, `NetSpec.used`.
     """
-    log_probs, entropies = heads.log_probs_and_entropies(logits, batch.actions, sizes)  # (N, 4) each
-    mask = heads.spoken_mask(batch.actions)  # (N, 4)
+    log_probs, entropies = heads.log_probs_and_entropies(logits, batch.actions, sizes)  # (N, H) each
+    mask = heads.spoken_mask(batch.actions, used)  # (N, H)
     own = torch.ones_like(values) if batch.lead is None else (~batch.lead.led).to(values.dtype)  # (N,)
-    change = (log_probs - batch.log_probs) * mask * own[:, None]  # (N, 4)
-    log_ratio = change.sum(-1, keepdim=True) if config.loss == "joint" else change  # (N, 1) or (N, 4)
+    change = (log_probs - batch.log_probs) * mask * own[:, None]  # (N, H)
+    log_ratio = change.sum(-1, keepdim=True) if config.loss == "joint" else change  # (N, 1) or (N, H)
     ratio = log_ratio.exp()
     advantage = batch.advantages[:, None]  # (N, 1)
     clipped = ratio.clamp(1 - config.clip, 1 + config.clip)
-    policy = -torch.minimum(ratio * advantage, clipped * advantage) * own[:, None]  # (N, 1) or (N, 4)
+    policy = -torch.minimum(ratio * advantage, clipped * advantage) * own[:, None]  # (N, 1) or (N, H)
     value = (values - batch.returns).square()  # (N,)
     if config.clip_value:
         near = batch.values + (values - batch.values).clamp(-config.clip, config.clip)
         value = torch.maximum(value, (near - batch.returns).square())
     if config.loss == "joint":
-        entropy = heads.joint_entropy(logits, entropies, sizes) * own  # (N,)
+        entropy = heads.joint_entropy(logits, entropies, sizes, used) * own  # (N,)
         policy_term, value_term, entropy_term = policy.mean(), value.mean(), entropy.mean()
     else:
         entropy = (entropies * mask).sum(-1) * own  # (N,), of the heads that took part
@@ -150,8 +152,10 @@ def ppo_loss(
     total = policy_term + config.value_coef * value_term - entropy_coef * entropy_term
     imitation = torch.zeros((), device=logits.device)
     if batch.lead is not None:
-        shown = batch.lead.actions  # (N, 4)
-        shown_log_probs = heads.log_probs(logits, shown, sizes) * heads.spoken_mask(shown)  # (N, 4)
+        shown = batch.lead.actions  # (N, H)
+        shown_log_probs = heads.log_probs_and_entropies(logits, shown, sizes)[0] * heads.spoken_mask(
+            shown, used
+        )
         imitation = -(shown_log_probs.sum(-1) * batch.lead.weights).mean()
         total = total + config.imitation_coef * imitation
     with torch.no_grad():
@@ -176,12 +180,13 @@ def update(session: Session, rollout: Rollout, mapper: Mapper = map) -> dict[str
     Raises:
         TrainingStopped: a loss, a gradient or a weight is not finite.
     """
-    net, config, sizes = session.actor.net, session.config, session.actor.net.spec.action_sizes
+    net, config = session.actor.net, session.config
+    sizes, used = net.spec.action_sizes, net.spec.used
     parameters = list(net.parameters())
     batch = estimate_advantages(config, rollout)
 
     def differentiate(share: Environments | Chunks) -> tuple[Tensor, Sequence[Tensor | None]]:
-        parts = [ppo_loss(*part, sizes, config, session.entropy_coef) for part in share.evaluate(net)]
+        parts = [ppo_loss(*part, sizes, config, session.entropy_coef, used) for part in share.evaluate(net)]
         loss = torch.stack([part.loss for part in parts]).mean() * share.weight
         statistics = torch.stack([torch.stack(part).detach() for part in parts]).mean(0) * share.weight
         return statistics, torch.autograd.grad(loss, parameters, allow_unused=True)

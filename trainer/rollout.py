@@ -23,12 +23,12 @@ class Rollout(NamedTuple):
     """T steps of E environments, time first, on the network's device.
 
     Attributes:
-        actions: int64 (T, E, 4), as played.
+        actions: int64 (T, E, H), as played.
         values, rewards: float32 (T, E); rewards with the bonus.
         starts, ended: bool (T, E), whether the episode began, and whether it ended, with this step.
         bootstrap: float32 (T, E), value of the state a time-out cut an episode off in; 0 elsewhere.
         pair_rows: int64 (T, E), row of the actor's `pairs`; on the CPU.
-        log_probs: float32 (T, E, 4) of the policy, before masking.
+        log_probs: float32 (T, E, H) of the policy, before masking.
         next_value: float32 (E,), value of the state after the last step.
         memories: float32 (T / bptt, E, *shape), memory before each stretch of back-propagation.
         lead: what a guide did, (T, E, ...); None where none took part.
@@ -71,7 +71,7 @@ def collect(session: Session) -> Rollout:
             memories.append(memory)
         output, state.memory = net.memory.step(features, memory)
         logits, values = net.heads(output)  # (E, A), (E,)
-        actions = heads.choose(logits + noise[t], sizes)  # (E, 4)
+        actions = heads.choose(logits + noise[t], sizes)  # (E, H)
         if session.guide is not None:
             actions, given = _follow(session, session.guide, actions, tally)
             leads.append(given)
@@ -79,7 +79,7 @@ def collect(session: Session) -> Rollout:
         steps.append((actions, values, reward, starts, ended, bootstrap, torch.from_numpy(rows), logits))
     next_value = _value(actor, emptied(state.memory, ended), state.image, state.tokens, _ids(envs))
     *columns, logits = (torch.stack(column) for column in zip(*steps, strict=True))
-    log_probs = heads.log_probs(logits, columns[0], sizes)
+    log_probs, _ = heads.log_probs_and_entropies(logits, columns[0], sizes)
     lead = None
     if any(given.led.any() or given.weights.any() for given in leads):
         lead = Lead(*map(torch.stack, zip(*leads, strict=True)))
@@ -95,14 +95,15 @@ def _ids(envs: Any) -> tuple[Int64, Int64]:
 
 
 def _follow(session: Session, guide: Guide, own: Tensor, tally: Tally) -> tuple[Tensor, Lead]:
-    """Ask the guide; returns the actions to play, int64 (E, 4): its own where it leads, else those of the policy."""
+    """Ask the guide; returns the actions to play, int64 (E, H): its own where it leads, else those of the policy."""
     state, move = session.state, session.actor.move
     given = guide.lead(session.envs, state.starts, min(session.frames / session.config.frames, 1.0))
-    for name, part, axes in zip(Lead._fields, given, ((4,), (), ()), strict=True):
-        require_shape(f"guide: {name} of lead", part, (len(own), *axes))
+    for name, part, shape in zip(Lead._fields, given, (own.shape, own.shape[:1], own.shape[:1]), strict=True):
+        require_shape(f"guide: {name} of lead", part, tuple(shape))
     state.led |= given.led
     lead = Lead(*(move(part.copy()) for part in given))
-    agrees = ((own == lead.actions) | (heads.spoken_mask(lead.actions) == 0)).all(1)  # (E,)
+    silent = heads.spoken_mask(lead.actions, session.actor.net.spec.used) == 0  # (E, H)
+    agrees = ((own == lead.actions) | silent).all(1)  # (E,)
     tally.led_steps += int(lead.led.sum())
     tally.agreed_steps += int((agrees & lead.led).sum())
     return torch.where(lead.led[:, None], lead.actions, own), lead

@@ -94,7 +94,8 @@ def _facts(name: str, loaded: "Loaded", data: Mapping[str, Any]) -> list[str]:
 
     playable = compile_loaded(loaded)
     programs = playable.programs if isinstance(playable, ProgramSuite) else (playable,)
-    sizes = [len(playable.actions) + 1, 2, len(playable.templates), len(playable.nouns)]
+    slots = playable.sentences.slots
+    sizes = [len(playable.actions) + 1, 2, len(playable.templates), *(len(slot.words) for slot in slots)]
     tokens = max(program.header(Header.TOKENS) for program in programs)
     ids = [f"`SocialAI/{gym}-v1`" for gym, scenario in IDS.items() if scenario == name]
     horizons = sorted({program.header(Header.HORIZON) for program in programs})
@@ -105,7 +106,7 @@ def _facts(name: str, loaded: "Loaded", data: Mapping[str, Any]) -> list[str]:
         ("skills", ", ".join(skills if isinstance(skills, list) else [skills]).replace("_", " ")),
         ("horizon", " or ".join(map(str, horizons)) + " steps"),
         ("reward", "1 - 0.9 t / horizon for a success in step t, else 0"),
-        ("action", f"{sizes}: body, speak or not, template, noun"),
+        ("action", f"{sizes}: body, speak or not, template, {', '.join(slot.name for slot in slots)}"),
         ("observation", f"image 7 x 7 x 4 and {tokens} tokens of {len(playable.vocabulary)} words"),
         ("body actions", ", ".join([*playable.actions, "none"])),
     ]
@@ -196,8 +197,10 @@ def _scenario(loaded: "LoadedScenario", data: Mapping[str, Any]) -> Iterator[lis
     if notes := data.get("notes"):
         yield ["## Notes", "", str(notes).strip()]
     grammar = loaded.scenario.grammar
-    yield ["## What can be said", "", f"{len(grammar.templates)} templates with {len(grammar.nouns)} nouns:", "",
-           "* " + " · ".join(map(code, grammar.templates)), "* " + " · ".join(map(code, grammar.nouns))]  # fmt: skip
+    words = grammar.nouns or [f"{name}: {', '.join(map(str, can))}" for name, can in grammar.slots.items()]
+    yield ["## What can be said", "",
+           f"{len(grammar.templates)} templates with {len(words)} {'nouns' if grammar.nouns else 'slots'}:", "",
+           "* " + " · ".join(map(code, grammar.templates)), "* " + " · ".join(map(code, words))]  # fmt: skip
     yield ["## Room", "", *items(data["room"])]
     yield ["## Cast", "", *_cast(loaded, data)]
     if objects := data.get("objects"):

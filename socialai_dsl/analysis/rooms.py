@@ -103,8 +103,8 @@ def name_of(checked: CheckedScenario, number: int) -> str:
 
 
 def idle(program: Program) -> NDArray[np.int64]:
-    """The action that does nothing and says nothing, int64 (4,)."""
-    return np.array([program.header(Header.PRIMITIVES), 0, 0, 0], np.int64)
+    """The action that does nothing and says nothing, int64 (3 + slots,)."""
+    return np.array([program.header(Header.PRIMITIVES), *[0] * (2 + len(program.sentences.slots))], np.int64)
 
 
 def wins_of(program: Program) -> NDArray[np.bool_]:

@@ -59,7 +59,7 @@ class Finding:
     Attributes:
         verdict: undecided where there are more states than it may look at.
         states: how many different states it looked at.
-        plan: actions of a success, int64 (4,) each; None without one, or where it needs chance to fall otherwise.
+        plan: actions of a success, int64 (heads,) each; None without one, or where it needs chance to fall otherwise.
         exact: False where chance may still open a way that was not drawn.
         steps: length of the success that was found, whatever chance it needs; None without one.
     """
@@ -255,7 +255,7 @@ class RandomActions:
     """Actions at random for several walks, of which some say more than others.
 
     Args:
-        useful: the actions to choose from, int64 (A, 4).
+        useful: the actions to choose from, int64 (A, 3 + slots).
         walks: how many walks there are.
     """
 
@@ -265,7 +265,7 @@ class RandomActions:
         self._spoken = np.array(_SPEECH)[np.arange(walks) % len(_SPEECH)]
 
     def next(self) -> NDArray[np.int64]:
-        """An action of each walk, int64 (walks, 4)."""
+        """An action of each walk, int64 (walks, 3 + slots)."""
         walks = len(self._spoken)
         actions: NDArray[np.int64] = self._useful[self._generator.choice(self._silent, walks)]
         if len(self._said):
@@ -334,12 +334,14 @@ def multipliers(count: int) -> NDArray[np.uint64]:
 
 
 def useful_actions(program: Program, whole_utterance: bool) -> NDArray[np.int64]:
-    """Every body action with silence and with one utterance of each class, or with every one, int64 (A, 4)."""
+    """Every body action with silence and with one utterance of each class, or with every one, int64 (A, 3 + slots)."""
     h = program.header
     start, nouns = h(Header.CLASS_AT), h(Header.NOUNS)
     classes = program.words[start : start + h(Header.TEMPLATES) * nouns]
-    pairs = np.arange(len(classes)) if whole_utterance else np.unique(classes, return_index=True)[1]
-    said = [(0, 0, 0), *((1, int(pair) // nouns, int(pair) % nouns) for pair in pairs)]
+    pairs = np.array([template * nouns + filling for template, filling in program.sentences.pairs()])
+    pairs = pairs if whole_utterance else pairs[np.unique(classes[pairs], return_index=True)[1]]
+    heads = program.sentences.heads
+    said = [(0, *heads(0, -1)), *((1, *heads(int(pair) // nouns, int(pair) % nouns)) for pair in pairs)]
     return np.array([(body, *words) for body in range(h(Header.PRIMITIVES) + 1) for words in said], np.int64)
 
 

@@ -92,7 +92,7 @@ class Tellers:
 
 
 Actions = Callable[[int], NDArray[np.int64]]
-"""What is done in each pair of twins in step t, int64 (pairs, 4)."""
+"""What is done in each pair of twins in step t, int64 (pairs, 3 + slots)."""
 
 
 @dataclass(frozen=True)
@@ -197,15 +197,9 @@ class Twins:
 def random_actions(program: Program, pairs: int, seed: int) -> Actions:
     """Any body action, and half of the time any utterance."""
     generator = np.random.default_rng(seed)
-    highest = np.array(
-        [
-            program.header(Header.PRIMITIVES) + 1,
-            2,
-            program.header(Header.TEMPLATES),
-            program.header(Header.NOUNS),
-        ]
-    )
-    return lambda step: generator.integers(0, highest, (pairs, 4))
+    sizes = [len(slot.words) for slot in program.sentences.slots]
+    highest = np.array([program.header(Header.PRIMITIVES) + 1, 2, program.header(Header.TEMPLATES), *sizes])
+    return lambda step: generator.integers(0, highest, (pairs, len(highest)))
 
 
 class Script:

@@ -280,10 +280,20 @@ def _utterances(data: Data) -> Iterator[Offer]:
     grammar = part_at(data, ("grammar",))
     if isinstance(grammar, str):
         grammar = shared_grammars().get(grammar)
-    templates, nouns = (part_at(grammar, (key,)) for key in ("templates", "nouns"))
+    templates, nouns, slots = (part_at(grammar, (key,)) for key in ("templates", "nouns", "slots"))
     for template in templates if isinstance(templates, list) else ():
         for noun in nouns if isinstance(nouns, list) else ():
             yield Offer(str(template).replace("<noun>", str(noun)), "word", "what the agent can say")
+        if isinstance(slots, dict):
+            yield Offer(
+                str(template), "word", "what the agent can say; `<slot>` is anything that can stand there"
+            )
+            for name, words in slots.items():
+                found = words if isinstance(words, list) and f"<{name}>" in str(template) else ()
+                for word in found:
+                    yield Offer(
+                        str(template).replace(f"<{name}>", str(word)), "word", "what the agent can say"
+                    )
 
 
 def _root(data: Data) -> type[BaseModel] | None:

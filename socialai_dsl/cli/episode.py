@@ -84,7 +84,7 @@ def record(
     Args:
         env: a single environment with render mode `rgb_array`.
         program: the scenario's, for the words of actions.
-        actions: int64 (4,) each; the last one ends the episode.
+        actions: int64 (heads,) each; the last one ends the episode.
         title: first line of the transcript; of a suite the member that is played is added.
         reset: arguments of `env.reset`.
         meet: says who is in the room; asked after the reset.

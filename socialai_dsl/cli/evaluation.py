@@ -34,7 +34,7 @@ class Evaluation:
         player: who played.
         result: what came of it.
         endings: in the order of the program's outcomes.
-        actions: of each episode, int64 (4,) each.
+        actions: of each episode, int64 (heads,) each.
         warnings: what the agent's checkpoint does not know of this scenario, and the like.
         more: figures that count for this agent alone.
         replies: of a language model, what it answered before each action of each episode.

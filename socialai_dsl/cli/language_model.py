@@ -41,7 +41,7 @@ class Played:
 
     Attributes:
         result: as for all agents.
-        actions: of each episode, int64 (4,) each. replies: what the model answered before each of them.
+        actions: of each episode, int64 (heads,) each. replies: what the model answered before each of them.
         endings: further ways in which episodes ended. figures: further ones.
     """
 

@@ -362,7 +362,7 @@ class _Suggestions(Suggester):
 
 
 class _Chooser(ModalScreen[str | None]):
-    """Two lists: templates, then nouns. Gives the sentence, or None."""
+    """A list of templates, then one of words for each slot. Gives the sentence, or None."""
 
     CSS = """
     _Chooser { align: center middle; }
@@ -380,20 +380,22 @@ class _Chooser(ModalScreen[str | None]):
     def __init__(self, phrases: Phrases) -> None:
         super().__init__()
         self._phrases = phrases
+        self._slots = phrases.grammar.slots
 
     def compose(self) -> ComposeResult:
         """The lists, and the sentence as it stands."""
         with Container(id="box"):
             yield Static(id="sentence")
             with Horizontal(id="lists"):
-                yield OptionList(*map(_option, self._phrases.templates), id="templates")
-                yield OptionList(*map(_option, self._phrases.nouns), id="nouns")
+                yield OptionList(*map(_option, self._phrases.grammar.templates), id="templates")
+                for slot in self._slots:
+                    yield OptionList(*map(_option, slot.words), id=f"slot-{slot.name}")
             yield Static("  ↑↓ move · Enter choose · ← back · Esc leave", classes="hint")
 
     def on_mount(self) -> None:
         """Begin with the first of each."""
-        for name in ("#nouns", "#templates"):
-            self.query_one(name, OptionList).highlighted = 0
+        for words in self.query(OptionList):
+            words.highlighted = 0
         self.query_one("#templates").focus()
 
     def on_option_list_option_highlighted(self) -> None:
@@ -401,29 +403,44 @@ class _Chooser(ModalScreen[str | None]):
         self.query_one("#sentence", Static).update(Text(printable(f'"{self._sentence()}"')))
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """Go from the template to the noun, and from the noun back to the game."""
-        if event.option_list.id == "templates" and "<noun>" in self._template():
-            self.query_one("#nouns").focus()
+        """Go from the template to the words of its slots, one after the other, and from the last back to the game."""
+        lists = self._lists()
+        place = lists.index(event.option_list) + 1 if event.option_list in lists else len(lists)
+        if place < len(lists):
+            lists[place].focus()
         else:
             self.dismiss(self._sentence())
 
     def action_into(self) -> None:
-        """Go to the nouns."""
-        self.query_one("#nouns").focus()
+        """Go to the words of the next slot."""
+        lists = self._lists()
+        lists[min(self._place(lists) + 1, len(lists) - 1)].focus()
 
     def action_back(self) -> None:
-        """Go back to the templates, and from there to the game."""
-        if self.query_one("#nouns").has_focus:
-            self.query_one("#templates").focus()
+        """Go back to the list before, and from the templates to the game."""
+        lists = self._lists()
+        if place := self._place(lists):
+            lists[place - 1].focus()
         else:
             self.dismiss(None)
 
-    def _template(self) -> str:
-        return self._phrases.templates[self.query_one("#templates", OptionList).highlighted or 0]
+    def _lists(self) -> list[OptionList]:
+        """The lists that the template takes notice of, which begin with that of templates."""
+        used = zip(self._slots, self._phrases.grammar.used[self._template()], strict=True)
+        names = ["templates", *(f"slot-{slot.name}" for slot, is_used in used if is_used)]
+        return [self.query_one(f"#{name}", OptionList) for name in names]
+
+    @staticmethod
+    def _place(lists: list[OptionList]) -> int:
+        """Which of the lists is chosen from."""
+        return next((i for i, one in enumerate(lists) if one.has_focus), 0)
+
+    def _template(self) -> int:
+        return self.query_one("#templates", OptionList).highlighted or 0
 
     def _sentence(self) -> str:
-        noun = self._phrases.nouns[self.query_one("#nouns", OptionList).highlighted or 0]
-        return self._template().replace("<noun>", noun)
+        words = [self.query_one(f"#slot-{slot.name}", OptionList).highlighted or 0 for slot in self._slots]
+        return self._phrases.grammar.text(self._template(), words)
 
 
 class _Help(ModalScreen[None]):

@@ -45,7 +45,7 @@ class Moment:
         snapshot: the environment's exact state.
         view: what the agent sees, uint8 (7, 7, C).
         member: of a suite, which scenario is played.
-        action: what led here, int64 (4,); None before the first step.
+        action: what led here, int64 (heads,); None before the first step.
         lines: what was said and heard so far.
         reward: sum of the rewards so far.
         ended: how the episode ended; None while it has not.
@@ -66,7 +66,7 @@ class Played:
 
     Attributes:
         title: which one it was.
-        actions: int64 (4,) each.
+        actions: int64 (heads,) each.
         reward: sum of the rewards.
         ended: how it ended.
     """
@@ -103,7 +103,7 @@ class Game:
         self._endings: dict[str, Ending] = {e.name: e for e in endings_of(loaded, self._program)}
         self._about = _abouts(loaded, self._program)
         self._env: Any = socialai_dsl.make(scenario).unwrapped
-        self.phrases = Phrases(self._program.actions, self._program.templates, self._program.nouns)
+        self.phrases = Phrases(self._program.actions, self._program.sentences)
         self.title = ""
         self._moments: list[Moment] = []
 

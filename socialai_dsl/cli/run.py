@@ -209,7 +209,7 @@ def _write_card(
 
 def _size(program: "Playable") -> str:
     """The size of the agent's choices, in one phrase."""
-    said = len(program.templates) * len(program.nouns)
+    said = sum(1 for _ in program.sentences.each())
     return f"{len(program.actions)} actions, {said} utterances, {len(program.vocabulary)} words"
 
 

@@ -217,7 +217,7 @@ class Traced:
 
     def _typed(self, line: str) -> "NDArray[np.int64]":
         env = self._env.unwrapped
-        phrases = Phrases(env.program.actions, env.program.templates, env.program.nouns)
+        phrases = Phrases(env.program.actions, env.program.sentences)
         try:
             action: NDArray[np.int64] = env.encode_action(split_line(line.strip(), phrases.actions))
         except ValueError:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.vocabulary import Sentences
 
 STANDING: Final = (".", "none")
 """What is typed for standing still."""
@@ -30,18 +31,15 @@ class Phrases:
 
     Attributes:
         actions: words for movements.
-        templates: each with its <noun>.
-        nouns: what the <noun> can be.
+        grammar: what can be said.
     """
 
     actions: Sequence[str]
-    templates: Sequence[str]
-    nouns: Sequence[str]
+    grammar: Sentences
 
     def sentences(self) -> list[str]:
-        """Each sentence once, by template, then by noun."""
-        pairs = (template.replace("<noun>", noun) for template in self.templates for noun in self.nouns)
-        return list(dict.fromkeys(pairs))
+        """Each sentence once, by template, then by what stands in its slots."""
+        return list(dict.fromkeys(self.grammar.text(*spoken) for spoken in self.grammar.each()))
 
     def completed(self, line: str) -> str | None:
         """The line with its utterance written out, where what is typed begins one; None where nothing does."""

@@ -31,7 +31,7 @@ from socialai_dsl.compiler.cells import (
     selected_condition,
     selected_value,
 )
-from socialai_dsl.compiler.folding import SILENCE, Classes, fold, fold_whole, texts_of_pairs
+from socialai_dsl.compiler.folding import SILENCE, Classes, fold, fold_whole
 from socialai_dsl.grammar.ast import every
 from socialai_dsl.program import CONSTANT, TEMPORARY, Field, Op, Register
 from socialai_dsl.semantics import terms
@@ -229,8 +229,9 @@ class Expressions(Emitter):
 
     def _compared(self, term: Term) -> int:
         """A value that is only compared: no noun at all is unlike any noun."""
-        unlike_any = isinstance(term, terms.World) and term.name == "noun" and term.type.kind == "noun"
-        return Register.NOUN if unlike_any else self.value(term)
+        if isinstance(term, terms.World) and term.name == "noun" and term.type.kind == "noun":
+            return self._digit(Register.NOUN, term.digit)
+        return self.value(term)
 
     def value(self, term: Term) -> int:
         """Emit what computes the term; the operand it is in afterwards."""
@@ -240,7 +241,7 @@ class Expressions(Emitter):
             case terms.Read():
                 return self._read(term.path)
             case terms.World(name="noun"):
-                return self._found(Register.NOUN)
+                return self._found(self._digit(Register.NOUN, term.digit), term.digit)
             case terms.World():
                 return int(_WORLD[term.name])
             case terms.Here():
@@ -298,15 +299,30 @@ class Expressions(Emitter):
             self.block.test(Op.IF_NE, found, constant(0), self.failed)
         return self.registers.by_path[path]
 
-    def _found(self, number: int) -> int:
-        """Something's number, where -1 is nothing: that fails, or else is as good as the first."""
+    def _found(self, number: int, digit: terms.Digit | None = None) -> int:
+        """Something's number, where -1, or a digit above all words, is nothing: that fails, or is as good as any."""
+        if digit is not None:
+            last = constant(digit.radix - 2)
+            if self.failed is not None:
+                self.block.test(Op.IF_LE, number, last, self.failed)
+            return self.into_temporary(Op.MIN, number, last)
         if self.failed is not None:
             self.block.test(Op.IF_LE, constant(0), number, self.failed)
         return self.into_temporary(Op.MAX, number, constant(0))
 
+    def _digit(self, filling: int, digit: terms.Digit | None) -> int:
+        """One slot of a filling; of -1, which is silence, a digit above all words, as division rounds down."""
+        if digit is None:
+            return filling
+        if digit.stride > 1:
+            filling = self.into_temporary(Op.DIV, filling, constant(digit.stride))
+        return self.into_temporary(Op.MOD, filling, constant(digit.radix))
+
     def _heard(self, op: Op, term: terms.Speaker | terms.HeardNoun) -> int:
         assert self.inbox >= 0, "internal: nobody is there to hear it"
-        return self._found(self.into_temporary(op, self.inbox, self.classes.set_of(term.patterns)))
+        number = self.into_temporary(op, self.inbox, self.classes.set_of(term.patterns))
+        digit = term.digit if isinstance(term, terms.HeardNoun) else None
+        return self._found(self._digit(number, digit), digit)
 
     def _container(self, term: terms.FieldOf) -> int:
         """What a thing lies in: among those that can hold something, even if it never did."""
@@ -375,7 +391,7 @@ class Lines:
 
     def __post_init__(self) -> None:
         self._known: dict[tuple[int, tuple[str | Term, ...]], int] = {}
-        self.grammar = tuple(texts_of_pairs(self.checked))
+        self.grammar = self.checked.sentences.by_number()
         self.vocabulary = ("<pad>", "<unk>", *self.checked.words_in_order)
         self._ids = {word: number for number, word in enumerate(self.vocabulary)}
         if self.checked.own_voice or any(frame.entity == 0 for frame in self.checked.frames):
@@ -406,7 +422,7 @@ class Lines:
         return term.type.words[term.value - term.type.low]
 
     def _noun_of_pair(self, k: int) -> int:
-        return k % len(self.checked.nouns)
+        return k % self.checked.sentences.fillings
 
     def adopt(self, other: Lines) -> None:
         """Number all lines as `other` does, which was made for the same scenario."""

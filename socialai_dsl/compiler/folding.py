@@ -29,7 +29,7 @@ class Classes:
     Attributes:
         of_pair: class of each pair that the agent says. of_performed: class of each pair that an NPC says as part of a
         sequence; empty where nobody performs one.
-        speakers_matter: whether a rule asks who said something, or with which noun.
+        speakers_matter: whether a rule asks who said something, or what stood in its slots.
         sets: sets of classes that a rule waits for and wants to know more about.
         said: for each NPC and pattern that somebody asks about, the lines of that NPC that fit it.
     """
@@ -39,18 +39,22 @@ class Classes:
         self.speakers_matter = any(True for kind in (Speaker, HeardNoun) for _ in every(kind, checked))
         self.sets: list[frozenset[int]] = []
         self.said: dict[tuple[int, Pattern | None], frozenset[int]] = {}
-        self._nouns = {normal(text): noun for pattern in self.patterns for text, noun in pattern.nouns}
+        self._nouns: dict[str, int] = {}
+        for text, noun in (found for pattern in self.patterns for found in pattern.nouns):
+            known = self._nouns.get(normal(text), noun)
+            self._nouns[normal(text)] = checked.sentences.both(known, noun)
         self._numbers: dict[frozenset[int], int] = {frozenset(): OTHER}
         self._texts = [frozenset(normal(text) for text in pattern.said_by_npcs) for pattern in self.patterns]
-        nouns = len(checked.nouns)
-        self.of_pair = [self._number(self._of_pair(k, nouns)) for k in range(len(checked.templates) * nouns)]
+        nouns = checked.sentences.fillings
+        pairs = range(len(checked.sentences.templates) * nouns)
+        self.of_pair = [self._number(self._of_pair(k, nouns)) for k in pairs]
         for texts in self._texts:
             for text in sorted(texts):
                 self.of_text(text)
         performs = any(activity.name == "perform" for activity in every(Activity, checked.frames))
         self.of_performed = [
             self._number(self._of_pair(k, nouns) | self._of_text(text))
-            for k, text in enumerate(texts_of_pairs(checked))
+            for k, text in enumerate(checked.sentences.by_number())
             if performs
         ]
 
@@ -73,7 +77,7 @@ class Classes:
         return frozenset(number for signature, number in self._numbers.items() if position in signature)
 
     def noun_in(self, text: str) -> int:
-        """The noun that a pattern finds in what an NPC says."""
+        """The filling that patterns find in what an NPC says."""
         return self._nouns.get(normal(text), NO_NOUN)
 
     def set_of(self, patterns: Iterable[Pattern]) -> int:
@@ -100,11 +104,6 @@ class Classes:
     def count(self) -> int:
         """Number of classes, silence included."""
         return len(self._numbers) + 1
-
-
-def texts_of_pairs(checked: CheckedScenario) -> list[str]:
-    """Texts of all pairs, row by row."""
-    return [template.replace("<noun>", noun) for template in checked.templates for noun in checked.nouns]
 
 
 # -- terms simplified by what is known when a rule is looked at: this sorts rules by trigger -----------------

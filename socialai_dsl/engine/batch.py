@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from typing import Any, Final
 
 import numpy as np
@@ -41,7 +42,10 @@ class Part:
         rules: number of counted rules.
         outcomes: the batch's number of each way to end, deadly and time-out included.
         actions: Body of each body action of the batch.
-        templates, nouns: the program's own index of each of the batch's, -1 if it has no such.
+        templates: the program's own index of each of the batch's, -1 if it has no such.
+        slots: for each slot of the batch the program's own index of each of its words, likewise.
+        strides: for each template of the batch the filling that it has without its slots, and what a word of each slot
+            of the batch counts in it, 0 if the template lacks the slot.
         tokens: the batch's id of each token id of the program.
         successes: whether each way to end is a success.
         name: what an error calls the program.
@@ -52,7 +56,8 @@ class Part:
     outcomes: Sequence[int]
     actions: Sequence[int]
     templates: Sequence[int]
-    nouns: Sequence[int]
+    slots: Sequence[Sequence[int]]
+    strides: Sequence[Sequence[int]]
     tokens: Sequence[int]
     successes: Sequence[bool]
     name: str = ""
@@ -102,7 +107,7 @@ class Batch:
         gestures = any(int(header[Header.CHANNELS]) > _PLAIN_CHANNELS for header in headers)
         self.state: State = empty_state(rows, registers, board, length, VIEW, gestures)
         counters = int(sum(int(header[Header.COUNTERS]) for header in headers))
-        self.ports: Ports = empty_ports(self.state, counters)
+        self.ports: Ports = empty_ports(self.state, counters, len(parts[0].slots))
         self.counters = self.ports.counters
         for row, pool in enumerate(pool_of_row):
             in_sequence = int(pool in sequences)
@@ -141,7 +146,7 @@ class Batch:
 
         Args:
             task: one of the steps.
-            actions: integers (E, 4); left out, `ports.actions`.
+            actions: integers (E, 3 + slots); left out, `ports.actions`.
 
         Raises:
             RoomError: all rows were stepped, but one that was reset found no room as its scenario requires; it
@@ -234,10 +239,10 @@ def _link(
         link[Link.OUTCOMES] = len(part.outcomes)
         link[Link.VIEWS] = views[canvas]
         link[Link.ACTIONS], link[Link.TEMPLATES] = len(part.actions), len(part.templates)
-        link[Link.NOUNS] = len(part.nouns)
-        tables = np.array(
-            [*part.actions, *part.templates, *part.nouns, *part.outcomes, *part.successes], np.int32
-        )
+        link[Link.SLOTS] = len(part.slots)
+        spoken = [*part.templates, *chain(*part.strides), *map(len, part.slots), *chain(*part.slots)]
+        link[Link.ENDINGS] = len(part.actions) + len(spoken)
+        tables = np.array([*part.actions, *spoken, *part.outcomes, *part.successes], np.int32)
         own = _with_tokens(part)
         link[Link.FIRST_ROLLING], link[Link.LAST_ROLLING] = _rolling(own)
         own[Header.FLAGS] |= _traits(own) | (Trait.GESTURES if gestures else 0)

@@ -41,10 +41,7 @@ def _keep_final(book: Any, row: int) -> None:
 def _how_it_ended(row: Row) -> int:
     """Where the batch's number of how the episode ended is in the words of the program."""
     link = row.program[Header.SIZE]
-    spaces = (
-        row.program[link + Link.ACTIONS] + row.program[link + Link.TEMPLATES] + row.program[link + Link.NOUNS]
-    )
-    return link + Link.END + spaces + row.registers[Register.OUTCOME]
+    return link + Link.END + row.program[link + Link.ENDINGS] + row.registers[Register.OUTCOME]
 
 
 @inline
@@ -139,13 +136,15 @@ def _actions_fit(book: Any, rows: int) -> bool:
     link = program[Header.SIZE]
     primitives = np.uint64(program[link + Link.ACTIONS])
     templates = np.uint64(program[link + Link.TEMPLATES])
-    nouns = np.uint64(program[link + Link.NOUNS])
+    slots = program[link + Link.SLOTS]
+    sizes = link + Link.END + program[link + Link.ACTIONS] + program[link + Link.TEMPLATES] * (2 + slots)
     actions = uint64_of(book, Book.FLAT_ACTIONS, ZERO)
     wrong = False
-    for i in range(0, 4 * rows, 4):
+    for i in range(0, (3 + slots) * rows, 3 + slots):
         # What is negative is large unsigned.
-        wrong |= (actions[i] >= primitives) | (actions[i + 1] >= np.uint64(2))
-        wrong |= (actions[i + 2] >= templates) | (actions[i + 3] >= nouns)
+        wrong |= (actions[i] >= primitives) | (actions[i + 1] >= np.uint64(2)) | (actions[i + 2] >= templates)
+        for slot in range(slots):
+            wrong |= actions[i + 3 + slot] >= np.uint64(program[sizes + slot])
     return not wrong
 
 

@@ -30,7 +30,7 @@ from socialai_dsl.program import Body, Flag, FrameColumn, Header, Register
 
 @inline
 def _play(row: Row, link: int) -> None:
-    """Write the action of the agent's frame, int64 (4,); the row is played on and must be a copy.
+    """Write the action of the agent's frame, int64 (3 + slots,); the row is played on and must be a copy.
 
     Without a frame the agent stands still and is silent.
     """
@@ -57,7 +57,8 @@ def _play(row: Row, link: int) -> None:
     action = row.action
     action[1] = 0
     action[2] = 0
-    action[3] = 0
+    for slot in range(program[link + Link.SLOTS]):
+        action[3 + slot] = 0
     action[0] = _index_of(program, link + Link.END, program[link + Link.ACTIONS], body)
     _encode_line(row, link, line)
 
@@ -73,12 +74,33 @@ def _encode_line(row: Row, link: int, line: int) -> None:
         return
     table = link + Link.END + program[link + Link.ACTIONS]
     template = _index_of(program, table, program[link + Link.TEMPLATES], pair // nouns)
-    table += program[link + Link.TEMPLATES]
-    noun = _index_of(program, table, program[link + Link.NOUNS], pair % nouns)
-    if template >= 0 and noun >= 0:
+    strides = table + program[link + Link.TEMPLATES]
+    if template >= 0 and _encode_words(row, link, strides, template, pair % nouns):
         action[1] = 1
         action[2] = template
-        action[3] = noun
+
+
+@outline
+def _encode_words(row: Row, link: int, strides: int, template: int, filling: int) -> bool:
+    """Write the words in the slots of a template; whether the batch has them all."""
+    stay_outline()
+    program = row.program
+    slots = program[link + Link.SLOTS]
+    sizes = strides + program[link + Link.TEMPLATES] * (1 + slots)
+    words = sizes + slots
+    strides += template * (1 + slots)
+    filling -= program[strides]
+    sayable = True
+    for slot in range(slots):
+        size = program[sizes + slot]
+        stride = program[strides + 1 + slot]
+        if stride != 0:
+            word = _index_of(program, words, size, filling // stride)
+            sayable &= word >= 0
+            filling %= stride
+            row.action[3 + slot] = max(word, ZERO)
+        words += size
+    return sayable
 
 
 @outline

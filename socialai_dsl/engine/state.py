@@ -58,8 +58,10 @@ class Key(IntEnum):
 class Link(IntEnum):
     """Words that follow a program in a batch.
 
-    After them: for each action, template and noun of the batch the program's own (-1 if it has none), then for each
-    outcome of the program the batch's, then whether each is a success.
+    After them: for each action and template of the batch the program's own (-1 if it has none); for each template
+    what a filling is without its slots, and what the word of each slot counts (0 if the template lacks it); how many
+    words each slot has; for each word of each slot the program's own; for each outcome of the program the batch's, then
+    whether each is a success.
     """
 
     NUMBER = 0  # of the program in the batch
@@ -69,10 +71,11 @@ class Link(IntEnum):
     VIEWS = 4  # first row of the views
     ACTIONS = 5  # choices of the batch's action space
     TEMPLATES = 6
-    NOUNS = 7
-    FIRST_ROLLING = 8  # the first and the last entity that may ever roll
-    LAST_ROLLING = 9
-    END = 10
+    SLOTS = 7
+    ENDINGS = 8  # words before those of outcomes
+    FIRST_ROLLING = 9  # the first and the last entity that may ever roll
+    LAST_ROLLING = 10
+    END = 11
 
 
 class Trait(IntEnum):
@@ -121,7 +124,7 @@ class Book(IntEnum):
     REFUSED = 30
     PICTURE = 31
     SIZES = 32
-    FLAT_ACTIONS = 33  # int64 (4 E), the rows of ACTIONS one behind the other
+    FLAT_ACTIONS = 33  # int64 (heads E), the rows of ACTIONS one behind the other
 
 
 class Size(IntEnum):
@@ -167,7 +170,7 @@ class Tables(NamedTuple):
 class Ports(NamedTuple):
     """What a call reads and writes besides the state."""
 
-    actions: NDArray[np.int64]  # (E, 4)
+    actions: NDArray[np.int64]  # (E, 3 + slots)
     pins: NDArray[np.int16]  # (layouts, R + 1) value of each register or PIN_NONE; last: member of the pool
     layout: NDArray[np.int32]  # (E,) row of the pins that the next reset uses
     chosen: NDArray[np.bool_]  # (E,) rows that a reset is for
@@ -223,11 +226,11 @@ def empty_state(rows: int, registers: int, board: int, tokens: int, view: int, g
     )
 
 
-def empty_ports(state: State, counters: int) -> Ports:
+def empty_ports(state: State, counters: int, slots: int) -> Ports:
     """Ports that fit a state, with nothing pinned and no outcome."""
     rows, registers = state.registers.shape
     return Ports(
-        actions=np.zeros((rows, 4), np.int64),
+        actions=np.zeros((rows, 3 + slots), np.int64),
         pins=no_pins(registers),
         layout=np.zeros(rows, np.int32),
         chosen=np.ones(rows, np.bool_),

@@ -10,7 +10,7 @@ from socialai_dsl.engine.entities import field
 from socialai_dsl.engine.jit import inline, merged
 from socialai_dsl.engine.picture import take_picture
 from socialai_dsl.engine.speech import empty_inbox, inbox_class
-from socialai_dsl.engine.state import AGENT, Link, Row, Trait
+from socialai_dsl.engine.state import AGENT, NOTHING, Link, Row, Trait
 from socialai_dsl.engine.turns import (
     compute_statuses,
     conclude,
@@ -50,8 +50,28 @@ def be_silent(row: Row) -> None:
 
 
 @inline
+def _filling(row: Row, link: int, strides: int) -> int:
+    """The number of the words in all slots of what the agent says; -1 if the program lacks one of them."""
+    program = row.program
+    slots = program[link + Link.SLOTS]
+    sizes = strides + program[link + Link.TEMPLATES] * (1 + slots)
+    words = sizes + slots
+    strides += row.action[2] * (1 + slots)
+    filling = program[strides]
+    lacks = False
+    for slot in range(slots):
+        stride = program[strides + 1 + slot]
+        if stride != 0:
+            word = program[words + row.action[3 + slot]]
+            lacks |= word < 0
+            filling += stride * word
+        words += program[sizes + slot]
+    return NOTHING if lacks else filling
+
+
+@inline
 def decode(row: Row, link: int) -> None:
-    """Note the agent's body action and utterance. A pair that its grammar lacks is silence."""
+    """Note the agent's body action and utterance. What its grammar cannot say is silence."""
     registers = row.registers
     program = row.program
     table = link + Link.END
@@ -60,11 +80,11 @@ def decode(row: Row, link: int) -> None:
     if row.action[1] == 1:
         table += program[link + Link.ACTIONS]
         template = program[table + row.action[2]]
-        noun = program[table + program[link + Link.TEMPLATES] + row.action[3]]
-        if template >= 0 and noun >= 0:
-            pair = template * program[Header.NOUNS] + noun
+        filling = _filling(row, link, table + program[link + Link.TEMPLATES])
+        if template >= 0 and filling >= 0:
+            pair = template * program[Header.NOUNS] + filling
             registers[Register.TEMPLATE] = template
-            registers[Register.NOUN] = noun
+            registers[Register.NOUN] = filling
             registers[Register.UTTERANCE] = 1 + pair
             registers[Register.CLASS] = program[program[Header.CLASS_AT] + pair]
 

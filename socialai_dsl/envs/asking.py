@@ -102,7 +102,7 @@ class Asker:
         """Take the environment's step; what is asked now.
 
         Args:
-            action: int64 (4,).
+            action: int64 (heads,).
             image: of the environment's observation after it.
             ended: whether the episode has ended.
         """
@@ -143,7 +143,8 @@ class _Looker:
     def __init__(self, program: Program) -> None:
         self._program = program
         self._table = Table([program], 1, 1)
-        self._table.batch.ports.actions[0] = len(program.actions), 0, 0, 0
+        self._table.batch.ports.actions[0] = 0
+        self._table.batch.ports.actions[0, 0] = len(program.actions)
         self._registers = self._table.state.registers[0]
         self._remembered = [name.register for name in program.registers if name.path.startswith(NOTED)]
 

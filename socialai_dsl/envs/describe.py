@@ -19,7 +19,7 @@ from socialai_dsl.program import (
     Register,
     RegisterName,
 )
-from socialai_dsl.vocabulary import ACTIONS, COLORS, DIRECTIONS, TURN_WORDS
+from socialai_dsl.vocabulary import ACTIONS, COLORS, DIRECTIONS, NOUN, TURN_WORDS
 
 Row = NDArray[np.int16]
 
@@ -126,7 +126,7 @@ def _last(program: Program, registers: Row) -> dict[str, Any]:
     poked = int(registers[Register.POKED])
     return {
         "action": ACTIONS[int(registers[Register.ACTION])],
-        "said": None if silent else utterance_text(program, 1 + template * len(program.nouns) + noun),
+        "said": None if silent else utterance_text(program, 1 + template * program.sentences.fillings + noun),
         "poked": str(program.entities[poked]) if poked >= 0 else None,
     }
 
@@ -144,5 +144,11 @@ def _pending(program: Program, registers: Row) -> dict[str, list[Any]]:
 
 
 def _heard_entry(program: Program, number: int, speaker: int, noun: int) -> list[Any]:
-    """An utterance in an inbox: its class, who said it, and the noun that was heard in it."""
-    return [number, str(program.entities[speaker]), program.nouns[noun] if noun >= 0 else None]
+    """An utterance in an inbox: its class, who said it, and the noun, or what stood in each slot."""
+    sentences = program.sentences
+    heard = {
+        slot.name: slot.words[choice]
+        for slot, choice in zip(sentences.slots, sentences.choices(noun), strict=True)
+        if choice is not None
+    }
+    return [number, str(program.entities[speaker]), heard.get(NOUN, heard or None)]

@@ -49,7 +49,7 @@ class Start:
 
 @dataclass
 class Recording:
-    """What happened since a moment: that moment, and the actions, int64 (4,) as bytes each."""
+    """What happened since a moment: that moment, and the actions, int64 (heads,) as bytes each."""
 
     start: Start
     actions: list[bytes] = field(default_factory=list)
@@ -242,10 +242,9 @@ def _alone(program: Program, suite: ProgramSuite | None, number: int) -> Program
         (program,),
         (suite.members[number],),
         suite.actions,
-        suite.templates,
-        suite.nouns,
+        suite.sentences,
         (suite.template_maps[number],),
-        (suite.noun_maps[number],),
+        (suite.slot_maps[number],),
     )
 
 

@@ -378,7 +378,7 @@ class _Layout:
         if utterance == 0:
             return
         pair = utterance - 1
-        template, noun = divmod(pair, len(self.program.nouns))
+        template, noun = divmod(pair, self.program.sentences.fillings)
         self.row[Register.UTTERANCE] = utterance
         self.row[Register.TEMPLATE], self.row[Register.NOUN] = template, noun
         self.row[Register.CLASS] = self.program.table(Header.CLASS_AT)[template, noun]
@@ -418,7 +418,7 @@ class _Layout:
                 self.row[first : first + words] = self._entry(f"pending.{key}[{i}]", entry, words)
 
     def _entry(self, key: str, given: Any, words: int) -> list[int]:
-        """An utterance in an inbox: its class, or [class, speaker, noun]."""
+        """An utterance in an inbox: its class, or [class, speaker, noun], where `noun` may be a mapping of slots."""
         highest = self.program.header(Header.CLASSES) - 1
         if words == 1:
             return [whole_number(key, given, 1, highest)]
@@ -429,8 +429,22 @@ class _Layout:
         return [
             whole_number(f"{key}[0]", number, 1, highest),
             word(f"{key}[1]", speaker, entities),
-            -1 if noun is None else word(f"{key}[2]", noun, self.program.nouns),
+            -1 if noun is None else self._filling(f"{key}[2]", noun),
         ]
+
+    def _filling(self, key: str, given: Any) -> int:
+        """The noun that was heard; of a grammar with slots a mapping of these to what stood there."""
+        sentences = self.program.sentences
+        if sentences.nouns:
+            return word(key, given, sentences.nouns)
+        self._mapping(key, given)
+        _only(key, given, [slot.name for slot in sentences.slots])
+        return sentences.filling(
+            [
+                word(f"{key}.{slot.name}", given[slot.name], slot.words) if slot.name in given else None
+                for slot in sentences.slots
+            ]
+        )
 
 
 def _only(key: str, given: Mapping[str, Any], allowed: Sequence[str]) -> None:

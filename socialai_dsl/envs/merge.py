@@ -11,7 +11,7 @@ from gymnasium import spaces
 from socialai_dsl.engine.batch import Part
 from socialai_dsl.program import NO_GESTURE, VIEW, Body, EntityColumn, Header, Program, TypeColumn, room_words
 from socialai_dsl.program_suite import Playable, ProgramSuite, mixture, prefixed
-from socialai_dsl.vocabulary import ACTIONS
+from socialai_dsl.vocabulary import ACTIONS, Sentences
 
 
 @dataclass(frozen=True)
@@ -65,9 +65,10 @@ class Merged:
         return self.playable.vocabulary
 
     def action_space(self) -> spaces.MultiDiscrete:
-        """[P + 1, 2, T, N]: body action (the last is no movement), speak or not, template, noun."""
-        words = self.playable
-        return spaces.MultiDiscrete([len(words.actions) + 1, 2, len(words.templates), len(words.nouns)])
+        """[P + 1, 2, T, N...]: body action (the last is no movement), speak or not, template, a word for each slot."""
+        sentences = self.playable.sentences
+        sizes = [len(slot.words) for slot in sentences.slots]
+        return spaces.MultiDiscrete([len(self.playable.actions) + 1, 2, len(sentences.templates), *sizes])
 
     def observation_space(self) -> spaces.Dict:
         """Image uint8 (7, 7, 4 or 6) and tokens int16 (L,), both with true bounds."""
@@ -98,15 +99,28 @@ def _parts(suite: ProgramSuite, outcomes: Sequence[str], playable: Playable) -> 
             outcomes=[ending[name] for name in _endings(member, program, playable)],
             actions=[*(_body(program, word) for word in suite.actions), int(Body.NONE)],
             templates=list(templates),
-            nouns=list(nouns),
+            slots=[list(own) for own in slots],
+            strides=_strides(program.sentences, suite.sentences, templates),
             tokens=[token[word] for word in program.vocabulary],
             name=program.name,
             successes=[outcome.success for outcome in program.outcome_table],
         )
-        for member, program, templates, nouns in zip(
-            suite.members, suite.programs, suite.template_maps, suite.noun_maps, strict=True
+        for member, program, templates, slots in zip(
+            suite.members, suite.programs, suite.template_maps, suite.slot_maps, strict=True
         )
     )
+
+
+def _strides(own: Sentences, shared: Sentences, templates: Sequence[int]) -> list[list[int]]:
+    """For each template of the batch the filling of a program where it has no slot, and what each slot adds to that."""
+    places = {slot.name: place for place, slot in enumerate(own.slots)}
+    rows = []
+    for template in templates:
+        used = own.used[template] if template >= 0 else (False,) * len(own.slots)
+        base = own.filling([0 if is_used else None for is_used in used])
+        found = (places.get(slot.name) for slot in shared.slots)
+        rows.append([base, *(own.strides[p] if p is not None and used[p] else 0 for p in found)])
+    return rows
 
 
 def _endings(member: str, program: Program, playable: Playable) -> list[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
 from typing import Any
 
 import gymnasium
@@ -21,54 +20,67 @@ from socialai_dsl.program_suite import Playable, ProgramSuite
 from socialai_dsl.render.panel import Face
 from socialai_dsl.render.tiles import Code
 from socialai_dsl.semantics.plans import CheckedScenario
+from socialai_dsl.vocabulary import Sentences, Slot
 
-FORMS = "(body action, template, noun) or (body action, sentence), each part a word, a number or None"
-
-
-Live = tuple[frozenset[int], frozenset[int]]
-"""Indices of templates and nouns that are meant, where a word stands for several."""
+Live = tuple[frozenset[int], ...]
+"""Indices of templates, and of the words of each slot, that are meant where a word stands for several."""
 
 
 def encode_action(
-    action: Sequence[Any],
-    actions: Sequence[str],
-    templates: Sequence[str],
-    nouns: Sequence[str],
-    live: Live | None = None,
+    action: Sequence[Any], actions: Sequence[str], sentences: Sentences, live: Live | None = None
 ) -> NDArray[np.int64]:
-    """The action of the space, int64 (4,), for the paper's notation or words.
+    """The action of the space, int64 (3 + slots,), for the paper's notation or words.
 
     `(1, None, None)` turns right, `(None, 1, 5)` says template 1 with noun 5 and stays, `("forward", "Open sesame")`
-    does both.
+    does both. Of a grammar with several slots there is a part for each: `(None, "Give <what> to <whom>", 0, "Ann")`.
 
     Args:
         action: what is meant.
         actions: words for body actions.
-        templates: what can be said, each with its <noun>.
-        nouns: what the <noun> can be.
-        live: which of equal templates and nouns are meant; None: the first.
+        sentences: what can be said.
+        live: which of equal templates and words are meant; None: the first.
 
     Raises:
         ValueError: what was given is none of these; the message says what was got and what was expected.
     """
-    if isinstance(action, str) or not isinstance(action, Sequence | np.ndarray) or len(action) not in (2, 3):
-        raise ValueError(f"got the action {action!r}; expected {FORMS}")
-    live_templates, live_nouns = live or (frozenset(), frozenset())
-    primitive = len(actions) if action[0] is None else _index(action[0], actions, "body action")
-    if len(action) == 2:
-        spoken = (
-            None
-            if action[1] is None
-            else _sentence(action[1], templates, nouns, (live_templates, live_nouns))
+    names = ", ".join(slot.name for slot in sentences.slots)
+    if (
+        isinstance(action, str)
+        or not isinstance(action, Sequence | np.ndarray)
+        or len(action) not in (2, 2 + len(sentences.slots))
+    ):
+        forms = (
+            f"(body action, template, {names}) or (body action, sentence), each part a word, a number or None"
         )
-    elif (action[1] is None) != (action[2] is None):
-        raise ValueError(f"got template {action[1]!r} and noun {action[2]!r}; expected both or neither")
-    elif action[1] is None:
-        spoken = None
-    else:
-        template = _index(action[1], templates, "template", live_templates)
-        spoken = template, _index(action[2], nouns, "noun", live_nouns)
-    return np.array([primitive, 0, 0, 0] if spoken is None else [primitive, 1, *spoken], np.int64)
+        raise ValueError(f"got the action {action!r}; expected {forms}")
+    meant = live or (frozenset(),) * (1 + len(sentences.slots))
+    primitive = len(actions) if action[0] is None else _index(action[0], actions, "body action")
+    if action[1] is None and all(word is None for word in action[2:]):
+        return np.array([primitive, 0, 0, *(0 for _ in sentences.slots)], np.int64)
+    if len(action) == 2:
+        return np.array([primitive, 1, *_sentence(action[1], sentences, meant)], np.int64)
+    if action[1] is None:
+        words = " and ".join(
+            f"{slot.name} {word!r}" for slot, word in zip(sentences.slots, action[2:], strict=True)
+        )
+        raise ValueError(f"got template None and {words}; expected both or neither")
+    template = _index(action[1], sentences.templates, "template", meant[0])
+    spoken = [
+        _word(word, slot, is_used, words, action[1])
+        for word, slot, is_used, words in zip(
+            action[2:], sentences.slots, sentences.used[template], meant[1:], strict=True
+        )
+    ]
+    return np.array([primitive, 1, template, *spoken], np.int64)
+
+
+def _word(given: Any, slot: Slot, is_used: bool, live: frozenset[int], template: Any) -> int:
+    """What stands in a slot; a template that lacks the slot takes no notice of it."""
+    if given is not None:
+        return _index(given, slot.words, slot.name, live)
+    if not is_used:
+        return 0
+    raise ValueError(f"got template {template!r} and {slot.name} None; expected both or neither")
 
 
 def _index(given: Any, words: Sequence[str], what: str, live: frozenset[int] = frozenset()) -> int:
@@ -85,18 +97,22 @@ def _index(given: Any, words: Sequence[str], what: str, live: frozenset[int] = f
     )
 
 
-def _sentence(given: Any, templates: Sequence[str], nouns: Sequence[str], live: Live) -> tuple[int, int]:
-    pairs = product(range(len(templates)), range(len(nouns)))
+def _sentence(given: Any, sentences: Sentences, live: Live) -> tuple[int, ...]:
+    def order(spoken: tuple[int, ...]) -> tuple[bool, tuple[int, ...]]:
+        used = (True, *sentences.used[spoken[0]])
+        is_live = all(k in among or not counts for k, among, counts in zip(spoken, live, used, strict=True))
+        return is_live, tuple(-k for k in spoken)
+
     # Of equal sentences the last is kept: a live one if there is one, else the first.
-    ordered = sorted(pairs, key=lambda pair: (pair[0] in live[0] and pair[1] in live[1], -pair[0], -pair[1]))
-    sentences = {templates[t].replace("<noun>", nouns[n]): (t, n) for t, n in ordered}
+    ordered = sorted(((template, *choices) for template, choices in sentences.each()), key=order)
+    texts = {sentences.text(template, choices): (template, *choices) for template, *choices in ordered}
     if isinstance(given, str):
-        if given in sentences:
-            return sentences[given]
-        near = did_you_mean(given, sentences)
+        if given in texts:
+            return texts[given]
+        near = did_you_mean(given, texts)
         hint = f"; did you mean {near!r}?" if near else ""
         raise ValueError(f"got the sentence {given!r}, which the grammar cannot say{hint}")
-    raise ValueError(f"got the sentence {given!r}; expected a text such as {next(iter(sentences))!r}")
+    raise ValueError(f"got the sentence {given!r}; expected a text such as {next(iter(texts))!r}")
 
 
 Observation = dict[str, NDArray[Any]]
@@ -114,8 +130,9 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
     colour, status, orientation, then pointing and last act. `tokens`, int16 (L,): the words heard since the reset,
     oldest first, as indices into `program.vocabulary`; 0 pads, 1 is an unknown word.
 
-    **Action.** int64 (4,): body action (the last one is no movement), speak (1) or not (0), template, noun. Template
-    and noun count only if the agent speaks. `encode_action` makes one from words.
+    **Action.** int64 (3 + slots,): body action (the last one is no movement), speak (1) or not (0), template, noun, or
+    in place of the noun a word for each slot of the grammar. Template and noun count only if the agent speaks, a slot
+    only if the template has it. `encode_action` makes one from words.
 
     **Reward.** A success in step t pays 1 - 0.9 t / horizon, everything else 0, unless the scenario's `reward` and
     `rules` say otherwise.
@@ -148,6 +165,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._table = Table([program], 1, 1)
         self.observation_space = self._table.merged.observation_space()  # type: ignore[assignment]
         self.action_space = self._table.merged.action_space()
+        self._shape = self.action_space.nvec.shape
         self._suite = isinstance(program, ProgramSuite)
         self._acts = isinstance(program, ProgramSuite) and program.in_sequence
         # What a step needs of one row, looked up once: asking an array takes longer than the engine takes for a step.
@@ -220,7 +238,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         if self._ended:
             raise ValueError("step: got a call outside of an episode; expected reset() first")
         given = action if isinstance(action, np.ndarray) else np.asarray(action)
-        if given.shape != (4,) or given.dtype is not _INT64:
+        if given.shape != self._shape or given.dtype is not _INT64:
             given = self._converted(action, given)
         self._action[:] = words = given.tobytes()
         ended = self._play()
@@ -269,8 +287,8 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         self._always = {"member": self._table.member(0)} if self._suite else {}
 
     def _converted(self, action: Any, given: NDArray[Any]) -> NDArray[np.int64]:
-        """Four whole numbers of another type. Raises ValueError for anything else."""
-        if given.shape != (4,) or given.dtype.kind not in "iu":
+        """Whole numbers of another type. Raises ValueError for anything else."""
+        if given.shape != self._shape or given.dtype.kind not in "iu":
             raise self._refusal(action)
         return given.astype(np.int64)
 
@@ -281,7 +299,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         return {"image": self._copy_image(), "tokens": self._copy_tokens()}
 
     def encode_action(self, action: Sequence[Any]) -> NDArray[np.int64]:
-        """The action that words or the paper's notation mean, int64 (4,).
+        """The action that words or the paper's notation mean, int64 (heads,).
 
         `("forward", "Open sesame")` moves and speaks, `(None, "Open sesame")` only speaks, `("left", None)` only moves.
         The paper's notation has indices: `(1, None, None)` is body action 1, `(None, 1, 5)` template 1 with noun 5.
@@ -294,10 +312,10 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
             ValueError: the action is none of these; the message says what was expected.
         """
         live = self.program.live(self._table.number(0)) if isinstance(self.program, ProgramSuite) else None
-        return encode_action(action, self.program.actions, self.program.templates, self.program.nouns, live)
+        return encode_action(action, self.program.actions, self.program.sentences, live)
 
     def scripted_action(self) -> NDArray[np.int64]:
-        """The action of the scenario's own script for the agent, int64 (4,); nothing changes.
+        """The action of the scenario's own script for the agent, int64 (3 + slots,); nothing changes.
 
         Raises:
             ValueError: the agent follows no frame.

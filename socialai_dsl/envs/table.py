@@ -173,13 +173,14 @@ class Table:
             self._begin(chosen & (rows == 0))
 
     def step(self, task: Task, actions: Any) -> int:
-        """Step all rows, int64 (E, 4); how many episodes ended. Raises ValueError for a bad action."""
+        """Step all rows, int64 (E, 3 + slots); how many episodes ended. Raises ValueError for a bad action."""
         if self.fresh:
             raise ValueError("step: got a call before the first reset(); expected reset() first")
         given = np.asarray(actions)
-        if given.shape != (self.rows, 4) or given.dtype.kind not in "iu":
+        expected = self.batch.ports.actions.shape
+        if given.shape != expected or given.dtype.kind not in "iu":
             raise ValueError(
-                f"step: got actions of shape {given.shape} and type {given.dtype}; expected integers ({self.rows}, 4)"
+                f"step: got actions of shape {given.shape} and type {given.dtype}; expected integers {expected}"
             )
         ended = self.play(task, given)
         if ended == BAD_ACTION:
@@ -290,7 +291,7 @@ class Table:
         self.batch.set_weights(0, weights)
 
     def scripted_actions(self) -> NDArray[np.int64]:
-        """What the agents' frames would do now, int64 (E, 4); nothing changes."""
+        """What the agents' frames would do now, int64 (E, 3 + slots); nothing changes."""
         free = [p.name for p in self.programs if not p.header(Header.FLAGS) & Flag.AGENT_FRAME]
         if free:
             names = ", ".join(dict.fromkeys(free))

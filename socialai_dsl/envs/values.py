@@ -139,30 +139,29 @@ def utterance_text(program: Program, value: int) -> str | list[int]:
     """What an utterance says, "" for silence; [template, noun] if another pair before it says the same."""
     if value == 0:
         return SILENCE
-    pair = divmod(value - 1, len(program.nouns))
-    text = _text(program, *pair)
-    return text if _pair_of(program, text) == pair else list(pair)
+    pair = divmod(value - 1, program.sentences.fillings)
+    text = program.sentences.said(*pair)
+    return text if text is not None and _pair_of(program, text) == pair else list(pair)
 
 
 def utterance_number(program: Program, given: Any, key: str) -> int:
-    """0 for silence, else 1 + template * nouns + noun."""
+    """0 for silence, else 1 + template * fillings + filling."""
     if given == SILENCE and isinstance(given, str):
         return 0
     if isinstance(given, str):
         pair = _pair_of(program, given)
         if pair is None:
-            texts = [_text(program, t, n) for t, n in _pairs(program)]
-            near = did_you_mean(given, texts)
+            near = did_you_mean(given, (program.sentences.text(*one) for one in program.sentences.each()))
             hint = f"; did you mean {near!r}?" if near else ""
             raise ValueError(f"{key}: got {given!r}, which the grammar cannot say{hint}")
     elif isinstance(given, Sequence) and len(given) == 2:
         pair = (
             whole_number(f"{key}[0]", given[0], 0, len(program.templates) - 1),
-            whole_number(f"{key}[1]", given[1], 0, len(program.nouns) - 1),
+            whole_number(f"{key}[1]", given[1], 0, program.sentences.fillings - 1),
         )
     else:
         raise ValueError(f'{key}: got {given!r}; expected a text, [template, noun], or "" for silence')
-    return 1 + pair[0] * len(program.nouns) + pair[1]
+    return 1 + pair[0] * program.sentences.fillings + pair[1]
 
 
 def whole_number(key: str, value: Any, low: int, high: int, hint: str = "") -> int:
@@ -204,14 +203,10 @@ def _cell(program: Program, given: Any, key: str) -> int:
     return CELL + 32 * whole_number(f"{key}[1]", y, 0, program.header(Header.CANVAS_HEIGHT) - 1) + across
 
 
-def _text(program: Program, template: int, noun: int) -> str:
-    return program.templates[template].replace("<noun>", program.nouns[noun])
-
-
-def _pairs(program: Program) -> list[tuple[int, int]]:
-    return [(t, n) for t in range(len(program.templates)) for n in range(len(program.nouns))]
-
-
 def _pair_of(program: Program, text: str) -> tuple[int, int] | None:
-    """The first pair that says a text; None if none does."""
-    return next((pair for pair in _pairs(program) if _text(program, *pair) == text), None)
+    """The first template and filling that say a text; None if none do."""
+    sentences = program.sentences
+    spoken = zip(sentences.each(), sentences.pairs(), strict=True)
+    return next(
+        (pair for (template, choices), pair in spoken if sentences.text(template, choices) == text), None
+    )

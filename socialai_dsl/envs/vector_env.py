@@ -34,8 +34,9 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
     are type, colour, status, orientation, then pointing and last act. `tokens`, int16 (E, L): the words heard since the
     reset, oldest first, as indices into `vocabulary`; 0 pads, 1 is an unknown word.
 
-    **Action.** int64 (E, 4): body action (the last one is no movement), speak (1) or not (0), template, noun. Template
-    and noun count only where the agent speaks.
+    **Action.** int64 (E, 3 + slots): body action (the last one is no movement), speak (1) or not (0), template, noun,
+    or in place of the noun a word for each slot of the grammar. Template and noun count only where the agent speaks, a
+    slot only where the template has it.
 
     **Infos.** Empty, except in a step that ends an episode: `success` bool (E,), `outcome` int (E,), an index into
     `outcomes`, and the masks `_success` and `_outcome`, bool (E,), of the episodes that ended. In same-step mode also
@@ -152,7 +153,7 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
         """Step every environment once.
 
         Args:
-            actions: integers (E, 4).
+            actions: integers (E, heads).
 
         Returns:
             Observation, rewards float64 (E,), terminations bool (E,), truncations bool (E,), infos. An outcome
@@ -244,7 +245,7 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
         return self._table.image_ids()
 
     def scripted_actions(self) -> NDArray[np.int64]:
-        """The actions of the scenario's own script for the agent, int64 (E, 4); nothing changes.
+        """The actions of the scenario's own script for the agent, int64 (E, 3 + slots); nothing changes.
 
         Raises:
             ValueError: the agent of a scenario follows no frame.

@@ -34,7 +34,7 @@ class Policy(Protocol):
         """
 
     def act(self, observation: Observation) -> Int64:
-        """Choose actions, int64 (E, 4), given `image`, uint8 (E, H, W, C), and `tokens`, int16 (E, L)."""
+        """Choose actions, int64 (E, heads), given `image`, uint8 (E, H, W, C), and `tokens`, int16 (E, L)."""
 
 
 class RandomPolicy:

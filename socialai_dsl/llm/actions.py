@@ -10,7 +10,7 @@ from typing import Any, Final, Literal, NamedTuple, get_args
 
 from socialai_dsl.diagnostics import did_you_mean, printable
 from socialai_dsl.program_suite import Playable
-from socialai_dsl.vocabulary import words
+from socialai_dsl.vocabulary import NOUN, words
 
 Mode = Literal["text", "json", "tools"]
 """How a model gives its action: in a line of its reply, as a JSON object, or by calling tools."""
@@ -105,17 +105,14 @@ class ActionLanguage:
     def __init__(self, program: Playable) -> None:
         self._actions = (*program.actions, _STANDING)
         self._templates = tuple(dict.fromkeys(program.templates))
-        self._nouns = tuple(dict.fromkeys(program.nouns))
+        self._slots = {slot.name: tuple(dict.fromkeys(slot.words)) for slot in program.sentences.slots}
         self._movements = {
             tuple(words(said)): action
             for action in self._actions
             for said in (action, *_SYNONYMS.get(action, ()))
         }
-        self._sentences = [
-            template.replace("<noun>", noun)
-            for template in self._templates
-            for noun in (self._nouns if "<noun>" in template else self._nouns[:1])
-        ]
+        spoken = (program.sentences.text(*one) for one in program.sentences.each())
+        self._sentences = list(dict.fromkeys(spoken))
         self._by_words: dict[tuple[str, ...], str] = {}
         for sentence in self._sentences:
             self._by_words.setdefault(tuple(words(sentence)), sentence)
@@ -133,9 +130,14 @@ class ActionLanguage:
         lines += [f"- {action}: {_MEANINGS[action]}" for action in self._actions[:-1]]
         lines += [f"- {_STANDING}: stay as you are"]
         if self._sentences:
-            lines += ["", "A sentence is one of these templates with one of these nouns for <noun>."]
+            places = _listed(
+                [f"one of these nouns for <{NOUN}>" if n == NOUN else f"<{n}>" for n in self._slots]
+            )
+            filled = places if [*self._slots] == [NOUN] else f"one of these words for each {places} in it"
+            lines += ["", f"A sentence is one of these templates with {filled}."]
             lines += [f"Templates: {'; '.join(map(printable, self._templates))}"]
-            lines += [f"Nouns: {'; '.join(map(printable, self._nouns))}"]
+            for name, known in self._slots.items():
+                lines += [f"{'Nouns' if name == NOUN else f'<{name}>'}: {'; '.join(map(printable, known))}"]
         return "\n".join([*lines, "", *self._how_to_reply(mode)])
 
     def write(self, action: Action) -> str:
@@ -186,14 +188,17 @@ class ActionLanguage:
         rules = [f"movement ::= {movements}"]
         if not self._sentences:
             return "\n".join(['root ::= "Act: " movement', *rules])
-        nouns = " | ".join(json.dumps(noun, ensure_ascii=False) for noun in self._nouns)
+        fillers = [
+            f"{_rule_name(name)} ::= {' | '.join(json.dumps(word, ensure_ascii=False) for word in known)}"
+            for name, known in self._slots.items()
+        ]
         templates = " | ".join(_rule_of(template) for template in self._templates)
         return "\n".join(
             [
                 'root ::= "Act: " (movement | speech | movement ", " speech)',
                 r'speech ::= "say \"" sentence "\""',
                 f"sentence ::= {templates}",
-                f"noun ::= {nouns}",
+                *fillers,
                 *rules,
             ]
         )
@@ -215,12 +220,17 @@ class ActionLanguage:
         direction = _choice("what to do", self._actions)
         tools = [_tool("move", "Move your body.", {"direction": direction})]
         if self._sentences:
-            spoken = {
-                "template": _choice("what to say", self._templates),
-                "noun": _choice("what stands for <noun>", self._nouns),
+            spoken = {"template": _choice("what to say", self._templates)}
+            fillers = {
+                name: _choice(f"what stands for <{name}>", known) for name, known in self._slots.items()
             }
             both = {"direction": _choice("what to do at the same time", self._actions)}
-            tools.append(_tool("say", "Say a template with a noun for its <noun>.", spoken, both))
+            if [*self._slots] == [NOUN]:
+                about = "Say a template with a noun for its <noun>."
+                tools.append(_tool("say", about, spoken | fillers, both))
+            else:
+                about = "Say a template with a word for each of the slots <...> that it has."
+                tools.append(_tool("say", about, spoken, fillers | both))
         return tools
 
     def _how_to_reply(self, mode: Mode) -> list[str]:
@@ -303,7 +313,9 @@ class ActionLanguage:
         )
         spoken = next((given[key] for key in ("say", "sentence", "utterance") if given.get(key)), None)
         if spoken is None and isinstance(given.get("template"), str):
-            spoken = given["template"].replace("<noun>", str(given.get("noun", "")))
+            spoken = given["template"]
+            for name in self._slots:
+                spoken = spoken.replace(f"<{name}>", str(given.get(name, "")))
         movement = sentence = None
         if moved is not None:
             movement = self._movements.get(tuple(words(str(moved)[:_QUOTED])))
@@ -331,7 +343,8 @@ class ActionLanguage:
 
     def _wrong(self, what: str) -> Parsed:
         """Say what was wrong, and what is possible."""
-        sayable = ", and sentences are the templates with one of the nouns" if self._sentences else ""
+        fillers = "one of the nouns" if [*self._slots] == [NOUN] else "words in place of <...>"
+        sayable = f", and sentences are the templates with {fillers}" if self._sentences else ""
         return Parsed(None, f"{what}. Movements are {', '.join(self._actions)}{sayable}.")
 
 
@@ -389,9 +402,20 @@ def _cited(given: Any) -> str:
 
 def _rule_of(template: str) -> str:
     """A template as a sequence of a grammar."""
-    before, noun, after = template.partition("<noun>")
-    parts = [json.dumps(before, ensure_ascii=False) if before else "", noun and "noun"]
-    return " ".join(part for part in [*parts, json.dumps(after, ensure_ascii=False) if after else ""] if part)
+    parts = re.split(r"<(\w+)>", template)  # a piece of text, a slot, a piece of text, ...
+    texts = (json.dumps(part, ensure_ascii=False) if part else "" for part in parts[::2])
+    slots = (*map(_rule_name, parts[1::2]), "")
+    return " ".join(part for pair in zip(texts, slots, strict=True) for part in pair if part)
+
+
+def _rule_name(slot: str) -> str:
+    """The rule of a grammar for what stands in a slot."""
+    return slot if slot == NOUN else f"slot-{slot.replace('_', '-')}"
+
+
+def _listed(parts: Sequence[str]) -> str:
+    """`a, b and c`."""
+    return " and ".join(part for part in (", ".join(parts[:-1]), parts[-1]) if part)
 
 
 def _choice(about: str, values: Sequence[str]) -> dict[str, Any]:

@@ -84,7 +84,7 @@ class Episode:
 
     Attributes:
         instructions: the text that a model reads before the first observation.
-        actions: the actions of this episode, int64 (4,) each.
+        actions: the actions of this episode, int64 (heads,) each.
         answered: the answers to probes of this episode, in the order given.
 
     Raises:
@@ -231,7 +231,7 @@ def scripted_reply(episode: Episode) -> str:
         ValueError: the agent follows no frame.
     """
     program: Any = episode.env.program
-    movement, speaks, template, noun = episode.env.scripted_action().tolist()
-    said = program.templates[template].replace("<noun>", program.nouns[noun]) if speaks else None
+    movement, speaks, template, *spoken = episode.env.scripted_action().tolist()
+    said = program.sentences.text(template, spoken) if speaks else None
     words = (*program.actions, None)
     return episode.language.write(Action(words[movement], said))

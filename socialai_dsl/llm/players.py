@@ -80,7 +80,7 @@ class PlayedEpisode:
 
     Attributes:
         number: of the test episode.
-        result: how it went. actions: int64 (4,) each.
+        result: how it went. actions: int64 (heads,) each.
         replies: what the model answered before each action, and after the last one if that ended the episode; each
             with what was wrong with it.
         rules: how often each of the scenario's rules fired.

@@ -245,10 +245,14 @@ def tree_of(document: Document) -> Node:
 def merge(base: Node, over: Node) -> Node:
     """`base` overlaid with `over`: mappings are merged key by key, all else is replaced.
 
-    Keys of the base keep their place, those that only `over` has follow in its order. Both trees are used up.
+    Keys of the base keep their place, those that only `over` has follow in its order. Of a grammar, `nouns` and `slots`
+    replace each other. Both trees are used up.
     """
     if not isinstance(base.children, dict) or not isinstance(over.children, dict):
         return over
+    for key, instead in (("nouns", "slots"), ("slots", "nouns")):
+        if over.path[-1:] == ("grammar",) and instead in over.children and key not in over.children:
+            base.children.pop(key, None)
     for key, part in over.children.items():
         below = base.children.get(key)
         base.children[key] = part if below is None else merge(below, part)

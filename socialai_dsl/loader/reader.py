@@ -437,6 +437,8 @@ def _kept(keys: list[str]) -> tuple[type, ...]:
             return (bool, int)
         case [*_, "grammar", "nouns"] | [*_, "grammars", _, "nouns"]:
             return (int,)
+        case [*_, "grammar", "slots", _] | [*_, "grammars", _, "slots", _]:
+            return (int,)
     return ()
 
 

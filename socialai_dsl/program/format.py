@@ -126,7 +126,7 @@ class Register(IntEnum):
     POKED = 14  # entity toggled at by the agent this step, -1 none (an NPC: it was poked)
     SAID_LINE = 15  # 1 + line that the entity on turn says this step, 0 none
     LAST_TURN = 16  # Body of the entity on turn
-    UTTERANCE = 17  # of the agent this step: 1 + template * nouns + noun, 0 silent
+    UTTERANCE = 17  # of the agent this step: 1 + template * fillings + filling, 0 silent
     CHANGED = 18  # 1: an object's status or presence has changed since statuses were last settled
     ACCEPTED = 19  # written by the code at REQUIRE_PC
     ATTEMPT = (
@@ -220,7 +220,7 @@ class LineColumn(IntEnum):
     FIRST_TOKEN = 0
     TOKENS = 1
     CLASS = 2  # utterance class to NPCs that hear it, 1 if no rule waits for it
-    NOUN = 3  # the noun that a pattern with <noun> finds in it; -1 none
+    NOUN = 3  # the filling that a pattern with slots finds in it; -1 none
     COLUMNS = 4
 
 

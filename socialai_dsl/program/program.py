@@ -26,7 +26,7 @@ from socialai_dsl.program.format import (
 )
 from socialai_dsl.program.instructions import TABLE, Kind, Op
 from socialai_dsl.source import Span
-from socialai_dsl.vocabulary import ACTIONS
+from socialai_dsl.vocabulary import ACTIONS, NOUN, Sentences
 
 _AS_WRITTEN = frozenset((Kind.LITERAL, Kind.SITE, Kind.BOARD, Kind.FILLED, Kind.CHANGED))
 """Operands whose word is shown as it is."""
@@ -68,7 +68,7 @@ class RegisterName:
         values: word of each value from `low` on; empty for plain numbers.
         low, high: range of its values.
         kind: what its values are: int, bool, color, direction, action, entity (by number), text, noun, status,
-            utterance (0 silence, else 1 + template * nouns + noun), cell (CELL + 32 * y + x).
+            utterance (0 silence, else 1 + template * fillings + filling), cell (CELL + 32 * y + x).
         fleeting: whether it tells nothing between steps: it is written in every step before it is read, follows
             from the others, or only saves work.
     """
@@ -107,8 +107,7 @@ class Program:
         words: int32 (Header.SIZE,), laid out as `socialai_dsl.program` says; never changed.
         name: canonical name of the scenario with its variants.
         actions: words of the body actions, by index.
-        templates: what the agent can say, each with its `<noun>`, by index.
-        nouns: what the `<noun>` can be, by index.
+        sentences: what the agent can say.
         entities: the agent, the NPCs and the objects, by number.
         registers: the registers of the scenario itself.
         lines: text of each line that can be heard, by number.
@@ -122,8 +121,7 @@ class Program:
     words: npt.NDArray[np.int32]
     name: str
     actions: tuple[str, ...]
-    templates: tuple[str, ...]
-    nouns: tuple[str, ...]
+    sentences: Sentences
     entities: tuple[EntityName, ...]
     registers: tuple[RegisterName, ...]
     lines: tuple[str, ...]
@@ -137,6 +135,16 @@ class Program:
         """One word of the header."""
         return int(self.words[word])
 
+    @property
+    def templates(self) -> tuple[str, ...]:
+        """The templates of what can be said."""
+        return self.sentences.templates
+
+    @property
+    def nouns(self) -> tuple[str, ...]:
+        """What `<noun>` can be; of a grammar with `slots` the words of each, one slot after the other."""
+        return tuple(word for slot in self.sentences.slots for word in slot.words)
+
     @cached_property
     def outcomes(self) -> list[str]:
         """Names of the ways an episode can end, by index."""
@@ -149,6 +157,9 @@ class Program:
         for texts in (self.actions, self.templates, self.nouns, self.lines, self.outcomes, self.vocabulary):
             digest.update("\x1f".join(texts).encode())
             digest.update(b"\x1e")
+        for slot in self.sentences.slots:
+            if slot.name != NOUN:
+                digest.update("\x1f".join((slot.name, *slot.words)).encode())
         return digest.hexdigest()
 
     @property

@@ -86,7 +86,7 @@ class Thought(_Part):
     """A trained agent's view of a moment.
 
     Attributes:
-        probabilities: for each head (body action, speak or not, template, noun), of each choice.
+        probabilities: for each head (body action, speak or not, template, noun or slots), of each choice.
         value: the expected return from here on; None if the agent estimates none.
     """
 
@@ -119,7 +119,7 @@ class Moment(_Part):
             looks up.
         view_gestures: what NPCs in it show.
         state: values that differ, by address: `wizard.state`, `doors[1].color`, `let.exit`.
-        action: body action, speak, template, noun; None without a step. did: the body action's word.
+        action: body action, speak, template, noun or slots; None without a step. did: the body action's word.
         said: the agent's utterance, None in silence. heard: lines.
         reward: of the step.
         fired: numbers of rules. others: pairs of a rule that was asked and did not fire, and the number of its reason.
@@ -163,6 +163,7 @@ class Trace(_Part):
         actions: words of the body actions; one more index is no movement.
         templates: words of the templates.
         nouns: words of the nouns.
+        slots: in place of nouns, the words of each slot.
         looks: the looks of cells that moments refer to by number.
         texts: the texts that moments refer to by number.
         rules: the rules that moments refer to by number.
@@ -177,6 +178,7 @@ class Trace(_Part):
     actions: list[str]
     templates: list[str]
     nouns: list[str]
+    slots: dict[str, list[str]] = {}
     looks: list[Look] = []
     texts: list[str] = []
     rules: list[Rule] = []

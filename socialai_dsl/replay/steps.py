@@ -39,9 +39,9 @@ def describe_step(
     program: Playable, action: Sequence[int] | NDArray[np.int64], t: int, utterance: str
 ) -> Step:
     """Put an action and what was heard into words."""
-    primitive, speaks, template, noun = (int(part) for part in action)
+    primitive, speaks, template, *spoken = (int(part) for part in action)
     words = [*program.actions, "none"]
-    said = program.templates[template].replace("<noun>", program.nouns[noun]) if speaks else None
+    said = program.sentences.text(template, spoken) if speaks else None
     heard = () if utterance == "NA" else tuple(utterance.splitlines())
     return Step(t, words[primitive], said, heard)
 

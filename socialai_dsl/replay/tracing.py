@@ -19,7 +19,7 @@ from socialai_dsl.replay.document import Line, Member, Moment, Outcome, Reply, R
 from socialai_dsl.replay.state import leaves, played
 from socialai_dsl.replay.steps import describe_step, heard_line
 from socialai_dsl.semantics.terms import Const
-from socialai_dsl.vocabulary import DIRECTIONS
+from socialai_dsl.vocabulary import DIRECTIONS, NOUN
 
 Action = NDArray[np.int64]
 Answers = Sequence[tuple[str, str]]
@@ -50,7 +50,7 @@ def trace_of(
 
     Args:
         env: of the scenario, as `socialai_dsl.make` returns it.
-        actions: int64 (4,) each; those after the end of the episode are ignored.
+        actions: int64 (heads,) each; those after the end of the episode are ignored.
         reset: arguments of `env.reset`, such as `{"seed": 7}`.
         scenario: its name, for people.
         agent: the player, for people.
@@ -185,7 +185,8 @@ class Tracer:
             episode=self._episode,
             actions=list(program.actions),
             templates=list(program.templates),
-            nouns=list(program.nouns),
+            nouns=list(program.sentences.nouns),
+            slots={slot.name: list(slot.words) for slot in program.sentences.slots if slot.name != NOUN},
             looks=list(self._looks)[looks:],
             texts=list(self._texts)[texts:],
             rules=list(self._rules)[rules:],

@@ -67,6 +67,14 @@ Texts = Annotated[
 ]
 """One text, or a list of them."""
 
+Fillers = Annotated[
+    tuple[TextLine | int, ...],
+    BeforeValidator(_as_tuple),
+    BeforeValidator(_one_or_many, json_schema_input_type=TextLine | int | tuple[TextLine | int, ...]),
+    Field(min_length=1, max_length=256),
+]
+"""What can stand in a slot of a grammar, one or a list."""
+
 
 class Model(BaseModel):
     """Base of all models: unknown keys are errors, nothing is coerced, nothing changes after loading."""
@@ -390,21 +398,27 @@ class Observe(Model):
 
 
 class UtteranceGrammar(Model):
-    """What the agent can say: every template with every noun."""
+    """What the agent can say: every template with all that its slots can be."""
 
     templates: Annotated[tuple[TextLine, ...], BeforeValidator(_as_tuple)] = Field(
         min_length=1,
         max_length=64,
-        description="texts; <noun> stands for each noun",
+        description="texts; <noun> stands for each noun, <slot> for all that a slot can be",
         examples=[["Where is <noun>"]],
     )
     nouns: Annotated[tuple[TextLine | int, ...], BeforeValidator(_as_tuple)] = Field(
-        min_length=1, max_length=256, description="what <noun> can be", examples=[["the exit", "the wall"]]
+        (),
+        min_length=1,
+        max_length=256,
+        description="what <noun> can be",
+        examples=[["the exit", "the wall"]],
     )
-
-    def utterance(self, template: int, noun: int) -> str:
-        """The text of a pair: the template with its <noun> filled."""
-        return self.templates[template].replace("<noun>", str(self.nouns[noun]))
+    slots: dict[Word, Fillers] = Field(
+        default_factory=dict,
+        max_length=8,
+        description="in place of `nouns`, name: what <name> can be: words, things, members of the cast, `colors`, 1..6",
+        examples=[{"what": ["the ball", "the key"], "whom": "peers"}],
+    )
 
 
 # -- claims and probes, which playing never reads ------------------------------------------------------------

@@ -49,7 +49,7 @@ from socialai_dsl.semantics.terms import (
     any_of,
     draws,
 )
-from socialai_dsl.semantics.texts import Alternative, asks_for_noun, binding, bound, with_nouns
+from socialai_dsl.semantics.texts import Alternative, asked_of_heard, binding, bound, with_slots
 from socialai_dsl.source import DataPath
 
 _STATUS_AFTER = {"reveal": "opened", "open": "open", "close": "closed", "lock": "locked", "unlock": "locked"}
@@ -403,8 +403,8 @@ class _Planner:
         doing = self._activity((*path, "do"), do, address) if do is not None else None
         sets, causes = self._sets(rule, path, address), self._causes(rule, path, address)
         say = self.spoken.lines.get(path)
-        if asks_for_noun((when, doing, sets, causes, say)):
-            heard = with_nouns(self.resolver, heard, self.resolver.findings.at((*path, "hears")))
+        if asked := asked_of_heard((when, doing, sets, causes, say)):
+            heard = with_slots(self.resolver, heard, asked, self.resolver.findings.at((*path, "hears")))
         patterns = tuple(pattern for alternative in heard for pattern, _ in alternative)
         compared = any(condition is not None for alternative in heard for _, condition in alternative)
         if compared:

@@ -464,7 +464,8 @@ class _Run:
             message = f"a room holds at most {MAX_BODIES} objects and members of the cast, this one {found}"
             findings.error("S106", message, findings.places.key_span((part,)))
             return None
-        possible.check_grammar(scenario, findings)
+        if not self._grammar_is_whole():
+            return None
         entities.declare_registers(resolver)
         if len(resolver.registers) > MAX_REGISTERS:
             own = len(scenario.let) + len(scenario.state)
@@ -500,13 +501,12 @@ class _Run:
             possible.check_shadowed(plan, findings)
         self._report_unused()
         names = [resolver.registers.read(f"{member}.name") for member in self._symbols.cast]
-        words = words_in_order(scenario.grammar, names, spoken.lines(self._symbols.cast))
+        words = words_in_order(self._symbols.sentences, names, spoken.lines(self._symbols.cast))
         return CheckedScenario(
             name=name,
             horizon=scenario.horizon,
             actions=tuple(action for action in PRIMITIVES if action in scenario.actions),
-            templates=scenario.grammar.templates,
-            nouns=tuple(str(noun) for noun in scenario.grammar.nouns),
+            sentences=self._symbols.sentences,
             room=room,
             entities=inhabitants,
             setup=in_order,
@@ -531,6 +531,15 @@ class _Run:
             probes=asked,
             readings=resolver.readings,
         )
+
+    def _grammar_is_whole(self) -> bool:
+        """Whether it can be known what the agent can say; mistakes are reported."""
+        if not possible.check_grammar(self._scenario, self._findings):
+            return False
+        slots = self._scenario.grammar.slots
+        if len(self._symbols.slots) < len(slots):
+            return False  # a slot that cannot be filled, which has been reported
+        return not slots or possible.check_slots_of_grammar(self._symbols.sentences, self._findings)
 
     def _spoken(self) -> _Spoken:
         """What everybody says, before what anybody hears."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from collections.abc import Sequence as Items
 from dataclasses import dataclass, field, replace
 
@@ -18,7 +18,7 @@ from socialai_dsl.schema.scenario import (
     Scenario,
     Sequence,
 )
-from socialai_dsl.semantics import groups, object_facts, texts
+from socialai_dsl.semantics import groups, object_facts, slots, texts
 from socialai_dsl.semantics.object_facts import initial
 from socialai_dsl.semantics.plans import Entity
 from socialai_dsl.semantics.resolve_names import slot_truth
@@ -110,9 +110,10 @@ def symbols_of(
         base = name.partition("[")[0]
         if base != name:
             groups[base] = (*groups.get(base, ()), name)
-    return Symbols(
+    symbols = Symbols(
         scenario, cast, alternatives, numbers, roles, groups, objects, types, defines, *sizes, prelude.colors
     )
+    return replace(symbols, slots=slots.filled(symbols, findings)) if scenario.grammar.slots else symbols
 
 
 def _check_files(scenario: Scenario, findings: Findings) -> None:
@@ -211,7 +212,7 @@ def _check_names(scenario: Scenario, findings: Findings) -> None:
             findings.error("S213", f"`{name}` is the name of {article} {taken[name]} already", span)
         taken.setdefault(name, kind)
     for path, frame in frames_of(scenario):
-        _check_frame_names(path, frame, findings)
+        _check_frame_names(path, frame, scenario.grammar.slots, findings)
 
 
 def mean_two_things(scenario: Scenario) -> bool:
@@ -220,7 +221,9 @@ def mean_two_things(scenario: Scenario) -> bool:
     return len(set(names)) < len(names)
 
 
-def _check_frame_names(path: DataPath, frame: Frame, findings: Findings) -> None:
+def _check_frame_names(
+    path: DataPath, frame: Frame, slots_of_grammar: Container[str], findings: Findings
+) -> None:
     own: dict[str, str] = {}
     for kind, section in (("slot", frame.slots), ("register", frame.let), ("definition", frame.define)):
         for key in section:
@@ -231,8 +234,9 @@ def _check_frame_names(path: DataPath, frame: Frame, findings: Findings) -> None
                 findings.error(
                     "S213", f"`{name}` is a word of the language; call the {kind} something else", span
                 )
-            elif name in own:
-                findings.error("S213", f"`{name}` is the name of a {own[name]} of this frame already", span)
+            elif name in own or name in slots_of_grammar:
+                of = f"{own[name]} of this frame" if name in own else "slot of the grammar"
+                findings.error("S213", f"`{name}` is the name of a {of} already", span)
             own.setdefault(name, kind)
 
 
@@ -241,6 +245,8 @@ def _names(scenario: Scenario) -> Iterator[tuple[str, DataPath, str]]:
         yield "member of the cast", ("cast", name), name
     for name in scenario.objects:
         yield "object", ("objects", name), name
+    for name in scenario.grammar.slots:
+        yield "slot of the grammar", ("grammar", "slots", name), name
     for name in scenario.let:
         yield "`let`", ("let", name), name
     for key in scenario.define:
@@ -417,9 +423,7 @@ def _declare_file(resolver: Resolver, name: str) -> None:
 def declare_name(resolver: Resolver, name: str) -> None:
     """The name of a member of the cast; by default its key."""
     symbols = resolver.symbols
-    group = symbols.group_of(name)
-    key = f"{group[0]} {group[1] + 1}" if group is not None else name
-    default = key[:1].upper() + key[1:].replace("_", " ")
+    default = symbols.default_name(name)
     names = [member.name if member.name is not None else default for member in symbols.alternatives[name]]
     raws = [str(raw) if isinstance(raw, int) else raw for raw in names]
     plain = [symbols.cast[name].name is None or is_plain_name(resolver, raw) for raw in raws]

@@ -99,6 +99,8 @@ def group(resolver: Resolver, node: ast.Expr, expected: Type | None, scope: Scop
                 return _cells(resolver, node, scope)
             if bound is None and word in ("colors", "nouns"):
                 type_ = COLOR if word == "colors" else resolver.symbols.nouns
+                if type_.size == 0:
+                    raise resolver.fail("S201", "this grammar has slots, and no `nouns`", node, scope)
                 return Group(type_, _values(type_))
             objects = resolver.symbols.objects.get(word)
             if bound is None and word in resolver.symbols.groups:
@@ -609,7 +611,7 @@ class Acts:
 
 def utterance_type(resolver: Resolver) -> Type:
     """Every utterance of the grammar as a value; 0 is silence."""
-    words = ("", *resolver.utterances.all_texts())
+    words = ("", *resolver.symbols.sentences.by_number())
     return Type("utterance", 0, len(words) - 1, words)
 
 
@@ -633,7 +635,7 @@ def _utterance(type_: Type, chance: float) -> Term:
     silence = Const(type_, 0)
     if not chance:
         return silence
-    said = tuple(Const(type_, value) for value in range(1, type_.high + 1))
+    said = tuple(Const(type_, value) for value in range(1, type_.high + 1) if type_.words[value])
     return Select(
         type_, (Chance(chance, 0),), (Quantified(type_, "pick", "each", said, None, ordinal=1),), silence
     )

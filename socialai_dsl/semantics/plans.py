@@ -7,6 +7,7 @@ from typing import Final, Literal
 
 from socialai_dsl.semantics.terms import Line, ObjectType, Pattern, Read, Readings, Sited, Term, Type
 from socialai_dsl.source import Span
+from socialai_dsl.vocabulary import Sentences
 
 FOR_EVER: Final = -1
 """The duration of a step that never ends."""
@@ -365,6 +366,7 @@ class CheckedScenario:
     """A scenario in which everything is resolved and nothing is wrong: the compiler's input.
 
     Attributes:
+        sentences: what the agent can say.
         setup: what is drawn at reset after the room, in the order it is done (needs first).
         words_in_order: every word that may be heard, in order of first appearance, lower case.
         computed: statuses that follow from conditions, each after those it reads.
@@ -382,8 +384,7 @@ class CheckedScenario:
     name: str
     horizon: int
     actions: tuple[str, ...]
-    templates: tuple[str, ...]
-    nouns: tuple[str, ...]
+    sentences: Sentences
     room: RoomPlan
     entities: tuple[Entity, ...]
     setup: tuple[Setup, ...]

@@ -27,6 +27,7 @@ from socialai_dsl.semantics.terms import (
     walk,
 )
 from socialai_dsl.source import DataPath, Span
+from socialai_dsl.vocabulary import Sentences, normal
 
 _TOLD = 12
 """How many states of a circle are named."""
@@ -35,17 +36,39 @@ GRAMMAR_CODE = "S104"
 """The code of a template that cannot be filled."""
 
 
-def check_grammar(scenario: Scenario, findings: Findings) -> None:
-    """Templates with something else than <noun> to fill, and anything that is in the grammar twice."""
+MOST_PAIRS: Final = 64 * 256
+"""So many numbers a grammar can have for what is said: templates times fillings."""
+
+
+def check_grammar(scenario: Scenario, findings: Findings) -> bool:
+    """Templates with something else than slots to fill, and anything that is in the grammar twice; False if the grammar
+    has nothing to fill templates with.
+    """
     grammar = scenario.grammar
+    span = findings.places.key_span(("grammar",))
+    if bool(grammar.nouns) == bool(grammar.slots):
+        message = (
+            "`grammar` has either `nouns` or `slots`" if grammar.nouns else "`grammar` needs a key `nouns`"
+        )
+        hint = "`nouns` are what `<noun>` can be; `slots` have names of their own" if grammar.nouns else None
+        findings.error("S107" if grammar.nouns else "S105", message, span, hint=hint)
+        return False
+    names = [*grammar.slots] or ["noun"]
     for i, template in enumerate(grammar.templates):
         path: DataPath = ("grammar", "templates", i)
-        other = re.search(r"<(?!noun>)[^<>]*>|[<>]", template.replace("<noun>", " " * 6))
-        if other or template.count("<noun>") > 1:
-            offset = other.start() if other else template.rindex("<noun>")
-            message = f"a template has one `<noun>` to fill, and no `{other.group()}`" if other else \
-                "a template has only one `<noun>`"  # fmt: skip
-            findings.error(GRAMMAR_CODE, message, findings.at(path, offset))
+        known = "|".join(map(re.escape, names))
+        blanked = re.sub(f"<({known})>", lambda found: " " * len(found.group()), template)
+        other = re.search(r"<[^<>]*>|[<>]", blanked)
+        twice = next((f"<{name}>" for name in names if template.count(f"<{name}>") > 1), "")
+        if other or twice:
+            offset = other.start() if other else template.rindex(twice)
+            message = f"a template has only one `{twice}`"
+            if other:
+                filled = "one `<noun>`" if grammar.nouns else " and ".join(f"`<{name}>`" for name in names)
+                message = f"a template has {filled} to fill, and no `{other.group()}`"
+            near = did_you_mean(other.group()[1:-1], grammar.slots) if other else None
+            suggestion = f"<{near}>" if near else None
+            findings.error(GRAMMAR_CODE, message, findings.at(path, offset), suggestion=suggestion)
     for part, words in (("templates", grammar.templates), ("nouns", grammar.nouns)):
         seen: set[str] = set()
         for i, word in enumerate(words):
@@ -53,6 +76,36 @@ def check_grammar(scenario: Scenario, findings: Findings) -> None:
                 span = findings.at(("grammar", part, i), 0, len(str(word)))
                 findings.error("S213", f"`{word}` is in the {part} already", span)
             seen.add(str(word))
+    return True
+
+
+def check_slots_of_grammar(sentences: Sentences, findings: Findings) -> bool:
+    """Slots that no template has, too many sentences, and sentences said in two ways; False if there are too many."""
+    names = {slot.name for slot in sentences.slots}
+    for place, slot in enumerate(sentences.slots):
+        strange = any(set(re.findall("<([^<>]*)>", template)) - names for template in sentences.templates)
+        if not strange and not any(used[place] for used in sentences.used):
+            span = findings.places.key_span(("grammar", "slots", slot.name))
+            hint = "every slot is a choice of its own for the agent; leave out what it cannot say"
+            findings.error(GRAMMAR_CODE, f"no template has `{slot.place}`", span, hint=hint)
+    if (count := len(sentences.templates) * sentences.fillings) > MOST_PAIRS:
+        sizes = " x ".join(map(str, sentences.radices))
+        product_of = f"{len(sentences.templates)} x {sizes} = {count:,}"
+        message = f"templates x slots are {product_of}; at most {MOST_PAIRS:,} are possible"
+        hint = "each slot counts with its values and one more, for templates that lack it"
+        findings.error("S106", message, findings.places.key_span(("grammar", "slots")), hint=hint)
+        return False
+    seen: dict[str, int] = {}
+    for template, choices in sentences.each():
+        text = normal(sentences.text(template, choices))
+        if seen.setdefault(text, template) != template:
+            message = (
+                f'"{sentences.text(template, choices)}" can be said with this template and an earlier one'
+            )
+            hint = "so it would not be known which slots it has"
+            findings.error("S213", message, findings.at(("grammar", "templates", template)), hint=hint)
+            break
+    return True
 
 
 def check_flow(scenario: Scenario, findings: Findings) -> None:

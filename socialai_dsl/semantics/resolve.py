@@ -493,6 +493,13 @@ class ScenarioResolver(Resolver):
 
     def equal(self, left: Term, right: Term, node: ast.Expr, scope: Scope) -> Term:
         """Whether two values are the same, by what they are called where their types differ."""
+        for one, other in ((left, right), (right, left)):
+            if one in self.slot_words:
+                slot, word = self.slot_words[one]  # where the agent said nothing there, it is unlike anything
+                return any_of(
+                    all_of([_is(word, i), self.equal(value, other, node, scope)])
+                    for i, value in enumerate(slot.values)
+                )
         if same_kind(left.type, right.type) and left.type.words == right.type.words:
             if isinstance(left, Const) and isinstance(right, Const):
                 return Const(BOOL, int(left.value == right.value))
@@ -539,7 +546,8 @@ class ScenarioResolver(Resolver):
             return between(left, self.value(option.low, INT, scope), self.value(option.high, INT, scope))
         if groups.is_group(self, option, scope):
             group = groups.group(self, option, left.type, scope)
-            if not same_kind(left.type, group.type) or left.type.words != group.type.words:
+            alike = same_kind(left.type, group.type) and left.type.words == group.type.words
+            if not alike or left in self.slot_words:
                 return any_of(self.equal(left, item, node, scope) for item in group.items)
             return one_of(left, group.items)
         return self.equal(left, self.guess(option, left.type, scope), option, scope)

@@ -9,7 +9,7 @@ from itertools import chain, pairwise
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Sequence
-from socialai_dsl.semantics import object_facts, texts
+from socialai_dsl.semantics import object_facts, slots, texts
 from socialai_dsl.semantics.groups import check_moment, check_points, check_toggled, must_be_agent, subject_of
 from socialai_dsl.semantics.resolver import VOCABULARIES, Resolver
 from socialai_dsl.semantics.scope import (
@@ -82,6 +82,8 @@ def without_arguments(
 ) -> Term:
     """`subject.name` or `subject.name()`: an attribute, a condition, or a status."""
     signature = VALUES.get(name)
+    if name in resolver.symbols.slots:
+        signature = replace(VALUES["noun"], name=name)
     statuses = {state for type_ in resolver.symbols.types.values() for state in type_.states}
     if signature is None or signature.takes:
         if name in statuses:
@@ -94,7 +96,7 @@ def without_arguments(
         if name == "spoke":
             return texts.spoke(resolver, node, scope)
         must_be_agent(resolver, node, scope)
-        return _of_the_agent(resolver, name)
+        return _of_the_agent(resolver, name, node, scope)
     who = subject_of(resolver, subject, signature, node, scope)
     if who is None:
         return _cell_coordinate(resolver, name)
@@ -137,9 +139,12 @@ def _of_frame(resolver: Resolver, node: ast.Expr) -> list[str]:
     return [*played.model.slots, *played.model.let] if played is not None else []
 
 
-def _of_the_agent(resolver: Resolver, name: str) -> Term:
+def _of_the_agent(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> Term:
+    if name in resolver.symbols.slots:
+        return _in_slot(resolver, name, heard=False)
     match name:
         case "noun":
+            texts.no_nouns(resolver, node, scope)
             return World(resolver.symbols.nouns, "noun")
     assert name == "action", f"internal: the agent has no `{name}`"
     return World(ACTION, "action")
@@ -431,7 +436,7 @@ def _not_a_value(resolver: Resolver, kind: str, node: ast.Name, scope: Scope) ->
 
 
 def _language(resolver: Resolver, node: ast.Name, scope: Scope) -> Term | None:
-    """t, W, H, and the noun that was heard."""
+    """t, W, H, and the noun, or what stood in another slot, of what was heard."""
     symbols = resolver.symbols
     match node.id:
         case "t" if scope.at_reset:
@@ -445,10 +450,25 @@ def _language(resolver: Resolver, node: ast.Name, scope: Scope) -> Term | None:
         case "H":
             return _size("height", symbols.height)
         case "noun" if scope.frame is not None and not scope.at_reset:
-            return texts.noun(resolver, scope)
+            return texts.noun(resolver, node, scope)
+        case word if word in symbols.slots and scope.frame is not None and not scope.at_reset:
+            return _in_slot(resolver, word, scope.hearing)
+        case word if word in symbols.slots and scope.frame is None:
+            hint = f"write `agent.{word}`: what the agent said there in this step"
+            message = f"`{word}` is what a frame hears; here nothing is heard"
+            raise resolver.fail("S211", message, node, scope, hint=hint)
         case "speaker":
             return texts.speaker(resolver, node, scope)
     return None
+
+
+def _in_slot(resolver: Resolver, name: str, heard: bool) -> Term:
+    """What stood in a slot; of what the agent said it is noted by which word, as it may have said none."""
+    slot, word = resolver.symbols.slots[name], texts.in_slot(resolver, name, heard)
+    value = slots.meaning(slot, word)
+    if value != word and not heard:
+        resolver.slot_words[value] = slot, word
+    return value
 
 
 def _size(which: str, sizes: tuple[int, int]) -> Term:

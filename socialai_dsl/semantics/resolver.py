@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain, islice, product
 from typing import Final
 
 from socialai_dsl.grammar import ast
-from socialai_dsl.schema.scenario import UtteranceGrammar
 from socialai_dsl.semantics.plans import Drawn
 from socialai_dsl.semantics.scope import (
     FailedError,
+    FilledSlot,
     Findings,
     PlayedFrame,
     Scalar,
@@ -48,29 +50,35 @@ from socialai_dsl.semantics.terms import (
     number,
 )
 from socialai_dsl.source import DataPath, Span
-from socialai_dsl.vocabulary import is_number, is_plain, normal, words
+from socialai_dsl.vocabulary import Sentences, is_number, is_plain, normal, words
 
 MAX_TEXTS = 4096
 """How many different texts one line may have."""
 
 
 class Utterances:
-    """Everything that may be said: each template with each noun by the agent, the texts of their lines by NPCs.
+    """Everything that may be said: the sentences of the grammar by the agent, the texts of their lines by NPCs.
 
     Attributes:
         npc_texts: every text that an NPC can say, for what others may hear; only ever added to.
         said_by: member -> the texts of those that it can say.
+        sentences: what the grammar can say.
     """
 
-    def __init__(self, grammar: UtteranceGrammar) -> None:
+    def __init__(self, sentences: Sentences) -> None:
         self.npc_texts: dict[str, None] = {}
         self.said_by: dict[str, dict[str, None]] = {}
-        self._grammar = grammar
-        self._pairs: dict[str, set[tuple[int, int]]] = {}
+        self.sentences = sentences
         self._by_normal: dict[str, list[tuple[int, str]]] = {}
         self._known_texts = 0
-        for t, n in product(range(len(grammar.templates)), range(len(grammar.nouns))):
-            self._pairs.setdefault(normal(grammar.utterance(t, n)), set()).add((t, n))
+
+    @cached_property
+    def _pairs(self) -> dict[str, set[tuple[int, int]]]:
+        """Templates and fillings of what the grammar can say, by what counts of the text."""
+        pairs: dict[str, set[tuple[int, int]]] = {}
+        for (template, choices), pair in zip(self.sentences.each(), self.sentences.pairs(), strict=True):
+            pairs.setdefault(normal(self.sentences.text(template, choices)), set()).add(pair)
+        return pairs
 
     def add_npc_texts(self, member: str, texts: Iterable[str]) -> None:
         """Make known what a member of the cast can say."""
@@ -79,22 +87,34 @@ class Utterances:
         self.said_by.setdefault(member, {}).update(found)
 
     def match(self, said: str) -> frozenset[tuple[int, int]]:
-        """The pairs of template and noun that a text is, `<noun>` standing for any noun."""
-        if "<noun>" not in said:
-            return frozenset(self._pairs.get(normal(said), ()))
-        nouns = [str(noun) for noun in self._grammar.nouns]
-        return frozenset(
-            pair for n in nouns for pair in self._pairs.get(normal(said.replace("<noun>", n)), ())
-        )
+        """The pairs of template and filling that a text is, `<slot>` standing for all that the slot can be."""
+        return frozenset(pair for text, _ in self._filled(said) for pair in self._pairs.get(normal(text), ()))
 
     def npcs_matching(self, said: str) -> dict[str, int | None]:
-        """The texts of NPCs that fit, each with the noun that stands for `<noun>`."""
+        """The texts of NPCs that fit, each with the filling that its slots have; None of a text without slots."""
         known = self._npc_texts()
-        if "<noun>" not in said:
-            return {text: None for _, text in known.get(normal(said), ())}
-        wanted = {normal(said.replace("<noun>", str(noun))): i for i, noun in enumerate(self._grammar.nouns)}
-        found = sorted((place, text, i) for like, i in wanted.items() for place, text in known.get(like, ()))
-        return {text: i for _, text, i in found}
+        wanted: dict[str, int | None] = {}
+        for text, filling in self._filled(said):
+            wanted[normal(text)] = filling
+        found = sorted((place, text, like) for like in wanted for place, text in known.get(like, ()))
+        return {text: wanted[like] for _, text, like in found}
+
+    def _filled(self, said: str) -> Iterator[tuple[str, int | None]]:
+        """A text with all that its slots can be in place of them, each with its filling."""
+        slots = self.sentences.slots
+        there = [slot.place in said for slot in slots]
+        if not any(there):
+            yield said, None
+            return
+        ranges = (
+            range(len(slot.words) if is_there else 1) for slot, is_there in zip(slots, there, strict=True)
+        )
+        for choices in product(*ranges):
+            text = said
+            for slot, choice in zip(slots, choices, strict=True):
+                text = text.replace(slot.place, slot.words[choice])
+            digits = [choice if is_there else None for choice, is_there in zip(choices, there, strict=True)]
+            yield text, self.sentences.filling(digits)
 
     def _npc_texts(self) -> dict[str, list[tuple[int, str]]]:
         """What NPCs say, by what counts of it, with its place among all texts, to which others only are added."""
@@ -104,12 +124,12 @@ class Utterances:
         self._known_texts = len(texts)
         return self._by_normal
 
-    def noun_in(self, said: str) -> int | None:
-        """The noun of what the grammar can say; None where it cannot, or the template has no place for a noun."""
+    def filling_of(self, said: str) -> int | None:
+        """The filling of what the grammar can say; None where it cannot, or the template has no slots."""
         found = [
-            noun
-            for template, noun in self._pairs.get(normal(said), ())
-            if "<noun>" in self._grammar.templates[template]
+            filling
+            for template, filling in self._pairs.get(normal(said), ())
+            if any(slot.place in self.sentences.templates[template] for slot in self.sentences.slots)
         ]
         return min(found, default=None)
 
@@ -120,8 +140,7 @@ class Utterances:
 
     def all_texts(self) -> Iterator[str]:
         """Every utterance as text."""
-        for t, n in product(range(len(self._grammar.templates)), range(len(self._grammar.nouns))):
-            yield self._grammar.utterance(t, n)
+        return (self.sentences.text(template, choices) for template, choices in self.sentences.each())
 
 
 def texts_of(line: Line) -> list[str]:
@@ -152,18 +171,18 @@ def words_of_values(type_: Type) -> list[str]:
 
 
 def words_in_order(
-    grammar: UtteranceGrammar, names: Iterable[Term], lines: Mapping[str, Sequence[Line]]
+    sentences: Sentences, names: Iterable[Term], lines: Mapping[str, Sequence[Line]]
 ) -> tuple[str, ...]:
     """The words of the grammar, then of the names, then of what each member can say, by first appearance.
 
     Args:
-        grammar: templates come first, then nouns.
+        sentences: templates come first, then the words of their slots.
         names: the name of each member of the cast, in order.
         lines: member -> its lines in the order of its frame.
     """
     texts = chain(
-        (template.replace("<noun>", " ") for template in grammar.templates),
-        (str(noun) for noun in grammar.nouns),
+        (re.sub("<[^<>]*>", " ", template) for template in sentences.templates),
+        (word for slot in sentences.slots for word in slot.words),
         (word for name in names for word in words_of_values(name.type)),
         (text for said in lines.values() for line in said for text in _texts(line)),
     )
@@ -443,6 +462,7 @@ class Resolver(ABC):
         frames: member -> the frame it plays.
         readings: how everything was written that has been given a meaning.
         used: where the definitions and draws stand that something uses.
+        slot_words: value of a slot of what the agent said -> the slot, and the word that stands for the value.
     """
 
     def __init__(
@@ -457,9 +477,10 @@ class Resolver(ABC):
         self.findings = findings
         self.frames = frames
         self.registers = Registers(self, words, ranges)
-        self.utterances = Utterances(symbols.scenario.grammar)
+        self.utterances = Utterances(symbols.sentences)
         self.readings = Readings()
         self.used: set[DataPath] = set()
+        self.slot_words: dict[Term, tuple[FilledSlot, Term]] = {}
         self._within: list[tuple[ast.Expr, Scope]] = []
         self._parts = self._all_parts = 0
         self._tables: dict[str, tuple[tuple[str, ...], tuple[Term, ...]] | None] = {}
@@ -678,4 +699,4 @@ def same_kind(actual: Type, expected: Type) -> bool:
         return bool(actual.words) == bool(expected.words) and (
             not actual.words or actual.words == expected.words
         )
-    return actual.kind != "status" or actual.words == expected.words
+    return actual.kind not in ("status", "noun") or actual.words == expected.words

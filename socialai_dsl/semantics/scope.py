@@ -28,6 +28,7 @@ from socialai_dsl.semantics.terms import (
     one_of,
 )
 from socialai_dsl.source import DataPath, Positions, Span
+from socialai_dsl.vocabulary import NOUN, Sentences, Slot
 
 Scalar = int | bool | float | str
 
@@ -296,6 +297,14 @@ class Define:
 
 
 @dataclass(frozen=True)
+class FilledSlot:
+    """What a slot of the grammar can be: its words, and what each stands for where that is in the room or a colour."""
+
+    words: Type
+    values: tuple[Const, ...] = ()
+
+
+@dataclass(frozen=True)
 class Symbols:
     """Everything a scenario declares, by name.
 
@@ -308,6 +317,7 @@ class Symbols:
         objects: name -> its entities.
         types: the object types of the prelude. default_colors: type -> its colour where none is given.
         width, height: least and largest size of the room.
+        slots: of a grammar with `slots`, what each can be.
     """
 
     scenario: Scenario
@@ -322,6 +332,16 @@ class Symbols:
     width: tuple[int, int]
     height: tuple[int, int]
     default_colors: Mapping[str, str]
+    slots: Mapping[str, FilledSlot] = field(default_factory=dict)
+
+    @cached_property
+    def sentences(self) -> Sentences:
+        """What the agent can say."""
+        grammar = self.scenario.grammar
+        slots = [Slot(name, slot.words.words) for name, slot in self.slots.items()]
+        if not grammar.slots:
+            slots = [Slot(NOUN, tuple(map(str, grammar.nouns)))]
+        return Sentences.of(grammar.templates, slots)
 
     @property
     def entities(self) -> int:
@@ -382,8 +402,9 @@ class Symbols:
 
     @cached_property
     def declared(self) -> dict[str, str]:
-        """Every name of the scenario and what it is: let, object, cast, define, memory, roles."""
+        """Every name of the scenario and what it is: let, object, cast, define, memory, roles, slot of the grammar."""
         found = dict.fromkeys(self.scenario.let, "let")
+        found |= dict.fromkeys(self.scenario.grammar.slots, "grammar.slots")
         found |= dict.fromkeys(self.defines, "define")
         found |= dict.fromkeys(self.scenario.memory, "memory")
         found |= dict.fromkeys(self.scenario.state, "state")
@@ -391,6 +412,12 @@ class Symbols:
         found |= dict.fromkeys(self.scenario.roles, "roles")
         found |= {name: "object" if o.single else "objects" for name, o in self.objects.items()}
         return found | dict.fromkeys((*self.cast, *self.groups), "cast")
+
+    def default_name(self, member: str) -> str:
+        """How a member of the cast is called that has no `name`: its key."""
+        group = self.group_of(member)
+        key = f"{group[0]} {group[1] + 1}" if group is not None else member
+        return key[:1].upper() + key[1:].replace("_", " ")
 
     def group_of(self, member: str) -> tuple[str, int] | None:
         """The group that a member of the cast belongs to and its place in it; None if it stands for itself."""

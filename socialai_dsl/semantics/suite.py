@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
 
 from socialai_dsl.diagnostics import DiagnosticBag, did_you_mean
 from socialai_dsl.grammar.ast import every
-from socialai_dsl.schema.scenario import Scenario
+from socialai_dsl.schema.scenario import Scenario, UtteranceGrammar
 from socialai_dsl.schema.suite import Suite
 from socialai_dsl.semantics.plans import CheckedScenario, FramePlan
 from socialai_dsl.semantics.resolver import texts_of
 from socialai_dsl.semantics.terms import Line, Pattern
 from socialai_dsl.source import Positions
-from socialai_dsl.vocabulary import PRIMITIVES, normal
+from socialai_dsl.vocabulary import NOUN, PRIMITIVES, Sentences, Slot, normal
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,15 +21,15 @@ class SharedSpace:
     """What can be done and said in a suite.
 
     Attributes:
-        actions, templates, nouns: words of the action space.
-        template_maps, noun_maps: for each member, its own index of each of them, -1 if it has no such.
+        actions: words of the action space. sentences: what can be said.
+        template_maps: for each member, its own index of each template, -1 if it has no such.
+        slot_maps: for each member and slot of the space, its own index of each word, likewise.
     """
 
     actions: tuple[str, ...]
-    templates: tuple[str, ...]
-    nouns: tuple[str, ...]
+    sentences: Sentences
     template_maps: tuple[tuple[int, ...], ...]
-    noun_maps: tuple[tuple[int, ...], ...]
+    slot_maps: tuple[tuple[tuple[int, ...], ...], ...]
 
 
 def shared_actions(suite: Suite, scenarios: Sequence[Scenario]) -> tuple[str, ...]:
@@ -61,25 +60,47 @@ def shared_space(
         places: where the parts of the suite's file stand.
         bag: takes the findings.
     """
-    templates, template_maps = _shared(suite, "templates", [member.templates for member in members])
-    nouns, noun_maps = _shared(suite, "nouns", [member.nouns for member in members])
-    space = SharedSpace(actions, templates, nouns, template_maps, noun_maps)
-    if not isinstance(suite.grammar, str):
+    own = [member.sentences for member in members]
+    written = None if isinstance(suite.grammar, str) else suite.grammar
+    if written is not None and bool(written.nouns) == bool(written.slots):
+        span = places.key_span(("grammar",))
+        if written.nouns:
+            bag.error("S107", "`grammar` has either `nouns` or `slots`", span)
+        else:
+            bag.error("S105", "`grammar` needs a key `nouns`", span)
+    templates, template_maps = _shared(
+        suite.grammar, written.templates if written else (), [one.templates for one in own]
+    )
+    slots, maps = [], []
+    for name, fillers in _slots(written, own).items():
+        words = [next((slot.words for slot in one.slots if slot.name == name), ()) for one in own]
+        shared, mapped = _shared(suite.grammar, fillers, words)
+        slots.append(Slot(name, shared))
+        maps.append(mapped)
+    slot_maps = tuple(zip(*maps, strict=True))
+    sentences = Sentences.shared(templates, slots, list(zip(own, template_maps, strict=True)))
+    space = SharedSpace(actions, sentences, template_maps, slot_maps)
+    if written is not None and not bag.has_errors:
         for number, (name, member) in enumerate(zip(names, members, strict=True)):
             _check_sayable(space, number, name, member, places, bag)
     return space
 
 
+def _slots(written: UtteranceGrammar | None, own: Sequence[Sentences]) -> dict[str, tuple[str, ...]]:
+    """The slots of a suite by name, in the order in which members have them, with words that are written there."""
+    if written is None:
+        return {slot.name: () for one in own for slot in one.slots}
+    fillers = dict(written.slots) or {NOUN: written.nouns}
+    return {name: tuple(str(word) for word in words) for name, words in fillers.items()}
+
+
 def _shared(
-    suite: Suite, part: str, lists: Sequence[tuple[str, ...]]
+    how: str | UtteranceGrammar, written: tuple[str, ...], lists: Sequence[tuple[str, ...]]
 ) -> tuple[tuple[str, ...], tuple[tuple[int, ...], ...]]:
-    """The words of templates or nouns in the suite, and each member's own index of each."""
-    if suite.grammar == "concat":
+    """The templates, or the words of a slot, in the suite, and each member's own index of each."""
+    if how == "concat":
         return _concatenated(lists)
-    if suite.grammar == "union":
-        words = tuple(dict.fromkeys(word for own in lists for word in own))
-    else:
-        words = tuple(str(word) for word in getattr(suite.grammar, part))
+    words = tuple(dict.fromkeys(word for own in lists for word in own)) if how == "union" else written
     maps = ({word: i for i, word in enumerate(own)} for own in lists)
     return words, tuple(tuple(own.get(word, -1) for word in words) for own in maps)
 
@@ -100,8 +121,8 @@ def _concatenated(
 def _check_sayable(
     space: SharedSpace, number: int, name: str, member: CheckedScenario, places: Positions, bag: DiagnosticBag
 ) -> None:
-    live = set(product(space.template_maps[number], space.noun_maps[number]))
-    sayable = {_text(member, pair): pair for pair in live if min(pair) >= 0}
+    sayable = dict(_live(space, number, member))
+    live = set(sayable.values())
     known = {normal(text) for text in sayable}
     needed = [p.text for p in every(Pattern, member) if p.pairs and not (p.pairs & live or p.said_by_npcs)]
     needed += [text for text in _scripted(member) if normal(text) not in known]
@@ -117,8 +138,17 @@ def _check_sayable(
         )
 
 
-def _text(member: CheckedScenario, pair: tuple[int, int]) -> str:
-    return member.templates[pair[0]].replace("<noun>", member.nouns[pair[1]])
+def _live(space: SharedSpace, number: int, member: CheckedScenario) -> Iterator[tuple[str, tuple[int, int]]]:
+    """The sentences of a member that the suite can say, each with its template and filling in the member."""
+    templates, slots = set(space.template_maps[number]), [set(own) for own in space.slot_maps[number]]
+    places = {slot.name: place for place, slot in enumerate(space.sentences.slots)}
+    own = [slots[places[slot.name]] if slot.name in places else set() for slot in member.sentences.slots]
+    for (template, choices), pair in zip(member.sentences.each(), member.sentences.pairs(), strict=True):
+        used = member.sentences.used[template]
+        if template in templates and all(
+            choice in words or not is_used for choice, words, is_used in zip(choices, own, used, strict=True)
+        ):
+            yield member.sentences.text(template, choices), pair
 
 
 def _scripted(member: CheckedScenario) -> Iterator[str]:

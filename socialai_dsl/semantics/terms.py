@@ -10,9 +10,9 @@ color      0 red, 1 green, 2 blue, 3 purple, 4 yellow, 5 grey
 action     0 left, 1 right, 2 forward, 3 pickup, 4 drop, 5 toggle, 6 done, 7 none
 entity     number of the entity: 0 the agent, NPCs in cast order, then objects in file order
 text       index into `words`: the finite set of texts that the expression can be (names, kinds)
-noun       index into `words`, the nouns of the scenario's grammar
+noun       index into `words`, the nouns of the scenario's grammar, or the words of one of its slots
 status     index into `words`, the states of an object type
-utterance  0 silence, else 1 + template * nouns + noun; `words` are the texts
+utterance  0 silence, else 1 + template * fillings + filling (`vocabulary.Sentences`); `words` are the texts
 cell       CELL + 32 * y + x (program); where an entity is asked for its place, a cell will do
 =========  =====================================================================================
 """
@@ -77,11 +77,22 @@ class Read:
 
 
 @dataclass(frozen=True, slots=True)
+class Digit(Leaf):
+    """One slot of a filling: `filling // stride % radix`; radix - 1 is a slot that is not there."""
+
+    stride: int
+    radix: int
+
+
+@dataclass(frozen=True, slots=True)
 class World:
-    """A fact of the world: t, width, height, action (the agent's this step), noun (of its utterance this step)."""
+    """A fact of the world: t, width, height, action (the agent's this step), noun (the filling of its utterance this
+    step, or with `digit` one slot of it).
+    """
 
     type: Type
     name: Literal["t", "width", "height", "action", "noun"]
+    digit: Digit | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,14 +239,14 @@ class PokedNow:
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """A set of the agent's utterances: pairs (template, noun); `text` is how it was written."""
+    """A set of the agent's utterances: pairs (template, filling); `text` is how it was written."""
 
     pairs: frozenset[tuple[int, int]]
     text: str
     said_by_npcs: frozenset[str] = frozenset()
     """Plain texts of NPCs (without speaker) that match as well."""
     nouns: tuple[tuple[str, int], ...] = ()
-    """Of a pattern with <noun>: the noun that it finds in each of those texts."""
+    """Of a pattern with slots: the filling that it finds in each of those texts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,10 +282,13 @@ class Speaker:
 
 @dataclass(frozen=True, slots=True)
 class HeardNoun:
-    """The noun in what one of these patterns matches: of what the member has heard since its last turn, the first."""
+    """The noun, or with `digit` what stands in a slot, in what one of these patterns matches: of what the member has
+    heard since its last turn, the first.
+    """
 
     type: Type
     patterns: tuple[Pattern, ...]
+    digit: Digit | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice, product
+from itertools import chain, islice, product
 from typing import TypeGuard
 
 from socialai_dsl.diagnostics import did_you_mean
@@ -29,6 +29,7 @@ from socialai_dsl.semantics.signatures import VALUES
 from socialai_dsl.semantics.terms import (
     Compare,
     Const,
+    Digit,
     Heard,
     HeardNoun,
     Line,
@@ -48,7 +49,7 @@ from socialai_dsl.semantics.terms import (
     walk,
 )
 from socialai_dsl.source import DataPath, Span
-from socialai_dsl.vocabulary import normal
+from socialai_dsl.vocabulary import NOUN, normal
 
 _JOINED = re.compile(r"\s*\|\s*|\s+or\s+")
 """What an author may put between alternatives."""
@@ -156,8 +157,7 @@ def _meant(
         nouns = resolver.utterances.npcs_matching(said) if from_npcs else {}
         conditions = [*drawn, *(condition for _, condition in choice if condition is not None)]
         if pairs or nouns:
-            found_nouns = tuple((t, noun) for t, noun in nouns.items() if noun is not None)
-            pattern = Pattern(pairs, said, frozenset(nouns), found_nouns)
+            pattern = Pattern(pairs, said, frozenset(nouns), _fillings(resolver, nouns))
             found.append((pattern, all_of(conditions) if conditions else None))
         elif _can_be(resolver, choice):
             unsayable.append((said, next((word for word, c in choice if c is not None), "")))
@@ -165,6 +165,15 @@ def _meant(
         values = [(node, part) for node, part in zip(spliced, parts, strict=True) if _varies(part)]
         _report_unsayable(resolver, unsayable, values, bool(found), span, from_npcs)
     return found
+
+
+def _fillings(resolver: Resolver, found: Mapping[str, int | None]) -> tuple[tuple[str, int], ...]:
+    """The filling of each text of NPCs: all of it where the grammar can say the text, else what its pattern catches."""
+    if not resolver.symbols.slots:
+        return tuple((text, noun) for text, noun in found.items() if noun is not None)
+    known = ((text, resolver.utterances.filling_of(text), caught) for text, caught in found.items())
+    whole = ((text, filling if filling is not None else caught) for text, filling, caught in known)
+    return tuple((text, filling) for text, filling in whole if filling is not None)
 
 
 def _spliced(
@@ -188,12 +197,16 @@ def _spliced(
         yield parts, [d for _, d, _ in choice if d is not None], place
 
 
-def _spoken_part(resolver: Resolver, part: str | ast.Expr, scope: Scope) -> str | Term | None:
-    """A piece of text, a value in it, or None for any noun."""
+def _spoken_part(resolver: Resolver, part: str | ast.Expr, scope: Scope) -> str | Term:
+    """A piece of text, a slot of the grammar as templates write it, or a value."""
     if isinstance(part, str):
         return part
-    if isinstance(part, ast.Name) and part.id == "noun" and "noun" not in scope.variables:
-        return None
+    if isinstance(part, ast.Name) and part.id not in scope.variables:
+        if part.id in resolver.symbols.slots:
+            return f"<{part.id}>"
+        if part.id == NOUN:
+            no_nouns(resolver, part, scope)
+            return "<noun>"
     if isinstance(part, ast.Name) and part.id == "nouns":
         message = "`nouns` are all of them; any one of them is `<noun>`"
         raise resolver.fail("S402", message, part, scope)
@@ -212,11 +225,9 @@ def _can_be(resolver: Resolver, choice: Iterable[tuple[str, Term | None]]) -> bo
     )
 
 
-def _choices(part: str | Term | None) -> list[tuple[str, Term | None]]:
+def _choices(part: str | Term) -> list[tuple[str, Term | None]]:
     if isinstance(part, str):
         return [(part, None)]
-    if part is None:
-        return [("<noun>", None)]
     if isinstance(part, Const):
         return [(spoken(part.type, part.value), None)]
     values = range(part.type.low, part.type.high + 1)
@@ -239,9 +250,12 @@ def _report_unsayable(
         message = f'`{name}` can be {word}, but "{said}" cannot be said with this grammar'
         drawn_once = isinstance(value, Read) and not resolver.registers.is_set(value.path)
         report = findings.error if drawn_once else findings.warning
-        nouns = [str(noun) for noun in resolver.symbols.scenario.grammar.nouns]
-        missing = f"`{word}`" if word not in nouns else "what is missing"
-        report("S402", message, span, hint=f"add {missing} to the nouns, or narrow what is drawn")
+        slots = resolver.symbols.sentences.slots
+        missing = (
+            f"`{word}`" if word not in chain.from_iterable(s.words for s in slots) else "what is missing"
+        )
+        where = "the nouns" if slots[0].name == NOUN else "a slot of the grammar"
+        report("S402", message, span, hint=f"add {missing} to {where}, or narrow what is drawn")
         return
     alternatives = [part for part in _JOINED.split(said) if part]
     if len(alternatives) > 1 and any(resolver.utterances.match(part) for part in alternatives):
@@ -362,7 +376,7 @@ class _Filling:
         return Scope(self.path, draws, member=self.member, outer=user.draws)
 
 
-def _varies(part: str | Term | None) -> TypeGuard[Term]:
+def _varies(part: str | Term) -> TypeGuard[Term]:
     """Whether a part of a text is a value that is not known."""
     return isinstance(part, Term) and not isinstance(part, Const)
 
@@ -379,7 +393,7 @@ def sayable(resolver: Resolver, node: ast.Expr, scope: Scope, or_condition: bool
     if groups.is_group(resolver, node, scope):
         message = f"`{quoted(node)}` is a group; `pick({quoted(node)})` says one of them"
         raise resolver.fail("S402", message, node, scope)
-    term = resolver.value(node, None, scope)
+    term = word_in_slot(resolver, node, scope) or resolver.value(node, None, scope)
     if term.type.kind not in _SAYABLE and not (or_condition and term.type.kind == "bool"):
         what = described(term.type)
         hint = f"say its colour or name: <{quoted(node)}.color>" if term.type.kind == "entity" else None
@@ -404,7 +418,7 @@ def _merged(parts: Iterable[str | Term]) -> Iterator[str | Term]:
         yield text
 
 
-# -- hearing: what a rule hears, which noun was in it, and what members of the cast have said ----------------
+# -- hearing: what a rule hears, what stood in its slots, and what members of the cast have said ----------------
 
 
 Patterns = tuple[Pattern, ...]
@@ -427,10 +441,39 @@ def speaker(resolver: Resolver, node: ast.Name, scope: Scope) -> Term:
     return Speaker(Type("entity", 0, len(resolver.symbols.numbers) - 1), ())
 
 
-def noun(resolver: Resolver, scope: Scope) -> Term:
+def noun(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
     """`noun`: of what the rule heard, else of what the agent said in this step."""
+    no_nouns(resolver, node, scope)
     nouns = resolver.symbols.nouns
     return HeardNoun(nouns, ()) if scope.hearing else World(nouns, "noun")
+
+
+def no_nouns(resolver: Resolver, node: ast.Expr, scope: Scope) -> None:
+    """Report what asks for nouns where the grammar has slots."""
+    if resolver.symbols.scenario.grammar.slots:
+        places = ", ".join(f"`<{name}>`" for name in resolver.symbols.scenario.grammar.slots)
+        raise resolver.fail("S201", f"this grammar has no nouns; its slots are {places}", node, scope)
+
+
+def in_slot(resolver: Resolver, name: str, heard: bool) -> Term:
+    """The word in a slot: of what the rule heard, else of what the agent said in this step."""
+    sentences, words = resolver.symbols.sentences, resolver.symbols.slots[name].words
+    place = [slot.name for slot in sentences.slots].index(name)
+    digit = Digit(sentences.strides[place], sentences.radices[place])
+    return HeardNoun(words, (), digit) if heard else World(words, "noun", digit)
+
+
+def word_in_slot(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term | None:
+    """What is said for `<slot>` or `<agent.slot>`: the word itself, whatever it stands for; None for anything else."""
+    slots = resolver.symbols.slots
+    match node:
+        case ast.Name(id=name) if (
+            name in slots and name not in scope.variables and scope.frame and not scope.at_reset
+        ):
+            return in_slot(resolver, name, scope.hearing)
+        case ast.Attribute(subject=ast.Name(id="agent"), name=name) if name in slots and not scope.at_reset:
+            return in_slot(resolver, name, heard=False)
+    return None
 
 
 def spoke(resolver: Resolver, node: ast.Call | ast.Attribute | ast.Name, scope: Scope) -> Term:
@@ -524,33 +567,55 @@ def speakers(
     ]
 
 
-def asks_for_noun(parts: object) -> bool:
-    """Whether something in a rule is made of the noun that was heard."""
-    return any(isinstance(term, HeardNoun) for term in walk(parts))
+def asked_of_heard(parts: object) -> set[Digit | None]:
+    """Which slots of what was heard something in a rule is made of; None is the noun."""
+    return {term.digit for term in walk(parts) if isinstance(term, HeardNoun)}
 
 
-def with_nouns(resolver: Resolver, heard: Sequence[Alternative], span: Span) -> list[Alternative]:
-    """Only what has a noun: a rule that asks for it does not hear anything else."""
+def with_slots(
+    resolver: Resolver, heard: Sequence[Alternative], asked: set[Digit | None], span: Span
+) -> list[Alternative]:
+    """Only what has these slots: a rule that asks for them does not hear anything else."""
     found = [
-        [(kept, condition) for pattern, condition in alternative if (kept := _with_noun(resolver, pattern))]
+        [
+            (kept, condition)
+            for pattern, condition in alternative
+            if (kept := _with_slots(resolver, pattern, asked))
+        ]
         for alternative in heard
     ]
     if any(heard) and not any(found):  # what is not understood has been reported
-        message = "nothing that this rule hears has a noun, and it asks for `noun`"
-        hint = "write `<noun>` where it stands in the text"
+        sentences = resolver.symbols.sentences
+        names = [
+            slot.name
+            for slot, stride in zip(sentences.slots, sentences.strides, strict=True)
+            if None in asked or stride in {digit.stride for digit in asked if digit is not None}
+        ]
+        name = names[0] if len(names) == 1 else " and ".join(names)
+        what = "a noun" if name == NOUN else " and ".join(f"`<{one}>`" for one in names)
+        message = f"nothing that this rule hears has {what}, and it asks for `{name}`"
+        hint = f"write `<{names[0]}>` where it stands in the text"
         raise resolver.findings.fail("S211", message, span, hint=hint)
     return found
 
 
-def _with_noun(resolver: Resolver, pattern: Pattern) -> Pattern | None:
-    """The part of a pattern that has a noun: what is caught by `<noun>`, and what the grammar can say."""
-    if pattern.nouns or "<noun>" in pattern.text:
+def _with_slots(resolver: Resolver, pattern: Pattern, asked: set[Digit | None]) -> Pattern | None:
+    """The part of a pattern that has some slots: what is caught by `<slot>`, and what the grammar can say."""
+    if None in asked and (pattern.nouns or "<noun>" in pattern.text):
         return pattern
-    known = ((text, resolver.utterances.noun_in(text)) for text in sorted(pattern.said_by_npcs))
-    nouns = tuple((text, noun) for text, noun in known if noun is not None)
-    if not (pattern.pairs or nouns):
+    known: dict[str, int | None] = dict(pattern.nouns)
+    for text in sorted(pattern.said_by_npcs):
+        known.setdefault(text, resolver.utterances.filling_of(text))
+    fillings = tuple((text, f) for text, f in known.items() if f is not None and _has(f, asked))
+    pairs = frozenset(pair for pair in pattern.pairs if _has(pair[1], asked))
+    if not (pairs or fillings):
         return None
-    return Pattern(pattern.pairs, pattern.text, frozenset(text for text, _ in nouns), nouns)
+    return Pattern(pairs, pattern.text, frozenset(text for text, _ in fillings), fillings)
+
+
+def _has(filling: int, asked: set[Digit | None]) -> bool:
+    """Whether a filling has all the slots that are asked for."""
+    return all(d is None or filling // d.stride % d.radix < d.radix - 1 for d in asked)
 
 
 def bound(plan: RulePlan, heard: Sequence[Alternative]) -> RulePlan:
@@ -559,38 +624,33 @@ def bound(plan: RulePlan, heard: Sequence[Alternative]) -> RulePlan:
 
 
 def binding(heard: Sequence[Alternative]) -> Callable[[Term], Term | None]:
-    """What `speaker` and `noun` are where these are heard; what only the agent says needs no search."""
+    """What `speaker`, `noun` and slots are where these are heard; what only the agent says needs no search."""
     only_agent = not any(pattern.said_by_npcs for alternative in heard for pattern, _ in alternative)
 
     def change(term: Term) -> Term | None:
         if isinstance(term, Speaker):
-            who = Type("entity", 0, 0)
-            return Const(who, 0) if only_agent else _of_what_is_meant(Speaker, term.type, heard, ())
+            return Const(Type("entity", 0, 0), 0) if only_agent else _of_what_is_meant(term, heard, ())
         if isinstance(term, HeardNoun):
-            noun = World(term.type, "noun")
-            return noun if only_agent else _of_what_is_meant(HeardNoun, term.type, heard, ())
+            said = World(term.type, "noun", term.digit)
+            return said if only_agent else _of_what_is_meant(term, heard, ())
         return None
 
     return change
 
 
-def _of_what_is_meant(
-    kind: type[Speaker] | type[HeardNoun], type_: Type, heard: Sequence[Alternative], patterns: Patterns
-) -> Term:
+def _of_what_is_meant(asked: Speaker | HeardNoun, heard: Sequence[Alternative], patterns: Patterns) -> Term:
     """Something of the first utterance that fits; what fits may depend on values, of which each text has one."""
     if not heard:
-        return kind(type_, patterns)
+        return replace(asked, patterns=patterns)
     alternative, *others = heard
     always = tuple(pattern for pattern, condition in alternative if condition is None)
     sometimes = [(pattern, condition) for pattern, condition in alternative if condition is not None]
-    otherwise = _of_what_is_meant(kind, type_, others, (*patterns, *always))
+    otherwise = _of_what_is_meant(asked, others, (*patterns, *always))
     if not sometimes:
         return otherwise
     return Select(
-        type_,
+        asked.type,
         tuple(condition for _, condition in sometimes),
-        tuple(
-            _of_what_is_meant(kind, type_, others, (*patterns, *always, pattern)) for pattern, _ in sometimes
-        ),
+        tuple(_of_what_is_meant(asked, others, (*patterns, *always, pattern)) for pattern, _ in sometimes),
         otherwise,
     )

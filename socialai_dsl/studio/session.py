@@ -27,7 +27,7 @@ from socialai_dsl.replay import Thought, Tracer
 from socialai_dsl.replay.page import replay_page
 from socialai_dsl.source import Source
 from socialai_dsl.studio.layouts import start_layout, suite_text, with_layout
-from socialai_dsl.vocabulary import EMPTY, WALL
+from socialai_dsl.vocabulary import EMPTY, WALL, Sentences
 
 Reply = dict[str, Any]
 
@@ -55,7 +55,7 @@ class Session:
         self._path = Path()
         self._texts: dict[Path, Source] = {}
         self._env: ScenarioEnv | None = None
-        self._phrases = Phrases((), (), ())
+        self._phrases = Phrases((), Sentences((), (), ()))
         self._tracer: Tracer | None = None
         self._moments: list[_Before] = []
         self._player, self._seed = "me", 0
@@ -229,7 +229,7 @@ class Session:
         """Play this from now on."""
         program = compile_loaded(loaded)
         self._env = ScenarioEnv(program, scenarios=scenarios_of(loaded))
-        self._phrases = Phrases(program.actions, program.templates, program.nouns)
+        self._phrases = Phrases(program.actions, program.sentences)
         endings = {ending.name: ending.text for ending in endings_of(loaded, program)}
         self._tracer = Tracer(self._env, loaded.name, "me", endings, about_of(loaded))
         self._player, self._policy, self._moments = "me", None, []

@@ -42,4 +42,4 @@ def test_a_scenario_can_name_a_shared_grammar(tmp_path):
     )
     checked = check(file).checked
     assert checked is not None
-    assert list(checked.templates) == shared_grammars()["body"]["templates"]
+    assert list(checked.sentences.templates) == shared_grammars()["body"]["templates"]

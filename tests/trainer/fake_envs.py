@@ -67,6 +67,7 @@ class EchoEnvs(gym.vector.VectorEnv):
             actions=("stop", "wait", "look"),
             templates=("ask <noun>", "say <noun>"),
             nouns=tuple(f"word{i}" for i in range(nouns)),
+            sentences=SimpleNamespace(used=((True,), (True,))),
         )
         kinds = np.stack([np.arange(48) % 13, np.arange(48) % 6, np.arange(48) % 3, np.arange(48) % 4], 1)
         drawn = np.random.default_rng(1).integers(0, 48, (pictures, 7, 7))

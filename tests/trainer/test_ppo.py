@@ -134,6 +134,56 @@ def test_the_entropy_is_that_of_all_actions_and_so_is_its_gradient(sizes: tuple[
     assert wanted[:, sizes[0] : sizes[0] + 2].abs().min() > 1e-4, "p(speak) matters"
 
 
+USED = torch.tensor([[1, 1], [1, 0], [0, 0]], dtype=torch.float32)
+"""The first template has two slots, the second the first of them, the third none."""
+
+
+def test_the_entropy_with_several_slots_is_that_of_all_actions_too() -> None:
+    """Every action is enumerated: silence, and each template with all words for the slots that it has."""
+    generator = torch.Generator().manual_seed(0)
+    sizes = (3, 2, 3, 4, 2)
+    logits = torch.randn(5, sum(sizes), generator=generator, dtype=torch.float64).requires_grad_()
+    batch = Batch(
+        torch.tensor([[0, 1, t % 3, 3, 1] for t in range(5)]),
+        torch.zeros(5, 5, dtype=torch.float64),
+        *torch.zeros(3, 5, dtype=torch.float64),
+    )
+    settings = config(value_coef=0.0)
+    zeros = torch.zeros(5, dtype=torch.float64)
+    parts = ppo_loss(batch, logits, zeros, sizes, settings, 1.0, USED)
+    first, speak, template, what, whom = (part.softmax(1) for part in logits.split(list(sizes), 1))
+    said = [
+        torch.einsum("nb,nc->nbc", what, whom).flatten(1) * template[:, :1],
+        what * template[:, 1:2],
+        template[:, 2:],
+    ]
+    spoken = torch.einsum("na,nb->nab", first * speak[:, 1:], torch.cat(said, 1)).flatten(1)
+    joint = torch.cat((first * speak[:, :1], spoken), 1)  # (N, 3 + 3 * 13)
+    assert joint.shape[1] == 42
+    assert torch.allclose(joint.sum(1), torch.ones(5, dtype=torch.float64))
+    expected = -(joint * joint.log()).sum(1).mean()
+    assert parts.entropy.item() == pytest.approx(expected.item(), rel=1e-12)
+    (got,) = torch.autograd.grad(parts.loss, logits)
+    (wanted,) = torch.autograd.grad(-expected, logits)
+    assert torch.allclose(got, wanted, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("loss", ["joint", "per_head"])
+def test_a_slot_that_the_template_lacks_is_not_learnt_from(loss: Any) -> None:
+    """Whatever the head for it said, the loss is the same, and pushes it nowhere but by its entropy."""
+    sizes = (3, 2, 3, 4, 2)
+    logits = torch.randn(1, sum(sizes), generator=torch.Generator().manual_seed(0)).requires_grad_()
+
+    def of(word: int) -> torch.Tensor:
+        batch = Batch(torch.tensor([[0, 1, 1, 2, word]]), torch.full((1, 5), -1.0), *torch.ones(3, 1) * 2)
+        return ppo_loss(batch, logits, torch.ones(1), sizes, config(loss=loss), 0.0, USED).loss
+
+    assert of(0).item() == of(1).item()
+    (gradient,) = torch.autograd.grad(of(0), logits)
+    assert (gradient[0, -2:] == 0).all()
+    assert (gradient[0, :12].abs() > 0).any()
+
+
 def test_per_head_loss_masks_and_averages_each_head() -> None:
     batch, _ = one_frame(False, advantage=2.0, acting=0.5, now=0.6)
     logits = torch.tensor(

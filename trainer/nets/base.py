@@ -17,25 +17,29 @@ from trainer.nets.reading import Reader
 
 Precision = Literal["float32", "bfloat16"]
 
-HEADS = ("primitive", "speak", "template", "noun")
-
 
 @dataclass(frozen=True)
 class NetSpec:
     """The sizes that a network is built for.
 
     Attributes:
-        action_sizes: choices of the four heads: body action (the last is no movement), speak (0 is silence), template,
-            noun.
+        action_sizes: choices of the heads: body (the last is no movement), speak (0 is silence), template, slots.
         image_shape: (H, W, C): cells from left to right, cells from far to near, channels.
         image_high: highest value of each channel.
         vocabulary: word of each token id; 0 pads, 1 is the unknown word.
+        slots_used: for each template, whether it has each slot; empty if all have all.
     """
 
-    action_sizes: tuple[int, int, int, int]
+    action_sizes: tuple[int, ...]
     image_shape: tuple[int, int, int]
     image_high: tuple[int, ...]
     vocabulary: tuple[str, ...]
+    slots_used: tuple[tuple[bool, ...], ...] = ()
+
+    @property
+    def used(self) -> Tensor | None:
+        """`slots_used` as 0 and 1, float (templates, slots); None if all templates have all slots."""
+        return None if all(map(all, self.slots_used)) else torch.tensor(self.slots_used, dtype=torch.float32)
 
     @property
     def vocabulary_size(self) -> int:
@@ -47,12 +51,12 @@ class NetSpec:
         """The sizes of an environment, single or vector.
 
         Raises:
-            ValueError: the spaces are not a `MultiDiscrete` of four and a `Dict` of `image` and `tokens`.
+            ValueError: the spaces are not a `MultiDiscrete` of four or more and a `Dict` of `image` and `tokens`.
         """
         actions = getattr(envs, "single_action_space", envs.action_space)
-        if not isinstance(actions, spaces.MultiDiscrete) or len(actions.nvec) != len(HEADS):
+        if not isinstance(actions, spaces.MultiDiscrete) or len(actions.nvec) < 4:
             raise ValueError(
-                f"action space: got {actions}, expected MultiDiscrete([primitives, 2, templates, nouns])"
+                f"action space: got {actions}, expected MultiDiscrete([bodies, 2, templates, words, ...])"
             )
         observations = getattr(envs, "single_observation_space", envs.observation_space)
         image = observations["image"] if isinstance(observations, spaces.Dict) else None
@@ -60,18 +64,16 @@ class NetSpec:
             raise ValueError(
                 f"observation space: got {observations}, expected Dict(image=Box(H, W, C), tokens=Box(L))"
             )
-        primitives, speak, templates, nouns = actions.nvec.tolist()
-        height, ahead, channels = image.shape
-        high = np.asarray(image.high).reshape(-1, channels).max(axis=0)
-        sizes, shape = (primitives, speak, templates, nouns), (height, ahead, channels)
-        return cls(sizes, shape, tuple(high.tolist()), tuple(envs.program.vocabulary))
+        high = np.asarray(image.high).reshape(-1, image.shape[2]).max(axis=0)
+        words, used = tuple(envs.program.vocabulary), envs.program.sentences.used
+        return cls(tuple(actions.nvec.tolist()), image.shape, tuple(high.tolist()), words, used)
 
 
 class Heads(nn.Module):
-    """Five two-layer heads: the four parts of the action and the value.
+    """Two-layer heads: one for each part of the action, and the value.
 
     Each is Linear to 64, tanh, Linear (SocialAI 1.0's heads); their first layers are kept as one matrix, because one
-    product is faster than five.
+    product is faster than several.
     """
 
     def __init__(self, input_size: int, action_sizes: tuple[int, ...], hidden: int = 64) -> None:
@@ -97,7 +99,7 @@ def unit_row_linear(module: nn.Module) -> None:
 
 
 class ActorCritic(nn.Module, ABC):
-    """A recurrent policy and value: images and dialogue to features, a memory, four heads and a critic.
+    """A recurrent policy and value: images and dialogue to features, a memory, heads and a critic.
 
     A subclass implements `prepare` and `perceive`, and may replace `memory`, `dialogue` or `heads` after this
     constructor; `--net mine:Net` builds `Net(spec)`. The trainer calls the parts one by one, so that each

@@ -3,6 +3,7 @@
 import { make, makeSvg, panel, spoken } from "./dom.js";
 import { COLOURS, NPC, PALETTE, css, drawTile } from "./tiles.js";
 import { drawPicture, fittingTile } from "./room.js";
+import { slotsOf } from "./trace.js";
 
 /** @typedef {import("./trace.js").Episode} Episode */
 /** @typedef {import("./trace.js").Scene} Scene */
@@ -243,8 +244,8 @@ export class Mind {
       this.bars.replaceChildren();
       return;
     }
-    const { actions, templates, nouns } = episode.trace;
-    const [body, speak, template, noun] = thought.probabilities;
+    const { actions, templates } = episode.trace;
+    const [body, speak, template, ...words] = thought.probabilities;
     this.value.textContent =
       `Chose step ${step} expecting a return of ${thought.value?.toFixed(3) ?? "?"}; ` +
       `spoke with probability ${percent(speak[1])}.`;
@@ -252,7 +253,8 @@ export class Mind {
     this.bars.replaceChildren(
       this.list("moves", [...actions, "none"], body, action?.[0] ?? -1),
       this.list(spoke ? "says" : "would say", templates, template, spoke ? (action?.[2] ?? -1) : -1),
-      this.list("about", nouns, noun, spoke ? (action?.[3] ?? -1) : -1));
+      ...slotsOf(episode.trace).map(([name, known], k) =>
+        this.list(name === "noun" ? "about" : name, known, words[k], spoke ? (action?.[3 + k] ?? -1) : -1)));
   }
 
   /** @param {string} title @param {string[]} words @param {number[]} shares @param {number} chosen */

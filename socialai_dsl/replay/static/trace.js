@@ -42,6 +42,7 @@
  * @property {string[]} actions
  * @property {string[]} templates
  * @property {string[]} nouns
+ * @property {Record<string, string[]>} [slots]
  * @property {Look[]} [looks]
  * @property {string[]} [texts]
  * @property {Rule[]} [rules]
@@ -172,6 +173,13 @@ export class Episode {
     }
     return counts;
   }
+}
+
+/** What stands in templates: the slots by name, each with its words; of most grammars one, the noun.
+ * @param {Trace} trace @returns {[string, string[]][]} */
+export function slotsOf(trace) {
+  const slots = Object.entries(trace.slots ?? {});
+  return trace.nouns.length ? [["noun", trace.nouns], ...slots] : slots;
 }
 
 /** Whether the agent has a cell in its field of view: 7 by 7, the agent in the middle of the near edge.

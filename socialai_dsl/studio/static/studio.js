@@ -3,7 +3,7 @@
 import { make, panel } from "./dom.js";
 import { Editor } from "./editor.js";
 import { Cast, Mind, Rules, Sight, Stage, Transcript, legend, outcomeInWords } from "./panels.js";
-import { Episode } from "./trace.js";
+import { Episode, slotsOf } from "./trace.js";
 
 /** @typedef {Record<string, any>} Reply */
 
@@ -134,8 +134,8 @@ class Studio {
     this.stage.sheet.append(this.target);
     /** @type {[number, number] | null} where the chosen thing is about to be put */ this.aim = null;
     this.moves = make("div", { class: "moves", role: "group", "aria-label": "movements" });
-    this.template = make("select", { "aria-label": "template" });
-    this.noun = make("select", { "aria-label": "noun" });
+    this.template = make("select", { "aria-label": "template", onchange: () => this.offerWords() });
+    this.words = make("span", { class: "words" });
     this.sentences = make("datalist", { id: "sentences" });
     this.typed = make("input", { list: "sentences", placeholder: "or type: forward, How are you …", "aria-label": "what to do or say" });
     this.checked = make("div", { class: "checked" }, make("p", { class: "quiet" }, "`check` tries in a hundred rooms what the scenario claims; it takes up to 20 seconds."));
@@ -168,7 +168,7 @@ class Studio {
       make("label", {}, "plays: ", this.players), this.watch,
       button("one step", () => this.auto(), "let whoever plays do one step"));
     const say = make("form", { class: "controls say", onsubmit: (/** @type {Event} */ event) => this.submit(event) },
-      this.template, this.noun, make("button", { type: "button", onclick: () => this.say() }, "Say"), this.typed, this.sentences, make("button", {}, "Do"));
+      this.template, this.words, make("button", { type: "button", onclick: () => this.say() }, "Say"), this.typed, this.sentences, make("button", {}, "Do"));
     const arrange = make("div", { class: "controls arrange" }, make("label", {}, "thing ", this.thing),
       button("Move it", () => this.moving(this.placeOf(this.thing.value)), "then by the arrow keys; Enter puts it down, Esc leaves it (M)"),
       button("Layout…", () => this.offerLayout(), "begin episodes in the room as it is now"));
@@ -355,7 +355,7 @@ class Studio {
     this.seed = begun.seed;
     this.seedField.value = String(begun.seed);
     document.body.dataset.rooms = String(Number(document.body.dataset.rooms ?? 0) + 1);
-    const { actions, templates, nouns } = this.episode.trace;
+    const { actions, templates } = this.episode.trace;
     const options = (/** @type {HTMLSelectElement} */ select, /** @type {string[]} */ words) => {
       const chosen = select.value;
       select.replaceChildren(...words.map((word) => make("option", { selected: word === chosen }, word)));
@@ -363,7 +363,13 @@ class Studio {
     options(this.thing, Object.keys(this.episode.scenes[0].state).filter((key) => key.endsWith(".at") && this.placeOf(key.slice(0, -3))).map((key) => key.slice(0, -3)));
     this.moving(null);
     options(this.template, templates);
-    options(this.noun, nouns);
+    const known = new Map([...this.words.children].map((select) => [select.getAttribute("aria-label"), select]));
+    this.words.replaceChildren(...slotsOf(this.episode.trace).map(([name, words]) => {
+      const select = /** @type {HTMLSelectElement} */ (known.get(name) ?? make("select", { "aria-label": name }));
+      options(select, words);
+      return select;
+    }));
+    this.offerWords();
     this.sentences.replaceChildren(...begun.phrases.sentences.map((/** @type {string} */ said) => make("option", { value: said })));
     this.moves.replaceChildren(...[...actions, "none"].map((word) => make("button", { onclick: () => this.act({ movement: word === "none" ? null : word }) }, word)));
     this.show();
@@ -412,7 +418,14 @@ class Studio {
   }
 
   say() {
-    this.act({ sentence: this.template.value.replace("<noun>", this.noun.value) });
+    const selects = /** @type {HTMLSelectElement[]} */ ([...this.words.children]);
+    this.act({ sentence: selects.reduce((said, words) => said.replace(`<${words.getAttribute("aria-label")}>`, words.value), this.template.value) });
+  }
+
+  /** Words are offered for the slots that the template has. */
+  offerWords() {
+    for (const words of /** @type {HTMLSelectElement[]} */ ([...this.words.children]))
+      words.hidden = !this.template.value.includes(`<${words.getAttribute("aria-label")}>`);
   }
 
   /** @param {Event} event */

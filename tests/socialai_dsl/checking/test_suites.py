@@ -19,34 +19,34 @@ pytestmark = pytest.mark.usefixtures("folder")
 def test_union_says_each_text_once_in_the_order_of_the_members() -> None:
     space = suite("pair").space
     talkitout, errands = suite("pair").members
-    assert space.templates == (*talkitout.checked.templates, "Give me <noun>")
-    assert space.nouns == (*talkitout.checked.nouns, "bread", "2")
-    assert [space.nouns[i] for i, own in enumerate(space.noun_maps[1]) if own >= 0] == [
+    assert space.sentences.templates == (*talkitout.checked.sentences.templates, "Give me <noun>")
+    assert space.sentences.nouns == (*talkitout.checked.sentences.nouns, "bread", "2")
+    assert [space.sentences.nouns[i] for i, own in enumerate(space.slot_maps[1][0]) if own >= 0] == [
         "sesame",
         "bread",
         "2",
     ]
     for number, member in enumerate((talkitout, errands)):
         for words, own, at in (
-            (space.templates, member.checked.templates, space.template_maps[number]),
-            (space.nouns, member.checked.nouns, space.noun_maps[number]),
+            (space.sentences.templates, member.checked.sentences.templates, space.template_maps[number]),
+            (space.sentences.nouns, member.checked.sentences.nouns, space.slot_maps[number][0]),
         ):
             assert {word: own[i] for word, i in zip(words, at, strict=True) if i >= 0} == {w: w for w in own}
 
 
 def test_concat_keeps_what_is_said_twice_and_its_place() -> None:
     space = suite("pair+loud").space
-    assert space.templates.count("Open <noun>") == space.nouns.count("sesame") == 2
+    assert space.sentences.templates.count("Open <noun>") == space.sentences.nouns.count("sesame") == 2
     assert space.template_maps == ((0, 1, 2, 3, -1, -1), (-1, -1, -1, -1, 0, 1))
-    assert space.noun_maps[1][-3:] == (0, 1, 2)
-    assert set(space.noun_maps[1][:-3]) == {-1}
+    assert space.slot_maps[1][0][-3:] == (0, 1, 2)
+    assert set(space.slot_maps[1][0][:-3]) == {-1}
 
 
 def test_a_grammar_may_be_written_out() -> None:
     space = suite("written").space
-    assert space.templates[-1] == "Fetch <noun>"
+    assert space.sentences.templates[-1] == "Fetch <noun>"
     assert space.template_maps == ((-1, -1, 1, 0, -1), (3, 0, 1, -1, -1))
-    assert space.noun_maps == ((0, 1, -1, -1, -1), (-1, 0, 1, 3, -1))
+    assert space.slot_maps == (((0, 1, -1, -1, -1),), ((-1, 0, 1, 3, -1),))
 
 
 def test_all_members_have_the_body_actions_of_all() -> None:
@@ -173,4 +173,4 @@ def test_the_suite_of_the_paper(split: str) -> None:
     assert tuple(names) == (coded if "as_coded" in split else paper)
     assert ("help_as_helper" in loaded.member_names) == ("test" in split)
     sizes = (15, 45) if "as_coded" in split else (7, 26)
-    assert (len(loaded.space.templates), len(loaded.space.nouns)) == sizes
+    assert (len(loaded.space.sentences.templates), len(loaded.space.sentences.nouns)) == sizes

@@ -3,9 +3,11 @@
 import pytest
 
 from socialai_dsl.cli.typed import Phrases, split_line
+from socialai_dsl.vocabulary import Sentences, Slot
 
 ACTIONS = ("left", "right", "forward", "pickup", "drop", "toggle", "done")
-PHRASES = Phrases(ACTIONS, ("Where is <noun>", "Hello"), ("the exit", "you"))
+GRAMMAR = Sentences.of(("Where is <noun>", "Hello"), (Slot("noun", ("the exit", "you")),))
+PHRASES = Phrases(ACTIONS, GRAMMAR)
 
 
 @pytest.mark.parametrize(

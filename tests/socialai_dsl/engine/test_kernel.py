@@ -184,7 +184,8 @@ def mixed(programs: list[Program], pools: list[list[int]], pool_of_row: list[int
             range(4 * i, 4 * i + 4),
             [*range(7), Body.NONE],
             range(2),
-            range(3),
+            [range(3)],
+            [[0, 1], [0, 1]],
             range(22),
             [False] * 4,
         )
@@ -240,7 +241,8 @@ def test_actions_of_a_larger_space_that_a_program_lacks() -> None:
         range(4),
         [Body.NONE, Body.FORWARD, Body.NONE],
         [-1, 1],
-        [0, -1, 2],
+        [[0, -1, 2]],
+        [[0, 1], [0, 1]],
         range(22),
         [False] * 4,
     )

@@ -120,7 +120,16 @@ def test_the_last_attempt_counts() -> None:
 
 def part_of(program: Program, name: str = "") -> Part:
     return Part(
-        program.words, 1, range(4), [*range(7), Body.NONE], range(2), range(3), range(22), [False] * 4, name
+        program.words,
+        1,
+        range(4),
+        [*range(7), Body.NONE],
+        range(2),
+        [range(3)],
+        [[0, 1], [0, 1]],
+        range(22),
+        [False] * 4,
+        name,
     )
 
 

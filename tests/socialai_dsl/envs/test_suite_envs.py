@@ -96,7 +96,7 @@ def test_a_member_plays_as_it_does_alone(variant: str) -> None:
         for i, env in enumerate(singles):
             number = suite.members.index(before[i])
             template = suite.template_maps[number][step[i, 2]]
-            noun = suite.noun_maps[number][step[i, 3]]
+            noun = suite.slot_maps[number][0][step[i, 3]]
             said = step[i, 1] and template >= 0 and noun >= 0
             body = min(step[i, 0], env.action_space.nvec[0] - 1)
             shown, paid, ended, out, info = env.step([body, said, max(template, 0), max(noun, 0)])

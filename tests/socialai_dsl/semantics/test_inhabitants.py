@@ -40,7 +40,7 @@ def test_a_member_has_a_voice_of_its_own(meaning):
 def test_a_variant_as_the_code_has_it():
     loaded = load("talkitout_no_liar+as_coded+unsocial")
     checked = loaded.checked
-    assert (checked.templates[2], checked.nouns[10]) == ("Close <noun>", "the floor")
+    assert (checked.sentences.templates[2], checked.sentences.nouns[10]) == ("Close <noun>", "the floor")
     assert (checked.npcs_hidden, checked.picture_before_npcs) == (True, True)
     assert [e.audible for e in checked.entities[:3]] == [False, False, True]
     assert loaded.name == "talkitout_no_liar+as_coded+unsocial"

@@ -53,7 +53,7 @@ def test_an_utterance_is_silence_or_any_pair(meaning):
     assert term.default == Const(term.type, 0)
     (said,) = term.values
     assert [item.value for item in said.items] == list(
-        range(1, 1 + len(checked.templates) * len(checked.nouns))
+        range(1, 1 + len(checked.sentences.templates) * len(checked.sentences.nouns))
     )
     assert said.type.words[0] == ""
 
