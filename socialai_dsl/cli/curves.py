@@ -1,15 +1,14 @@
-"""`socialai curves`: draws the learning curves of several runs and prints their tables."""
+"""`socialai curves`: the learning curves of several runs in one picture and one table."""
 
 import argparse
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.cli.errors import Exit, UsageError
-from socialai_dsl.cli.run_folder import RESULT, SETTINGS, read_json, scenario_folder_name
 
 if TYPE_CHECKING:
-    from socialai_dsl.reporting.seeds_figure import Condition
+    from socialai_dsl.reporting.analysis import Summary
 
 SUMMARY: Final = "draw the learning curves of several runs, seeds of one condition together"
 
@@ -19,7 +18,7 @@ _WORTH_SHOWING: Final = 0.005
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
-    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN_DIR", help="folders of finished runs")
+    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN_DIR", help="folders of runs")
     parser.add_argument(
         "--out",
         type=Path,
@@ -31,75 +30,50 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Group the runs by everything but their seed, draw them, and print a table in Markdown."""
-    from socialai_dsl.cli.agents import require_trainer
+    from socialai_dsl.cli.report import require_libraries
 
-    require_trainer()
-    from socialai_dsl.reporting.seeds_figure import draw_conditions
+    require_libraries()
+    from socialai_dsl.reporting.analysis import Summary
+    from socialai_dsl.reporting.collect import read_runs
+    from socialai_dsl.reporting.plots import conditions_figure
 
-    groups: dict[str, list[Path]] = {}
-    for run in arguments.runs:
-        groups.setdefault(_title(_read(run, SETTINGS)), []).append(run)
-    conditions = [_condition(title, runs) for title, runs in groups.items()]
-    draw_conditions(conditions, arguments.out)
-    for condition in conditions:
-        print(_table(condition))
+    try:
+        experiment = read_runs(arguments.runs)
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    for run in experiment.runs:
+        if run.updates() is None:
+            said = "; ".join(run.problems) or "it has no metrics.jsonl that can be read"
+            raise UsageError(f"{run.folder}: expected the folder of a run that has learned, {said}")
+    summaries = [Summary(condition) for condition in experiment.conditions]
+    conditions_figure(summaries).savefig(arguments.out)
+    for summary in summaries:
+        print(_table(summary))
     print(f"written to {arguments.out}")
     return Exit.GOOD
 
 
-def _read(run: Path, name: str) -> dict[str, Any]:
-    if not (run / name).is_file():
-        raise UsageError(f"{run}: expected the folder of a finished run, it has no {name}")
-    return read_json(run / name)
-
-
-def _title(settings: dict[str, Any]) -> str:
-    """What was run, without the seed."""
-    from socialai_dsl.reporting.collect import unusual
-
-    return ", ".join([scenario_folder_name(str(settings["scenario"])), *unusual(settings)])
-
-
-def _condition(title: str, runs: list[Path]) -> "Condition":
-    import socialai_dsl
-    from socialai_dsl.cli.endings import endings_of
-    from socialai_dsl.reporting.seeds import read_seeds
-    from socialai_dsl.reporting.seeds_figure import Condition
-
-    scenario = str(_read(runs[0], SETTINGS)["scenario"])
-    loaded = socialai_dsl.load(scenario)
-    endings = endings_of(loaded, socialai_dsl.compile(loaded))
-    results = [_read(run, RESULT) for run in runs]
-    try:
-        seeds = read_seeds([run / "metrics.jsonl" for run in runs])
-    except ValueError as error:
-        raise UsageError(str(error)) from error
-    successes = frozenset(ending.name for ending in endings if ending.success)
-    words = {ending.name: ending.text for ending in endings}
-    tests = [(float(result["frames"]), float(result["eval"]["success_rate"])) for result in results]
-    return Condition(title, seeds, successes, words, tests)
-
-
-def _table(condition: "Condition") -> str:
+def _table(summary: "Summary") -> str:
     """Success of each seed, and the mean rates of outcomes and rules, at a few moments, as Markdown."""
     import numpy as np
 
     from socialai_dsl.reporting.seeds import mean_over_seeds
 
-    seeds = condition.seeds
+    seeds = summary.seeds
+    assert seeds is not None, "internal: every run has a curve"
     step = max(1, len(seeds.frames) // _ROWS)
     moments = range(step - 1, len(seeds.frames), step)
     means = {name: mean_over_seeds(rate) for name, rate in seeds.rates.items()}
     rates = {name: rate for name, rate in means.items() if np.nanmax(rate, initial=0.0) >= _WORTH_SHOWING}
     head = ["frames", *(f"run {number + 1}" for number in range(len(seeds.success)))]
     head += [name.partition("/")[2] for name in rates]
-    lines = [f"\n{condition.title}\n", f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    lines = [f"\n{summary.name}\n", f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for moment in moments:
         cells = [f"{seeds.frames[moment] / 1e6:.2f} M"]
         cells += [_shown(value) for value in seeds.success[:, moment]]
         cells += [_shown(rate[moment]) for rate in rates.values()]
         lines.append(f"| {' | '.join(cells)} |")
-    test = ", ".join(f"{rate:.3f}" for _, rate in condition.tests)
+    test = ", ".join(f"{rate:.3f}" for rate in summary.success)
     return "\n".join([*lines, "", f"test set: {test}"])
 
 

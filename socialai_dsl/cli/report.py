@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Read, compute, draw, write."""
-    _require_libraries()
+    require_libraries()
     from socialai_dsl.reporting.analysis import analyse
 
     experiment, place = _experiment(arguments.folders)
@@ -51,7 +51,12 @@ def execute(arguments: argparse.Namespace) -> Exit:
     return Exit.GOOD
 
 
-def _require_libraries() -> None:
+def require_libraries() -> None:
+    """Say how to install what reports need, if it is missing.
+
+    Raises:
+        UsageError: a library is not installed.
+    """
     try:
         import jinja2  # noqa: F401
         import matplotlib  # noqa: F401

@@ -174,7 +174,7 @@ def draw_outcomes(
         frames: (B,), frames seen so far.
         shares: outcome -> (B,), its share of the episodes.
         successes: which outcomes are successes.
-        words: outcome -> what the scenario says of it, which names it where it is known.
+        words: outcome -> what the scenario says of it; others are called by their kind and line.
         legend: where it stands, as options of matplotlib's.
     """
     shares = {name: values for name, values in shares.items() if np.nanmax(values, initial=0.0) > 0}
@@ -185,7 +185,7 @@ def draw_outcomes(
         frames,
         [values for _, _, values in drawn],
         colors=[colour for colour, _, _ in drawn],
-        labels=[shown(words.get(name, name), 64) for _, name, _ in drawn],
+        labels=[shown(words.get(name, name.replace("@", ", line ")), 64) for _, name, _ in drawn],
         linewidth=0,
     )
     axes.legend(fontsize=7, frameon=False, **legend)

@@ -11,13 +11,16 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from socialai_dsl.reporting.analysis import Analysis, Ceilings, Section, Summary
 from socialai_dsl.reporting.curve import draw_outcomes
+from socialai_dsl.reporting.seeds import Seeds
 from socialai_dsl.reporting.style import (
     INK,
     MUTED,
+    WIDTH,
     colour,
     frames,
     marker,
@@ -29,6 +32,7 @@ from socialai_dsl.reporting.style import (
 
 _LEVELS: Final = (("oracle", "own script", "-"), ("random", "random", ":"), ("alone", "without NPCs", "--"))
 _LEGEND: Final[dict[str, Any]] = {"loc": "outside upper left", "ncols": 2}
+_RULES_SHOWN: Final = 6
 _BETWEEN: Final = 0.08  # of an axis, so that two names do not overlap
 
 
@@ -179,18 +183,57 @@ def _ends(axes: Axes, summary: Summary, index: int, place: float) -> None:
 
 def endings_figure(summary: Summary, label: str) -> Figure:
     """How training episodes of a condition ended over frames, mean over seeds, in the words of the scenario."""
-    assert summary.seeds is not None, "internal: only conditions with curves are drawn"
     figure, axes = new_axes(3.4)
-    words = {name: ending.text for name, ending in summary.endings.items()}
-    draw_outcomes(
-        axes, summary.seeds.frames, summary.seeds.means("outcomes"), summary.successes, words,
-        {"loc": "upper left", "bbox_to_anchor": (-0.08, -0.1), "ncols": 1},
-    )  # fmt: skip
     axes.set_title(shown(label, 40))
+    _endings(axes, summary)
+    return figure
+
+
+def _endings(axes: Axes, summary: Summary) -> None:
+    seeds = summary.seeds
+    assert seeds is not None, "internal: only conditions with curves are drawn"
+    words = {name: ending.text for name, ending in summary.endings.items()}
+    below = {"loc": "upper left", "bbox_to_anchor": (-0.08, -0.1)}
+    draw_outcomes(axes, seeds.frames, seeds.means("outcomes"), summary.successes, words, below)
     rates(axes)
     axes.set_ylim(0, 1)
-    frames(axes, float(summary.seeds.frames[-1]))
+    frames(axes, float(seeds.frames[-1]))
+
+
+def conditions_figure(summaries: Sequence[Summary]) -> Figure:
+    """Conditions that have learned, side by side: success above, endings of episodes, the rules that fired most."""
+    with styled():
+        figure = Figure(figsize=(WIDTH * len(summaries), 9), dpi=110, layout="constrained")
+        FigureCanvasAgg(figure)
+        grid = figure.subplots(3, len(summaries), squeeze=False, height_ratios=(3, 2, 2))
+        for (success, endings, rules), summary in zip(grid.T, summaries, strict=True):
+            assert summary.seeds is not None, "internal: only conditions with curves are drawn"
+            end = float(summary.seeds.frames[-1])
+            success.set_title(shown(summary.name, 40))
+            _curve(success, summary, 0, "training")
+            _ends(success, summary, 0, end * 1.03)
+            rates(success)
+            frames(success, end * 1.03)
+            _endings(endings, summary)
+            _rules(rules, summary.seeds)
+            frames(rules, end)
+        for axes, label in zip(
+            grid[:, 0], ("success", "episodes ended by", "firings per episode"), strict=True
+        ):
+            axes.set_ylabel(label)
     return figure
+
+
+def _rules(axes: Axes, seeds: Seeds) -> None:
+    """The rules that fired most, one line each."""
+    means = seeds.means("rules")
+    peaks = {name: float(np.nanmax(rate, initial=0.0)) for name, rate in means.items()}
+    names = [name for name in sorted(peaks, key=lambda name: -peaks[name]) if peaks[name] > 0][:_RULES_SHOWN]
+    for name in names:
+        axes.plot(seeds.frames, means[name], linewidth=1.4, label=shown(name))
+    axes.set_ylim(bottom=0)
+    if names:
+        axes.legend(loc="upper left", bbox_to_anchor=(-0.08, -0.1), fontsize=7)
 
 
 def iqm_figure(section: Section) -> Figure:

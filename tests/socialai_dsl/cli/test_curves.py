@@ -8,6 +8,7 @@ import pytest
 
 from socialai_dsl.cli.main import main
 from socialai_dsl.reporting.seeds import mean_over_seeds, read_seeds
+from tests.socialai_dsl.reporting.synthetic import figures
 
 
 def row(update: int, episodes: int, success: float | None, asked: float | None = None) -> str:
@@ -62,7 +63,7 @@ def make_run(folder: Path, scenario: str, seed: int, rate: float, bonus: str = "
     run.mkdir()
     settings = {"scenario": scenario, "seed": seed, "net": "fast", "bonus": bonus, "curriculum": "none"}
     (run / "config.json").write_text(json.dumps(settings))
-    (run / "result.json").write_text(json.dumps({"frames": 300, "eval": {"success_rate": rate}}))
+    (run / "result.json").write_text(json.dumps({"frames": 300, "eval": figures(rate)}))
     write_metrics(run / "metrics.jsonl", [row(n, 10, rate, 1.0) for n in range(1, 4)])
     return run
 
@@ -75,10 +76,10 @@ def test_seeds_of_one_condition_share_a_column_and_a_table(
     picture = tmp_path / "curves.png"
     assert main(["curves", *map(str, runs), "--out", str(picture)]) == 0
     printed = capsys.readouterr().out
-    assert "talkitout\n\n| frames | run 1 | run 2 | success@9 | timeout | ask |" in printed
+    assert "talkitout / ppo\n\n| frames | run 1 | run 2 | success@9 | timeout | ask |" in printed
     assert "| 0.00 M | 0.20 | 0.30 | 0.25 | 0.75 | 1.00 |" in printed
     assert "test set: 0.200, 0.300" in printed
-    assert "talkitout, bonus lang\n" in printed
+    assert "talkitout / ppo, bonus lang\n" in printed
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
@@ -90,17 +91,17 @@ def test_runs_with_other_hyper_parameters_are_another_condition(
     (runs[1] / "config.json").write_text(json.dumps(settings | {"lr": 0.1, "entropy_coef": 0.02}))
     assert main(["curves", *map(str, runs), "--out", str(tmp_path / "curves.png")]) == 0
     printed = capsys.readouterr().out
-    assert "talkitout\n" in printed
-    assert "talkitout, lr=0.1, entropy_coef=0.02\n" in printed
+    assert "talkitout / ppo\n" in printed
+    assert "talkitout / ppo, lr=0.1, entropy_coef=0.02\n" in printed
 
 
 def test_what_is_no_finished_run_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["curves", str(tmp_path)]) == 2
-    assert "expected the folder of a finished run, it has no config.json" in capsys.readouterr().err
+    assert "expected the folder of a run, with its config.json" in capsys.readouterr().err
 
 
 def test_an_empty_log_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = make_run(tmp_path, "talkitout", 0, 0.5)
     (run / "metrics.jsonl").write_text("")
     assert main(["curves", str(run), "--out", str(tmp_path / "c.png")]) == 2
-    assert "expected at least one update, got an empty file" in capsys.readouterr().err
+    assert "expected the folder of a run that has learned" in capsys.readouterr().err

@@ -47,7 +47,7 @@ def test_of_many_outcomes_the_most_frequent_are_drawn_and_the_rest_is_one() -> N
     legend = axes.get_legend()
     assert legend is not None
     assert [text.get_text() for text in legend.get_texts()] == [
-        *("failure@8", "failure: agent.at(wrong)", "failure@6", "6 more failures"),
+        *("failure, line 8", "failure: agent.at(wrong)", "failure, line 6", "6 more failures"),
     ]
     top = max(path.vertices[:, 1].max() for area in axes.collections for path in area.get_paths())  # type: ignore[index]
     assert top == pytest.approx(1.0)
