@@ -1,4 +1,4 @@
-"""What `load` returned to programs, in four passes: allocate, lower, lay out, verify."""
+"""Compiles loaded scenarios and suites to programs, in four passes: allocate, lower, lay out, verify."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is wrong in an author's file: the findings, their catalogue, and how they are shown."""
+"""Findings in authors' files: their form, their catalogue, and their text."""
 
 from __future__ import annotations
 

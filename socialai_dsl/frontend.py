@@ -66,7 +66,7 @@ class Ignore:
 
     @property
     def key(self) -> tuple[str, int, str]:
-        """What tells which warnings it ignores."""
+        """The key of the warnings that it ignores."""
         return self.span.file, self.span.line, self.code
 
 
@@ -226,7 +226,7 @@ SUFFIXES = (".yaml", ".yml")
 
 @dataclass(frozen=True)
 class CheckResult:
-    """What checking one file or name found.
+    """The result of checking one file or name.
 
     Attributes:
         name: as it was asked for.

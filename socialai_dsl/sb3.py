@@ -65,7 +65,7 @@ class SB3VecEnv(VecEnv):
         self.envs.close()
 
     def get_attr(self, attr_name: str, indices: _Indices = None) -> list[Any]:
-        """What the batch calls so, once for each environment asked for."""
+        """The batch's attribute of this name, once for each of these environments."""
         return [getattr(self.envs, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: _Indices = None) -> None:

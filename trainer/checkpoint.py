@@ -32,7 +32,7 @@ _NO_DIGEST = "0" * 64
 
 
 class CheckpointMeta(BaseModel):
-    """What a checkpoint says about itself.
+    """The metadata of a checkpoint.
 
     Attributes:
         format: version of this layout.

@@ -89,7 +89,7 @@ class Metrics:
 
 
 def episode_metrics(tally: Tally, before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
-    """What the episodes that ended in one rollout were like; rates are None where none ended.
+    """The figures of the episodes that ended in one rollout; rates are None where none ended.
 
     Args:
         tally: the trainer's sums, of the agent's own episodes.

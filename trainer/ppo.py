@@ -79,7 +79,7 @@ def estimate_advantages(config: RunConfig, rollout: Rollout) -> Batch:
 
 
 class LossParts(NamedTuple):
-    """Parts of the loss, scalars; all but the first are without gradients.
+    """Parts of the loss, scalars; only the first has gradients.
 
     Attributes:
         loss: what is minimised.

@@ -55,7 +55,7 @@ _ROOMS_PER_SITE: Final = 32
 
 @dataclass(frozen=True)
 class Alone:
-    """What a policy that neither sees nor hears an NPC gets.
+    """The success of a policy that neither sees nor hears an NPC.
 
     Attributes:
         success: mean over the rooms of the share of twins that the policy for their looks solves.
@@ -142,7 +142,7 @@ class _Twins:
         return len(self._drawn)
 
     def draw(self, room: int, wanted: int) -> int:
-        """Draw twins of a room until so many look like it, itself among them; how many were found."""
+        """Draw twins of a room until enough look like it, itself among them; the number found."""
         self._drawn, looks = [], None
         for number in range(_BLOCKS):
             table = self._table(number)

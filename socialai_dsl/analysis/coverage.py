@@ -40,7 +40,7 @@ class Part:
 
 @dataclass
 class Coverage:
-    """What was tried, and what did not happen.
+    """The parts of a scenario that were tried, and those that did not happen.
 
     Attributes:
         parts: how many states, rules and outcomes there are, as they are written.

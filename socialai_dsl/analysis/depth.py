@@ -15,7 +15,7 @@ from socialai_dsl.compilation import compile_loaded
 
 @dataclass(frozen=True)
 class Depth:
-    """What is known about success in the rooms that were tried.
+    """The difficulty of success in the rooms that were tried.
 
     Attributes:
         rooms: how many rooms were searched.
@@ -51,7 +51,7 @@ def depth(trial: Trial, effort: Effort) -> Depth:
 
 
 def without_npcs(loaded: LoadedScenario, effort: Effort) -> Alone | None:
-    """What a policy gets that neither sees nor hears an NPC; None if there is none."""
+    """The success of a policy that neither sees nor hears an NPC; None without NPCs."""
     if all(entity.role != "npc" for entity in loaded.checked.entities):
         return None
     hidden = replace(loaded, checked=replace(loaded.checked, npcs_hidden=True))

@@ -32,12 +32,12 @@ class Clock:
 
     @property
     def interrupted(self) -> bool:
-        """Whether somebody wants to stop."""
+        """Whether an interruption was requested."""
         return self._whole._interrupted
 
     @property
     def is_over(self) -> bool:
-        """Whether the time is spent, or somebody wants to stop."""
+        """Whether the time is spent, or an interruption was requested."""
         return self.interrupted or (self._until is not None and time.monotonic() >= self._until)
 
     @property
@@ -46,7 +46,7 @@ class Clock:
         return None if self._until is None else max(0.0, self._until - time.monotonic())
 
     def part(self, parts: int) -> Clock:
-        """A clock for one of so many tasks that share what is left."""
+        """A clock for one of `tasks` that share the time left."""
         own = Clock(None if self.left is None else self.left / parts, self._tell)
         own._whole = self._whole
         return own
@@ -73,7 +73,7 @@ class Effort:
     clock: Clock = field(default_factory=Clock, compare=False)
 
     def each_room(self, what: str, find: Callable[[int], T], complete: Callable[[T], bool]) -> Iterator[T]:
-        """What is found in room after room, until the time is spent or somebody interrupts.
+        """Results room by room, until the time is spent or an interruption.
 
         Args:
             what: for progress, such as `needs: ada`.

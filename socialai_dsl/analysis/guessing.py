@@ -60,7 +60,7 @@ class Answer(Enum):
 
 @dataclass(frozen=True)
 class Guess:
-    """What was found out about rooms that look alike.
+    """The result for rooms that look alike.
 
     Attributes:
         answer: what a policy can do at most.

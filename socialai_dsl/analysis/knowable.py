@@ -191,7 +191,7 @@ class Knowing:
 
 @dataclass(frozen=True)
 class Followed:
-    """What a script does in a room and its alternatives.
+    """A script's actions in a room and its alternatives.
 
     Attributes:
         plan: its actions in the room; None if it does not succeed there.

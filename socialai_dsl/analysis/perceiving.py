@@ -51,7 +51,7 @@ class Peek:
 
 @dataclass(frozen=True)
 class Perceived:
-    """What playing twins showed.
+    """The result of playing twins.
 
     Attributes:
         pairs: how many of them looked alike at first. peeks: those in which the script peeked.

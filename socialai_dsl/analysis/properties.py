@@ -497,7 +497,7 @@ class _Draw:
         return self._guessing.solve(state.registers, state.boards, state.keys, effort)
 
     def told(self, room: int, effort: Effort, tellers: Tellers) -> str | None:
-        """Who or what first makes the rooms of this draw differ, in words; None if that is not found."""
+        """The first difference between the rooms of this draw, in words; None if none is found."""
         self._table.reset(effort.seed, {"index": room, "layout": self._layouts})
         state, batch = self._table.state, self._table.batch
         plan: Plan | None = ()

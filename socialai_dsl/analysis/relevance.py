@@ -72,7 +72,7 @@ Instruction = tuple[Op, tuple[int, int, int]]
 
 @dataclass(frozen=True)
 class Relevance:
-    """What matters in a program's states.
+    """The relevant part of a program's states.
 
     Attributes:
         registers: numbers of the registers that decide how an episode goes on.

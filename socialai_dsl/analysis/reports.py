@@ -24,7 +24,7 @@ class Verdict(Enum):
 
 @dataclass(frozen=True)
 class Report:
-    """What was found out about one property.
+    """The result of one property.
 
     Attributes:
         verdict: undecided where a search gave up, or where rooms can be told apart and more was not tried.
@@ -47,7 +47,7 @@ class Report:
 
 @dataclass
 class Evidence:
-    """What was found in room after room: the numbers of the rooms, and why some say nothing."""
+    """The evidence room by room: the numbers of the rooms, and the reasons why some are vacuous."""
 
     held: list[int]
     against: list[int]
@@ -106,7 +106,7 @@ def steps_text(count: int | None) -> str:
 
 
 def names_text(tellers: Sequence[str]) -> str:
-    """Who or what tells, as `Tellers.between` says it."""
+    """The sources of a difference, as `Tellers.between` returns them, in words."""
     return ", ".join(name if name == SOMEBODY else f"`{name}`" for name in tellers) or "the walls"
 
 

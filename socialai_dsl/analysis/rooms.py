@@ -27,7 +27,7 @@ def start_in(table: Table, row: int) -> Start:
 
 
 class Rooms:
-    """Rooms 0, 1, ... of a seed. What is found out about one is kept for whoever asks next.
+    """Rooms 0, 1, ... of a seed, with a cache of the facts found about each.
 
     Args:
         checked: the scenario. program: of the same.
@@ -59,7 +59,7 @@ class Rooms:
         return found
 
     def missing(self, room: int, names: Collection[str]) -> list[str]:
-        """Who of these members is not in a room, though nobody asked for that."""
+        """Those of these members that are absent from a room although they were placed."""
         return [name for name in self._unasked if name in names and self._gone(room, self._unasked[name])]
 
     @property
@@ -97,7 +97,7 @@ class Rooms:
 
 
 def name_of(checked: CheckedScenario, number: int) -> str:
-    """What a scenario calls an entity: `people[0]`."""
+    """The scenario's name of an entity: `people[0]`."""
     entity = checked.entities[number]
     return entity.key if entity.index is None else f"{entity.key}[{entity.index}]"
 

@@ -45,7 +45,7 @@ _TRIED: Final = 64
 
 
 class Verdict(Enum):
-    """What a search found."""
+    """The verdict of a search."""
 
     SOLVABLE = "solvable"
     UNSOLVABLE = "unsolvable"
@@ -54,7 +54,7 @@ class Verdict(Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """What a search found out about one room.
+    """The result of a search in one room.
 
     Attributes:
         verdict: undecided where there are more states than it may look at.

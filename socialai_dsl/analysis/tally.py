@@ -54,7 +54,7 @@ def tally(
     episodes: int,
     seed: int,
 ) -> Tally:
-    """Play so many episodes, each to its end, and count.
+    """Play a number of episodes, each to its end, and count.
 
     Args:
         envs: environments that do not reset themselves (autoreset_mode "Disabled"), which nobody has played yet.
@@ -141,7 +141,7 @@ class _Watch:
             frames.moved(self._registers[own], state.registers[own])
 
     def tally(self, episodes: int) -> Tally:
-        """What has been counted."""
+        """The counts so far."""
         times: Counter[Part] = Counter()
         endings: Counter[str] = Counter()
         counters = self._table.batch.counters

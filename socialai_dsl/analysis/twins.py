@@ -112,7 +112,7 @@ class Leak:
 
 @dataclass(frozen=True)
 class Compared:
-    """What playing pairs of twins showed.
+    """The result of playing pairs of twins.
 
     Attributes:
         pairs: how many were played. cued: how many differ first in a cue. leaks: the pairs that differ otherwise.
@@ -203,7 +203,7 @@ def random_actions(program: Program, pairs: int, seed: int) -> Actions:
 
 
 class Script:
-    """What the agent's own frame does in rooms 0, 1, ... of a seed, where it knows one of the two values.
+    """The actions of the agent's own frame in rooms 0, 1, ... of a seed, where it knows one of the two values.
 
     Args:
         program: of the scenario with a frame for the agent. path, values: of the draw, one value for each room.

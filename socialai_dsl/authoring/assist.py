@@ -76,7 +76,7 @@ class Offer:
 
 
 def explain(document: Document, data: Data, line: int, column: int) -> tuple[str, Cursor] | None:
-    """What the word at a position means, as Markdown, and where it is; None if nothing is known about it.
+    """The meaning of the word at a position, as Markdown, and its range; None if it is unknown.
 
     Args:
         document: the file.
@@ -177,7 +177,7 @@ def _named_file(document: Document, cursor: Cursor) -> Path | None:
 
 
 def complete(text: str, whole: Data, folder: Path | None, line: int, column: int) -> list[Offer]:
-    """What can be written at a position.
+    """The completions at a position.
 
     Args:
         text: the file as it is now, which need not be YAML.

@@ -59,7 +59,7 @@ def word_at(document: Document, line: int, column: int) -> Cursor | None:
 
 
 def completion_at(text: str, line: int, column: int) -> Cursor | None:
-    """What is being written at a position, from 1; None if it cannot be told.
+    """The unfinished word at a position, from 1; None if there is none.
 
     The word there is replaced by a marker as a value and as a key, first with all that follows, then without.
     """

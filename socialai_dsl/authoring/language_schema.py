@@ -89,7 +89,7 @@ class _Definitions:
         self.used: Schema = {}
 
     def kind(self, kind: str, files: tuple[type[BaseModel], ...]) -> Schema:
-        """What a file of a kind has to be."""
+        """The schema of a kind of file."""
         parameters = kind in ("scenario", "npc")
         if kind == "library":
             chosen = [

@@ -150,7 +150,7 @@ def make_server() -> Server:
 
 
 def hover(ls: Server, params: lsp.HoverParams) -> lsp.Hover | None:
-    """What the word under the cursor means."""
+    """The meaning of the word under the cursor."""
     uri = params.text_document.uri
     document = ls.document(uri)
     if document is None:
@@ -186,7 +186,7 @@ def definition(ls: Server, params: lsp.DefinitionParams) -> lsp.Location | None:
 
 
 def completion(ls: Server, params: lsp.CompletionParams) -> list[lsp.CompletionItem]:
-    """What can be written at the cursor."""
+    """The completions at the cursor."""
     uri = params.text_document.uri
     resolved = ls.resolved(uri)
     line, column = ls.place(uri, params.position)

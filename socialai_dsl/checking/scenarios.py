@@ -374,7 +374,7 @@ class Draft:
 def check_scenario(
     resolved: ResolvedFile, bag: DiagnosticBag
 ) -> tuple[CheckedScenario | None, Scenario | None]:
-    """What a scenario means, and its models; None for what cannot be had. `bag` takes the findings."""
+    """The meaning of a scenario, and its models; each None if it has mistakes. `bag` takes the findings."""
     draft = draft_of(resolved, bag)
     if draft is None:
         return None, None
@@ -403,7 +403,7 @@ def draft_of(resolved: ResolvedFile, bag: DiagnosticBag) -> Draft | None:
 
 
 def meaning_of(draft: Draft, bag: DiagnosticBag) -> CheckedScenario | None:
-    """What a scenario means; None if something is wrong, which `bag` then says.
+    """The meaning of a scenario; None if it has mistakes, which `bag` then holds.
 
     Args:
         draft: the scenario.

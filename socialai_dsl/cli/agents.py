@@ -199,7 +199,7 @@ def resolve_device(device: str) -> str:
 
 
 def automatic_threads() -> int:
-    """Threads where nobody says how many."""
+    """The number of threads by default."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(1, min(cores, _MOST_THREADS))
 
@@ -290,7 +290,7 @@ def folder_of(agent: str) -> Path:
 
 
 def named_agent(agent: str, scenario: str) -> str:
-    """What `--agent` stands for: the word `shipped` is the agent that ships for the scenario, as `shipped:NAME`.
+    """The agent that `--agent` names; `shipped` alone is the one that ships for the scenario, as `shipped:NAME`.
 
     A variant is played by the agent of what it is a variant of, unless it has one of its own.
 

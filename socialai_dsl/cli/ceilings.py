@@ -20,7 +20,7 @@ _BUILT_IN: Final = ("oracle", "random")
 
 
 def known_ceilings(experiment: "Experiment") -> "dict[str, Ceilings]":
-    """What conditions of the experiment tell whose agent is the scenario's script, or chance, by scenario."""
+    """The baselines, by scenario, from conditions of the experiment that play the script or chance."""
     from socialai_dsl.reporting.analysis import Ceilings, Level
 
     told: dict[str, dict[str, Level]] = {}
@@ -55,7 +55,7 @@ def measured_ceilings(scenario: str) -> "Ceilings":
 
 
 def read_ceilings(path: Path) -> "dict[str, Ceilings]":
-    """What an earlier report of the same folder measured; nothing if there is no such file, or a damaged one."""
+    """The baselines that an earlier report of the same folder measured; none if their file is missing or damaged."""
     from pydantic import TypeAdapter, ValidationError
 
     from socialai_dsl.reporting.analysis import Ceilings

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class ScenarioReport:
-    """What was found out about one scenario, so far.
+    """The results for one scenario so far.
 
     Attributes:
         scenario: its name. rooms, seed: what was to be tried: rooms 0 to rooms - 1 of the seed.
@@ -40,7 +40,7 @@ class ScenarioReport:
     in_time: bool = True
 
     def findings(self) -> Iterator[Diagnostic]:
-        """What fails as errors, what is undecided or never happens as warnings, each at its place."""
+        """Failures as errors, undecided claims and parts that never happen as warnings, each at its place."""
         for plan, report in self.tried:
             hint = _listed(report.against) if report.against else None
             if report.verdict.value == "fails":

@@ -154,7 +154,7 @@ class _Row:
 
 
 class Report:
-    """What came about with which agent, of everything that could.
+    """The parts of scenarios that happened, by agent.
 
     Attributes:
         scenarios: what was played. parts: what could come about.

@@ -166,7 +166,7 @@ class Evaluation:
 
 
 def about_of(loaded: "Loaded") -> str:
-    """What a file says of itself."""
+    """A file's own description."""
     data = loaded.resolved.data
     return str(data.get("about", "")) if isinstance(data, dict) else ""
 

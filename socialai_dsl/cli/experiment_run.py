@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def work_on(
     folder: Path, document: Mapping[str, Any], runs: "Sequence[Run]", engine: "Engine", as_json: bool
 ) -> Exit:
-    """Do what is left to do, and say what came of it.
+    """Work on the runs that are left, and report their results.
 
     Raises:
         KeyboardInterrupt: somebody stopped it; all runs are left so that the same command goes on with them.

@@ -16,7 +16,7 @@ _MESSAGES_SHOWN: Final = 10
 def plan_figures(
     document: Mapping[str, Any], folder: Path, runs: "Sequence[Run]", speeds: "Speeds", workers: int
 ) -> dict[str, Any]:
-    """What is planned: each run with its state and the seconds it will still take, and the sum.
+    """The plan: each run with its state and the seconds left, and the sum.
 
     Args:
         document: of the experiment.
@@ -47,7 +47,7 @@ def plan_figures(
 
 
 def seconds_left(runs: "Sequence[Run]", left: "Sequence[Run]") -> float | None:
-    """What some runs of an experiment still take, one after the other; None if the speed of one is not known.
+    """The seconds left of some runs, one after the other; None if the speed of one is unknown.
 
     Args:
         runs: all, which tell the speed.

@@ -37,7 +37,7 @@ _BUDGET: Final = re.compile(r"(\d[\d_,]*(?:\.\d+)?) ?(tokens|usd)?", re.IGNORECA
 
 @dataclass(frozen=True)
 class Played:
-    """What came of test episodes that a model has played.
+    """The results of test episodes that a model has played.
 
     Attributes:
         result: as for all agents.
@@ -185,7 +185,7 @@ def let_a_model_play(
 
 
 def episodes_of_model(run: Path, program: "Playable", most: int) -> "Played":
-    """What came of the first episodes that a model has played, from their transcripts in the folder `run`.
+    """The results of the first episodes of a model, from their transcripts in the folder `run`.
 
     Raises:
         UsageError: there are none of this program.

@@ -26,7 +26,7 @@ class Learnt:
         """Rule -> the member whose it is, and the one utterance that it waits for."""
 
     def sentence(self, row: Mapping[str, Any]) -> str:
-        """What happened in the episodes of an update.
+        """The events of an update's episodes, in a sentence.
 
         Args:
             row: its figures, as `metrics.jsonl` has them.

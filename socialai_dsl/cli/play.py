@@ -43,7 +43,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
 
 def play(scenario: str, episodes: "Episodes", practice: bool = True) -> "list[Played]":
-    """Let somebody at the terminal play; the episodes that were played to their end.
+    """Let a person play at the terminal; the episodes that ended.
 
     Args:
         scenario: a path or a name.

@@ -46,7 +46,7 @@ _NAMES: Final = {"left": "←", "right": "→", "up": "↑", "full_stop": "."}
 
 
 class PlayApp(App[list[Played]]):
-    """Lets somebody play episode after episode.
+    """A person's play, episode after episode.
 
     Args:
         game: what is played; its first episode has begun.

@@ -154,7 +154,7 @@ class Game:
 
     @property
     def about(self) -> str:
-        """What the scenario that is played says of itself."""
+        """The description of the scenario that is played."""
         return self._about.get(self.now.member, "")
 
     @property
@@ -167,7 +167,7 @@ class Game:
         return str(self._env.coloured_text())
 
     def view(self) -> View:
-        """What the agent sees."""
+        """The agent's view."""
         program = played(self._program, {"member": self.now.member})
         egocentric = bool(program.header(Header.FLAGS) & Flag.EGOCENTRIC)
         return View(self.now.view, DIRECTIONS.index(self._env.describe()["agent"]["facing"]), egocentric)
@@ -178,7 +178,7 @@ class Game:
         return None if at is None else (at[0], at[1])
 
     def backstage(self) -> list[str]:
-        """What a player does not see: states of frames, what was drawn, and what the cast remembers."""
+        """The hidden state: states of frames, draws, and registers of the cast."""
         state = self._env.describe()
         program = played(self._program, {"member": self.now.member})
         cast = cast_of(program)

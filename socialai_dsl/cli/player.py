@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Player:
-    """Who plays, and how.
+    """A player and its options.
 
     Attributes:
         agent: `random`, `oracle`, `human`, `llm:MODEL`, `shipped:NAME`, or the path of a run, of a folder of
@@ -52,7 +52,7 @@ class Player:
 
 
 def make_policy(player: Player, envs: Any) -> "tuple[Policy, list[str]]":
-    """What plays, and what is to be known about it, such as that it was trained on something else.
+    """The policy of a player, and remarks about it, such as another scenario in training.
 
     Raises:
         ValueError: the checkpoint does not fit the environments.

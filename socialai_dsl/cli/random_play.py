@@ -13,7 +13,7 @@ _TOGETHER: Final = 1000
 
 @dataclass(frozen=True)
 class Sample:
-    """What a number of episodes came to.
+    """Counts of a number of episodes.
 
     Attributes:
         episodes: how many were counted.
@@ -107,7 +107,7 @@ class _Tally:
         self._length[ended], self._return[ended] = 0, 0.0
 
     def sample(self) -> Sample:
-        """What was counted."""
+        """The counts."""
         episodes = self._each * len(self._played)
         mean = self._lengths / episodes
         variance = (self._squares - episodes * mean * mean) / max(episodes - 1, 1)

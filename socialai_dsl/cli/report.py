@@ -82,7 +82,7 @@ def _experiment(folders: list[Path]) -> "tuple[Experiment, Path]":
 def ceilings_of(
     experiment: "Experiment", out: Path, only_known: bool
 ) -> "tuple[dict[str, Ceilings], list[str]]":
-    """Baselines by scenario: conditions tell, an earlier report told, or it is measured now and kept."""
+    """Baselines by scenario: from conditions, from an earlier report, or measured now and kept."""
     from socialai_dsl.cli.agents import require_trainer
     from socialai_dsl.cli.ceilings import (
         FILE,

@@ -38,7 +38,7 @@ class Checked:
 
 
 def limited(checked: Sequence[Checked], most: int) -> list[Checked]:
-    """What was checked with only the first `most` errors; one in a file that several inputs share counts once."""
+    """The results with the first `most` errors alone; one in a file that several inputs share counts once."""
     errors = [d for d in _all(checked) if d.severity is Severity.ERROR]
     hidden = set(errors[most:])
     return [

@@ -247,5 +247,5 @@ def _origin(seed: int | None, options: dict[str, Any]) -> str:
 
 
 def is_among(who: str, names: Sequence[str]) -> bool:
-    """Whether somebody is named, or is a member of a group that is."""
+    """Whether a member is named, or its group is."""
     return who in names or who.partition("[")[0] in names

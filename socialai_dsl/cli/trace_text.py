@@ -30,7 +30,7 @@ class Text:
         self._told: dict[tuple[str, str], str] = {}
 
     def head(self, trace: Trace) -> list[str]:
-        """What is played, and the room before the first step."""
+        """The scenario, and the room before the first step."""
         self._cast = trace.cast
         member = f": {trace.member}" if trace.member is not None else ""
         title = printable(f"{trace.scenario}, {trace.origin}, agent {trace.agent}{member}")
@@ -110,7 +110,7 @@ class Text:
 
 
 def present(cast: Sequence[str], state: dict[str, Any]) -> list[str]:
-    """Where everybody of the cast is, where they look, the state of their frames, their colour, and what they show."""
+    """Each member of the cast: its cell, direction, state, colour and gestures."""
     width = max(map(len, cast), default=0)
     lines = []
     for name in cast:

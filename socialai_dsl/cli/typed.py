@@ -66,7 +66,7 @@ class Phrases:
         return f"{movement} {said}" if said else movement
 
     def problem(self, line: str) -> str:
-        """What is wrong with a line that can be neither done nor said."""
+        """The problem of a line that is neither an action nor an utterance."""
         movement, said = split_line(line, self.actions)
         sentence = movement is not None or line[:1].isupper()
         what = f"{said!r} cannot be said" if sentence else f"{line!r} can be neither done nor said"

@@ -263,7 +263,7 @@ class Registers:
 
 
 def label(entity: Entity) -> str:
-    """What an entity is called in the path of a register of its own."""
+    """The name of an entity in the paths of its registers."""
     return entity.key if entity.index is None else f"{entity.key}[{entity.index}]"
 
 

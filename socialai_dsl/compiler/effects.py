@@ -312,7 +312,7 @@ def store(registers: Registers, emit: Callable[..., None], path: str, value: int
 
 
 def remember(to: Expressions) -> None:
-    """Before anything happens in a step: what rules will want to know about the state that the last step left.
+    """At the start of a step: values of `prev` and the like from the state that the last step left.
 
     Then nobody has said anything yet.
     """

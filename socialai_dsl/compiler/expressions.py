@@ -431,7 +431,7 @@ class Lines:
         self.speakers = {speaker: set(lines) for speaker, lines in other.speakers.items()}
 
     def said_by(self, speaker: int, pattern: Pattern | None) -> frozenset[int]:
-        """The lines of an NPC that fit a pattern (None: all of them), once it is known what everybody says."""
+        """The lines of an NPC that fit a pattern (None: all of them), once the lines of all members are known."""
         wanted = None if pattern is None else self.classes_of.matching(pattern)
         own = self.speakers.get(speaker, set())
         return frozenset(line for line in own if wanted is None or self.classes[line] in wanted)
@@ -445,7 +445,7 @@ class Lines:
         return first, first + prod(map(len, map(_choices, (speaker.name or "", *line.parts)))) - 1
 
     def speak(self, to: Expressions, speaker: Entity, line: int) -> None:
-        """Emit that `speaker` says the line in an operand, and note it where somebody asks what was said."""
+        """Emit that `speaker` says the line in an operand, and note it if a condition reads it."""
         block = to.block
         block.emit(Op.SAY, constant(speaker.number), line)
         noted = to.registers.by_path.get(said_path(speaker))
@@ -569,7 +569,7 @@ class Lines:
 
 
 def note_what_is_said(checked: CheckedScenario, lines: Lines, registers: Registers) -> None:
-    """Where somebody asks what an NPC has said: find all lines there are, and make room to note them."""
+    """For conditions on an NPC's lines: find all its lines, and allocate a register for the last one."""
     asked = list(every(SaidBy, checked))
     if not asked:
         return

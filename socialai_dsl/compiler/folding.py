@@ -117,7 +117,7 @@ SEVERAL = -1
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What is known at compile time; None means unknown.
+    """Facts at compile time; None means unknown.
 
     Attributes:
         said: utterance class of the agent this step. action: its body action.
@@ -485,7 +485,7 @@ def plans(checked: CheckedScenario) -> Iterable[RulePlan | StepPlan]:
 
 
 def activities(checked: CheckedScenario) -> Iterable[tuple[int, Activity]]:
-    """Who may do what."""
+    """The possible activities of each member."""
     for frame in checked.frames:
         for step in frame.steps:
             yield frame.entity, step.activity

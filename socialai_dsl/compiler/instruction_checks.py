@@ -34,7 +34,7 @@ LAST_BODY = Body.STOP_POINTING
 
 @dataclass(frozen=True)
 class Ranges:
-    """What every register may hold at any time, which each write is proven to keep; the `Bounds` of a program."""
+    """The range of every register, which each write is proven to keep; the `Bounds` of a program."""
 
     of_register: tuple[Interval, ...]
     width: int
@@ -141,7 +141,7 @@ class Known:
         return None
 
     def joined(self, other: Known | None) -> Known:
-        """What is known where two paths meet."""
+        """The knowledge where two paths meet."""
         known = self.copy()
         if other is not None:
             both = self.temporaries.keys() & other.temporaries.keys()
@@ -151,7 +151,7 @@ class Known:
         return known
 
     def after_loop(self, written: Iterable[int], before: Known) -> Known:
-        """What is left of it behind a loop that ran any number of times, none included.
+        """The knowledge behind a loop that ran any number of times, including none.
 
         A temporary that was written inside may hold anything, or was never written unless it was before the loop.
         """
@@ -192,7 +192,7 @@ def problem_of(
     writable: frozenset[int],
     is_agents: bool = False,
 ) -> str | None:
-    """What is wrong with an instruction where so much is known, or None; then `known` includes what it writes.
+    """The problem of an instruction, given `known`, or None; then `known` includes its writes.
 
     `is_agents`: it belongs to the frame of the agent, who can do less than NPCs.
     """
@@ -228,7 +228,7 @@ class _Check:
         self.h = program.header
 
     def problem(self) -> str | None:
-        """What is wrong with it, or None."""
+        """The problem, or None."""
         for operand, word in zip(self.entry.operands, self.words, strict=True):
             if problem := self._operand(operand, word):
                 return problem

@@ -30,7 +30,7 @@ from socialai_dsl.semantics.terms import BOOL, Type
 
 
 class Asked:
-    """What a rule asks, while its code is emitted. This one notes nothing."""
+    """The conditions of a rule while its code is emitted; this one notes nothing."""
 
     def unless(self, key: str, otherwise: Label) -> Label:
         """Where to skip to if what is written under a key does not hold; `otherwise` is where the rule ends."""
@@ -72,7 +72,7 @@ NO_NOTES = NoteTaker()
 
 @dataclass(frozen=True)
 class Allocation:
-    """What code of one scenario is emitted with; lowering adds registers of its own, sites, lines and code.
+    """The context of one scenario's code; lowering adds registers of its own, sites, lines and code.
 
     Attributes:
         inbox: the first register of the inboxes. inbox_of: that of the inbox of each member with a frame.
@@ -95,7 +95,7 @@ class Allocation:
     rules: list[str] = field(default_factory=list)
 
     def expressions(self, facts: Facts | None = None, inbox: int = -1) -> Expressions:
-        """What emits into a fresh block, given these facts."""
+        """An emitter into a fresh block, given these facts."""
         to = Expressions(Block(), self.checked, self.registers, self.classes, self.sites, inbox)
         to.facts = facts or to.facts
         return to

@@ -55,7 +55,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Note:
-    """What is noted of a rule, an entry of `steps`, or an outcome.
+    """The notes of a rule, an entry of `steps`, or an outcome.
 
     Attributes:
         register: 0 it was not asked, or it fired; k: part k - 1 was false; -k: something in part k - 1 found nothing.

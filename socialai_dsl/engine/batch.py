@@ -157,7 +157,7 @@ class Batch:
         return self._serve(task)
 
     def stepper(self, task: Task) -> Callable[[], int]:
-        """What does `step(task)` without anything between Python and the engine.
+        """A call of `step(task)` with nothing between Python and the engine.
 
         Below BAD_ACTION means that a room was refused (`refused_room`).
         """

@@ -65,7 +65,7 @@ def is_opaque(row: Row, x: int, y: int) -> bool:
 
 @inline
 def is_solid(row: Row, x: int, y: int) -> bool:
-    """Whether nobody can enter this cell because of walls or objects; off the canvas nobody can."""
+    """Whether walls or objects keep bodies out of this cell; off the canvas always."""
     width = row.program[Header.CANVAS_WIDTH]
     height = row.program[Header.CANVAS_HEIGHT]
     if x < 0 or x >= width or y < 0 or y >= height:
@@ -139,7 +139,7 @@ def npc_look(row: Row, entity: int) -> int:
 
 @inline
 def is_in_the_way(row: Row, entity: int) -> bool:
-    """Whether nobody can enter the cell of this object as it is now."""
+    """Whether this object keeps bodies out of its cell now."""
     return row.program[type_row(row, entity) + TypeColumn.WALKABLE] == 0
 
 

@@ -20,7 +20,7 @@ NO_ROOM = -(1 << 32)
 
 
 class Task(IntEnum):
-    """What a call of `serve` is to do."""
+    """The task of a call of `serve`."""
 
     STEP_NEXT = 0  # step; an episode that has ended is reset by the next step
     STEP_SAME = 1  # step; an episode that ends is reset at once, its last observation is kept

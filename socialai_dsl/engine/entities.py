@@ -128,7 +128,7 @@ def preferred(row: Row, mover: int, ways: int) -> int:
 
 @inline
 def front_direction(row: Row, entity: int) -> int:
-    """Direction of the cell in front: where somebody faces, from a wall into the room; of other objects -1."""
+    """Direction of the cell in front: a member's own, from a wall into the room; of other objects -1."""
     if entity <= row.program[Header.NPCS]:
         return field(row, entity, Field.DIR) & 3
     x = field(row, entity, Field.X)

@@ -10,7 +10,7 @@ from socialai_dsl.program import CONSTANT, TEMPORARY, Header, Register
 
 @inline
 def value(row: Row, operand: int) -> int:
-    """What an operand stands for."""
+    """The value of an operand."""
     if operand >= CONSTANT // 2:
         return operand - CONSTANT
     if operand >= TEMPORARY:

@@ -78,7 +78,7 @@ def push(row: Row, x: int, y: int, direction: int, rolling: int) -> None:
 
 @outline
 def roll(row: Row) -> None:
-    """What rolls moves one cell, the objects in order. What meets something in its way pushes it, and rolls no more."""
+    """Move each rolling object one cell, in order. One with an obstacle ahead pushes it, and rolls no more."""
     stay_outline()
     link = row.program[Header.SIZE]
     for entity in range(row.program[link + Link.FIRST_ROLLING], row.program[link + Link.LAST_ROLLING] + 1):

@@ -46,7 +46,7 @@ _PAIRS = np.uint64(0x0000FFFF0000FFFF)
 
 @inline
 def look_around(row: Row) -> None:
-    """Called before anybody asks what is opaque or lit: while reset code runs nothing is drawn yet."""
+    """Prepare questions about opaque and lit cells: while reset code runs nothing is drawn yet."""
     if row.registers[Register.ENDED] == RESETTING:
         note_opaque(row)
 

@@ -17,7 +17,7 @@ _ONE = np.uint64(1)
 
 @inline
 def find_way(row: Row, mover: int, target: int, beside: bool) -> int:
-    """What `paths.find_way` says for the cell of this number, if the mover is in the room and not there already."""
+    """The result of `paths.find_way` for the cell of this number, if the mover is in the room and not there already."""
     width = np.uint64(row.program[Header.CANVAS_WIDTH])
     first_column = _first_column(row)
     free = _find_free(row, mover)

@@ -90,7 +90,7 @@ def within_earshot(row: Row, speaker: int, hearer: int) -> bool:
 
 @inline
 def entry_size(row: Row) -> int:
-    """Registers of an entry of an inbox: the class, and where somebody asks for them the speaker and the noun."""
+    """Registers of an entry of an inbox: the class, and where rules read them the speaker and the noun."""
     return 3 if row.program[Header.FLAGS] & Flag.HEARD_BY else 1
 
 
@@ -176,7 +176,7 @@ def _agent_may_hear(row: Row, speaker: int) -> bool:
 
 @inline
 def deliver(row: Row, speaker: int, utterance: int, noun: int) -> None:
-    """Put what was said into the inbox of everybody else with a frame who is within earshot."""
+    """Put an utterance into the inbox of every other member with a frame within earshot."""
     table = row.program[Header.FRAME_AT]
     x = field(row, speaker, Field.X)
     y = field(row, speaker, Field.Y)

@@ -138,7 +138,7 @@ class Size(IntEnum):
 
 
 class State(NamedTuple):
-    """What persists from step to step. `tokens` and `image` are also the caller's observation."""
+    """The state that persists from step to step. `tokens` and `image` are also the caller's observation."""
 
     registers: NDArray[np.int16]  # (E, R)
     boards: NDArray[
@@ -155,7 +155,7 @@ class State(NamedTuple):
 
 
 class Tables(NamedTuple):
-    """What never changes."""
+    """The constant tables."""
 
     words: NDArray[np.int32]  # the programs, each followed by its link
     views: NDArray[
@@ -168,7 +168,7 @@ class Tables(NamedTuple):
 
 
 class Ports(NamedTuple):
-    """What a call reads and writes besides the state."""
+    """The data that a call reads and writes besides the state."""
 
     actions: NDArray[np.int64]  # (E, 3 + slots)
     pins: NDArray[np.int16]  # (layouts, R + 1) value of each register or PIN_NONE; last: member of the pool

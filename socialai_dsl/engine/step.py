@@ -28,7 +28,7 @@ from socialai_dsl.program import Field, Flag, FrameColumn, Header, Register
 
 @merged
 def begin(row: Row) -> None:
-    """What asks how things were is answered; then time goes on, and nothing is heard, used or said yet."""
+    """Store values of the past state; then advance time, and clear what was heard, used and said."""
     registers = row.registers
     if row.program[Header.BEFORE_PC] != 0:
         run(row, row.program[Header.BEFORE_PC])

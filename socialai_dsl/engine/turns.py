@@ -54,7 +54,7 @@ def compute_statuses(row: Row, changed: bool) -> None:
 
 @merged
 def go_by_itself(row: Row) -> bool:
-    """What counts or moves by itself does so, with its direct consequences; whether a status has changed."""
+    """Count timers and move rolling objects, with direct consequences; whether a status has changed."""
     if row.program[Header.TICK_PC] != 0:
         run(row, row.program[Header.TICK_PC])
     if row.program[Header.FLAGS] & Flag.ROLLS:
@@ -116,7 +116,7 @@ def move_agent(row: Row, action: int) -> None:
 
 @outline
 def move_npc(row: Row, npc: int, action: int) -> None:
-    """The body action of an NPC. It never enters what is solid or deadly, nor the cell of anybody else."""
+    """The body action of an NPC. It never enters a cell that is solid, deadly or taken."""
     stay_outline()
     direction = field(row, npc, Field.DIR)
     x = field(row, npc, Field.X)
@@ -164,7 +164,7 @@ def _do_the_rest(row: Row, frame: int) -> None:
 
 @merged
 def notice(row: Row, frame: int, heard: int, flags: int) -> bool:
-    """What a frame perceives, and does before the body action (`first`); whether it has chosen that action."""
+    """The beliefs and `first` of a frame, before the body action; whether `first` has chosen that action."""
     if flags & Trait.APART:
         _perceive(row, frame)
     row.registers[Register.LAST_TURN] = -1

@@ -172,7 +172,7 @@ class _Looker:
         return bool(self._registers[name.register])
 
     def question(self, probe: ProbeNotes, called: str) -> Question:
-        """What a probe asks at the moment that was looked at."""
+        """The question of a probe at the present moment."""
         answers = {normal(text): text for text in map(self._text, reversed(probe.answers))}
         right = self._text(probe.right)
         right = answers.setdefault(normal(right), right)

@@ -23,7 +23,7 @@ Bounds = NDArray[np.int16]
 
 
 def first_unsound(program: Program, registers: NDArray[np.int16]) -> str | None:
-    """What is wrong with the registers, int16 (E, R), of environments that play a program; None if nothing is."""
+    """The first problem of the registers, int16 (E, R), of environments that play a program; None without one."""
     low, high = _bounds(program)
     own = registers[:, : len(low)]
     wrong = np.argwhere((own < low) | (own > high))

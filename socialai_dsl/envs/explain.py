@@ -49,7 +49,7 @@ class Start:
 
 @dataclass
 class Recording:
-    """What happened since a moment: that moment, and the actions, int64 (heads,) as bytes each."""
+    """A moment, and the actions since then, int64 (heads,) as bytes each."""
 
     start: Start
     actions: list[bytes] = field(default_factory=list)
@@ -195,7 +195,7 @@ class Explainer:
         self._table.reset(0, None)
 
     def explain(self, recording: Recording, reached: NDArray[np.int16] | None) -> dict[str, Any]:
-        """What happened in the last step of a recording, which led to these registers, int16 (R,), if they are known.
+        """Explain the last step of a recording, which led to these registers, int16 (R,), if they are known.
 
         See `ScenarioEnv.explain`.
         """
@@ -258,11 +258,11 @@ class _Notes:
     board: NDArray[Any]
 
     def number(self, note: Note) -> int:
-        """What `Note.register` says."""
+        """The number in `Note.register`."""
         return int(self.registers[note.register])
 
     def values(self, part: Part) -> dict[str, Any]:
-        """What a part was about, by how it is written."""
+        """The values of a part, by their text."""
         return {value.words: self._value(value) for value in part.values if value.words}
 
     def why(self, note: Note, words: str) -> str:

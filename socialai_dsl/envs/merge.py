@@ -16,7 +16,7 @@ from socialai_dsl.vocabulary import ACTIONS, Sentences
 
 @dataclass(frozen=True)
 class Merged:
-    """What the programs of a batch have in common.
+    """The common action space and vocabulary of a batch's programs.
 
     Attributes:
         playable: the scenario or suite; of several their mixture.

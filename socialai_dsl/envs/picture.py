@@ -31,7 +31,7 @@ _DOWN = 1
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What a picture of the room shows.
+    """The content of a picture of the room.
 
     Attributes:
         codes: uint8 (H, W, 4), each cell's type, colour, status and orientation.
@@ -49,7 +49,7 @@ class Scene:
 
 
 def scene(table: Table, row: int) -> Scene:
-    """What a row of the table looks like."""
+    """The scene of a row of the table."""
     codes, agent = table.cells(row)
     width, height = table.room(row)
     return Scene(

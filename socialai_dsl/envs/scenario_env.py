@@ -419,7 +419,7 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         return coloured_text(self._table, 0)
 
     def scene(self) -> Scene:
-        """What a picture of the room shows now."""
+        """The content of a picture of the room now."""
         return scene(self._table, 0)
 
     def looks_of_npcs(self) -> dict[EntityName, Code]:

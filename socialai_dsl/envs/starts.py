@@ -20,7 +20,7 @@ _STEP = re.compile(r"[^.\[\]]+")
 
 
 class Starts:
-    """What is pinned at the reset of each program.
+    """The pins at the reset of each program.
 
     Attributes:
         rows: row of `pins` for each program, int32 (programs,); 0 pins nothing.

@@ -192,7 +192,7 @@ class Table:
         return ended
 
     def stepper(self, task: Task) -> Callable[[], int]:
-        """What does a step of all rows with the actions in the ports: see `Batch.stepper`."""
+        """A call that steps all rows with the actions in the ports: see `Batch.stepper`."""
         return partial(self.play, task) if self._starts else self.batch.stepper(task)
 
     def play(self, task: Task, actions: NDArray[np.integer[Any]] | None = None) -> int:
@@ -291,7 +291,7 @@ class Table:
         self.batch.set_weights(0, weights)
 
     def scripted_actions(self) -> NDArray[np.int64]:
-        """What the agents' frames would do now, int64 (E, 3 + slots); nothing changes."""
+        """The actions of the agents' scripts, int64 (E, 3 + slots); nothing changes."""
         free = [p.name for p in self.programs if not p.header(Header.FLAGS) & Flag.AGENT_FRAME]
         if free:
             names = ", ".join(dict.fromkeys(free))
@@ -316,7 +316,7 @@ class Table:
         return self.programs[self.number(row)]
 
     def member(self, row: int) -> str | None:
-        """What the suite calls the scenario that a row plays in this episode; None if it plays no suite."""
+        """The name of the suite's member that a row plays in this episode; None without a suite."""
         pool = self.pool_of.item(row)
         members = self._called[pool]
         return None if members is None else members[self.number(row) - self.merged.pools[pool][0]]

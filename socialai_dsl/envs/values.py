@@ -136,7 +136,7 @@ def read(program: Program, name: RegisterName, given: Any, key: str) -> int:
 
 
 def utterance_text(program: Program, value: int) -> str | list[int]:
-    """What an utterance says, "" for silence; [template, noun] if another pair before it says the same."""
+    """The text of an utterance, "" for silence; [template, noun] if an earlier pair has the same text."""
     if value == 0:
         return SILENCE
     pair = divmod(value - 1, program.sentences.fillings)
@@ -182,7 +182,7 @@ def word(key: str, value: Any, words: Sequence[Any]) -> int:
 
 
 def meant(given: str, among: Any) -> str:
-    """What may have been meant by a name that does not exist, to be added to a message."""
+    """A suggestion for a name that does not exist, to be added to a message."""
     known = list(among)
     near = did_you_mean(given, known)
     return f"; did you mean {near!r}?" if near else f"; expected one of {', '.join(sorted(known))}"

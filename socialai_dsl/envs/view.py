@@ -78,7 +78,7 @@ class View:
 
 
 def ahead(view: NDArray[np.uint8]) -> str:
-    """What lies or stands in front of the agent, in a few words."""
+    """The thing or member in front of the agent, in a few words."""
     kind, colour, status = (int(value) for value in view[VIEW // 2, VIEW - 2, :3])
     if kind in (tiles.UNSEEN, tiles.EMPTY):
         return "nothing"

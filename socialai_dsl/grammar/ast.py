@@ -295,7 +295,7 @@ MAX_DEPTH = 24
 
 
 class ParseProblem(Exception):  # noqa: N818 - a finding on its way to a diagnostic, not a failure
-    """What is wrong with a string of the language: a code of the catalogue, a message and where.
+    """A mistake in a string of the language: a code of the catalogue, a message and a place.
 
     Attributes: code, message, offset (0-based, into the parsed string), hint (or None), words (several that stand
     side by side and may be a text; or None).

@@ -119,7 +119,7 @@ class ActionLanguage:
         self._exact = set(self._sentences)
 
     def instructions(self, mode: Mode) -> str:
-        """What can be done and said, and how to reply.
+        """The possible actions and utterances, and the form of a reply.
 
         Raises:
             ValueError: there is no such mode.

@@ -38,7 +38,7 @@ class EndpointError(Exception):
 
 @dataclass(frozen=True)
 class Usage:
-    """What requests took.
+    """The tokens and cost of requests.
 
     Attributes:
         prompt, completion: tokens. cost: in US dollars; None if prices are not known.
@@ -67,7 +67,7 @@ class Usage:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a model answered: text, tools that it calls as (id, call), and what it took."""
+    """A model's answer: text, the tools that it calls as (id, call), and the usage."""
 
     text: str
     calls: tuple[tuple[str, ToolCall], ...]

@@ -55,7 +55,7 @@ def is_surface(cell: Cell) -> bool:
 
 
 def facts(cell: Cell, kinds: Mapping[int, str], directions: tuple[str, ...]) -> dict[str, str]:
-    """What a cell shows: `what` it is and, as far as it has one, `color`, `state`, direction and gestures.
+    """The facts of a cell: `what` it is and, as far as it has one, `color`, `state`, direction and gestures.
 
     Args:
         cell: not an empty one.

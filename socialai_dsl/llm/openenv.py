@@ -21,7 +21,7 @@ _SEEDS = 1 << 31
 
 
 class Reply(Action):
-    """What a model replies."""
+    """A model's reply."""
 
     message: str = Field(description="the reply, which ends with a line such as `Act: left`")
 
@@ -34,7 +34,7 @@ class Reply(Action):
 
 
 class Told(Observation):
-    """What a model is told."""
+    """An observation in text."""
 
     text: str = Field(description="what is seen and heard, after what was wrong with the reply, if anything")
     instructions: str = Field("", description="of the scenario; at the start of an episode only")

@@ -58,7 +58,7 @@ class Manner:
 
 @dataclass(frozen=True)
 class Budget:
-    """What may be spent; None is no limit.
+    """The limits of tokens and cost; None is no limit.
 
     Attributes:
         tokens: of prompts and completions. cost: in US dollars.
@@ -199,7 +199,7 @@ class LanguageModelPlayer:
 
     @property
     def spent(self) -> Usage:
-        """What was spent by this player, without what earlier ones had spent."""
+        """The usage of this player, without that of earlier ones."""
         return self._spent
 
     def play(
@@ -315,7 +315,7 @@ class Conversation:
         ]
 
     def constraints(self) -> dict[str, Any]:
-        """What a request says of the form of the reply."""
+        """The constraints of a request on the form of the reply."""
         if self._episode.question is not None:
             return constraints(self._episode.question, self._manner.mode, self._manner.grammar)
         language = self._episode.language

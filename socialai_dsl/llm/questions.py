@@ -66,7 +66,7 @@ def put(question: Question, mode: Mode) -> str:
 
 
 def constraints(question: Question, mode: Mode, grammar: bool) -> dict[str, Any]:
-    """What a request says of the form of the answer."""
+    """The constraints of a request on the form of the answer."""
     if mode == "json":
         answer = {"type": "string", "enum": list(question.answers)}
         schema = {

@@ -64,7 +64,7 @@ class TextView:
         self._described = lru_cache(_REMEMBERED)(self._describe)
 
     def instructions(self, mode: Mode = "text", goal: str = "") -> str:
-        """What there is to see, to do and to say, and how to reply, without a word on what solves the scenario.
+        """The possible sights, actions and utterances, and the form of a reply, without a word on the solution.
 
         Args:
             mode: how replies are given: `text`, `json` or `tools`.
@@ -83,7 +83,7 @@ class TextView:
         )
 
     def observe(self, observation: Mapping[str, NDArray[Any]], info: Mapping[str, Any]) -> str:
-        """What the agent sees and hears now.
+        """The observation of the present moment as text.
 
         Args:
             observation: of `ScenarioEnv`.

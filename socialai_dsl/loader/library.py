@@ -170,7 +170,7 @@ class Node:
 
     @property
     def kind(self) -> str:
-        """What this part is, for messages."""
+        """The kind of this part, for messages."""
         if isinstance(self.children, dict):
             return "a mapping"
         if isinstance(self.children, list):

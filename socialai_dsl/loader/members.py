@@ -39,7 +39,7 @@ class Leaf:
 
     @property
     def name(self) -> str:
-        """What people call it: `introduction=ask,problem=boxes`."""
+        """Its name: `introduction=ask,problem=boxes`."""
         return ",".join(f"{parameter}={label}" for parameter, label in self.labels.items())
 
 

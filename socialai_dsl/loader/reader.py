@@ -391,7 +391,7 @@ _STEP: Final = re.compile(r"[^.\[\]]+")
 
 
 def value_at(path: DataPath, text: str) -> Data | None:
-    """What a plain word means where a text may stand; None where YAML's own reading holds.
+    """The value of a plain word where a text may stand; None where YAML's own reading holds.
 
     Args:
         path: where in its file it stands.

@@ -38,7 +38,7 @@ _DECLARED_NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,80}")
 
 @dataclass
 class Ancestor:
-    """What a scenario is, or is a variant of: variants are looked for by folder and stem.
+    """A scenario, or one that it is a variant of: variants are looked for by folder and stem.
 
     Attributes:
         folder: where its variants are.

@@ -41,7 +41,7 @@ def shipped_scenarios() -> list[str]:
 
 
 def variants_of(scenario: str) -> list[str]:
-    """What can follow a scenario's name after a `+`: variants of its own, then those of any scenario.
+    """The variants that can follow a scenario's name after a `+`: its own, then those of any scenario.
 
     A variant of what the scenario is itself a variant of counts too, where it has none of that name.
     """
@@ -60,7 +60,7 @@ def variants_of(scenario: str) -> list[str]:
 
 
 def base_of(scenario: str) -> str:
-    """What a shipped scenario is a variant of, if it does not say for itself what it is about; else nothing."""
+    """The base of a shipped variant without a description of its own; else nothing."""
     content = _documents()[scenario]
     return "" if "about" in content else _base(content)
 

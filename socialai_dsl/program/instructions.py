@@ -26,7 +26,7 @@ _BITS_OF_A_SET = 32
 
 
 class Bounds(Protocol):
-    """What the range of a result may depend on besides its operands."""
+    """The bounds that the range of a result may depend on besides its operands."""
 
     @property
     def first_cell(self) -> int:
@@ -245,7 +245,7 @@ CLASS_BITS: Final = 6
 
 
 class OpClass(IntEnum):
-    """What kinds of instructions there are."""
+    """The classes of instructions."""
 
     CONTROL = 0  # where code goes on
     TEST = 1  # goes on if true, else skips
@@ -348,7 +348,7 @@ class Op(IntEnum):
 
 
 class Kind(Enum):
-    """What an operand word is."""
+    """The kinds of operand words."""
 
     UNUSED = "unused"
     VALUE = "a value"
@@ -392,7 +392,7 @@ _WRITTEN: Final = frozenset((Kind.TARGET, Kind.UPDATED, Kind.TEMPORARIES))
 
 @dataclass(frozen=True)
 class Instruction:
-    """What an op is.
+    """The entry of an op in the table.
 
     Attributes:
         says: what it does, in one sentence; a, b, c are its operands, v(x) the value of one.

@@ -24,7 +24,7 @@ _DONE: Final = {"stop pointing": "stop"}
 
 
 class Gesture(NamedTuple):
-    """What an NPC shows beside its looks.
+    """The gestures of an NPC.
 
     Attributes:
         pointing: the direction in which it points, 0 right, 1 down, 2 left, 3 up; None if it does not.

@@ -120,7 +120,7 @@ def figures(
     gestures: Mapping[tuple[int, int], Gesture],
     places: Container[tuple[int, int]] | None = None,
 ) -> list[str]:
-    """What the two letters of an NPC do not say, one line each in reading order: `A> 3,1 red, points down`.
+    """Further facts of NPCs, one line each in reading order: `A> 3,1 red, points down`.
 
     Args:
         codes: as for `draw_grid`.

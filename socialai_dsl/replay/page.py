@@ -30,7 +30,7 @@ _PAGE: Final = """<!doctype html>
 
 
 class Shown(Protocol):
-    """What the page needs of an episode."""
+    """The interface of an episode for the page."""
 
     @property
     def scenario(self) -> str:

@@ -25,7 +25,7 @@ def cast_of(program: Program) -> tuple[str, ...]:
 
 
 def changes(before: dict[str, Any], after: dict[str, Any]) -> dict[str, tuple[Any, Any]]:
-    """What differs between two states, by address: `honest.state`, `doors[1].state`, `let.exit`."""
+    """The differences between two states, by address: `honest.state`, `doors[1].state`, `let.exit`."""
     old, new = leaves(before), leaves(after)
     return {key: (old.get(key), new.get(key)) for key in {**old, **new} if old.get(key) != new.get(key)}
 

@@ -30,7 +30,7 @@ class Step:
 
     @property
     def dialogue(self) -> list[DialogueLine]:
-        """What was said in this step, the agent first."""
+        """The lines of this step, the agent's first."""
         own = [DialogueLine(self.t, "You", self.said)] if self.said is not None else []
         return own + [heard_line(self.t, line) for line in self.heard]
 

@@ -170,7 +170,7 @@ _SCALARS: Final = {int: "a whole number", float: "a number", bool: "`true` or `f
 
 
 def expectation(annotation: Any) -> str:
-    """What belongs there, in words."""
+    """The expected value, in words."""
     parts = [part for part in branches(annotation) if part is not type(None)]
     if {int, bool, str} <= set(map(_hashable, parts)):
         return "an expression"

@@ -330,7 +330,7 @@ def entries(played: PlayedFrame) -> Iterator[tuple[DataPath, str, Effects]]:
 
 
 def lines_of(resolver: Resolver, played: PlayedFrame) -> Spoken:
-    """What a member says in its frame; resolved first, so that others can hear it."""
+    """The lines of a member in its frame; resolved first, so that others can hear them."""
     spoken = Spoken()
     for path, address, entry in entries(played):
         if entry.say is not None:

@@ -357,7 +357,7 @@ def check_meaning(
     params: Mapping[str, Scalar] | None = None,
     substituted: frozenset[DataPath] = frozenset(),
 ) -> CheckedScenario | None:
-    """What a scenario means; None if something is wrong with it, which `bag` then says.
+    """The meaning of a scenario; None if it has mistakes, which `bag` then holds.
 
     Types that follow from uses (`pick(left | right)`, registers that are set) are found by resolving again with
     what the uses asked for, until nothing changes.

@@ -324,7 +324,7 @@ def played_frame(
     path: DataPath,
     looked_at: bool = False,
 ) -> PlayedFrame:
-    """A frame as a member plays it; slots that nobody fills have no text."""
+    """A frame as a member plays it; slots that are not filled have no text."""
     alternatives = symbols.alternatives[member]
     texts = {
         slot: tuple(symbols.with_path(member, slot, which) for which in range(len(alternatives)))

@@ -296,7 +296,7 @@ def check_points(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope
 
 
 def check_toggled(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: Scope) -> None:
-    """Report what nobody uses."""
+    """Report memories that are never used."""
     if who.type.low < len(resolver.symbols.numbers):
         message = f"only objects are toggled, so only they have `{name}`"
         raise resolver.fail("S204", message, node, scope, hint="an NPC is poked: `anna.poked`")
@@ -317,7 +317,7 @@ def check_moment(resolver: Resolver, signature: Signature, node: ast.Expr, scope
 def subject_of(
     resolver: Resolver, subject: ast.Expr | None, signature: Signature, node: ast.Expr, scope: Scope
 ) -> Term | None:
-    """Who a verb is about: what stands before the dot, else the NPC itself. None: the candidate cell."""
+    """The subject of a verb: the part before the dot, else the NPC itself. None: the candidate cell."""
     if subject is None:
         if scope.member is None:
             example = "agent" if signature.subject != "object" else "door"
@@ -348,7 +348,7 @@ def subject_of(
 
 
 def must_be_agent(resolver: Resolver, node: ast.Call | ast.Attribute | ast.Name, scope: Scope) -> None:
-    """Report what is known of the agent only, asked of somebody else."""
+    """Report a question that only the agent can answer, asked of another member."""
     subject = None if isinstance(node, ast.Name) else node.subject
     if subject is None and scope.member == "agent":
         return
@@ -642,7 +642,7 @@ def _utterance(type_: Type, chance: float) -> Term:
 
 
 def memories(resolver: Resolver) -> Iterator[MemoryPlan]:
-    """What is remembered of the agent's acts."""
+    """The memories of the agent's acts."""
     for name, model in resolver.symbols.scenario.memory.items():
         path = ("memory", name, "while")
         open_: Sited | None = None

@@ -463,7 +463,7 @@ def _path(resolver: Resolver, member: str, key: str, part: str) -> DataPath:
 
 
 def beliefs(resolver: Resolver) -> Iterator[BeliefPlan]:
-    """What members note at the start of their turns."""
+    """The beliefs that members update at the start of their turns."""
     for name, member in resolver.symbols.cast.items():
         for key, belief in member.beliefs.items():
             with surviving():
@@ -482,7 +482,7 @@ def beliefs(resolver: Resolver) -> Iterator[BeliefPlan]:
 
 
 def watching(member: str, number: int, span: Span) -> FramePlan:
-    """What a member does who believes something but follows no frame: it stays, and looks."""
+    """The frame of a member with beliefs and no frame of its own: it stays, and looks."""
     state = StatePlan("looking", (), Activity("stay", (), "", span), (), span)
     return FramePlan(member, "looks on", number, span, state.name, (state,), written=False)
 
@@ -505,5 +505,5 @@ def believed(resolver: Resolver, owner: ast.Attribute, node: ast.Attribute, scop
 
 
 def unnamed(subject: str) -> str:
-    """What to say of `sally.believes` without the name of a belief."""
+    """The message about `sally.believes` without the name of a belief."""
     return f"`believes` needs the name of a belief after a dot: `{subject}.believes.where_it_is`"

@@ -291,7 +291,7 @@ class Computed:
 
 @dataclass(frozen=True, slots=True)
 class BeliefPlan:
-    """What a member takes for true: at the start of each of its turns the register takes `value` if `when` holds.
+    """A belief of a member: at the start of each of its turns the register takes `value` if `when` holds.
 
     It starts, as a `Drawn` of the setup, with what is true when the episode begins.
     """

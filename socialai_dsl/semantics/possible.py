@@ -387,7 +387,7 @@ def _untils(checked: CheckedScenario) -> Iterator[tuple[Span, Sited]]:
 
 
 class Possible:
-    """What the parts of a scenario can be, each looked at by itself."""
+    """The possible values of the parts of a scenario, each by itself."""
 
     def __init__(self, checked: CheckedScenario) -> None:
         self._checked = checked

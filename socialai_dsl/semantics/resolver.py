@@ -134,7 +134,7 @@ class Utterances:
         return min(found, default=None)
 
     def anything(self) -> Pattern:
-        """Whatever anybody can say."""
+        """Every utterance that a member can say."""
         pairs = frozenset(pair for found in self._pairs.values() for pair in found)
         return Pattern(pairs, "any", frozenset(self.npc_texts))
 
@@ -295,7 +295,7 @@ class Registers:
         return self._declared[path].source
 
     def drawn(self) -> list[Drawn]:
-        """All registers that are not constants, in the order declared; those nobody asked for are resolved now."""
+        """All registers that are not constants, in the order declared; unused ones are resolved now."""
         for path in self._declared:
             with suppress(FailedError):
                 self.read(path)
@@ -349,7 +349,7 @@ class Registers:
         return self._terms.get(f"{member}.one_of")
 
     def drawn_at_reset(self, path: str) -> Term | None:
-        """What a register is given at reset and keeps for the episode; None for a constant, or if rules can set it."""
+        """The value that a register gets at reset and keeps; None for a constant, or if rules can set it."""
         drawn = self._drawn.get(path)
         return drawn.value.term if drawn is not None and not self.is_set(path) else None
 

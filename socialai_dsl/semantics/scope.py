@@ -60,7 +60,7 @@ class Findings:
     data: object = None
 
     def part(self, path: DataPath) -> object:
-        """What is written at `path`; None if nothing is."""
+        """The text at `path`; None without one."""
         part: Any = self.data
         for step in path:
             known = range(len(part)) if isinstance(part, list) else part if isinstance(part, dict) else ()
@@ -230,7 +230,7 @@ def usage(signature: Signature) -> str:
 
 
 def wrong_count(signature: Signature, given: int) -> str:
-    """What to say when an instruction has too few or too many values in brackets."""
+    """The message about too few or too many values in brackets."""
     many, least = len(signature.takes), len(signature.takes) - signature.optional
     number = f"{least} or {many}" if least < many else f"{many}"
     takes = "nothing in brackets" if not many else f"{number} value{'s' if many > 1 else ''} in brackets"
@@ -238,7 +238,7 @@ def wrong_count(signature: Signature, given: int) -> str:
 
 
 def with_article(name: str) -> str:
-    """What something is called, with its article: `an apple`, `a remote door`."""
+    """A name with its article: `an apple`, `a remote door`."""
     return f"{'an' if name[:1] in 'aeiou' else 'a'} {name.replace('_', ' ')}"
 
 
@@ -456,7 +456,7 @@ class PlayedFrame:
 
     @property
     def address(self) -> DataPath:
-        """What its draw sites are named by, wherever it is written."""
+        """The name of its draw sites, in any file."""
         return ("frames", self.name)
 
 

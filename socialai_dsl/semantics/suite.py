@@ -18,7 +18,7 @@ from socialai_dsl.vocabulary import NOUN, PRIMITIVES, Sentences, Slot, normal
 
 @dataclass(frozen=True, slots=True)
 class SharedSpace:
-    """What can be done and said in a suite.
+    """The action space of a suite.
 
     Attributes:
         actions: words of the action space. sentences: what can be said.

@@ -274,7 +274,7 @@ class Heard:
 
 @dataclass(frozen=True, slots=True)
 class Speaker:
-    """Who said what one of these patterns matches: of what the member has heard since its last turn, the first."""
+    """The speaker of the first utterance since the member's last turn that one of these patterns matches."""
 
     type: Type
     patterns: tuple[Pattern, ...]
@@ -381,7 +381,7 @@ class Sited:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """What can be said: fixed pieces and values with words, joined; `site` for picks inside."""
+    """A line: fixed pieces and values with words, joined; `site` for picks inside."""
 
     parts: tuple[str | Term, ...]
     site: str
@@ -420,7 +420,7 @@ class ObjectType(Leaf):
 
     @property
     def unlocked(self) -> int:
-        """What becomes of it when it is unlocked: closed, if it can be, else as it is at first."""
+        """Its status after unlocking: closed, if it can be, else its initial one."""
         return self.states.index("closed") if "closed" in self.states else self.initial
 
 

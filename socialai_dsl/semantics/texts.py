@@ -275,7 +275,7 @@ def _report_unsayable(
 
 
 def line(resolver: Resolver, path: DataPath, raw: str, scope: Scope) -> Line:
-    """What a `say:` says: pieces and values. The agent can only say what its grammar has."""
+    """The line of a `say:`: pieces and values. The agent can say only utterances of its grammar."""
     findings = resolver.findings
     text = findings.text(path, raw)
     span = findings.at(path)
@@ -371,7 +371,7 @@ class _Filling:
     drawn: Term | None
 
     def scope(self, user: Scope) -> Scope:
-        """What its names mean where it is put in."""
+        """The meaning of its names at its place."""
         draws = Draws(f"cast.{self.member}.with.{self.slot}")
         return Scope(self.path, draws, member=self.member, outer=user.draws)
 
@@ -624,7 +624,7 @@ def bound(plan: RulePlan, heard: Sequence[Alternative]) -> RulePlan:
 
 
 def binding(heard: Sequence[Alternative]) -> Callable[[Term], Term | None]:
-    """What `speaker`, `noun` and slots are where these are heard; what only the agent says needs no search."""
+    """The meaning of `speaker`, `noun` and slots where these are heard; utterances of the agent alone need no search."""
     only_agent = not any(pattern.said_by_npcs for alternative in heard for pattern, _ in alternative)
 
     def change(term: Term) -> Term | None:

@@ -25,7 +25,7 @@ class FileError(ValueError):
 
 
 class ConflictError(FileError):
-    """Somebody else has written the file since it was read."""
+    """Another program has written the file since it was read."""
 
 
 class Folder:
@@ -134,7 +134,7 @@ class Folder:
             raise FileError(f"{name}: the draft cannot be kept: {error.strerror}") from None
 
     def draft(self, name: str) -> str | None:
-        """What was typed into a file and not saved; None if there is nothing."""
+        """The unsaved text of a file; None without one."""
         try:
             return self._draft(name).read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError):

@@ -49,7 +49,7 @@ class _Before:
 
 
 class Session:
-    """What a window shows. Each method that a window may ask for returns what it shows next."""
+    """The content of a window. Each method that a window may call returns its next content."""
 
     def __init__(self) -> None:
         self._path = Path()
@@ -210,7 +210,7 @@ class Session:
         return {"page": replay_page([self._tracer.trace()])}
 
     def check(self, path: str, text: str, seconds: float = 20.0) -> Reply:
-        """What `socialai check` says of a text."""
+        """The report of `socialai check` about a text."""
         from socialai_dsl.analysis.effort import Clock, Effort
         from socialai_dsl.cli.check import check_scenario
 

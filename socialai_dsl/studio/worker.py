@@ -1,4 +1,4 @@
-"""What runs in a process of its own for each window, so that nothing that happens in it ends the server.
+"""The process of a window, whose failures do not end the server.
 
 A window has two of them: one answers a line of JSON with another, one is the language server of its editor.
 """
@@ -59,7 +59,7 @@ def serve(questions: Iterable[str], answers: TextIO) -> None:
 
 
 def answer(session: Any, asked: dict[str, Any]) -> dict[str, Any]:
-    """What a session says to a question.
+    """A session's answer to a question.
 
     Raises:
         RefusalError: it is none, or cannot be done.

@@ -36,7 +36,7 @@ class Ramp(_Model):
     over: int = Field(ge=1, description="episodes")
 
     def after(self, episodes: int) -> float:
-        """The weight after so many episodes of the phase."""
+        """The weight after this number of episodes of the phase."""
         return self.start + (self.to - self.start) * min(episodes / self.over, 1.0)
 
 
@@ -80,7 +80,7 @@ class Group(_Model):
 
 
 class Until(_Model):
-    """When the next phase begins: after more than so many episodes of this one, and with enough success lately."""
+    """The end of a phase: more than a number of episodes, and enough recent success."""
 
     episodes: int = Field(0, ge=0)
     success: float = Field(0.0, ge=0, le=1)
@@ -88,7 +88,7 @@ class Until(_Model):
 
 
 class Phase(_Model):
-    """What is played until when; the last phase never ends."""
+    """The members of a phase, and its end; the last phase never ends."""
 
     name: str | None = None
     play: tuple[Group, ...] = Field(default=(Group(),), min_length=1)

@@ -87,7 +87,7 @@ class _ResettableLstm(torch.autograd.Function):
 
 
 class Memory(nn.Module, ABC):
-    """What a network carries from step to step: a float32 tensor (E, *shape), all zeros where an episode starts.
+    """The state of a network from step to step: a float32 tensor (E, *shape), all zeros where an episode starts.
 
     A subclass says how one step changes it. Back-propagation through time follows from that; `forward` may be
     overridden by something faster.

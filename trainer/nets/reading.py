@@ -23,7 +23,7 @@ class Reader:
         self.words = tuple(vocabulary)
 
     def length(self, tokens: int) -> int:
-        """Words in the longest history read from a buffer of so many tokens."""
+        """The number of words in the longest history read from a buffer of this number of tokens."""
         return tokens
 
     def read(self, tokens: NDArray[np.int16]) -> NDArray[np.int16]:
