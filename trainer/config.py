@@ -71,12 +71,12 @@ class RunConfig(BaseModel):
     )
     curriculum: Name = _flag(
         "none",
-        "which members of a suite are played: none, expert, progress, reverse, a .yaml file of phases or "
+        "the choice of a suite's members: none, expert, progress, reverse, a .yaml file of phases or "
         "mine:Curriculum",
     )
     guide: Name = _flag(
         "none",
-        "who shows the agent what to do: none, script (the scenario's own script plays, the agent imitates it) or "
+        "the guide that shows the task: none, script (the scenario's own script plays, the agent imitates it) or "
         "mine:Guide",
     )
     guide_share: float = _option(0.6, "first share of the frames, led by the guide (measured)", ge=0, le=1)

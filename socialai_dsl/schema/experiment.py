@@ -36,19 +36,19 @@ AGENTS: Final = ("ppo", "random", "oracle")
 
 
 class Reference(Model):
-    """What somebody else found under this condition, for the report to set beside."""
+    """A published figure of this condition, which the report sets beside ours."""
 
     mean: float | int = Field(description="share of successful test episodes, mean over seeds", ge=0, le=1)
     std: float | int | None = Field(None, description="its standard deviation over seeds", ge=0, le=1)
-    note: Prose | None = Field(None, description="what has to be known to compare")
-    source: str | None = Field(None, description="where the figure stands")
+    note: Prose | None = Field(None, description="a remark for the comparison")
+    source: str | None = Field(None, description="the source of the figure")
 
 
 class Tested(Model):
     """A scenario that the trained agents play besides their own."""
 
-    scenario: MemberName = Field(description="what is played; the condition's `variants` apply to it as well")
-    reference: Reference | None = Field(None, description="what was found elsewhere")
+    scenario: MemberName = Field(description="the scenario; the condition's `variants` apply to it as well")
+    reference: Reference | None = Field(None, description="a published figure")
 
 
 def _is_mapping(value: Any) -> str:
@@ -99,13 +99,13 @@ else:
 
 
 class Settings(_RunOptions):
-    """What can be said of runs; a key that is left out is as `socialai-run` has it."""
+    """Settings of runs; a key that is left out has the default of `socialai-run`."""
 
     scenario: MemberName | None = Field(
         None, description="a shipped name, or a path relative to this file; with variants and parameters"
     )
     variants: Annotated[tuple[Word, ...], BeforeValidator(_as_tuple)] | None = Field(
-        None, description="variants applied to the scenario and to what is tested besides"
+        None, description="variants applied to the scenario and to its tests"
     )
     agent: Annotated[str, StringConstraints(min_length=1, max_length=1000)] | None = Field(
         None,
@@ -120,13 +120,14 @@ class Settings(_RunOptions):
             Field(min_length=1, max_length=10_000),
         ]
         | None
-    ) = Field(None, description="how many seeds, from 0 on, or a list of seeds")
+    ) = Field(None, description="the number of seeds, from 0 on, or a list of seeds")
     tests: Annotated[tuple[Test, ...], BeforeValidator(_as_tuple)] | None = Field(
         None, description="scenarios that the agents play besides their own when they are trained"
     )
-    reference: Reference | None = Field(None, description="what was found elsewhere on the scenario itself")
+    reference: Reference | None = Field(None, description="a published figure of the scenario itself")
     recipe: Literal["plain", "guided", "paper"] | None = Field(
-        None, description="how the agents learn; guided: the scenario's script shows it first; default plain"
+        None,
+        description="the way of learning; guided: the scenario's script shows the task first; default plain",
     )
     hyper: Hyper | None = Field(None, description="any other option of the trainer")
 
@@ -199,7 +200,7 @@ OverrideList = Annotated[tuple[Override, ...], BeforeValidator(_as_tuple), Field
 
 
 class Profile(Model):
-    """A size in which the experiment can be run; what it says wins over everything else in the file."""
+    """A size in which the experiment can be run; it overrides everything else in the file."""
 
     about: Prose | None = Field(None, description="one sentence for people")
     set: Settings | None = Field(None, description="settings of all conditions of the file")
@@ -210,17 +211,17 @@ class Profile(Model):
 
 
 class Experiment(Model):
-    """What to run, as a whole."""
+    """An experiment: agents on scenarios, each with its seeds."""
 
     experiment: Word = Field(description="the name of the experiment, and of its folder")
     about: Prose | None = Field(None, description="one sentence for people")
     notes: Prose | None = Field(None, description="more for people")
-    set: Settings | None = Field(None, description="settings of all conditions that say nothing else")
+    set: Settings | None = Field(None, description="settings of all conditions, which each may override")
     conditions: Annotated[ConditionList, Field(min_length=1)] = Field(
         description="conditions and grids of them"
     )
     overrides: OverrideList = Field(
         (), description="other settings for some of the conditions; later ones win"
     )
-    profile: Word | None = Field(None, description="the profile that is meant where none is named")
+    profile: Word | None = Field(None, description="the profile that is used where none is named")
     profiles: dict[Word, Profile] = Field(default_factory=dict, description="sizes in which it can be run")

@@ -46,7 +46,7 @@ class VariantFile(Model):
     of: str = Field(description="the file it is a variant of, or `any`", examples=["talkitout.yaml", "any"])
     about: Prose | None = Field(None, description="one sentence for people")
     notes: Prose | None = Field(None, description="more for people")
-    skills: list[Prose] = Field(default_factory=list, description="what it asks of an agent, for people")
+    skills: list[Prose] = Field(default_factory=list, description="the skills that it needs, for people")
     remove: list[str] = Field(
         default_factory=list, description="paths of what is removed", examples=[["cast.liar"]]
     )

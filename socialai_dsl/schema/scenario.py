@@ -125,7 +125,7 @@ class Rule(Effects):
 
 
 class WorldRule(Model):
-    """A rule about the world, read once a step after everybody has moved; each that holds takes effect."""
+    """A rule about the world, read once a step after all turns; each that holds takes effect."""
 
     id: Word | None = Field(None, description="names the rule in coverage, traces and patches")
     when: Expression | None = Field(None, description="a condition", examples=["eye_contact(agent)"])
@@ -177,7 +177,7 @@ class Step(Effects):
 
 
 class Ranged(Model):
-    """A register with a range, in which it stays whatever it is set to."""
+    """A register with a range, to which its values are clipped."""
 
     start: Expression = Field(description="its value at first")
     range: Expression = Field(description="a..b", examples=["0..10"])
@@ -216,19 +216,19 @@ class Role(Model):
 
 
 class Belief(Model):
-    """What a member of the cast takes for true: what it saw last."""
+    """A belief of a member of the cast: its latest observation of a value."""
 
-    of: Expression = Field(description="what it is about, such as toy.inside")
-    when: Expression | None = Field(None, description="when it is looked at; default always")
+    of: Expression = Field(description="the value that it is about, such as toy.inside")
+    when: Expression | None = Field(None, description="the condition of an observation; default always")
 
 
 class Character(Model):
-    """What an inhabitant of the room is: how it looks, where it is put, what it does."""
+    """An inhabitant of the room: its appearance, place and behaviour."""
 
     role: Word | None = Field(None, description="the part it plays")
-    kind: Word | None = Field(None, description="what it looks like; default peer")
+    kind: Word | None = Field(None, description="its appearance; default peer")
     name: ExpressionOrText | None = Field(
-        None, description="what precedes its lines; default its key, capitalised"
+        None, description="the speaker's name before its lines; default its key, capitalised"
     )
     color: Expression | None = Field(None, description="default random")
     place: str | None = Field(None, description="default anywhere")
@@ -237,12 +237,12 @@ class Character(Model):
     )
     facing: Expression | None = Field(None, description="a direction, random, or toward(x); default random")
     view: int | None = Field(None, ge=1, le=15, description="side of the square it sees; default 7")
-    earshot: Expression | None = Field(None, description="how far its voice carries")
+    earshot: Expression | None = Field(None, description="the reach of its voice")
     frame: Word | None = Field(None, description="the frame it follows; default none: it stays")
     with_: dict[Word, ExpressionOrText] = Field(
         default_factory=dict, alias="with", description="fills the slots"
     )
-    beliefs: dict[Word, Belief] = Field(default_factory=dict, description="what it takes for true")
+    beliefs: dict[Word, Belief] = Field(default_factory=dict, description="name: a belief")
     audible: Literal["always"] | None = Field(None, description="heard even while NPCs are hidden")
     kind_code: int | None = Field(None, ge=0, le=255, description="status code in the image")
 
@@ -251,7 +251,7 @@ class Npc(Character):
     """A file of its own for one NPC: what it is, with its frames; `one_of` draws it."""
 
     npc: Word = Field(description="the name of this file's NPC")
-    abstract: bool = Field(False, description="others build on it by `extends`; nobody can be it")
+    abstract: bool = Field(False, description="a base for `extends` only; no member can be it")
     about: Prose | None = Field(None, description="one sentence for people")
     notes: Prose | None = Field(None, description="more for people")
     frames: dict[Word, Frame] = Field(default_factory=dict, description="the frames it brings along")
@@ -286,7 +286,7 @@ class CastGroup(CastMember):
     The loader makes members `name[0]`, `name[1]`, ... of it, so that no scenario holds one.
     """
 
-    count: int = Field(ge=1, le=16, description="a group of so many")
+    count: int = Field(ge=1, le=16, description="the size of the group")
     name: Annotated[Expression | None, as_written(ExpressionOrText | None | list[ExpressionOrText])] = Field(
         None, description="what precedes its lines; a list gives one each"
     )
@@ -331,7 +331,7 @@ class Room(Model):
         description="fixed things in place of floor, as {type: place}",
         examples=[[{"lava": "column(W // 2)"}]],
     )
-    occlusion: bool = Field(False, description="what is not transparent hides what lies behind it")
+    occlusion: bool = Field(False, description="opaque things hide the cells behind them")
     canvas: (
         Annotated[tuple[int, ...], BeforeValidator(_as_tuple), Field(min_length=2, max_length=2)] | None
     ) = Field(None, description="[width, height] of the grid the room lies on; default the largest room")
@@ -341,7 +341,7 @@ class ObjectGroup(Model):
     """An object, or with `count` (or a list in `at`) a group of them."""
 
     type: Word = Field(description="an object type of the prelude", examples=["door"])
-    count: int | None = Field(None, ge=1, le=16, description="a group of so many")
+    count: int | None = Field(None, ge=1, le=16, description="the size of the group")
     place: Expressions | None = Field(None, description="where it is drawn; a list gives one each")
     at: (
         Annotated[
@@ -367,11 +367,11 @@ class ObjectGroup(Model):
         None, ge=1, le=10_000, description="steps after which its active status expires"
     )
     opens: str | None = Field(
-        None, description="what is open while this is active: one object, or a group in the same order"
+        None, description="the object that is open while this is active, or a group in the same order"
     )
     pushed_by: Word | None = Field(None, description="the only type of object that can push it")
     unlocks: str | None = Field(
-        None, description="what is unlocked while this is pressed: one object, or a group in the same order"
+        None, description="the object that is unlocked while this is pressed, or a group in the same order"
     )
 
 
@@ -380,7 +380,7 @@ CHANNELS: tuple[Channel, ...] = ("type", "color", "status", "orientation", "poin
 
 
 class Observe(Model):
-    """What the agent perceives; it never changes what happens."""
+    """The agent's perception; it changes nothing else."""
 
     npcs: Literal["shown", "hidden"] = Field(
         "shown", description="hidden: NPCs are neither seen nor heard nor in the way"
@@ -398,7 +398,7 @@ class Observe(Model):
 
 
 class UtteranceGrammar(Model):
-    """What the agent can say: every template with all that its slots can be."""
+    """The agent's utterances: every template with all values of its slots."""
 
     templates: Annotated[tuple[TextLine, ...], BeforeValidator(_as_tuple)] = Field(
         min_length=1,
@@ -410,13 +410,13 @@ class UtteranceGrammar(Model):
         (),
         min_length=1,
         max_length=256,
-        description="what <noun> can be",
+        description="the values of <noun>",
         examples=[["the exit", "the wall"]],
     )
     slots: dict[Word, Fillers] = Field(
         default_factory=dict,
         max_length=8,
-        description="in place of `nouns`, name: what <name> can be: words, things, members of the cast, `colors`, 1..6",
+        description="in place of `nouns`, name: the values of <name>: words, things, members of the cast, `colors`, 1..6",
         examples=[{"what": ["the ball", "the key"], "whom": "peers"}],
     )
 
@@ -437,10 +437,10 @@ Names = Annotated[
 
 
 class OnlyThrough(Model):
-    """What was drawn shows only through these members."""
+    """A draw that only these members reveal."""
 
     draw: Word = Field(description="a `let` whose values are tried against each other")
-    by: Names = Field(description="members of the cast whose cues may tell what was drawn")
+    by: Names = Field(description="members of the cast whose cues may reveal it")
 
 
 class Property(Model):
@@ -451,13 +451,15 @@ class Property(Model):
     within: int | None = Field(None, ge=1, le=10_000, description="steps of a shortest success")
     oracle: Probability | None = Field(None, description="share of rooms that the variant `oracle` solves")
     script: Literal["perceives"] | None = Field(
-        None, description="the variant `oracle` acts on what it has perceived alone"
+        None, description="the variant `oracle` acts on its perceptions alone"
     )
-    needs: Names | None = Field(None, description="members without whom one can only guess")
-    only_through: OnlyThrough | None = Field(None, description="whose cues alone may show what was drawn")
+    needs: Names | None = Field(None, description="members without which an agent can only guess")
+    only_through: OnlyThrough | None = Field(
+        None, description="the members whose cues alone may reveal a draw"
+    )
     knowable: bool | None = Field(
         None,
-        description="whether an agent can perceive in time what its success depends on (tried by default)",
+        description="whether an agent can perceive in time the draws that its success depends on (tried by default)",
     )
     share: Probability | None = Field(
         None, description="least share of rooms, for `reachable`, `within`, `script`, `needs` and `knowable`"
@@ -473,11 +475,11 @@ class Probe(Model):
     )
     ask: TextLine = Field(description="the question; <...> is a value", examples=["Where will Sally look?"])
     answer: Expression = Field(
-        description="what is right at that moment: a value, or a condition for yes or no",
+        description="the right answer at that moment: a value, or a condition for yes or no",
         examples=["sally.believes.toy_in.color"],
     )
     answers: Texts = Field(
-        (), description="what can be answered; <...> is a value (default: all that the answer can be)"
+        (), description="the possible answers; <...> is a value (default: all values of the answer)"
     )
 
 
@@ -505,7 +507,7 @@ class Outcome(Model):
 
 
 class Reward(Model):
-    """What is earned: linear(s) is 1 - s t / horizon at success; `each_step` is added to every reward."""
+    """The reward: linear(s) is 1 - s t / horizon at success; `each_step` is added to every reward."""
 
     success: str = Field("linear(0.9)", description="linear(s), the part s that is lost by the horizon")
     each_step: Annotated[float, BeforeValidator(lambda v: float(v) if type(v) is int else v)] = Field(
@@ -524,17 +526,17 @@ class SungWith(Model):
 class Sequence(Model):
     """A sequence of acts, drawn at reset: each element has a move and perhaps an utterance."""
 
-    sequence: int = Field(ge=1, le=16, description="how many elements")
+    sequence: int = Field(ge=1, le=16, description="the number of elements")
     moves: Annotated[tuple[Primitive, ...], BeforeValidator(_as_tuple)] = Field(
-        min_length=1, description="what each move is drawn from"
+        min_length=1, description="the moves to draw from"
     )
     utterance: SungWith | None = Field(None, description="default: silent")
 
 
 class Memory(Model):
-    """What the agent did last, to be compared with a sequence."""
+    """The agent's last acts, to be compared with a sequence."""
 
-    last: int = Field(ge=1, le=16, description="how many acts it holds")
+    last: int = Field(ge=1, le=16, description="the number of acts that it holds")
     of: Literal["agent.acts"] = Field("agent.acts", description="moves and utterances of the agent")
     while_: Expression | None = Field(
         None, alias="while", description="only steps at whose start this held; default all"
@@ -546,7 +548,7 @@ class Parameter(Model):
 
     default: int | bool | float | str = Field(description="its value unless `?name=value` gives another")
     values: list[int | bool | float | str] | dict[str, int | bool | float | str] | None = Field(
-        None, description="what it may be: a list, or label: value"
+        None, description="its possible values: a list, or label: value"
     )
 
 
@@ -554,11 +556,11 @@ class Scenario(Model):
     """One environment: a room with objects, a cast that follows frames, and an outcome."""
 
     scenario: Word = Field(description="the name of the scenario")
-    abstract: bool = Field(False, description="others build on it by `extends`; it cannot be run itself")
+    abstract: bool = Field(False, description="a base for `extends` only; it cannot be run itself")
     about: Prose | None = Field(None, description="one sentence for people")
     notes: Prose | None = Field(None, description="more for people")
     skills: Annotated[tuple[Prose, ...], BeforeValidator(_as_tuple)] = Field(
-        (), description="what it asks of an agent, for people"
+        (), description="the skills that it needs, for people"
     )
     horizon: int = Field(100, ge=1, le=10_000, description="the episode ends at t == horizon")
     earshot: Expression = Field("next_to", description="next_to, room, or a Manhattan distance")
@@ -570,7 +572,7 @@ class Scenario(Model):
         description="name: default of parameters, used as $name and given as ?name=value",
     )
     grammar: Annotated[UtteranceGrammar, as_written(UtteranceGrammar | Word)] = Field(
-        description="what the agent can say: written out, or the name of a grammar that all can use"
+        description="the agent's utterances: written out, or the name of a shared grammar"
     )
     room: Room = Field(description="the walled room", examples=[{"size": "5..8"}])
     order: Annotated[tuple[Word, ...], BeforeValidator(_as_tuple)] = Field(
@@ -578,7 +580,7 @@ class Scenario(Model):
     )
     objects: dict[Word, ObjectGroup] = Field(
         default_factory=dict,
-        description="name: what lies in the room",
+        description="name: an object in the room",
         examples=[{"exit": {"type": "door", "place": "wall(top)"}}],
     )
     let: dict[Word, Expression | Sequence] = Field(
@@ -591,12 +593,12 @@ class Scenario(Model):
     tables: dict[Word, dict[str, ExpressionOrText] | str] = Field(
         default_factory=dict, description="name: {key: value}, or permuted(table): name(key) looks a value up"
     )
-    memory: dict[Word, Memory] = Field(default_factory=dict, description="what the agent did last")
+    memory: dict[Word, Memory] = Field(default_factory=dict, description="name: the agent's last acts")
     frames: dict[Word, Frame] = Field(
         default_factory=dict, description="name: protocol of interaction, which members of the cast follow"
     )
     roles: dict[Word, Role] = Field(default_factory=dict, description="parts that members of the cast play")
-    npc_defaults: Character = Field(Character(), description="what NPCs have that do not say otherwise")
+    npc_defaults: Character = Field(Character(), description="keys of all NPCs, which each may override")
     cast: Annotated[dict[MemberName, CastMember], as_written(WrittenCast)] = Field(
         description="who is in the room: the `agent` and the NPCs by name",
         examples=[{"guide": {"frame": "show_the_way"}, "agent": {"place": "anywhere"}}],
@@ -607,8 +609,8 @@ class Scenario(Model):
     outcome: Annotated[tuple[Outcome, ...], BeforeValidator(_as_tuple)] = Field(
         min_length=1, description="read top to bottom after every step; the first that holds ends the episode"
     )
-    reward: Reward = Field(Reward(), description="what is earned")
-    observe: Observe = Field(Observe(), description="what the agent perceives")
+    reward: Reward = Field(Reward(), description="the reward of a success and of each step")
+    observe: Observe = Field(Observe(), description="the agent's perception")
     require: Annotated[tuple[Expression, ...], BeforeValidator(_as_tuple)] = Field(
         (), description="conditions on the drawn room, which is drawn again while one is false"
     )

@@ -28,21 +28,21 @@ Labels = (
 
 
 class Changes(Model):
-    """What a suite changes in a scenario, like a variant, and how its episodes start."""
+    """A suite's changes of a scenario, like a variant's, and the start of its episodes."""
 
     set: dict[str, JsonValue] = Field(default_factory=dict, description="path: value, as in a variant")
     remove: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = Field((), description="paths")
     add: dict[str, JsonValue] = Field(default_factory=dict, description="path: items or keys")
     layout: dict[str, JsonValue] | None = Field(
-        None, description="how every episode starts; the rest is drawn"
+        None, description="the start of every episode; the rest is drawn"
     )
 
 
 class Entry(Changes):
     """A member that the suite changes."""
 
-    scenario: MemberName = Field(description="what is played, with variants and parameters")
-    name: Word | None = Field(None, description="what the suite calls it; default the scenario's name")
+    scenario: MemberName = Field(description="the scenario, with variants and parameters")
+    name: Word | None = Field(None, description="its name in the suite; default the scenario's name")
 
 
 class Value(Changes):
@@ -52,7 +52,7 @@ class Value(Changes):
     __pydantic_extra__: dict[Word, Values]
 
     about: Prose | None = Field(None, description="one sentence for people")
-    scenario: MemberName | None = Field(None, description="what is played; deeper ones replace it")
+    scenario: MemberName | None = Field(None, description="the scenario; deeper ones replace it")
 
 
 Values = Annotated[
@@ -69,7 +69,7 @@ class Split(Model):
     """Other members than the suite's own: some replaced, all written anew, or some leaves of its tree."""
 
     replace: dict[MemberName, MemberName] = Field(
-        default_factory=dict, description="member -> what is played in its place"
+        default_factory=dict, description="member -> its substitute"
     )
     members: MemberNames | None = Field(
         None, min_length=1, max_length=64, description="all members of this split"
@@ -89,7 +89,7 @@ class Suite(Model):
     about: Prose | None = Field(None, description="one sentence for people")
     notes: Prose | None = Field(None, description="more for people")
     skills: Annotated[tuple[Prose, ...], BeforeValidator(_as_tuple)] = Field(
-        (), description="what it asks of an agent, for people"
+        (), description="the skills that it needs, for people"
     )
     draw: Literal["uniform", "in_sequence"] = Field(
         "uniform", description="uniform: an episode plays one member; in_sequence: all, one after another"

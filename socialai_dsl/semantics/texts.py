@@ -624,7 +624,7 @@ def bound(plan: RulePlan, heard: Sequence[Alternative]) -> RulePlan:
 
 
 def binding(heard: Sequence[Alternative]) -> Callable[[Term], Term | None]:
-    """The meaning of `speaker`, `noun` and slots where these are heard; utterances of the agent alone need no search."""
+    """The meaning of `speaker`, `noun` and slots where these are heard; lines of the agent alone need no search."""
     only_agent = not any(pattern.said_by_npcs for alternative in heard for pattern, _ in alternative)
 
     def change(term: Term) -> Term | None:
