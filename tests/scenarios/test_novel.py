@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
@@ -14,6 +14,7 @@ NAMES = (
     "culprit",
     "gaze_following",
     "haggling",
+    "implicature",
     "interpreter",
     "sally_anne",
     "shop",
@@ -241,6 +242,41 @@ class TestGazeFollowing:
         assert episode.act("right").heard == "Ann: Look"
         episode.acts(None, None, None)
         assert episode.now()["peer"]["facing"] == "up"
+
+
+class TestImplicature:
+    LAYOUT: ClassVar[dict[str, Any]] = {
+        "lamps": [{"at": [2, 0]}, {"at": [4, 0]}, {"at": [6, 0]}],
+        "ann": {"at": [1, 1]},
+        "examiner": {"at": [2, 5]},
+        "agent": {"at": [4, 6], "facing": "up"},
+    }
+
+    def test_each_answer_is_right_in_a_third_of_the_rooms(self) -> None:
+        answers = {(3, 3): "yes", (2, 3): "no"}
+        drawn = [room["let"] for room in rooms("novel/implicature", 1500)]
+        right = (answers.get((let["lit"], let["looked_at"]), "nobody knows") for let in drawn)
+        check_shares(right, evenly(("yes", "no", "nobody knows")))
+
+    def test_lamps_look_alike_to_the_agent(self) -> None:
+        pictures = []
+        for lit in (2, 3):
+            env = made("novel/implicature")
+            observation, _ = env.reset(
+                seed=0, options={"layout": self.LAYOUT | {"let": {"lit": lit, "looked_at": 2}}}
+            )
+            pictures.append(observation["image"])
+        assert (pictures[0] == pictures[1]).all()
+
+    def test_ann_waits_until_the_agent_sees_her(self) -> None:
+        away = self.LAYOUT | {"agent": {"at": [4, 6], "facing": "down"}, "let": {"lit": 3, "looked_at": 3}}
+        episode = Episode("novel/implicature", away)
+        assert episode.hears(*[None] * 10) == [""] * 10
+        assert episode.acts("left", "left").heard == "Ann: I will look at the lamps"
+
+    def test_an_answer_before_the_question_is_a_failure(self) -> None:
+        episode = Episode("novel/implicature", self.LAYOUT | {"let": {"lit": 3, "looked_at": 3}})
+        assert episode.act(say="I say yes").ended == "failure"
 
 
 class TestTurnTaking:

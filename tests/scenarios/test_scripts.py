@@ -17,7 +17,16 @@ PAPER = (
 NOVEL = tuple(
     f"novel/{name}"
     for name in (
-        *("culprit", "gaze_following", "haggling", "interpreter", "sally_anne", "shop", "turn_taking"),
+        *(
+            "culprit",
+            "gaze_following",
+            "haggling",
+            "implicature",
+            "interpreter",
+            "sally_anne",
+            "shop",
+            "turn_taking",
+        ),
         "whisper",
     )
 )
