@@ -65,6 +65,7 @@ CODES: Final[dict[str, str]] = {
     "S315": "files of `one_of` that differ where they must not",
     "S316": "no success or no room is possible",
     "W317": "a definition that nothing uses",
+    "S318": "a register that nothing is ever put into",
     # S4xx: what can be said
     "S401": "an utterance that nobody can say",
     "S402": "a value that cannot be said",

@@ -208,8 +208,9 @@ def _flatten(node: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 def _state_of_reference(env: ScenarioEnv, reference: Reference) -> dict[str, Any]:
     """The same from the reference, of what the engine holds."""
-    held = {name.path for name in env.program.registers}
-    nouns = {name.path for name in env.program.registers if name.kind == "noun"}  # the engine calls 3 "3"
+    held = {name.path.partition("(")[0] for name in env.program.registers}
+    # The engine calls 3 "3".
+    nouns = {name.path.partition("(")[0] for name in env.program.registers if name.kind == "noun"}
     state = reference.describe()
     for name, member in state["cast"].items():
         del member["kind_code"], member["was_poked"], member["once"]
@@ -222,7 +223,7 @@ def _state_of_reference(env: ScenarioEnv, reference: Reference) -> dict[str, Any
             member["state"] = f"step{member['state']}"
         slots = {k: plain(v) for k, v in reference.world.cast[name].slots.items()}
         member["registers"] = {
-            k: str(v) if f"{name}.{k}" in nouns else v
+            k: _as_nouns(v) if f"{name}.{k}" in nouns else v
             for k, v in {**slots, **member["registers"]}.items()
             if f"{name}.{k}" in held
         }
@@ -232,11 +233,19 @@ def _state_of_reference(env: ScenarioEnv, reference: Reference) -> dict[str, Any
         }
         if not member["registers"]:
             del member["registers"]
-    state["state"] = {k: v for k, v in state["state"].items() if f"state.{k}" in held}
+    state["state"] = {
+        k: _as_nouns(v) if f"state.{k}" in nouns else v
+        for k, v in state["state"].items()
+        if f"state.{k}" in held
+    }
     sequences = {path.removeprefix("let.").partition("[")[0] for path in held if "[0].move" in path}
     state["objects"] = {name: [_object(o) for o in group] for name, group in state["objects"].items()}
     state["let"] = {k: v for k, v in state["let"].items() if f"let.{k}" in held or k in sequences}
     return dict(_flatten(state))
+
+
+def _as_nouns(value: Any) -> Any:
+    return {key: str(one) for key, one in value.items()} if isinstance(value, dict) else str(value)
 
 
 def _difference(got: dict[str, Any], wanted: dict[str, Any]) -> str:

@@ -1477,6 +1477,53 @@ def test_5_57_of_a_conditional_value_only_what_is_taken_is_asked_for(play: Folde
     assert run.at("ann") == [4, 1]
 
 
+TRUSTING = """
+    grammar: {templates: [I am <noun>, Hello], nouns: [good, bad]}
+    frames:
+      judge:
+        let:
+          trust: {for: people, start: 1, range: 0..5}
+          word: {start: none}
+          seen: 0
+        states:
+          s:
+            then:
+              %s
+              - {hears: I am <noun>, set: {word: noun}}
+      talk: {states: {s: {then: [{when: t == 2, say: Hello}]}}}
+    cast:
+      people: {count: 2, at: [[4, 4], [5, 4]], frame: talk}
+      ann: {at: [4, 5], frame: judge}
+    earshot: room
+"""
+
+
+def test_5_58_keys_are_computed_with_the_values(play: Folder) -> None:
+    rule = "{when: t == 1, set: {seen: 1, trust(first(p in people where p.index == seen)): 3}}"
+    run = play(TRUSTING % f"- {rule}").steps(1)
+    assert run.value("ann.trust") == {"people[0]": 3, "people[1]": 1}
+
+
+@pytest.mark.parametrize(
+    ("condition", "holds"),
+    [
+        *(("word == good", False), ("word != good", True), ("word == none", True), ("word == word", False)),
+        *(("word in good | bad", False), ("not word in good | bad", True), ("word != word", True)),
+    ],
+)
+def test_5_59_nothing_is_unlike_every_value(play: Folder, condition: str, holds: bool) -> None:
+    rule = f"- {{when: {condition}, set: {{seen: 1}}}}"
+    assert play(TRUSTING % rule).steps(1).value("ann.seen") == holds
+
+
+def test_5_60_of_a_key_without_a_register_nothing_is_set(play: Folder) -> None:
+    run = play(TRUSTING % "- {hears: any, set: {trust(speaker): 4, seen: seen + 1}}")
+    run.step(said="I am good")
+    assert (run.value("ann.seen"), run.value("ann.trust")) == (0, {"people[0]": 1, "people[1]": 1})
+    run.steps(1)
+    assert (run.value("ann.seen"), run.value("ann.trust")) == (1, {"people[0]": 4, "people[1]": 1})
+
+
 # -- 6. memories -----------------------------------------------------------------------------------
 
 

@@ -213,7 +213,7 @@ class Registers:
         registers = cls(FIRST_ENTITY + ENTITY_FIELDS * len(checked.entities), checked.room.canvas)
         for item in checked.setup:
             if isinstance(item, Drawn):
-                registers.add(item.path, item.type)
+                registers.add(item.path, item.type, nothing=item.nothing)
         for frame in checked.frames:
             states = Type("status", 0, len(state_names(frame)) - 1, state_names(frame))
             registers.add(f"{frame.member}.frame", states, fleeting=not frame.written)
@@ -239,13 +239,15 @@ class Registers:
         if memory.open is not None:
             self.add(f"{memory.path}.open", BOOL, fleeting=True)
 
-    def add(self, path: str, type_: Type, fleeting: bool = False) -> int:
+    def add(self, path: str, type_: Type, fleeting: bool = False, nothing: int | None = None) -> int:
         """A named register. One of a cell may hold any cell of the canvas, and none."""
         type_ = self.cut(type_)
         register = self.reserve(1)
         self.by_path[path] = register
-        name = RegisterName(path, register, type_.words, type_.low, type_.high, type_.kind, fleeting)
-        self.names.append(name)
+        low, words = type_.low, type_.words
+        if nothing is not None:
+            low, words = min(low, nothing), ("none", *words) if words else ()
+        self.names.append(RegisterName(path, register, words, low, type_.high, type_.kind, fleeting, nothing))
         return register
 
     def cut(self, type_: Type) -> Type:

@@ -95,7 +95,7 @@ class Emitter(ABC):
     def saturated(self, term: Term) -> int:
         """The operand of a value that is cut to its type: of things that are gone, places and distances are odd."""
         value = self.value(term)
-        if term.type.kind != "int" or isinstance(term, Const | terms.Read | terms.World):
+        if term.type.kind != "int" or isinstance(term, Const | Read | terms.ReadEach | terms.World):
             return value
         value = self.into_temporary(Op.MAX, value, self.number(term.type.low))
         return self.into_temporary(Op.MIN, value, self.number(term.type.high))
@@ -432,7 +432,7 @@ def _but_one(term: terms.Quantified) -> terms.Term | None:
         case terms.Compare(
             "!=",
             terms.Variable(name=name),
-            (terms.Const() | terms.Read() | terms.FieldOf(entity=Const())) as one,
+            (terms.Const() | terms.Read(nothing=None) | terms.FieldOf(entity=Const())) as one,
         ):
             first, last = term.items[0].value, term.items[-1].value
             in_a_row = [item.value for item in term.items] == list(range(first, last + 1))
@@ -657,9 +657,9 @@ def _switch(term: Select) -> _Switch | None:
 def asks(condition: Term) -> tuple[Read, frozenset[int]] | None:
     """The register that a condition is about, and the numbers for which it holds."""
     match condition:
-        case terms.Compare(op="==", left=Read() as read, right=Const(value=number)):
+        case terms.Compare(op="==", left=Read(nothing=None) as read, right=Const(value=number)):
             return read, frozenset((number,))
-        case terms.Compare(op="==", left=Const(value=number), right=Read() as read):
+        case terms.Compare(op="==", left=Const(value=number), right=Read(nothing=None) as read):
             return read, frozenset((number,))
         case terms.Logic(op="or", args=args):
             parts = [asks(arg) for arg in args]

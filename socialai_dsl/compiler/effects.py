@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from socialai_dsl.compiler.assembler import (
     NOWHERE,
@@ -19,9 +19,11 @@ from socialai_dsl.compiler.assembler import (
 from socialai_dsl.compiler.cells import ROW
 from socialai_dsl.compiler.expressions import Expressions, Lines
 from socialai_dsl.compiler.folding import Changes, Mobility, When, numbers_of, plans
+from socialai_dsl.compiler.rows import row, row_of
 from socialai_dsl.program import CELL, TEMPORARY, Field, Op, Register
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import (
+    Assignment,
     CheckedScenario,
     Computed,
     Drawn,
@@ -160,11 +162,13 @@ class Operands:
     """Where the values are that a rule or step needs.
 
     Attributes:
-        sets: of each register that is set. targets: for each effect, of what it is about. values: for each effect, of
+        sets: of each register that is set. keys: of each of these the first register of its row and the operand of its
+        place, where it is one of a key. targets: for each effect, of what it is about. values: for each effect, of
         its value, if it has one. line: of what is said, if anything is.
     """
 
     sets: tuple[int, ...]
+    keys: tuple[tuple[int, int] | None, ...]
     targets: tuple[tuple[int, ...], ...]
     values: tuple[int | None, ...]
     line: int | None
@@ -189,7 +193,8 @@ class Effects:
         """Compute all values; a pick that finds nothing skips to `failed`."""
         to = self.to
         to.failed = failed
-        sets = tuple(to.sited_copy(sited) for _, sited in what.sets)
+        sets = tuple(to.sited_copy(item.value) for item in what.sets)
+        keys = tuple(self._key(item, what) for item in what.sets)
         targets: list[tuple[int, ...]] = []
         values: list[int | None] = []
         for effect in what.causes:
@@ -202,13 +207,21 @@ class Effects:
             line = self._steady(self.lines.say(to, speaker, what.say), what)
         to.failed = None
         to.block.span = what.span
-        return Operands(sets, tuple(targets), tuple(values), line)
+        return Operands(sets, keys, tuple(targets), tuple(values), line)
+
+    def _key(self, item: Assignment, what: RulePlan | StepPlan) -> tuple[int, int] | None:
+        """The first register of a row, and the place of the one that is set."""
+        if item.target is None:
+            return None
+        self.to.site = item.key_site
+        first, place = row(self.to, item.target)
+        return first, self._steady(place, what)
 
     def carry_out(self, what: RulePlan | StepPlan, operands: Operands, speaker: Entity | None) -> None:
         """Set, reward, cause, say."""
         block = self.to.block
-        for (path, _), operand in zip(what.sets, operands.sets, strict=True):
-            store(self.registers, block.emit, path, operand)
+        for item, operand, key in zip(what.sets, operands.sets, operands.keys, strict=True):
+            store(self.registers, block.emit, item.paths[0], operand, _empties(item), key)
         if isinstance(what, RulePlan) and what.reward:
             block.emit(Op.REWARD, constant(what.reward))
         for effect, targets, value in zip(what.causes, operands.targets, operands.values, strict=True):
@@ -219,7 +232,7 @@ class Effects:
 
     def _steady(self, value: int, what: RulePlan | StepPlan) -> int:
         """The operand of a value that nothing the rule sets can change."""
-        is_set = value in {self.registers.by_path[path] for path, _ in what.sets}
+        is_set = value in {self.registers.by_path[path] for item in what.sets for path in item.paths}
         return self.to.into_temporary(Op.LOAD, value) if is_set else value
 
     def _cause(self, effect: Effect, term: Term, entity: int, value: int | None) -> None:
@@ -298,17 +311,36 @@ class Effects:
             self.to.block.emit(Op.BECOME, entity, status)
 
 
-def store(registers: Registers, emit: Callable[..., None], path: str, value: int) -> None:
-    """Put a temporary into a register; those that hold plain integers saturate."""
+def store(
+    registers: Registers,
+    emit: Callable[..., None],
+    path: str,
+    value: int,
+    is_nothing: bool = False,
+    key: tuple[int, int] | None = None,
+) -> None:
+    """Put a temporary into a register; those that hold plain integers saturate, unless it is nothing that is put there.
+
+    Of a row of registers `path` is that of the first, and `key` the operands of `Op.STORE_AT` that say which is meant.
+    """
     name = next(name for name in registers.names if name.path == path)
     assert value >= TEMPORARY, "internal: what is stored is cut to its range in place"
-    if not name.values:
-        emit(Op.MAX, value, value, constant(name.low))
+    if not name.values and not is_nothing:
+        emit(Op.MAX, value, value, constant(name.least))
         emit(Op.MIN, value, value, constant(name.high))
-    emit(Op.LOAD, name.register, value)
+    if key is None:
+        emit(Op.LOAD, name.register, value)
+    else:
+        emit(Op.STORE_AT, value, *key)
 
 
-# -- what is kept: `prev(...)` and open memories as a step begins, acts as it ends, beliefs at each turn -----
+def _empties(item: Assignment) -> bool:
+    """Whether a register is set to nothing."""
+    term = item.value.term
+    return isinstance(term, Const) and term.value < term.type.low
+
+
+# -- what is kept: `prev(...)` and open memories as a step begins, acts as it ends -----
 
 
 def remember(to: Expressions) -> None:
@@ -382,49 +414,34 @@ def push_acts(to: Expressions) -> None:
         block.bind(shut)
 
 
-# -- beliefs ---------------------------------------------------------------------------------------------------
-
-
-def perceive(to: Expressions, member: str) -> None:
-    """Emit the beliefs of a member, in order: each that it can make out takes its value."""
-    block = to.block
-    for belief in to.checked.beliefs:
-        if belief.member != member:
-            continue
-        unseen = Label()
-        mark = block.taken
-        if belief.when is not None:
-            to.sited_condition(belief.when, unseen)
-        to.failed = unseen
-        value = to.sited_copy(belief.value)
-        to.failed = None
-        store(to.registers, block.emit, belief.path, value)
-        block.bind(unseen)
-        block.release(mark)
-
-
 # -- rules of `first` with a body action of their own: the rest waits, with its values, until that is done ---
 
 
 @dataclass(frozen=True, slots=True)
 class _Kept:
-    """A register that keeps a value, and the range of the value; a known value needs no register (None)."""
+    """A register that keeps a value, and the range of the value; a known value needs no register (None).
+
+    `first` is the first register of the row that the value is a place in.
+    """
 
     register: int | None
     low: int
     high: int
+    first: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class _KeptRule:
     sets: tuple[_Kept, ...]
+    keys: tuple[_Kept | None, ...]
     targets: tuple[tuple[_Kept, ...], ...]
     values: tuple[_Kept | None, ...]
     line: _Kept | None
 
     def registers(self) -> Iterator[int]:
         """Those that are in use."""
-        every = [*self.sets, *(kept for targets in self.targets for kept in targets), *self.values, self.line]
+        targets = (kept for targets in self.targets for kept in targets)
+        every = [*self.sets, *self.keys, *targets, *self.values, self.line]
         return (kept.register for kept in every if kept is not None and kept.register is not None)
 
 
@@ -467,6 +484,7 @@ class Deferred:
 
         operands = Operands(
             tuple(to.into_temporary(Op.LOAD, operand) for operand in fetched(kept.sets)),
+            tuple(None if part is None else (part.first, _fetch(to, part)) for part in kept.keys),
             tuple(map(fetched, kept.targets)),
             tuple(None if part is None else _fetch(to, part) for part in kept.values),
             None if kept.line is None else _fetch(to, kept.line),
@@ -477,16 +495,24 @@ class Deferred:
 
     def _room(self, rule: RulePlan) -> _KeptRule:
         sets = []
-        for path, _ in rule.sets:
-            name = next(name for name in self.registers.names if name.path == path)
+        for item in rule.sets:
+            name = next(name for name in self.registers.names if name.path == item.paths[0])
             sets.append(self._kept_range(name.low, name.high))
         line = None if rule.say is None else self._kept_range(*self.lines.bounds(self.speaker, rule.say))
         return _KeptRule(
             tuple(sets),
+            tuple(self._kept_key(item) for item in rule.sets),
             tuple(tuple(self._kept_term(entity) for entity in effect.entities) for effect in rule.causes),
             tuple(None if e.value is None else self._kept_term(e.value) for e in rule.causes),
             line,
         )
+
+    def _kept_key(self, item: Assignment) -> _Kept | None:
+        """The place in a row; the registers of the row that it may name are next to each other."""
+        if item.target is None:
+            return None
+        first, low, high = row_of(self.registers, item.target)
+        return replace(self._kept_range(low, high), first=first)
 
     def _kept_term(self, term: Term) -> _Kept:
         if isinstance(term, Const):
@@ -511,6 +537,9 @@ def _has_more(rule: RulePlan) -> bool:
 
 def _pairs(kept: _KeptRule, operands: Operands) -> Iterator[tuple[_Kept, int]]:
     yield from zip(kept.sets, operands.sets, strict=True)
+    for place, key in zip(kept.keys, operands.keys, strict=True):
+        if place is not None and key is not None:
+            yield place, key[1]
     for parts, targets in zip(kept.targets, operands.targets, strict=True):
         yield from zip(parts, targets, strict=True)
     for part, value in zip(kept.values, operands.values, strict=True):

@@ -32,6 +32,7 @@ from socialai_dsl.compiler.cells import (
     selected_value,
 )
 from socialai_dsl.compiler.folding import SILENCE, Classes, fold, fold_whole
+from socialai_dsl.compiler.rows import row
 from socialai_dsl.grammar.ast import every
 from socialai_dsl.program import CONSTANT, TEMPORARY, Field, Op, Register
 from socialai_dsl.semantics import terms
@@ -119,7 +120,8 @@ class Expressions(Emitter):
             case terms.Not():
                 self._negated(term.arg, otherwise)
             case terms.Compare():
-                left, right = self._compared(term.left), self._compared(term.right)
+                equality = term.op in _OPPOSITE
+                left, right = self._compared(term.left, equality), self._compared(term.right, equality)
                 block.test(_COMPARE[term.op], left, right, otherwise)
             case terms.Test(subject=None):
                 self._about_here(term, otherwise)
@@ -227,10 +229,12 @@ class Expressions(Emitter):
         self.site, self.block.span = sited.site, sited.span
         return self.saturated(fold(sited.term, self.facts, self.classes))
 
-    def _compared(self, term: Term) -> int:
-        """A value that is only compared: no noun at all is unlike any noun."""
+    def _compared(self, term: Term, equality: bool) -> int:
+        """A value that is only compared: no noun at all is unlike any noun, and nothing is unlike anything."""
         if isinstance(term, terms.World) and term.name == "noun" and term.type.kind == "noun":
             return self._digit(Register.NOUN, term.digit)
+        if equality and isinstance(term, terms.Read | terms.ReadEach) and term.nothing is not None:
+            return self.held(term)
         return self.value(term)
 
     def value(self, term: Term) -> int:
@@ -238,8 +242,10 @@ class Expressions(Emitter):
         match term:
             case Const():
                 return self.number(term.value)
-            case terms.Read():
+            case terms.Read(nothing=None):
                 return self._read(term.path)
+            case terms.Read() | terms.ReadEach():
+                return self._something(term)
             case terms.World(name="noun"):
                 return self._found(self._digit(Register.NOUN, term.digit), term.digit)
             case terms.World():
@@ -298,6 +304,24 @@ class Expressions(Emitter):
         if found is not None and self.failed is not None:
             self.block.test(Op.IF_NE, found, constant(0), self.failed)
         return self.registers.by_path[path]
+
+    def held(self, term: terms.Read | terms.ReadEach) -> int:
+        """What is in a register, or in that of a key, nothing included."""
+        if isinstance(term, terms.Read):
+            return self.registers.by_path[term.path]
+        if (known := term.known()) is not None:
+            return self.registers.by_path[known.path]
+        first, place = row(self, term)
+        return self.into_temporary(Op.READ_AT, first, place)
+
+    def _something(self, term: terms.Read | terms.ReadEach) -> int:
+        """What is in a register that may hold nothing: that fails, or else is as good as the least there is."""
+        held = self.held(term)
+        if term.nothing is None:
+            return held
+        if self.failed is not None:
+            self.block.test(Op.IF_NE, held, self.number(term.nothing), self.failed)
+        return self.into_temporary(Op.MAX, held, self.number(term.type.low))
 
     def _found(self, number: int, digit: terms.Digit | None = None) -> int:
         """Something's number, where -1, or a digit above all words, is nothing: that fails, or is as good as any."""

@@ -196,6 +196,8 @@ def _decide(term: Term) -> Term:
         return _decide_select(term)
     if isinstance(term, terms.Quantified) and term.op in ("any", "all") and not term.cells:
         return _decide_quantified(term)
+    if isinstance(term, terms.ReadEach):
+        return term.known() or term
     return term
 
 
@@ -271,7 +273,7 @@ class Changes:
     def __init__(self, checked: CheckedScenario) -> None:
         self.entities = checked.entities
         self.occlusion = checked.room.occlusion
-        self.written = {path for plan in plans(checked) for path, _ in plan.sets}
+        self.written = {path for plan in plans(checked) for item in plan.sets for path in item.paths}
         self.changed = {
             number
             for plan in plans(checked)
@@ -328,6 +330,8 @@ class Changes:
             case terms.Quantified() if term.to is not None:
                 return max(self._parts(term), self._place(term.to))
             case terms.Operation() | terms.Compare() | terms.Logic() | terms.Not() | terms.Select():
+                return self._parts(term)
+            case terms.ReadEach():
                 return self._parts(term)
             case terms.Quantified():
                 return self._parts(term)

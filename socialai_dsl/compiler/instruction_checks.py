@@ -83,6 +83,13 @@ class Ranges:
             result = hull(result, self.of_register[register])
         return result
 
+    def row(self, first: int, last: int) -> Interval:
+        """The range of all registers from one to another."""
+        result = self.of_register[first]
+        for register in range(first, last + 1):
+            result = hull(result, self.of_register[register])
+        return result
+
 
 def _field_ranges(program: Program, entity: int, width: int, height: int) -> dict[Field, Interval]:
     return {
@@ -357,6 +364,23 @@ class _Check:
     def _if_heard(self) -> str | None:
         return self.literal(self.words[1], 1, self.h(Header.CLASSES) - 1)
 
+    def _store_at(self) -> str | None:
+        if problem := self._row():
+            return problem
+        low, high = self.interval(self.words[2])
+        for register in range(self.words[1] + low, self.words[1] + high + 1):
+            if register not in self.writable:
+                return f"may write to register {register}, which is not for it to write"
+            if problem := self.known.write(register, self.interval(self.words[0])):
+                return problem
+        return None
+
+    def _row(self) -> str | None:
+        """Whether all that may be meant are registers of the row."""
+        low, high = self.interval(self.words[2])
+        last = self.h(Header.REGISTERS) - 1
+        return self.literal(self.words[1] + low, 0, last) or self.literal(self.words[1] + high, 0, last)
+
     def _set_field(self) -> str | None:
         a, which, c = self.words
         if which not in _SETTABLE:
@@ -466,6 +490,8 @@ _OWN_CHECKS: Final[dict[Op, Callable[[_Check], str | None]]] = {
     Op.PICK_BIT: _Check._not_negative,
     Op.HEARD_FROM: _Check._heard,
     Op.HEARD_NOUN: _Check._heard,
+    Op.READ_AT: _Check._row,
+    Op.STORE_AT: _Check._store_at,
     Op.SET_FIELD: _Check._set_field,
     Op.BECOME: _Check._become,
     Op.SAY: _Check._line,

@@ -8,13 +8,13 @@ from itertools import product
 
 from socialai_dsl.compiler.activities import ACTING, ACTS, GOING, NOTHING, Activities, has_aim
 from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Registers, Sites, constant, state_names
+from socialai_dsl.compiler.beliefs import perceive
 from socialai_dsl.compiler.effects import (
     ComputedStatuses,
     Deferred,
     Effects,
     Homes,
     links,
-    perceive,
     push_acts,
     remember,
     tick,
@@ -188,7 +188,9 @@ class _FrameCompiler:
         return [self._state_row(k) for k in range(len(self.frame.states))]
 
     def perceive(self) -> int:
-        """The address of what is done at the start of a turn."""
+        """The address of what is done at the start of a turn; 0 if nothing is."""
+        if not any(belief.member == self.frame.member for belief in self.shared.checked.beliefs):
+            return 0
         to = self._expressions(Facts())
         perceive(to, self.frame.member)
         return self.shared.code.add(to.block, f"{self.frame.member}.believes")

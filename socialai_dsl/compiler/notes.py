@@ -142,6 +142,7 @@ class _Shown:
     words: str
     type: Type
     emit: Callable[[Expressions], int]
+    nothing: int | None = None
 
 
 _INT = Type("int", _LEAST, _GREATEST)
@@ -152,7 +153,11 @@ def _known(operand: int) -> Callable[[Expressions], int]:
 
 
 def _computed(term: Term) -> Callable[[Expressions], int]:
-    return lambda to: to.value(fold(term, to.facts, to.classes))
+    def emit(to: Expressions) -> int:
+        folded = fold(term, to.facts, to.classes)
+        return to.held(folded) if isinstance(folded, terms.Read | terms.ReadEach) else to.value(folded)
+
+    return emit
 
 
 @dataclass
@@ -225,9 +230,11 @@ class _Noting(Asked):
     def _value(self, shown: _Shown) -> Value:
         type_ = shown.type
         register = self._recorder.register()
-        return Value(
-            shown.words, RegisterName(shown.words, register, type_.words, type_.low, type_.high, type_.kind)
-        )
+        low, words = type_.low, type_.words
+        if shown.nothing is not None:
+            low, words = min(low, shown.nothing), ("none", *words) if words else ()
+        name = RegisterName(shown.words, register, words, low, type_.high, type_.kind, nothing=shown.nothing)
+        return Value(shown.words, name)
 
 
 # --- parts of conditions, and what they are about --------------------------------------------------------------------
@@ -257,7 +264,8 @@ def _asked_about(term: Term, reading: Reading | None, checked: CheckedScenario) 
     for value in _values(term, True):
         if value not in found and value in written and not _is_free(value):
             found[value] = None
-            yield _Shown(written[value], value.type, _computed(value))
+            nothing = value.nothing if isinstance(value, terms.Read | terms.ReadEach) else None
+            yield _Shown(written[value], value.type, _computed(value), nothing)
         elif value not in found and (shown := _unwritten(value, checked)) is not None:
             found[value] = None
             yield shown

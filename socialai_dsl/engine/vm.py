@@ -55,6 +55,8 @@ def _compute(row: Row, op: int, a: int, b: int, c: int) -> None:
         result = cell_of(row, result)
     elif op == Op.CELL_BESIDE:
         result = cell_beside(row, result, value(row, c))
+    elif op == Op.READ_AT:
+        result = np.int64(row.registers[b + value(row, c)])
     elif op >= Op.HEARD_FROM:
         result = first_heard(row, b, c, op - Op.HEARD_FROM + 1)
     elif op == Op.SET_BIT:
@@ -148,8 +150,8 @@ def _effect(row: Row, op: int, a: int, b: int, c: int) -> None:
     elif op == Op.END:
         registers[Register.OUTCOME] = a
         registers[Register.PERCENT] = b
-    elif op == Op.PLACE or op == Op.REWARD or op == Op.END_GRADED:
-        _rare_effect(row, op, a, b)
+    elif op == Op.PLACE or op == Op.REWARD or op == Op.END_GRADED or op == Op.STORE_AT:
+        _rare_effect(row, op, a, b, c)
     else:
         entity = value(row, a)
         if op == Op.SET_FIELD:
@@ -165,9 +167,11 @@ def _effect(row: Row, op: int, a: int, b: int, c: int) -> None:
 
 
 @outline
-def _rare_effect(row: Row, op: int, a: int, b: int) -> None:
+def _rare_effect(row: Row, op: int, a: int, b: int, c: int) -> None:
     stay_outline()
-    if op == Op.PLACE:
+    if op == Op.STORE_AT:
+        assign(row, b + value(row, c), value(row, a))
+    elif op == Op.PLACE:
         put_on(row, value(row, a), value(row, b))
     elif op == Op.REWARD:
         row.registers[Register.BONUS] += value(row, a)

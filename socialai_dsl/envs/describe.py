@@ -56,6 +56,11 @@ def describe(program: Program, registers: Row) -> dict[str, Any]:
         state["let"][key] = [_act(program, registers, acts, k) for k in range(acts.length)]
     if addresses.world:
         state["state"] = {key: _value(program, registers, name) for key, name in addresses.world.items()}
+    for place, keys in addresses.kept.items():
+        section, _, key = place.partition(".")
+        state.setdefault(section, {})[key] = {
+            word: _value(program, registers, name) for word, name in keys.items()
+        }
     if addresses.memories:
         state["memory"] = _memories(program, registers, addresses)
     if state["t"]:

@@ -308,6 +308,8 @@ class _Layout:
         self._mapping("let", given)
         plain, sequences = self.addresses.plain, self.addresses.sequences
         for key, value in given.items():
+            if self._kept(f"let.{key}", value):
+                continue
             if key not in plain and key not in sequences:
                 raise ValueError(f"let: there is no {key!r}{meant(key, [*plain, *sequences])}")
             if value is None:
@@ -326,10 +328,26 @@ class _Layout:
             return
         self._mapping("state", given)
         for key, value in given.items():
+            if self._kept(f"state.{key}", value):
+                continue
             if key not in self.addresses.world:
                 raise ValueError(f"state: there is no {key!r}{meant(key, self.addresses.world)}")
             if value is not None:
                 self._pin(self.addresses.world[key], value, f"state.{key}")
+
+    def _kept(self, key: str, given: Any) -> bool:
+        """Registers that there are for each of a group: a mapping of keys to values; whether `key` names some."""
+        names = self.addresses.kept.get(key)
+        if names is None or given is None:
+            return names is not None
+        if not isinstance(given, Mapping):
+            raise ValueError(f"{key}: got {given!r}; expected a mapping of {', '.join(names)} to values")
+        known = {str(called): value for called, value in given.items()}
+        _only(key, known, list(names))
+        for called, value in known.items():
+            if value is not None:
+                self._pin(names[called], value, f"{key}.{called}")
+        return True
 
     def _memory(self, given: Any) -> None:
         """What memories hold, oldest first; the latest act has the last place."""

@@ -15,6 +15,7 @@ from socialai_dsl.program import CELL, Flag, Header, Program, RegisterName
 
 _ELEMENT: Final = re.compile(r"(let|memory)\.(\w+)\[(\d+)\]\.(move|utterance)")
 _FILLED: Final = re.compile(r"memory\.(\w+)\.filled")
+_OF_KEY: Final = re.compile(r"(.+?)\((.*)\)")
 _BELIEF: Final = re.compile(r"(.+)\.believes\.(\w+)")
 _OF_ENTITY: Final = {
     "name": "name",
@@ -52,6 +53,7 @@ class Addresses:
         world: those of `state`, by name. beliefs: cast member -> key -> register.
         one_of: cast member -> which file it is. owned: (entity, key) -> register, e.g. ("wizard", "state").
         plain: all others by their key under `let`; what tells nothing between steps is left out.
+        kept: those that there are for each of a group, by place in a layout (`let.ann.trust`) and key.
     """
 
     def __init__(self, program: Program) -> None:
@@ -63,6 +65,7 @@ class Addresses:
         self.world: dict[str, RegisterName] = {}
         self.beliefs: dict[str, dict[str, RegisterName]] = {}
         self.plain: dict[str, RegisterName] = {}
+        self.kept: dict[str, dict[str, RegisterName]] = {}
         entities = {str(entity) for entity in program.entities}
         for name in program.registers:
             self._add(name, entities)
@@ -75,6 +78,9 @@ class Addresses:
             group, key, index, part = element.groups()
             acts = (self.sequences if group == "let" else self.memories).setdefault(key, Acts())
             (acts.moves if part == "move" else acts.utterances)[int(index)] = name
+        elif of_key := _OF_KEY.fullmatch(name.path):
+            place = of_key[1] if of_key[1].startswith("state.") else f"let.{of_key[1]}"
+            self.kept.setdefault(place, {})[of_key[2]] = name
         elif filled := _FILLED.fullmatch(name.path):
             self.filled[filled.group(1)] = name
         elif name.path.startswith("state."):
@@ -95,6 +101,9 @@ class Addresses:
 NOWHERE = "nowhere"
 """The cell of what is not in the room."""
 
+NOTHING = "none"
+"""What is in a register that may hold nothing, when it does."""
+
 SILENCE = ""
 """The utterance of who says nothing."""
 
@@ -105,7 +114,9 @@ def entry_words(program: Program) -> int:
 
 
 def shown(program: Program, name: RegisterName, value: int) -> Any:
-    """A register's value as plain data: a word, a number, true or false, a text, or [x, y]."""
+    """A register's value as plain data: a word, a number, true or false, a text, or [x, y]; `none` for nothing."""
+    if value == name.nothing:
+        return NOTHING
     match name.kind:
         case "entity":
             return str(program.entities[value])
@@ -120,10 +131,12 @@ def shown(program: Program, name: RegisterName, value: int) -> Any:
 
 def read(program: Program, name: RegisterName, given: Any, key: str) -> int:
     """The number for a value as `shown` gives it. Raises ValueError that names the key for any other."""
+    if name.nothing is not None and given == NOTHING:
+        return name.nothing
     match name.kind:
         case "entity":
             words = [str(entity) for entity in program.entities]
-            return name.low + word(key, given, words[name.low : name.high + 1])
+            return name.least + word(key, given, words[name.least : name.high + 1])
         case "bool":
             return word(key, given, (False, True))
         case "cell":
@@ -132,7 +145,7 @@ def read(program: Program, name: RegisterName, given: Any, key: str) -> int:
             return utterance_number(program, given, key)
     if name.values:
         return name.low + word(key, given, name.values)
-    return whole_number(key, given, name.low, name.high)
+    return whole_number(key, given, name.least, name.high)
 
 
 def utterance_text(program: Program, value: int) -> str | list[int]:

@@ -55,6 +55,9 @@ class Bounds(Protocol):
     def field(self, things: Interval, which: int) -> Interval:
         """The range of a field over several entities, or over cells."""
 
+    def row(self, first: int, last: int) -> Interval:
+        """The range of all registers from one to another."""
+
 
 Operands = Sequence[Interval]
 """Ranges of an instruction's three operands; a literal's holds it alone, and that of an unused one 0."""
@@ -140,6 +143,11 @@ def field(bounds: Bounds, operands: Operands) -> Interval:
     return bounds.field(things, which[0])
 
 
+def one_of_a_row(bounds: Bounds, operands: Operands) -> Interval:
+    """Of READ_AT, of the registers that it may read."""
+    return bounds.row(operands[1][0] + operands[2][0], operands[1][0] + operands[2][1])
+
+
 def distance(bounds: Bounds, _: Operands) -> Interval:
     """Of DISTANCE: from cell to cell, or to what is not in the room the sum of its sides.
 
@@ -153,14 +161,9 @@ def one_of_those(_: Bounds, operands: Operands) -> Interval:
     return -1, operands[2][0] & 255
 
 
-def direction(_: Bounds, __: Operands) -> Interval:
-    """Of QUADRANT."""
-    return 0, 3
-
-
-def truth(_: Bounds, __: Operands) -> Interval:
-    """Of SEES."""
-    return 0, 1
+def always(low: int, high: int) -> Rule:
+    """The same range whatever the operands are."""
+    return lambda _, __: (low, high)
 
 
 def drawn(_: Bounds, operands: Operands) -> Interval:
@@ -307,6 +310,7 @@ class Op(IntEnum):
     CELL_BESIDE = 149
     HEARD_FROM = 150
     HEARD_NOUN = 151
+    READ_AT = 152
 
     SET_FIELD = 192
     BECOME = 193
@@ -319,6 +323,7 @@ class Op(IntEnum):
     REWARD = 200
     END_GRADED = 201
     ANSWER = 202
+    STORE_AT = 203
 
     BODY = 256
     TURN_TO = 257
@@ -457,6 +462,7 @@ _CHANGED: Final = Operand(Kind.CHANGED)
 _SITE: Final = Operand(Kind.SITE)
 _INBOX: Final = Operand(Kind.INBOX)
 _SKIP: Final = Operand(Kind.SKIP)
+_REGISTER: Final = Operand(Kind.REGISTER)
 
 
 def _literal(meaning: str, low: int = 0, high: int = (1 << 31) - 1) -> Operand:
@@ -498,7 +504,7 @@ _ALL: Final = (
     _test(Op.IF_LT, "v(a) < v(b).", _VALUE, _VALUE),
     _test(Op.IF_LE, "v(a) <= v(b).", _VALUE, _VALUE),
     _test(Op.IF_BIT, "Bit v(b) of v(a) is set.", _VALUE, Operand(Kind.VALUE, 0, 62)),
-    _test(Op.IF_UNPINNED, "No layout gives register a.", Operand(Kind.REGISTER), _NONE),
+    _test(Op.IF_UNPINNED, "No layout gives register a.", _REGISTER, _NONE),
     _test(
         Op.IF_CHANCE,
         "An event of probability a / 65536 happens, drawn at site b.",
@@ -555,7 +561,7 @@ _ALL: Final = (
     _value(
         Op.QUADRANT,
         "a = the direction of c seen from b; on diagonals SE is right, NE up, NW left, SW down.",
-        direction,
+        always(0, 3),
         _PLACE,
         _PLACE,
     ),
@@ -591,7 +597,7 @@ _ALL: Final = (
     _value(
         Op.SEES,
         "a = 1 if c would be in the view square of b if b faced direction v(a), else 0.",
-        truth,
+        always(0, 1),
         _ENTITY,
         _PLACE,
         Operand(Kind.UPDATED, 0, 3),
@@ -618,6 +624,7 @@ _ALL: Final = (
         _INBOX,
         _literal("class set"),
     ),
+    _value(Op.READ_AT, "a = register b + v(c).", one_of_a_row, _REGISTER, _VALUE),
     _plain(
         Op.SET_FIELD,
         "Field b of a = v(c); x, y, status and gone have ops of their own.",
@@ -657,6 +664,7 @@ _ALL: Final = (
         _VALUE,
         _literal("goal"),
     ),
+    _plain(Op.STORE_AT, "Register b + v(c) = v(a).", _VALUE, _REGISTER, _VALUE),
     _plain(Op.BODY, "Body action v(a).", _VALUE),
     _plain(
         Op.TURN_TO,

@@ -63,7 +63,8 @@ class RegisterName:
     Attributes:
         path: address in a layout: `let.exit`, `wizard.frame`, `wizard.clock`, `wizard.name`, `jill.goal`,
             `teacher.one_of`, `switches[0].initial`; an element of a sequence or memory is `let.dance[0].move` and
-            `let.dance[0].utterance`; how many a memory holds is `memory.attempt.filled`.
+            `let.dance[0].utterance`; how many a memory holds is `memory.attempt.filled`; that of one of a group is
+            `ann.trust(bob)`.
         register: its number.
         values: word of each value from `low` on; empty for plain numbers.
         low, high: range of its values.
@@ -71,6 +72,7 @@ class RegisterName:
             utterance (0 silence, else 1 + template * fillings + filling), cell (CELL + 32 * y + x).
         fleeting: whether it tells nothing between steps: it is written in every step before it is read, follows
             from the others, or only saves work.
+        nothing: the value that stands for nothing, where the register may hold nothing; it is within low..high.
     """
 
     path: str
@@ -80,6 +82,12 @@ class RegisterName:
     high: int = 0
     kind: str = "int"
     fleeting: bool = False
+    nothing: int | None = None
+
+    @property
+    def least(self) -> int:
+        """The least of the values that are something."""
+        return self.low if self.nothing is None else self.nothing + 1
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,11 @@ Word = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$", max
 WORD_SCHEMA: Final[JsonDict] = {"pattern": "^[A-Za-z_][A-Za-z0-9_]*$", "maxLength": 40}
 """The same for keys of a mapping whose known keys have fields; pydantic leaves their names out."""
 
+Target = Annotated[
+    str, StringConstraints(pattern=r"^\s*[A-Za-z_][A-Za-z0-9_]*\s*(\(.+\)\s*)?$", max_length=200)
+]
+"""What `set` changes: a register by its name, or one of those that there are for each of a group, `trust(speaker)`."""
+
 Expression = int | bool | str
 """The source of an expression; a bare number or truth value may be written without quotes."""
 
@@ -106,7 +111,9 @@ Probability = Annotated[
 class Effects(Model):
     """What a rule or a step does, in this order whatever the order in the file: do, set, cause, say, goto."""
 
-    set: dict[Word, Expression] = Field(default_factory=dict, description="registers of the frame's `let`")
+    set: dict[Target, Expression] = Field(
+        default_factory=dict, description="registers of the frame's `let`", examples=[{"trust(speaker)": 5}]
+    )
     cause: Expressions = Field((), description="effects on objects and on oneself, in order")
     say: TextLine | None = Field(
         None, description="a text to say; <...> puts a value in", examples=["The <exit.color> door"]
@@ -131,7 +138,7 @@ class WorldRule(Model):
     when: Expression | None = Field(None, description="a condition", examples=["eye_contact(agent)"])
     chance: Probability | None = Field(None, description="drawn anew each step if everything else holds")
     once: bool = Field(False, description="once per episode")
-    set: dict[Word, Expression] = Field(default_factory=dict, description="registers of `state`")
+    set: dict[Target, Expression] = Field(default_factory=dict, description="registers of `state`")
     cause: Expressions = Field((), description="effects on objects and NPCs, in order")
     reward: int = Field(
         0, ge=-100, le=100, description="per cent of the success reward, added to the reward of the step"
@@ -176,11 +183,16 @@ class Step(Effects):
     for_: Expression | None = Field(None, alias="for", description="number of steps, or `ever`")
 
 
-class Ranged(Model):
-    """A register with a range, to which its values are clipped."""
+class Register(Model):
+    """A register with a range to which its values are clipped, or one for each of a group."""
 
-    start: Expression = Field(description="its value at first")
-    range: Expression = Field(description="a..b", examples=["0..10"])
+    start: Expression = Field(description="its value at first; `none`: nothing yet")
+    range: Expression | None = Field(
+        None, description="a..b, to which its values are clipped", examples=["0..10"]
+    )
+    for_: Expression | None = Field(
+        None, alias="for", description="a group: one register for each of it", examples=["peers"]
+    )
 
 
 class Frame(Model):
@@ -191,7 +203,7 @@ class Frame(Model):
         description="name: type of what varies; members of the cast fill it by `with`",
         examples=[{"lesson": "object"}],
     )
-    let: dict[Word, Expression | Ranged] = Field(
+    let: dict[Word, Expression | Register] = Field(
         default_factory=dict, description="registers, one copy per NPC"
     )
     define: dict[str, Expression] = Field(default_factory=dict, description="recomputed at every use")
@@ -587,7 +599,7 @@ class Scenario(Model):
         default_factory=dict, description="drawn or computed once per episode"
     )
     define: dict[str, Expression] = Field(default_factory=dict, description="recomputed at every use")
-    state: dict[Word, Expression | Ranged] = Field(
+    state: dict[Word, Expression | Register] = Field(
         default_factory=dict, description="registers of the world, set by rules and by any frame"
     )
     tables: dict[Word, dict[str, ExpressionOrText] | str] = Field(

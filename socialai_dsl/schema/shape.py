@@ -21,7 +21,7 @@ from socialai_dsl.schema.annotations import (
     literals,
     model_at,
 )
-from socialai_dsl.schema.scenario import FirstRule, Npc, Ranged, Scenario, State, Step, ThenRule, WorldRule
+from socialai_dsl.schema.scenario import FirstRule, Npc, Register, Scenario, State, Step, ThenRule, WorldRule
 from socialai_dsl.source import DataPath, Positions, Span
 
 _KEYS = {key for model in (FirstRule, ThenRule, Step, WorldRule) for key in model.model_fields}
@@ -532,10 +532,10 @@ class _Report:
             near = None
         else:
             near = did_you_mean(key, known)
-            if near is None and owner is Ranged:
+            if near is None and owner is Register:
                 near = self._left_over(finding.path[:-1], key, known)
             self._unknown_word(key, owner, called, known, near, span)
-        if owner is Ranged and near == "range" and ".." not in str(finding.value):
+        if owner is Register and near == "range" and ".." not in str(finding.value):
             near = None  # `max: 9` is not a range under another name
         if near is None or near == "extends" or not self._repaired.rename(finding.path, near):
             self._repaired.leave_out(finding.path)
@@ -572,7 +572,7 @@ class _Report:
         if any(did_you_mean(word, ["extends"]) for word in self._extra.get((), ())):
             return  # the file it builds on may have it
         owner = model_at(self._model, parent)
-        if owner is Ranged and extra:
+        if owner is Register and extra:
             return  # which stand for it
         called = CALLED.get(owner, "this mapping") if owner is not None else "this mapping"
         if parent:

@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, cast
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Effects, FirstRule, Rule, State, Step, ThenRule, WorldRule
-from socialai_dsl.semantics import groups, object_facts, texts
+from socialai_dsl.semantics import groups, object_facts, rows, texts
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.groups import performed
-from socialai_dsl.semantics.plans import FOR_EVER, Activity, Effect, FramePlan, RulePlan, StatePlan, StepPlan
-from socialai_dsl.semantics.resolve_names import status_of
+from socialai_dsl.semantics.plans import (
+    FOR_EVER,
+    Activity,
+    Assignment,
+    Effect,
+    FramePlan,
+    RulePlan,
+    StatePlan,
+    StepPlan,
+)
+from socialai_dsl.semantics.resolve_names import single, status_of
 from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
 from socialai_dsl.semantics.scope import (
+    KEY,
     Draws,
     FailedError,
     PlayedFrame,
@@ -23,6 +34,7 @@ from socialai_dsl.semantics.scope import (
     at_every_step,
     described,
     dotted,
+    is_nothing,
     quoted,
     reset_scope,
     surviving,
@@ -42,6 +54,7 @@ from socialai_dsl.semantics.terms import (
     Line,
     Measure,
     Read,
+    ReadEach,
     Sited,
     Term,
     Type,
@@ -51,6 +64,7 @@ from socialai_dsl.semantics.terms import (
 )
 from socialai_dsl.semantics.texts import Alternative, asked_of_heard, binding, bound, with_slots
 from socialai_dsl.source import DataPath
+from socialai_dsl.vocabulary import is_number
 
 _STATUS_AFTER = {"reveal": "opened", "open": "open", "close": "closed", "lock": "locked", "unlock": "locked"}
 """The status that an object must be able to have for an effect to make sense."""
@@ -357,13 +371,56 @@ def plan(resolver: Resolver, played: PlayedFrame, spoken: Spoken) -> FramePlan:
     return FramePlan(played.member, played.name, played.number, span, start, states, steps)
 
 
-def assigned(resolver: Resolver, register: str, raw: object, path: DataPath, scope: Scope) -> Sited:
-    """The value that a register is set to; it makes room for it."""
-    known = resolver.registers.read(register)
-    expected = INT if known.type.kind == "int" and not known.type.words else known.type
+def assigned(
+    resolver: Resolver, key: str, raw: object, path: DataPath, scope: Scope, register_of: Callable[[str], str]
+) -> Iterator[Assignment]:
+    """What a register is set to, for which it makes room.
+
+    It is written as a name, or with whose register is meant, `trust(speaker)`, or those of a group, `trust(peers)`;
+    `register_of` gives the path of a name.
+    """
+    register = register_of(key.partition("(")[0].strip())
+    value = Sited(
+        _value_for(resolver, register, raw, path, scope), scope.draws.site, resolver.findings.at(path)
+    )
+    own = scope.at((*path, KEY), f"{scope.draws.site}.key")
+    node = resolver.findings.expression(own.path, key)
+    targets: list[Term] = []
+    if isinstance(node, ast.Call):
+        targets += rows.of_keys(resolver, register, node, own)
+    else:
+        targets.append(single(resolver, register, None, node, own))
+    for target in targets:
+        if isinstance(target, ReadEach):
+            yield Assignment(register, value, target, own.draws.site)
+        elif isinstance(target, Read):
+            yield Assignment(target.path, value)
+
+
+def _value_for(resolver: Resolver, register: str, raw: object, path: DataPath, scope: Scope) -> Term:
+    """The value that a register is set to; one that may hold nothing can be set to `none`."""
+    registers = resolver.registers
+    known = registers.holds(register)
+    if registers.starts_with_nothing(register) and is_nothing(raw):
+        base = registers.read(register)
+        assert isinstance(base, Read), "internal: a register that is set is no constant"
+        return Const(base.type, base.nothing if base.nothing is not None else 0)
+    if is_nothing(raw) and known is not None and known.kind != "action" and known.words != TURN.words:
+        message = "only a register that starts with `none` can hold nothing"
+        raise resolver.findings.fail("S204", message, resolver.findings.at(path))
+    expected = INT if known is not None and known.kind == "int" and not known.words else known
+    if known is None and isinstance(raw, str) and _is_noun(resolver, raw.strip(), scope):
+        expected = resolver.symbols.nouns
     term = resolver.written(path, raw, expected, scope)  # type: ignore[arg-type]
-    resolver.registers.widen(register, term.type)
-    return Sited(term, scope.draws.site, resolver.findings.at(path))
+    registers.widen(register, term.type)
+    return term
+
+
+def _is_noun(resolver: Resolver, raw: str, scope: Scope) -> bool:
+    """Whether a value is a noun of the grammar, and nothing else, or a quoted one."""
+    words = resolver.symbols.nouns.words
+    quoted_noun = raw[:1] == raw[-1:] and raw[:1] in ("'", '"') and raw[1:-1] in words
+    return quoted_noun or (raw in words and not is_number(raw) and resolver.means_nothing(raw, scope))
 
 
 @dataclass(frozen=True)
@@ -495,17 +552,16 @@ class _Planner:
     def _staying(self, path: DataPath) -> Activity:
         return Activity("stay", (), "", self.resolver.findings.at(path))
 
-    def _sets(self, entry: Effects, path: DataPath, address: str) -> tuple[tuple[str, Sited], ...]:
-        made = []
-        for name, raw in entry.set.items():
-            place = (*path, "set", name)
+    def _sets(self, entry: Effects, path: DataPath, address: str) -> tuple[Assignment, ...]:
+        made: list[Assignment] = []
+        for key, raw in entry.set.items():
+            place = (*path, "set", key)
             with surviving():
-                register = self._register(name, place)
-                scope = self._scope(place, f"{address}.set.{name}")
-                made.append((register, assigned(self.resolver, register, raw, place, scope)))
+                scope = self._scope(place, f"{address}.set.{key}")
+                made += assigned(self.resolver, key, raw, place, scope, partial(self._register, place))
         return tuple(made)
 
-    def _register(self, name: str, path: DataPath) -> str:
+    def _register(self, path: DataPath, name: str) -> str:
         """The register of the frame, or of the world, that an effect sets."""
         if name in self.played.model.let:
             return self.played.register(name)
@@ -643,19 +699,19 @@ def _rule(resolver: Resolver, rule: WorldRule, path: DataPath) -> RulePlan:
     )
 
 
-def _sets(resolver: Resolver, rule: WorldRule, path: DataPath, name: str) -> Iterator[tuple[str, Sited]]:
+def _sets(resolver: Resolver, rule: WorldRule, path: DataPath, name: str) -> Iterator[Assignment]:
     """The registers of the world that a rule sets."""
-    known = resolver.symbols.scenario.state
-    for word, raw in rule.set.items():
-        place = (*path, word)
+    for key, raw in rule.set.items():
+        place = (*path, key)
         with surviving():
-            if word not in known:
-                raise _not_of_the_world(resolver, word, place)
-            register = f"state.{word}"
-            yield (
-                register,
-                assigned(resolver, register, raw, place, _world_scope(place, f"{name}.set.{word}")),
-            )
+            scope = _world_scope(place, f"{name}.set.{key}")
+            yield from assigned(resolver, key, raw, place, scope, partial(_of_the_world, resolver, place))
+
+
+def _of_the_world(resolver: Resolver, path: DataPath, word: str) -> str:
+    if word in resolver.symbols.scenario.state:
+        return f"state.{word}"
+    raise _not_of_the_world(resolver, word, path)
 
 
 def _not_of_the_world(resolver: Resolver, word: str, path: DataPath) -> FailedError:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from operator import itemgetter
 from typing import Final, Literal, get_args
 
-from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, did_you_mean
+from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, Severity, did_you_mean
 from socialai_dsl.schema.scenario import CHANNELS, Expression, Property, Scenario, Sequence
 from socialai_dsl.semantics import behaviour, entities, groups, object_facts, possible, setup
 from socialai_dsl.semantics.entities import AGENT, Prelude, entities_of
@@ -24,7 +24,6 @@ from socialai_dsl.semantics.resolver import (
     Resolver,
     number_of_texts,
     texts_of,
-    words_in_order,
 )
 from socialai_dsl.semantics.scope import (
     FailedError,
@@ -54,6 +53,7 @@ from socialai_dsl.semantics.terms import (
     draws,
     walk,
 )
+from socialai_dsl.semantics.texts import words_in_order
 from socialai_dsl.source import DataPath, Positions
 from socialai_dsl.vocabulary import PRIMITIVES
 
@@ -386,6 +386,8 @@ def check_meaning(
         registers = run.resolver.registers
         settled = registers.words == words
         words = registers.words
+        if registers.learned:
+            continue
         if found.has_errors or (ranges.settled(registers.ranges) and settled):
             for path in ranges.unbounded:
                 run.report_growth(path)
@@ -416,6 +418,8 @@ def _without_consequences(found: DiagnosticBag, scenario: Scenario) -> Iterator[
         follow |= {"S401", "S402"}
     if entities.mean_two_things(scenario):
         follow |= {"S204", "S211"}
+    if any(d.severity is Severity.ERROR and d.code != "S318" for d in found):
+        follow.add("S318")  # what is put into a register may be what is wrong
     return (d for d in found if d.code not in follow)
 
 

@@ -9,7 +9,7 @@ from typing import Final
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics.resolver import INT, Resolver, same_kind
 from socialai_dsl.semantics.scope import Draws, FailedError, Scope, described, quoted, spoken
-from socialai_dsl.semantics.terms import BOOL, Compare, Const, Select, Term, Type, is_own_noun
+from socialai_dsl.semantics.terms import BOOL, Compare, Const, Select, Term, Type, is_own_noun, may_be_nothing
 
 _SAYABLE: Final = ("text", "noun", "color", "int", "status", "direction", "action")
 _MOST_WORDS: Final = 256
@@ -133,4 +133,6 @@ def _as_text(term: Term, type_: Type) -> Term:
     asked = replace(term, type=replace(term.type, kind="text")) if is_own_noun(term) else term
     *texts, last = (_as_text(value, type_) for value in known)
     cases = tuple(Compare("==", asked, value) for value in known[:-1])
+    if may_be_nothing(term):  # as a text it is needed as well
+        cases, texts = (Compare("<", term, known[0]), *cases), [last, *texts]
     return Select(type_, cases, tuple(texts), last) if cases else last

@@ -14,11 +14,11 @@ from socialai_dsl.schema.scenario import (
     Expression,
     Frame,
     ObjectGroup,
-    Ranged,
+    Register,
     Scenario,
     Sequence,
 )
-from socialai_dsl.semantics import groups, object_facts, slots, texts
+from socialai_dsl.semantics import groups, object_facts, rows, slots, texts
 from socialai_dsl.semantics.object_facts import initial
 from socialai_dsl.semantics.plans import Entity
 from socialai_dsl.semantics.resolve_names import slot_truth
@@ -26,6 +26,7 @@ from socialai_dsl.semantics.resolver import ANY_TEXT, ENTITY, INT, Declaration, 
 from socialai_dsl.semantics.scope import (
     Define,
     Draws,
+    FailedError,
     Findings,
     Objects,
     PlayedFrame,
@@ -34,6 +35,7 @@ from socialai_dsl.semantics.scope import (
     at_every_step,
     dotted,
     frames_of,
+    is_nothing,
     parse_define,
     reset_scope,
     select,
@@ -469,22 +471,28 @@ def _declare_register(
     register: str,
     name: str,
     path: DataPath,
-    raw: Expression | Ranged,
+    raw: Expression | Register,
     scope: Scope,
     imagined: bool = False,
 ) -> None:
-    """A register with its start value, and its range if that is given."""
-    if not isinstance(raw, Ranged):
+    """A register with its start value, or one for each of a group, and its range if that is given."""
+    if not isinstance(raw, Register):
         resolver.registers.declare(Declaration(register, name, path, raw, scope, imagined=imagined))
         return
     given: Type | None = None
+    keys: tuple[Const, ...] = ()
     with surviving():
-        given = _range(resolver, (*path, "range"), raw.range)
+        given = _range(resolver, (*path, "range"), raw.range) if raw.range is not None else None
+    if raw.for_ is not None:
+        try:
+            keys = rows.keys(resolver, (*path, "for"), raw.for_)
+        except FailedError:
+            return
     start = (*path, "start")
     scope = scope.at(start, scope.draws.site)
-    resolver.registers.declare(
-        Declaration(register, name, start, raw.start, scope, range=given, imagined=imagined)
-    )
+    declared = Declaration(register, name, start, raw.start, scope, range=given, imagined=imagined)
+    nothing = is_nothing(raw.start)
+    resolver.registers.declare(replace(declared, for_each=keys, starts_with_nothing=nothing))
 
 
 def _range(resolver: Resolver, path: DataPath, raw: Expression) -> Type:

@@ -78,6 +78,7 @@ def is_group(resolver: Resolver, node: ast.Expr, scope: Scope) -> bool:
             objects = resolver.symbols.objects.get(word)
             return (
                 word in ("colors", "nouns", "cells")
+                or is_everybody(resolver, word)
                 or word in resolver.symbols.groups
                 or (objects is not None and not objects.single)
             )
@@ -102,6 +103,8 @@ def group(resolver: Resolver, node: ast.Expr, expected: Type | None, scope: Scop
                 if type_.size == 0:
                     raise resolver.fail("S201", "this grammar has slots, and no `nouns`", node, scope)
                 return Group(type_, _values(type_))
+            if bound is None and is_everybody(resolver, word):
+                return _everybody(resolver, word)
             objects = resolver.symbols.objects.get(word)
             if bound is None and word in resolver.symbols.groups:
                 numbers = [resolver.symbols.numbers[name] for name in resolver.symbols.groups[word]]
@@ -118,6 +121,18 @@ def group(resolver: Resolver, node: ast.Expr, expected: Type | None, scope: Scop
         "a group is the name of objects with `count`, `colors`, `nouns`, a range 1..3, or alternatives a | b"
     )
     raise resolver.fail("S204", message, node, scope, hint=hint)
+
+
+def is_everybody(resolver: Resolver, word: str) -> bool:
+    """Whether a word stands for all members of the cast, or for all objects, and for nothing that is declared."""
+    symbols = resolver.symbols
+    return word not in symbols.declared and (word == "cast" or (word == "objects" and bool(symbols.objects)))
+
+
+def _everybody(resolver: Resolver, word: str) -> Group:
+    members, entities = len(resolver.symbols.numbers), resolver.symbols.entities
+    type_ = Type("entity", 0, members - 1) if word == "cast" else Type("entity", members, entities - 1)
+    return Group(type_, _values(type_))
 
 
 def _cells(resolver: Resolver, node: ast.Name, scope: Scope) -> Group:
@@ -159,7 +174,7 @@ def _alternatives(
         expected = group(resolver, lead, None, scope).type
     items: list[Const] = []
     for weight, option in parts:
-        members = group(resolver, option, _open(expected), scope)
+        members = group(resolver, option, opened(expected), scope)
         if members.bounds is not None:
             raise resolver.fail(
                 "S204", f"the ends of `{quoted(option)}` are not known numbers", option, scope
@@ -168,7 +183,8 @@ def _alternatives(
     return _joined(resolver, node, items, scope)
 
 
-def _open(expected: Type | None) -> Type | None:
+def opened(expected: Type | None) -> Type | None:
+    """What is expected of the members of a group: numbers and things of any range."""
     if expected is not None and expected.kind in ("int", "entity") and not expected.words:
         return replace(expected, low=0, high=0)
     return expected
@@ -223,7 +239,7 @@ def quantified(resolver: Resolver, node: ast.Quantifier, expected: Type | None, 
         raise resolver.fail("S211", f"`{node.name}` needs `where` and a condition", node, scope)
     chooses = node.name in ("pick", "first", "nearest")
     ordinal = scope.draws.number() if node.name == "pick" else 0
-    members = group(resolver, node.group, _open(expected) if chooses else None, scope)
+    members = group(resolver, node.group, opened(expected) if chooses else None, scope)
     variable = _named(node.var, scope)
     inner = replace(scope.binding(node.var, Variable(members.type, variable)), nested=scope.nested + 1)
     condition = resolver.value(node.where, BOOL, inner) if node.where is not None else None
@@ -234,7 +250,7 @@ def quantified(resolver: Resolver, node: ast.Quantifier, expected: Type | None, 
 def pick(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope) -> Term:
     """`pick(group)` and `first(group)`, `count(group)`: without a condition."""
     ordinal = scope.draws.number() if node.name == "pick" else 0
-    members = group(resolver, node.args[0], _open(expected) if node.name != "count" else None, scope)
+    members = group(resolver, node.args[0], opened(expected) if node.name != "count" else None, scope)
     return made(cast(Op, node.name), members, _named("each", scope), None, scope, ordinal)
 
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import ParseProblem, parse_expression
-from socialai_dsl.schema.scenario import Effects, Frame, Ranged, Scenario
+from socialai_dsl.schema.scenario import Effects, Frame, Register, Scenario
 from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.plans import Activity, BeliefPlan, Computed, FramePlan, StatePlan
 from socialai_dsl.semantics.resolver import ENTITY, Declaration, Resolver
@@ -131,7 +131,7 @@ def _sources(scenario: Scenario) -> dict[str, list[object]]:
         declared += [frame.let, frame.define, *(entry.set for entry in _entries(frame))]
     for mapping in declared:
         for name, source in mapping.items():
-            value = source.start if isinstance(source, Ranged) else source
+            value = source.start if isinstance(source, Register) else source
             found.setdefault(name.partition("(")[0].strip(), []).append(value)
     return found
 

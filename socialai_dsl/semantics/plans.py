@@ -5,7 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final, Literal
 
-from socialai_dsl.semantics.terms import Line, ObjectType, Pattern, Read, Readings, Sited, Term, Type
+from socialai_dsl.semantics.terms import (
+    Line,
+    ObjectType,
+    Pattern,
+    Read,
+    ReadEach,
+    Readings,
+    Sited,
+    Term,
+    Type,
+)
 from socialai_dsl.source import Span
 from socialai_dsl.vocabulary import Sentences
 
@@ -99,6 +109,23 @@ class Effect:
 
 
 @dataclass(frozen=True, slots=True)
+class Assignment:
+    """What a register is set to; it is known which, by its path, or it is the one of a key (`target`)."""
+
+    path: str
+    value: Sited
+    target: ReadEach | None = None
+    key_site: str = ""
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Every register that it may set."""
+        if self.target is None:
+            return (self.path,)
+        return tuple(register.path for register in self.target.registers)
+
+
+@dataclass(frozen=True, slots=True)
 class RulePlan:
     """A rule with everything resolved. `name` is its address: `wizard.courtesy.acquainted.then[0]` or its id."""
 
@@ -111,7 +138,7 @@ class RulePlan:
     chance: float | None = None
     once: bool = False
     do: Activity | None = None
-    sets: tuple[tuple[str, Sited], ...] = ()
+    sets: tuple[Assignment, ...] = ()
     causes: tuple[Effect, ...] = ()
     say: Line | None = None
     goto: str | None = None
@@ -148,7 +175,7 @@ class StepPlan:
     until: Sited | None = None
     duration: int | None = None
     lasted: Sited | None = None
-    sets: tuple[tuple[str, Sited], ...] = ()
+    sets: tuple[Assignment, ...] = ()
     causes: tuple[Effect, ...] = ()
     say: Line | None = None
 
@@ -175,11 +202,15 @@ class FramePlan:
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """A register given its value at reset: names, `let`s, start values and slots of frames."""
+    """A register given its value at reset: names, `let`s, start values and slots of frames.
+
+    `nothing` is the number that stands for nothing, where it may hold nothing.
+    """
 
     path: str
     type: Type
     value: Sited
+    nothing: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,6 +24,7 @@ from socialai_dsl.semantics.terms import (
     Term,
     draws,
     is_own_noun,
+    may_be_nothing,
     walk,
 )
 from socialai_dsl.source import DataPath, Span
@@ -427,8 +428,8 @@ class Possible:
         return True
 
     def _may_compare(self, term: terms.Compare, wanted: bool) -> bool:
-        if is_own_noun(term.left) or is_own_noun(term.right):
-            return True  # whoever is silent names no noun
+        if any(is_own_noun(side) or may_be_nothing(side) for side in (term.left, term.right)):
+            return True  # whoever is silent names no noun, and a register may hold nothing
         op, left, right = term.op, term.left, term.right
         a, b = self._values(left), self._values(right)
         if not wanted:

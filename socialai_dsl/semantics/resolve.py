@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics import groups, object_facts, resolve_names, texts
+from socialai_dsl.semantics import groups, object_facts, resolve_names, rows, texts
 from socialai_dsl.semantics.conditional import conditional
 from socialai_dsl.semantics.groups import check_moment, check_points, check_toggled, must_be_agent, subject_of
 from socialai_dsl.semantics.resolve_names import toggled_by, without_arguments
@@ -48,7 +48,9 @@ from socialai_dsl.semantics.terms import (
     Measure,
     Not,
     Operation,
+    ReadEach,
     Sees,
+    Select,
     Sited,
     Speaker,
     Term,
@@ -61,7 +63,9 @@ from socialai_dsl.semantics.terms import (
     between,
     draws,
     entity,
+    holds_nothing,
     is_own_noun,
+    may_be_nothing,
     may_find_nothing,
     number,
     one_of,
@@ -85,6 +89,8 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
         return resolve_names.expanded(resolver, define, arguments, node, expected, scope)
     if node.subject is None and node.name in resolver.symbols.scenario.tables:
         return groups.looked_up(resolver, node, scope)
+    if node.name not in VALUES and (kept := rows.kept_for(resolver, node, scope)) is not None:
+        return kept
     signature = VALUES.get(node.name)
     if signature is None:
         raise _unknown(resolver, node, scope)
@@ -468,14 +474,26 @@ class ScenarioResolver(Resolver):
             if groups.is_group(self, node.right, scope):
                 member = ast.Member(node.left, node.right, node.op == "!=", at=node.at)
                 return self._membership(member, scope)
-            left, right = self.pair(node.left, node.right, scope)
-            same = self.equal(left, right, node, scope)
+            same = self._same(node, scope)
             return same if node.op == "==" else _negated(same)
         left = self.value(node.left, INT, scope)
         right = self.value(node.right, INT, scope)
         if node.op in (">", ">="):
             left, right = right, left
         return Compare("<" if node.op in ("<", ">") else "<=", left, right)
+
+    def _same(self, node: ast.Compare, scope: Scope) -> Term:
+        """Whether both sides of a comparison are the same; `none` is what a register holds that holds nothing."""
+        for word, side in ((node.left, node.right), (node.right, node.left)):
+            if isinstance(word, ast.Name) and word.id == "none" and not self.is_bare(side, scope):
+                other = self.value(side, None, scope)
+                if may_be_nothing(other):
+                    return holds_nothing(other)
+                said = self.guess(word, other.type, scope)
+                left, right = (said, other) if word is node.left else (other, said)
+                return self.equal(left, right, node, scope)
+        left, right = self.pair(node.left, node.right, scope)
+        return self.equal(left, right, node, scope)
 
     def pair(self, left: ast.Expr, right: ast.Expr, scope: Scope) -> tuple[Term, Term]:
         """Two sides of a comparison; a bare word takes its type from the other side."""
@@ -500,10 +518,13 @@ class ScenarioResolver(Resolver):
                     all_of([_is(word, i), self.equal(value, other, node, scope)])
                     for i, value in enumerate(slot.values)
                 )
+            if isinstance(one, Select) and may_be_nothing(one):
+                values = tuple(self.equal(value, other, node, scope) for value in one.values)
+                return Select(BOOL, one.conditions, values, self.equal(one.default, other, node, scope))
         if same_kind(left.type, right.type) and left.type.words == right.type.words:
             if isinstance(left, Const) and isinstance(right, Const):
                 return Const(BOOL, int(left.value == right.value))
-            return Compare("==", left, right)
+            return _both_hold(left, right)
         worded = (*WORDED, "int")
         if left.type.kind in worded and right.type.kind in worded and (left.type.words or right.type.words):
             alike = any_of(
@@ -513,7 +534,7 @@ class ScenarioResolver(Resolver):
                 if spoken(left.type, i) == spoken(right.type, j)
             )
             # Both are asked for, even if none of their values are called the same.
-            asked = [side for side in (left, right) if may_find_nothing(side) and not is_own_noun(side)]
+            asked = [side for side in (left, right) if _has_to_be_there(side)]
             return all_of([*(Compare("==", side, side) for side in asked), alike])
         message = f"{described(left.type)} and {described(right.type)} cannot be compared"
         colored = {left.type.kind, right.type.kind} == {"color", "entity"}
@@ -577,6 +598,27 @@ class ScenarioResolver(Resolver):
         if left.type.kind == "direction":
             return left, self.value(node.right, TURN, scope)
         return self.fit(left, INT, node.left, scope), self.value(node.right, INT, scope)
+
+
+def _both_hold(left: Term, right: Term) -> Term:
+    """Whether two values of one type are equal: nothing is unlike anything, another register with nothing included."""
+    alike = Compare("==", left, right)
+    empty = [side for side in (left, right) if may_be_nothing(side)]
+    if not empty or (left.type.kind != "int" and not all(_is_unlike(side) for side in (left, right))):
+        return alike
+    return all_of([*(_negated(holds_nothing(side)) for side in empty), alike])
+
+
+def _has_to_be_there(term: Term) -> bool:
+    """Whether a term may find nothing, and with it the whole condition; of a register that is its key."""
+    if isinstance(term, ReadEach):
+        return term.may_miss or may_find_nothing(term.key)
+    return may_find_nothing(term) and not _is_unlike(term)
+
+
+def _is_unlike(term: Term) -> bool:
+    """Whether a term that finds nothing is unlike any value, rather than making the whole condition false."""
+    return is_own_noun(term) or may_be_nothing(term)
 
 
 def _is(term: Term, value: int) -> Term:

@@ -9,7 +9,7 @@ from itertools import chain, pairwise
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Sequence
-from socialai_dsl.semantics import object_facts, slots, texts
+from socialai_dsl.semantics import object_facts, rows, slots, texts
 from socialai_dsl.semantics.groups import check_moment, check_points, check_toggled, must_be_agent, subject_of
 from socialai_dsl.semantics.resolver import VOCABULARIES, Resolver
 from socialai_dsl.semantics.scope import (
@@ -341,7 +341,17 @@ def _own(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope
         return None
     if frame.register(word) not in resolver.registers:
         raise FailedError  # a slot that nobody fills, which is reported where it is left empty
-    return resolver.registers.read(frame.register(word), expected, resolver.findings.node(scope.path, node))
+    return single(resolver, frame.register(word), expected, node, scope)
+
+
+def single(resolver: Resolver, path: str, expected: Type | None, node: ast.Expr, scope: Scope) -> Term:
+    """A register that is named without a key."""
+    registers = resolver.registers
+    if registers.keys(path):
+        name = path.rpartition(".")[2]
+        message = f"there is a `{name}` for each of a group: write `{name}({rows.example(resolver, path)})`"
+        raise resolver.fail("S211", message, node, scope)
+    return registers.read(path, expected, resolver.findings.node(scope.path, node))
 
 
 def _substituted(resolver: Resolver, node: ast.Name, expected: Type | None, scope: Scope) -> Term:
@@ -393,7 +403,9 @@ def _declared(resolver: Resolver, node: ast.Name, expected: Type | None, scope: 
     if word in symbols.scenario.memory or isinstance(symbols.scenario.let.get(word), Sequence):
         raise _not_a_value(resolver, "memory" if word in symbols.scenario.memory else "sequence", node, scope)
     if word in symbols.scenario.state:
-        return resolver.registers.read(f"state.{word}", expected, resolver.findings.node(scope.path, node))
+        if f"state.{word}" not in resolver.registers:
+            raise FailedError  # its group means nothing, which has been reported
+        return single(resolver, f"state.{word}", expected, node, scope)
     if word in symbols.scenario.let:
         resolver.used.add(("let", word))
         return resolver.registers.read(f"let.{word}", expected, resolver.findings.node(scope.path, node))
@@ -593,7 +605,7 @@ def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
             owner = resolver.symbols.roles.get(owner, owner)
             register, played = f"{owner}.{node.name}", resolver.frames.get(owner)
             if register in resolver.registers:
-                return resolver.registers.read(register)
+                return single(resolver, register, None, node, scope)
             if played is not None and played.model.slots.get(node.name) == "bool":
                 return member_truth(resolver, played, node.name, scope)
         # Of somebody unknown nobody can say what they have.
@@ -609,6 +621,8 @@ def _of_each(resolver: Resolver, who: Term, name: str) -> Term | None:
         return None
     members = [resolver.symbols.member_of(number) for number in range(who.type.low, who.type.high + 1)]
     if not all(f"{member}.{name}" in resolver.registers for member in members):
+        return None
+    if any(resolver.registers.keys(f"{member}.{name}") for member in members):
         return None
     values = [resolver.registers.read(f"{member}.{name}") for member in members]
     return of_each(who, values) if len({value.type.kind for value in values}) == 1 else None

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import chain, islice, product
+from functools import cached_property, reduce
+from itertools import islice, product
 from typing import Final
 
 from socialai_dsl.grammar import ast
@@ -41,16 +40,18 @@ from socialai_dsl.semantics.terms import (
     Line,
     Pattern,
     Read,
+    ReadEach,
     Readings,
     Select,
     Sited,
     Term,
     Type,
     arithmetic,
+    nothing_of,
     number,
 )
 from socialai_dsl.source import DataPath, Span
-from socialai_dsl.vocabulary import Sentences, is_number, is_plain, normal, words
+from socialai_dsl.vocabulary import Sentences, is_number, is_plain, normal
 
 MAX_TEXTS = 4096
 """How many different texts one line may have."""
@@ -167,47 +168,6 @@ def words_of_values(type_: Type) -> list[str]:
     return [spoken(type_, value) for value in range(type_.low, type_.high + 1)]
 
 
-# -- words -----------------------------------------------------------------------------------------------------
-
-
-def words_in_order(
-    sentences: Sentences, names: Iterable[Term], lines: Mapping[str, Sequence[Line]]
-) -> tuple[str, ...]:
-    """The words of the grammar, then of the names, then of what each member can say, by first appearance.
-
-    Args:
-        sentences: templates come first, then the words of their slots.
-        names: the name of each member of the cast, in order.
-        lines: member -> its lines in the order of its frame.
-    """
-    texts = chain(
-        (re.sub("<[^<>]*>", " ", template) for template in sentences.templates),
-        (word for slot in sentences.slots for word in slot.words),
-        (word for name in names for word in words_of_values(name.type)),
-        (text for said in lines.values() for line in said for text in _texts(line)),
-    )
-    return tuple(dict.fromkeys(word for text in texts for word in words(text)))
-
-
-def _texts(line: Line) -> Iterator[str]:
-    """The pieces of a line, each value with all its words; then whole texts, where pieces run into each other."""
-    for part in line.parts:
-        yield from [part] if isinstance(part, str) else words_of_values(part.type)
-    if _runs_together(line):
-        yield from texts_of(line)
-
-
-def _runs_together(line: Line) -> bool:
-    pairs = zip(line.parts, line.parts[1:], strict=False)
-    return any(_inside_word(a, b) for a, b in pairs)
-
-
-def _inside_word(a: str | Term, b: str | Term) -> bool:
-    before = a[-1:] if isinstance(a, str) else "x"
-    after = b[:1] if isinstance(b, str) else "x"
-    return bool(words(before) and words(after))
-
-
 # -- registers: what is drawn or computed once at reset ------------------------------------------------------
 
 
@@ -223,6 +183,7 @@ class Declaration:
         range: the numbers it keeps to, if its declaration says them.
         constant: a known value needs no register.
         imagined: it is only looked at, and never drawn.
+        for_each: the keys of the group of which each has one. starts_with_nothing: until it is set.
     """
 
     path: str
@@ -235,13 +196,17 @@ class Declaration:
     constant: bool = False
     imagined: bool = False
     others: tuple[tuple[DataPath, Scalar], ...] = ()
+    for_each: tuple[Const, ...] = ()
+    starts_with_nothing: bool = False
 
 
 class Registers:
     """All registers of a scenario.
 
     Attributes:
-        words: types that uses settled for registers whose value is bare words, such as `pick(left | right)`.
+        words: types that uses settled for registers whose value is bare words, such as `pick(left | right)`, or that
+            start with nothing.
+        learned: whether it was found only now what some register holds that starts with nothing.
         ranges: for registers that are set, the range they were found to need.
         remembered: what is computed at the start of every step, for `prev`.
     """
@@ -250,12 +215,13 @@ class Registers:
         self._resolver = resolver
         self._declared: dict[str, Declaration] = {}
         self._terms: dict[str, Term | None] = {}
-        self._drawn: dict[str, Drawn] = {}
+        self._drawn: dict[str, tuple[Drawn, ...]] = {}
         self._busy: list[str] = []
         self._put: list[str] = []
         self.remembered: list[Drawn] = []
         self._settled: dict[str, tuple[Type, Span]] = {}
         self.words = dict(words)
+        self.learned = False
         self._given_ranges = dict(ranges)
         self.ranges: dict[str, Type] = {}
 
@@ -275,7 +241,7 @@ class Registers:
         """A register that takes a value at reset which is resolved already."""
         type_ = value.term.type
         self._terms[path] = Read(type_, path)
-        self._drawn[path] = Drawn(path, type_, value)
+        self._drawn[path] = (Drawn(path, type_, value),)
         self._put.append(path)
         return Read(type_, path)
 
@@ -300,7 +266,7 @@ class Registers:
             with suppress(FailedError):
                 self.read(path)
         kept = [path for path, declaration in self._declared.items() if not declaration.imagined]
-        return [self._drawn[path] for path in (*self._put, *kept) if path in self._drawn]
+        return [drawn for path in (*self._put, *kept) for drawn in self._drawn.get(path, ())]
 
     def read(self, path: str, expected: Type | None = None, span: Span | None = None) -> Term:
         """The register (or its constant) as a term; `expected` and `span` are those of the use."""
@@ -317,10 +283,29 @@ class Registers:
             raise FailedError
         return term
 
+    def keys(self, path: str) -> tuple[Const, ...]:
+        """The keys of registers that there are for each of a group; none of a single one."""
+        declaration = self._declared.get(path)
+        return declaration.for_each if declaration is not None else ()
+
+    def of_key(self, path: str, key: Term) -> Read | ReadEach:
+        """Of registers that there are for each of a group, that of a key."""
+        base, keys = self.read(path), self.keys(path)
+        assert isinstance(base, Read), "internal: a register that is set is no constant"
+        registers = tuple(replace(base, path=self._called(path, each)) for each in keys)
+        term = ReadEach(base.type, key, tuple(each.value for each in keys), registers)
+        return term.known() or term
+
+    def _called(self, path: str, key: Const) -> str:
+        """The path of the register of a key: `ann.trust(bob)`."""
+        return f"{path}({self._resolver.symbols.called(key)})"
+
     def is_wordy(self, path: str) -> bool:
         """Whether a register's value consists of bare words, so that its type depends on its uses."""
         declaration = self._declared.get(path)
         if declaration is None or declaration.expected is not None or not isinstance(declaration.raw, str):
+            return False
+        if declaration.starts_with_nothing:
             return False
         try:
             node = self._resolver.findings.expression(declaration.source, declaration.raw)
@@ -350,39 +335,98 @@ class Registers:
 
     def drawn_at_reset(self, path: str) -> Term | None:
         """The value that a register gets at reset and keeps; None for a constant, or if rules can set it."""
-        drawn = self._drawn.get(path)
-        return drawn.value.term if drawn is not None and not self.is_set(path) else None
+        drawn = self._drawn.get(path, ())
+        return drawn[0].value.term if len(drawn) == 1 and not self.is_set(path) else None
 
     def is_set(self, path: str) -> bool:
         """Whether a register is one that rules can set: of a frame's `let`, or of `state`."""
+        path = path.partition("(")[0]
         source = self._declared[path].source if path in self._declared else ()
         return source[:1] == ("state",) or ("frames" in source and "let" in source)
 
+    def starts_with_nothing(self, path: str) -> bool:
+        """Whether a register holds nothing until it is set."""
+        return self._declared[path].starts_with_nothing
+
+    def holds(self, path: str) -> Type | None:
+        """What a register holds; None if it starts with nothing and it is not known yet what that will be."""
+        declaration = self._declared[path]
+        if declaration.starts_with_nothing and declaration.range is None and path not in self.words:
+            return None
+        return self.read(path).type
+
     def widen(self, path: str, type_: Type) -> None:
         """Make room in a register for the values it is set to; one with a range of its own keeps to it."""
-        if self._declared[path].range is None and type_.kind == "int" and not type_.words:
-            own = self.ranges.get(path) or self._drawn[path].value.term.type
+        declaration = self._declared[path]
+        if declaration.starts_with_nothing and declaration.range is None and path not in self.words:
+            self.words[path] = type_
+            self.learned = True
+        counted = type_.kind == "int" and not type_.words
+        if declaration.range is None and (
+            counted or (declaration.starts_with_nothing and type_.kind == "entity")
+        ):
+            own = self.ranges.get(path) or self._started(path) or type_
             self.ranges[path] = _union(own, type_)
+
+    def _started(self, path: str) -> Type | None:
+        """The type of all that a register starts with; None if that is nothing."""
+        found = [drawn.value.term.type for drawn in self._drawn.get(path, ()) if drawn.nothing is None]
+        return reduce(_union, found) if found else None
 
     def _resolve(self, declaration: Declaration) -> None:
         path = declaration.path
         self._terms[path] = None
         self._busy.append(path)
         try:
-            expected = declaration.expected or self.words.get(path)
-            term = self._written(declaration, expected)
+            starts = self._starts(declaration)
         finally:
             self._busy.pop()
-        if declaration.constant and isinstance(term, Const):
-            self._terms[path] = term
+        (first, _), *_ = starts
+        if declaration.constant and isinstance(first.term, Const):
+            self._terms[path] = first.term
             return
-        widened = self._within_range(declaration, term)
-        if path in self._given_ranges and widened.kind == "int" and not widened.words:
-            widened = _union(widened, self._given_ranges[path])
-        findings = self._resolver.findings
-        sited = Sited(term, declaration.scope.draws.site, findings.at(declaration.source))
-        self._terms[path] = Read(widened, path)
-        self._drawn[path] = Drawn(path, widened, sited)
+        type_ = self._common_type(declaration, [start.term for start, _ in starts])
+        may_widen = declaration.starts_with_nothing and type_.kind == "entity"
+        if path in self._given_ranges and (may_widen or (type_.kind == "int" and not type_.words)):
+            type_ = _union(type_, self._given_ranges[path])
+        nothing = nothing_of(type_) if declaration.starts_with_nothing else None
+        self._terms[path] = Read(type_, path, nothing)
+        if nothing is not None:
+            starts = [(replace(start, term=Const(type_, nothing)), called) for start, called in starts]
+        self._drawn[path] = tuple(Drawn(called, type_, start, nothing) for start, called in starts)
+
+    def _starts(self, declaration: Declaration) -> list[tuple[Sited, str]]:
+        """What each register of a declaration starts with, and its path."""
+        path, scope = declaration.path, declaration.scope
+        expected = declaration.expected or self.words.get(path)
+        span = self._resolver.findings.at(declaration.source)
+        if declaration.starts_with_nothing:
+            holds = declaration.range or expected
+            if holds is None:
+                message = f"nothing is ever put into `{declaration.label}`, so it is not known what it holds"
+                raise self._resolver.findings.fail("S318", message, span, hint="set it in a rule or a step")
+            start = Sited(Const(holds, holds.low), scope.draws.site, span)
+            return [(start, self._called(path, key)) for key in declaration.for_each] or [(start, path)]
+        if not declaration.for_each:
+            return [(Sited(self._written(declaration, expected), scope.draws.site, span), path)]
+        starts = []
+        for i, key in enumerate(declaration.for_each):
+            own = replace(scope.at(scope.path, f"{scope.draws.site}[{i}]"), it=key)
+            term = self._written(replace(declaration, scope=own), expected)
+            starts.append((Sited(term, own.draws.site, span), self._called(path, key)))
+        return starts
+
+    def _common_type(self, declaration: Declaration, starts: list[Term]) -> Type:
+        """The type that has room for all that the registers of a declaration start with."""
+        type_ = self._within_range(declaration, starts[0])
+        for start in starts[1:]:
+            other = self._within_range(declaration, start)
+            if not same_kind(other, type_) or other.words != type_.words:
+                findings = self._resolver.findings
+                message = f"`{declaration.label}` starts with values of different kinds"
+                raise findings.fail("S204", message, findings.at(declaration.source))
+            type_ = _union(type_, other)
+        return type_
 
     def _within_range(self, declaration: Declaration, term: Term) -> Type:
         """The type of the register; its start must lie in the range that is given."""

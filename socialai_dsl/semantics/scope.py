@@ -25,6 +25,7 @@ from socialai_dsl.semantics.terms import (
     Term,
     Type,
     all_of,
+    may_be_nothing,
     one_of,
 )
 from socialai_dsl.source import DataPath, Positions, Span
@@ -32,6 +33,9 @@ from socialai_dsl.vocabulary import NOUN, Sentences, Slot
 
 Scalar = int | bool | float | str
 
+
+KEY: Final = "(key)"
+"""The last step of the path of an expression that is the key itself: `trust(speaker)` in `set`."""
 
 _NO_TEXTS = frozenset({"cause", "do", "place"})
 """Keys whose values have no texts in them."""
@@ -75,6 +79,10 @@ class Findings:
 
     def at(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
         """The place of a character of the text at `path`."""
+        if path[-1:] == (KEY,):
+            span = self.places.key_span(path[:-1])
+            quote = int(span.width > len(str(path[-2])))
+            return span.shifted(offset + quote, width)
         return self.places.locate(path, 0 if path in self.substituted else offset, width)
 
     def node(self, path: DataPath, node: ast.Expr) -> Span:
@@ -175,6 +183,11 @@ def as_text(text: str, whole: object) -> str:
 def surviving() -> suppress:
     """Go on after a value that failed; its reason has been reported."""
     return suppress(FailedError)
+
+
+def is_nothing(raw: object) -> bool:
+    """Whether `none` is written, where a register starts or is set."""
+    return isinstance(raw, str) and raw.strip() == "none"
 
 
 def dotted(path: DataPath) -> str:
@@ -399,6 +412,15 @@ class Symbols:
         if called in self.scenario.frames:
             return self.scenario.frames[called], ("frames", called)
         return None
+
+    def called(self, value: Const) -> str:
+        """A known value in the scenario's own words: `boxes[1]`, `bob`, `red`, `3`."""
+        if value.type.kind != "entity":
+            return spoken(value.type, value.value)
+        objects = self.object_of(value.value)
+        return (
+            objects.called(value.value - objects.numbers[0]) if objects else str(self.member_of(value.value))
+        )
 
     @cached_property
     def declared(self) -> dict[str, str]:
@@ -659,4 +681,5 @@ def _words_of(condition: Term, term: Term, type_: Type) -> Iterator[tuple[Term, 
         return
     for value in range(term.type.low, term.type.high + 1):
         equal = Compare("==", term, Const(term.type, value))
-        yield all_of([condition, equal]), Const(type_, type_.words.index(spoken(term.type, value)))
+        needed = [Compare("<=", Const(term.type, term.type.low), term)] if may_be_nothing(term) else []
+        yield all_of([condition, *needed, equal]), Const(type_, type_.words.index(spoken(term.type, value)))

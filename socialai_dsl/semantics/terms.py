@@ -69,11 +69,45 @@ class Const:
 @dataclass(frozen=True, slots=True)
 class Read:
     """A register of the scenario, by its path: `let.exit`, `wizard.name`, `jill.goal` (a frame's `let` or slot),
-    `teacher.one_of`, `let.dance[0].move`, `memory.attempt.filled`, `prev.0`.
+    `teacher.one_of`, `let.dance[0].move`, `memory.attempt.filled`, `prev.0`, `ann.trust(bob)`.
+
+    `nothing` is the number in a register that may hold nothing when it does; `type` is that of what it holds else.
     """
 
     type: Type
     path: str
+    nothing: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ReadEach:
+    """Of registers that there are for each of a group the one of `key`; what is not in the group has none.
+
+    `keys` are the values of the group, `registers` theirs, one behind the other. As the target of a rule that sets
+    one, it is that register.
+    """
+
+    type: Type
+    key: Term
+    keys: tuple[int, ...]
+    registers: tuple[Read, ...]
+
+    @property
+    def nothing(self) -> int | None:
+        """The number that stands for nothing, where they may hold nothing."""
+        return self.registers[0].nothing
+
+    @property
+    def may_miss(self) -> bool:
+        """Whether the key may be something that is not in the group."""
+        type_ = self.key.type
+        return not set(self.keys) >= set(range(type_.low, type_.high + 1))
+
+    def known(self) -> Read | None:
+        """The register itself, if it is known which."""
+        if isinstance(self.key, Const) and self.key.value in self.keys:
+            return self.registers[self.keys.index(self.key.value)]
+        return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -343,6 +377,7 @@ class Quantified:
 Term = (
     Const
     | Read
+    | ReadEach
     | World
     | FieldOf
     | Here
@@ -457,6 +492,28 @@ def number(value: int) -> Const:
     return Const(integer(value), value)
 
 
+def nothing_of(type_: Type) -> int:
+    """The number that stands for nothing in a register of values of a type, none of which it is."""
+    return -1 if type_.kind == "entity" else type_.low - 1
+
+
+def may_be_nothing(term: Term) -> bool:
+    """Whether a term is a register that may hold nothing, which can be compared, and no more."""
+    if isinstance(term, Select):
+        return any(map(may_be_nothing, (*term.values, term.default)))
+    return isinstance(term, Read | ReadEach) and term.nothing is not None
+
+
+def holds_nothing(term: Term) -> Term:
+    """Whether a register holds nothing."""
+    if isinstance(term, Select):
+        values = tuple(map(holds_nothing, term.values))
+        return Select(BOOL, term.conditions, values, holds_nothing(term.default))
+    if isinstance(term, Read | ReadEach) and term.nothing is not None:
+        return Compare("==", term, Const(term.type, term.nothing))
+    return FALSE
+
+
 def any_of(conditions: Iterable[Term]) -> Term:
     """Whether one of them holds."""
     return _joined("or", FALSE, TRUE, conditions)
@@ -488,7 +545,7 @@ def between(term: Term, low: Term, high: Term) -> Term:
 def one_of(term: Term, values: Sequence[Const]) -> Term:
     """Whether a term is one of some known values of its type."""
     numbers = sorted({v.value for v in values})
-    if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
+    if not may_be_nothing(term) and len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
         return between(term, Const(term.type, numbers[0]), Const(term.type, numbers[-1]))
     return any_of(Compare("==", term, value) for value in values)
 
@@ -565,14 +622,16 @@ def draws(term: Term) -> bool:
 def may_find_nothing(term: Term) -> bool:
     """Whether a term may need one of a group when none is what is wanted, or the noun of somebody who is silent.
 
-    What `prev` noted may have found nothing then.
+    What `prev` noted may have found nothing then, and a register may hold nothing.
     """
     for part in walk(term):
         if isinstance(part, HeardNoun) or is_own_noun(part):
             return True
         if isinstance(part, Quantified) and part.op in ("first", "pick", "nearest"):
             return True
-        if isinstance(part, Read) and part.path.startswith(NOTED):
+        if isinstance(part, Read) and (part.path.startswith(NOTED) or part.nothing is not None):
+            return True
+        if isinstance(part, ReadEach) and part.may_miss:
             return True
     return False
 

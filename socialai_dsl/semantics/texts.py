@@ -13,7 +13,7 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.groups import must_be_agent, subject_of, values_of
 from socialai_dsl.semantics.plans import RulePlan
-from socialai_dsl.semantics.resolver import MAX_TEXTS, Resolver
+from socialai_dsl.semantics.resolver import MAX_TEXTS, Resolver, texts_of, words_of_values
 from socialai_dsl.semantics.scope import (
     Draws,
     FailedError,
@@ -49,7 +49,7 @@ from socialai_dsl.semantics.terms import (
     walk,
 )
 from socialai_dsl.source import DataPath, Span
-from socialai_dsl.vocabulary import NOUN, normal
+from socialai_dsl.vocabulary import NOUN, Sentences, normal, words
 
 _JOINED = re.compile(r"\s*\|\s*|\s+or\s+")
 """What an author may put between alternatives."""
@@ -654,3 +654,44 @@ def _of_what_is_meant(asked: Speaker | HeardNoun, heard: Sequence[Alternative], 
         tuple(_of_what_is_meant(asked, others, (*patterns, *always, pattern)) for pattern, _ in sometimes),
         otherwise,
     )
+
+
+# -- words -----------------------------------------------------------------------------------------------------
+
+
+def words_in_order(
+    sentences: Sentences, names: Iterable[Term], lines: Mapping[str, Sequence[Line]]
+) -> tuple[str, ...]:
+    """The words of the grammar, then of the names, then of what each member can say, by first appearance.
+
+    Args:
+        sentences: templates come first, then the words of their slots.
+        names: the name of each member of the cast, in order.
+        lines: member -> its lines in the order of its frame.
+    """
+    texts = chain(
+        (re.sub("<[^<>]*>", " ", template) for template in sentences.templates),
+        (word for slot in sentences.slots for word in slot.words),
+        (word for name in names for word in words_of_values(name.type)),
+        (text for said in lines.values() for line in said for text in _pieces(line)),
+    )
+    return tuple(dict.fromkeys(word for text in texts for word in words(text)))
+
+
+def _pieces(line: Line) -> Iterator[str]:
+    """The pieces of a line, each value with all its words; then whole texts, where pieces run into each other."""
+    for part in line.parts:
+        yield from [part] if isinstance(part, str) else words_of_values(part.type)
+    if _runs_together(line):
+        yield from texts_of(line)
+
+
+def _runs_together(line: Line) -> bool:
+    pairs = zip(line.parts, line.parts[1:], strict=False)
+    return any(_inside_word(a, b) for a, b in pairs)
+
+
+def _inside_word(a: str | Term, b: str | Term) -> bool:
+    before = a[-1:] if isinstance(a, str) else "x"
+    after = b[:1] if isinstance(b, str) else "x"
+    return bool(words(before) and words(after))

@@ -7,7 +7,7 @@ from typing import Any
 
 from socialai_dsl.grammar import ast
 from tests.reference import chance, geometry, motion
-from tests.reference.evaluate import Context, drawn, of, weighed
+from tests.reference.evaluate import Context, drawn, of, something, weighed
 from tests.reference.source import Value
 from tests.reference.world import (
     TYPES,
@@ -160,7 +160,7 @@ def plan(value: Value, context: Context) -> Activity:
             return Activity(("forward", "left", "right")[drawn(context, node, 3)])
         return Activity(node.id)
     assert isinstance(node, ast.Call), "internal: no activity"
-    return Activity(node.name, *(of(argument, context) for argument in node.args))
+    return Activity(node.name, *(something(of(argument, context)) for argument in node.args))
 
 
 def turn_towards(world: World, me: Entity, wanted: str) -> str:

@@ -7,9 +7,9 @@ from typing import Any
 
 from socialai_dsl.grammar import ast
 from tests.reference import geometry
-from tests.reference.evaluate import Context, evaluate, of, there
+from tests.reference.evaluate import Context, NothingFoundError, evaluate, key_of, of, something, there
 from tests.reference.source import Sources
-from tests.reference.world import TYPES, Cell, Entity, World, as_list, where
+from tests.reference.world import NOTHING, TYPES, Cell, Entity, World, as_list, where
 
 Cause = tuple[str, list[Entity], Any]
 
@@ -27,10 +27,10 @@ def cause(node: Any, context: Context) -> Cause:
     """One effect."""
     if isinstance(node, ast.Name):
         return node.id, as_list(context.me), None
-    subject = as_list(context.me) if node.subject is None else as_list(of(node.subject, context))
+    subject = as_list(context.me) if node.subject is None else as_list(something(of(node.subject, context)))
     status: Any = None
     if node.name in ("put", "move_into"):
-        status = of(node.args[0], context)
+        status = something(of(node.args[0], context))
     elif isinstance(node, ast.Call) and node.args:
         status = node.args[0].id if isinstance(node.args[0], ast.Name) else str(of(node.args[0], context))
     return node.name, subject, status
@@ -38,20 +38,58 @@ def cause(node: Any, context: Context) -> Cause:
 
 def assignments(
     sources: Sources, rule: Any, path: str, context: Context, frame: str | None
-) -> dict[str, Any]:
-    """What a rule gives to registers, computed before anything is done."""
-    return {
-        name: there(evaluate(sources.expression(f"{path}.set.{name}", source, frame), context))
-        for name, source in rule.set.items()
-    }
+) -> list[tuple[str, Any, Any]]:
+    """What a rule gives to registers, each with its key if it has one, computed before anything is done."""
+    found = []
+    for written, source in rule.set.items():
+        name = written.partition("(")[0].strip()
+        value: Any = NOTHING
+        if (
+            str(source).strip() != "none"
+            or name not in holder_of(context.world, context.me, name).may_be_nothing
+        ):
+            value = there(_assigned(sources, f"{path}.set.{written}", source, context, frame))
+        found += [(name, key, value) for key in _keys(sources, written, path, context, frame)]
+    return found
 
 
-def assign(world: World, me: Entity | None, values: dict[str, Any]) -> None:
+def _assigned(sources: Sources, site: str, source: Any, context: Context, frame: str | None) -> Any:
+    """A value; a noun of several words is written as it is."""
+    if " " in str(source) and source in context.world.nouns:
+        return source
+    return evaluate(sources.expression(site, source, frame), context)
+
+
+def _keys(sources: Sources, written: str, path: str, context: Context, frame: str | None) -> list[Any]:
+    """Whose registers are set: of `trust(speaker)` the speaker's, of a group each of it; None of a single one."""
+    if "(" not in written:
+        return [None]
+    value = sources.expression(f"{path}.set.{written}.key", written, frame)
+    assert isinstance(value.tree, ast.Call)
+    own = replace(context, value=value)
+    found = [key_of(there(key)) for key in as_list(of(value.tree.args[0], own))]
+    kept = holder_of(context.world, context.me, value.tree.name).registers[value.tree.name].values
+    if not all(key in kept for key in found):
+        raise NothingFoundError
+    return found
+
+
+def holder_of(world: World, me: Entity | None, name: str) -> Any:
+    """Who has a register of this name: oneself, else the world."""
+    return me if me is not None and name in me.registers else world
+
+
+def assign(world: World, me: Entity | None, values: list[tuple[str, Any, Any]]) -> None:
     """Sets registers of one's own, else those of the world. A given range saturates."""
-    for name, value in values.items():
-        holder: Any = me if me is not None and name in me.registers else world
-        low, high = holder.ranges.get(name, (value, value))
-        holder.registers[name] = min(max(value, low), high) if name in holder.ranges else value
+    for name, key, value in values:
+        holder = holder_of(world, me, name)
+        if name in holder.ranges and value is not NOTHING:
+            low, high = holder.ranges[name]
+            value = min(max(value, low), high)
+        if key is None:
+            holder.registers[name] = value
+        else:
+            holder.registers[name].values[key] = value
 
 
 def affect(world: World, target: Entity, verb: str, status: Any) -> None:

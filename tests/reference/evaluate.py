@@ -12,8 +12,10 @@ from tests.reference.source import Value
 from tests.reference.world import (
     COLORS,
     DIRECTIONS,
+    NOTHING,
     TYPES,
     Entity,
+    Kept,
     Performance,
     Recall,
     World,
@@ -54,7 +56,7 @@ def evaluate(value: Value, context: Context) -> Any:
 
 def holds(value: Value | None, context: Context) -> bool:
     """Whether a condition holds; nothing written always does."""
-    return value is None or bool(evaluate(value, context))
+    return value is None or bool(there(evaluate(value, context)))
 
 
 def of(node: Any, context: Context) -> Any:
@@ -131,6 +133,7 @@ def _name(node: ast.Name, context: Context) -> Any:
         "self": lambda: me,
         "objects": world.things,
         "cells": lambda: [cell for cell in world.interior() if cell not in world.terrain],
+        "cast": lambda: [world.agent, *world.npcs],
         "colors": lambda: list(COLORS),
         "directions": lambda: list(DIRECTIONS),
         "nouns": lambda: speech.noun_values(world),
@@ -184,7 +187,7 @@ def _attribute(node: ast.Attribute, context: Context) -> Any:
         if context.setup:
             context.setup.compute_beliefs(holder)
         return holder.believes[node.name]
-    subject = of(node.subject, context)
+    subject = something(of(node.subject, context))
     if isinstance(subject, list):
         return [attribute(item, node.name, context) for item in subject]
     return attribute(subject, node.name, context)
@@ -239,11 +242,13 @@ def attribute(subject: Any, name: str, context: Context) -> Any:
 
 def _logic(node: ast.Logic, context: Context) -> bool:
     test = all if node.op == "and" else any
-    return test(bool(of(operand, context)) for operand in node.operands)
+    return test(bool(there(of(operand, context))) for operand in node.operands)
 
 
 def same(a: Any, b: Any) -> bool:
     """Equality. A value fits a noun if their texts are equal, so 3 is "3"; an entity in a cell is not the cell."""
+    if a is NOTHING or b is NOTHING:
+        return False
     if isinstance(a, Entity) or isinstance(b, Entity):
         return a is b
     if isinstance(a, Recall) and isinstance(b, Performance):
@@ -259,13 +264,23 @@ def same(a: Any, b: Any) -> bool:
 
 def there(value: Any) -> Any:
     """A value that is needed. The noun of somebody who is silent can be compared, and nothing else."""
-    if value is None:
+    if value is None or value is NOTHING:
+        raise NothingFoundError
+    return value
+
+
+def something(value: Any) -> Any:
+    """A thing, a cell or a word that something is asked of."""
+    if value is NOTHING:
         raise NothingFoundError
     return value
 
 
 def _compare(node: ast.Compare, context: Context) -> bool:
     left, right = of(node.left, context), of(node.right, context)
+    sides = ((left, node.right), (right, node.left))
+    if any(value is NOTHING and isinstance(word, ast.Name) and word.id == "none" for value, word in sides):
+        return bool(node.op == "==")
     if node.op in ("==", "!="):
         equal = any(same(a, b) for a in as_list(left) for b in as_list(right))
         return equal == (node.op == "==")
@@ -337,7 +352,7 @@ def _quantifier(node: ast.Quantifier, context: Context) -> Any:
     condition, variable = node.where, node.var
 
     def true_of(item: Any) -> bool:
-        return condition is None or bool(of(condition, context.knowing(**{variable: item})))
+        return condition is None or bool(there(of(condition, context.knowing(**{variable: item}))))
 
     if node.name == "any":
         return any(true_of(item) for item in group)
@@ -347,7 +362,7 @@ def _quantifier(node: ast.Quantifier, context: Context) -> Any:
     if node.name == "count":
         return len(found)
     if node.name == "nearest":
-        goal = where(of(node.to, context))
+        goal = where(something(of(node.to, context)))
         found = [item for item in found if where(item) is not None and goal is not None]
         found.sort(key=lambda item: geometry.apart(item, goal))
     if not found and context.take_first and group:
@@ -365,6 +380,9 @@ def _call(node: ast.Call, context: Context) -> Any:
         return FUNCTIONS[node.name](node, context)
     if node.subject is None and (node.name in context.world.tables or in_tables(node.name, context)):
         return _table(node, context)
+    kept = _kept(node, context)
+    if kept is not None:
+        return _of_key(kept, node.args[0], context)
     # "In a frame a verb without a subject is the NPC's own."
     subject = context.me if node.subject is None else of(node.subject, context)
     if isinstance(subject, list):
@@ -386,10 +404,36 @@ def _verb(subject: Any, node: ast.Call, context: Context) -> Any:
             for text in texts
             for asked in patterns
         )
-    arguments = [of(argument, context) for argument in node.args]
+    something(subject)
+    arguments = [something(of(argument, context)) for argument in node.args]
     if name == "toggled_by":
         return any(user in subject.toggled_by for user in as_list(arguments[0]))
     return getattr(geometry, name)(world, subject, *arguments)
+
+
+def _kept(node: ast.Call, context: Context) -> Kept | None:
+    """The registers of a name that there are for each of a group; None if it names none."""
+    if node.subject is None:
+        own = context.me.registers if context.me is not None and context.in_frame else {}
+        found = own.get(node.name, context.world.registers.get(node.name))
+        return found if isinstance(found, Kept) else None
+    if not any(node.name in member.registers for member in context.world.cast.values()):
+        return None
+    found = there(of(node.subject, context)).registers[node.name]
+    assert isinstance(found, Kept), f"{node.name} is one register"
+    return found
+
+
+def key_of(value: Any) -> Any:
+    """A key: an entity is itself, anything else is known by its text."""
+    return value if isinstance(value, Entity) else str(value)
+
+
+def _of_key(kept: Kept, node: ast.Node, context: Context) -> Any:
+    key = key_of(there(of(node, context)))
+    if key not in kept.values:
+        raise NothingFoundError
+    return kept.values[key]
 
 
 def in_tables(name: str, context: Context) -> bool:
@@ -469,7 +513,7 @@ HANDLERS: dict[type, Callable[[Any, Context], Any]] = {
     ast.Attribute: _attribute,
     ast.Call: _call,
     ast.Quantifier: _quantifier,
-    ast.Not: lambda node, context: not of(node.operand, context),
+    ast.Not: lambda node, context: not there(of(node.operand, context)),
     ast.Logic: _logic,
     ast.Compare: _compare,
     ast.Member: _member,

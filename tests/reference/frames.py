@@ -281,8 +281,12 @@ class FrameRunner:
     def wants_noun(self, rule: Rule, path: str) -> bool:
         """Whether a rule asks for the noun that was heard."""
         frame = self.me.frame
-        written = [rule.when, rule.do, *rule.set.values(), *rule.cause]
-        values = [self.expression(f"{path}.asked", source) for source in written if source is not None]
+        written = [rule.when, rule.do, *rule.set, *rule.set.values(), *rule.cause]
+        values = [
+            self.expression(f"{path}.asked", source)
+            for source in written
+            if source is not None and source not in self.world.nouns
+        ]
         if rule.say is not None:
             values.append(self.sources.text(f"{path}.asked", rule.say, frame))
         return any(asks_for_noun(value.tree) for value in values)

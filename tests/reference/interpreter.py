@@ -18,7 +18,7 @@ from tests.reference.script import Outcome, script_of
 from tests.reference.settling import Settling
 from tests.reference.source import Sources, Value
 from tests.reference.vocabulary import Vocabulary, Words
-from tests.reference.world import Entity, Performance, World, as_list
+from tests.reference.world import NOTHING, Entity, Kept, Performance, World, as_list
 
 Action = tuple[int, int, int, int]
 ATTEMPTS = 64
@@ -376,7 +376,7 @@ class Reference:
             },
             "let": {name: self.describe_value(value) for name, value in world.lets.items()},
             "memory": {name: self.acts(memory.entries) for name, memory in world.memories.items()},
-            "state": dict(world.registers),
+            "state": {name: plain(value) for name, value in world.registers.items()},
             "one_of": {name: m.drawn_from for name, m in world.cast.items() if m.drawn_from is not None},
         }
 
@@ -427,4 +427,6 @@ def plain(value: Any) -> Any:
         return value.key if value.sort != "object" or value.single else f"{value.key}[{value.index}]"
     if isinstance(value, tuple | list):
         return [plain(item) for item in value]
-    return value
+    if isinstance(value, Kept):
+        return {str(plain(key)): plain(one) for key, one in value.values.items()}
+    return "none" if value is NOTHING else value

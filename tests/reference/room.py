@@ -7,7 +7,7 @@ from typing import Any
 
 from socialai_dsl.grammar import ast
 from tests.reference import chance
-from tests.reference.evaluate import Context, evaluate, of
+from tests.reference.evaluate import Context, evaluate, key_of, of
 from tests.reference.places import region
 from tests.reference.script import Group, Member, Script, Sequence
 from tests.reference.source import Sources, Value
@@ -15,9 +15,11 @@ from tests.reference.speech import noun_value
 from tests.reference.world import (
     COLORS,
     DIRECTIONS,
+    NOTHING,
     TYPES,
     Cell,
     Entity,
+    Kept,
     Performance,
     Recall,
     World,
@@ -540,13 +542,28 @@ class Setup:
         """The start value of a register, and its range where one is given."""
         context = self.context(holder if isinstance(holder, Entity) else None)
         context.in_frame = isinstance(holder, Entity)
+        group: list[Any] | None = None
         if isinstance(source, dict):
             if "range" in source:
                 numbers = evaluate(self.sources.expression(f"{path}.range", source["range"], frame), context)
                 holder.ranges[name] = (numbers[0], numbers[-1])
+            if "for" in source:
+                group = as_list(evaluate(self.sources.expression(f"{path}.for", source["for"]), context))
             source = source["start"]
-        if name not in holder.registers:
-            holder.registers[name] = evaluate(self.sources.expression(path, source, frame), context)
+            if str(source).strip() == "none":
+                holder.may_be_nothing.add(name)
+        if name in holder.registers:
+            return
+        values = []
+        for number, key in enumerate([None] if group is None else group):
+            asked = context if group is None else context.knowing(it=key)
+            site = path if group is None else f"{path}[{number}]"
+            nothing = name in holder.may_be_nothing
+            values.append(
+                NOTHING if nothing else evaluate(self.sources.expression(site, source, frame), asked)
+            )
+        keys = [] if group is None else map(key_of, group)
+        holder.registers[name] = values[0] if group is None else Kept(dict(zip(keys, values, strict=True)))
 
 
 def sizes(scenario: Script, sources: Sources, side: str) -> list[int]:

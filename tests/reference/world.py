@@ -93,6 +93,23 @@ TYPES = {
 }
 
 
+class Nothing:
+    """What a register holds that holds nothing yet: unlike anything, and not there where it is needed."""
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Nothing:
+        return self
+
+
+NOTHING = Nothing()
+
+
+@dataclass
+class Kept:
+    """Registers that there are for each of a group, by key."""
+
+    values: dict[Any, Any]
+
+
 @dataclass
 class Heard:
     """One utterance as it reached somebody."""
@@ -142,6 +159,7 @@ class Entity:
     slots: dict[str, Any] = field(default_factory=dict)
     registers: dict[str, Any] = field(default_factory=dict)
     ranges: dict[str, tuple[int, int]] = field(default_factory=dict)  # of registers that saturate
+    may_be_nothing: set[str] = field(default_factory=set)  # registers that start with nothing
     fired_once: set[str] = field(default_factory=set)
     inbox: list[Heard] = field(default_factory=list)
     utterance: str | None = None  # in this step
@@ -207,6 +225,7 @@ class World:
     lets: dict[str, Any] = field(default_factory=dict)
     registers: dict[str, Any] = field(default_factory=dict)  # the world's `state`
     ranges: dict[str, tuple[int, int]] = field(default_factory=dict)  # of registers that saturate
+    may_be_nothing: set[str] = field(default_factory=set)  # registers that start with nothing
     tables: dict[str, dict[str, Any]] = field(default_factory=dict)  # by the text of the key
     memories: dict[str, Recall] = field(default_factory=dict)
     fired_once: set[str] = field(default_factory=set)  # of the world's rules

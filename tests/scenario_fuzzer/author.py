@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from tests.scenario_fuzzer.behaviour import Behaviour
-from tests.scenario_fuzzer.declared import STATUSES, Declared, Frame, Thing
+from tests.scenario_fuzzer.declared import STATUSES, Declared, Frame, Row, Thing
 from tests.scenario_fuzzer.phrases import COLORS, Phrases, Where
 
 NOUNS: tuple[tuple[str | int, ...], ...] = (
@@ -88,6 +88,8 @@ class _Author:
             made["require"] = ["agent.distance(ann) > 1"]
         if self.often(0.6):
             made["rules"] = [behaviour.world_rule() for _ in range(self.rng.randint(1, 3))]
+        if filled := behaviour.filled(self.declared.rows, Where(acts=self.acts)):
+            made["rules"] = [*made.get("rules", ()), {"when": "t % 4 == 1", "set": filled}]
         made["outcome"] = self.outcome()
         if self.often(0.3):
             made["reward"] = {"success": "linear(0.5)", "each_step": self.rng.choice((-0.001, 0.002))}
@@ -258,6 +260,40 @@ class _Author:
             }
             self.declared.numbers.append(name)
             self.declared.registers.append(name)
+        self.declared.rows = self.rows("score", "news")
+        return made | self.starts(self.declared.rows)
+
+    def rows(self, kept: str, single: str) -> list[Row]:
+        """Registers for each of a group, and single ones that begin with nothing."""
+        groups = ["colors", "nouns", "cast", "1..4", *(thing.name for thing in self.declared.several)]
+        groups += ["crowd"] if "crowd" in self.declared.groups else []
+        made = []
+        for number in range(self.rng.choice((0, 0, 1, 2))):
+            holds = self.rng.choice(("number", "color", "noun"))
+            made.append(Row(f"{kept}_{number}", self.rng.choice(groups), holds, self.often(0.5)))
+        if self.often(0.3):
+            made.append(Row(single, None, self.rng.choice(("color", "noun")), True))
+        return made
+
+    def starts(self, rows: list[Row]) -> dict[str, Any]:
+        """How they are declared."""
+        made: dict[str, Any] = {}
+        for row in rows:
+            if row.empty:
+                start = "none"
+            elif row.holds == "number":
+                start = self.rng.choice(
+                    ("2", "it.index", "pick(0..2)") if row.keys == "crowd" else ("1", "pick(0..2)")
+                )
+            elif row.holds == "color":
+                start = self.rng.choice(
+                    ("it", "pick(colors)") if row.keys == "colors" else ("red", "pick(colors)")
+                )
+            else:
+                start = "first(k in nouns where k == k)" if row.keys == "nouns" else "pick(nouns)"
+            made[row.name] = {"start": start}
+            made[row.name] |= {"for": row.keys} if row.keys else {}
+            made[row.name] |= {"range": f"0..{self.rng.randint(3, 6)}"} if row.holds == "number" else {}
         return made
 
     def definitions(self) -> dict[str, str]:
@@ -332,6 +368,7 @@ class _Author:
             if self.often(0.15):
                 frame.slots[f"{name}_{frame.name[-1]}"] = type_
                 known.append(f"{name}_{frame.name[-1]}")
+        frame.rows = self.rows(f"note_{name[-1]}", f"last_{name[-1]}")
         return frame
 
     def sorts_of_beliefs(self) -> dict[str, str]:
@@ -353,6 +390,7 @@ class _Author:
         }
         lets |= dict.fromkeys(frame.colors, "pick(colors)")
         lets |= {name: f"pick({group})" for name, group in frame.things.items()}
+        lets |= self.starts(frame.rows)
         if lets:
             made["let"] = lets
         return made | (

@@ -7,7 +7,7 @@ from dataclasses import replace
 from random import Random
 from typing import Any
 
-from tests.scenario_fuzzer.declared import STATUSES, Declared, Frame, Thing
+from tests.scenario_fuzzer.declared import STATUSES, Declared, Frame, Row, Thing
 from tests.scenario_fuzzer.phrases import Phrases, Where
 
 ALWAYS_OPEN = ("face", "follow", "stay_near", "flee", "wander", "choose")
@@ -29,9 +29,16 @@ class Behaviour:
     def by_states(self, frame: Frame) -> dict[str, Any]:
         """A frame with states."""
         where = Where(frame, acts=self.acts)
-        return {
-            "states": {name: self.state(number, frame, where) for number, name in enumerate(frame.states)}
-        }
+        states = {name: self.state(number, frame, where) for number, name in enumerate(frame.states)}
+        first = states[frame.states[0]]
+        if filled := self.filled(frame.rows, where):
+            first["then"] = [*first.get("then", ()), {"when": "t % 3 == 2", "set": filled}]
+        return {"states": states}
+
+    def filled(self, rows: list[Row], where: Where) -> dict[str, str]:
+        """Something in each row that begins with nothing, so that it is known what it holds."""
+        values = {"number": "2", "color": "green", "noun": "first(nouns)"}
+        return {self.phrases.of_row(row, where): values[row.holds] for row in rows if row.empty}
 
     def state(self, number: int, frame: Frame, where: Where) -> dict[str, Any]:
         """One state: what comes later can be entered at once."""
@@ -51,7 +58,10 @@ class Behaviour:
     def by_steps(self, frame: Frame) -> dict[str, Any]:
         """A frame with steps, of which some have names."""
         where = Where(frame, acts=self.acts)
-        return {"steps": [self.step(name, where) for name in frame.states if name != "finished"]}
+        steps = [self.step(name, where) for name in frame.states if name != "finished"]
+        if filled := self.filled(frame.rows, where):
+            steps[0]["set"] = filled
+        return {"steps": steps}
 
     def step(self, name: str, where: Where) -> dict[str, Any]:
         """One entry."""
@@ -119,6 +129,10 @@ class Behaviour:
         found: dict[str, Callable[[], str]] = {
             name: lambda: self.phrases.number(where) for name in self.declared.registers
         }
+        for row in [*self.declared.rows, *(where.frame.rows if where.frame else [])]:
+            found[self.target(row, where)] = lambda row=row: (  # type: ignore[misc]
+                "none" if row.empty and self.often(0.2) else self.phrases.value_of(row, where)
+            )
         if where.frame is not None:
             frame = where.frame
             found |= {name: lambda: self.phrases.number(where) for name in frame.numbers}
@@ -129,6 +143,12 @@ class Behaviour:
                 if name not in frame.slots
             }
         return found
+
+    def target(self, row: Row, where: Where) -> str:
+        """Which of a row is set, or all of it."""
+        if row.keys is not None and self.often(0.15):
+            return f"{row.name}({row.keys})"
+        return self.phrases.of_row(row, where)
 
     # -- activities --------------------------------------------------------------------------------------------
 

@@ -31,6 +31,16 @@ class Thing:
     count: int | None = None
 
 
+@dataclass(frozen=True)
+class Row:
+    """A register for each of a group (`keys`; None: a single one), and what it holds; it may begin with nothing."""
+
+    name: str
+    keys: str | None
+    holds: str
+    empty: bool = False
+
+
 @dataclass
 class Frame:
     """A frame as others speak of it: what it can be asked for."""
@@ -45,6 +55,7 @@ class Frame:
     cells: list[str] = field(default_factory=list)  # slots that hold a cell
     nouns: list[str] = field(default_factory=list)  # slots that hold a noun
     truths: list[str] = field(default_factory=list)  # slots that hold a condition
+    rows: list[Row] = field(default_factory=list)
     of_group: bool = False  # whether it is followed by the members of a group, which have an index
     of_agent: bool = False  # whether the agent follows it, who says what its grammar has and never points
 
@@ -60,6 +71,7 @@ class Declared:
     beliefs: dict[str, dict[str, str]] = field(default_factory=dict)  # member: belief: sort
     numbers: list[str] = field(default_factory=list)  # registers of the world and lets
     registers: list[str] = field(default_factory=list)  # those of them that rules can set
+    rows: list[Row] = field(default_factory=list)  # registers of the world for each of a group
     colors: list[str] = field(default_factory=list)  # lets that hold a colour
     lets: dict[str, str] = field(default_factory=dict)  # lets that hold one of a group
     cells: list[str] = field(default_factory=list)  # lets that hold a cell

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from random import Random
 
-from tests.scenario_fuzzer.declared import STATUSES, Declared, Frame, Thing
+from tests.scenario_fuzzer.declared import STATUSES, Declared, Frame, Row, Thing
 
 COLORS = ("red", "green", "blue", "purple", "yellow", "grey")
 DIRECTIONS = ("right", "down", "left", "up")
@@ -122,6 +122,68 @@ class Phrases:
                 options += [f"pick({name})", lambda: f"pick(o in {name} where {self.plain_condition(inner)})"]
         return self.chosen(lambda: self.one_of(*options), where)
 
+    # -- registers for each of a group -----------------------------------------------------------------------
+
+    def kept(self, holds: str, where: Where) -> list[Callable[[], str]]:
+        """Registers for each of a group, or single ones that may be empty, that hold a sort of value."""
+        if where.reset:
+            return []
+        rows = [*self.declared.rows, *(where.frame.rows if where.frame else [])]
+        return [lambda row=row: self.of_row(row, where) for row in rows if row.holds == holds]  # type: ignore[misc]
+
+    def of_row(self, row: Row, where: Where) -> str:
+        """One of a row, whose key may be none of the group."""
+        return row.name if row.keys is None else f"{row.name}({self.key(row, where)})"
+
+    def key(self, row: Row, where: Where) -> str:
+        """Whose register is meant."""
+        match row.keys:
+            case "colors":
+                held = [*self.declared.colors, f"{self.anchor(where)}.color"]
+                return self.rng.choice([*held, self.rng.choice(COLORS)])
+            case "nouns":
+                return "noun" if where.noun and self.often(0.7) else self.noun()
+            case "cast":
+                return self.rng.choice(["speaker"] * 2 * where.heard + ["agent", *self.declared.members])
+            case "crowd":
+                return "speaker" if where.heard and self.often(0.6) else "nearest(k in crowd to agent)"
+            case "1..4":
+                return f"t % {self.rng.randint(3, 6)}"
+        thing = self.declared.group(str(row.keys))
+        held = [variable for variable, group in where.variables if group == thing]
+        if held and self.often(0.7):
+            return held[0]
+        return f"first(k in {thing.name} where k.index == t % {thing.count})"
+
+    def value_of(self, row: Row, where: Where) -> str:
+        """Something to put into a row."""
+        if row.holds == "number":
+            return self.number(where)
+        if row.holds == "color":
+            return self.color(where)
+        plain = [noun for noun in self.declared.nouns if isinstance(noun, str) and noun not in (*COLORS, "3")]
+        return "noun" if where.noun and self.often(0.7) else self.rng.choice(plain or ["first(nouns)"])
+
+    def of_rows(self, where: Where) -> str:
+        """A condition on what a row holds."""
+        rows = [*self.declared.rows, *(where.frame.rows if where.frame else [])]
+        if not rows or where.reset:
+            return self.relation(where)
+        row = self.rng.choice(rows)
+        what, op = self.of_row(row, where), self.rng.choice(("==", "!="))
+        options: list[str | Callable[[], str]] = [f"{what} {op} none"] if row.empty else []
+        others = [other for other in rows if other.holds == row.holds]
+        options.append(lambda: f"{what} {op} {self.of_row(self.rng.choice(others), where)}")
+        if row.holds == "noun":
+            options += [lambda: f"{what} {op} {self.noun()}", f"{what} {op} agent.noun"]
+            options += [f"{what} {op} noun"] * 2 if where.noun else []
+        elif row.holds == "color":
+            options += [lambda: f"{what} in red | {self.rng.choice(COLORS)} | grey | green"]
+            options += [lambda: f"{what} {op} {self.entity(where)}.color"]
+        else:
+            options += [f"{what} > {self.rng.randint(0, 3)}", f"{what} in 1..3"]
+        return self.one_of(*options)
+
     def bound(self, variable: str, thing: Thing, where: Where) -> Where:
         """Inside a quantifier over a group."""
         return replace(where, variables=(*where.variables, (variable, thing)), still=True, searching=True)
@@ -203,6 +265,7 @@ class Phrases:
                 lambda: f"({self.number(where, depth - 1)} {rng.choice('+-*')} {self.number(where, 0)})",
                 lambda: f"({self.number(where, depth - 1)} {rng.choice(('//', '%'))} {rng.randint(1, 4)})",
             ]
+        options += self.kept("number", where)
         if known.nouns_are_numbers:
             options += ["noun", "noun"] if where.noun else []
             options += ["agent.noun"] if not where.reset else []
@@ -218,6 +281,7 @@ class Phrases:
         options: list[str | Callable[[], str]] = [self.rng.choice(COLORS), *self.declared.colors]
         if where.frame is not None and not where.reset:
             options += where.frame.colors
+        options += self.kept("color", where)
         options += [lambda: f"{self.entity(where)}.color"] * 3
         return self.chosen(lambda: self.one_of(*options), where)
 
@@ -250,6 +314,7 @@ class Phrases:
         simple += (
             [self.of_this_step, self.of_speech, self.of_this_step, self.of_frames] if not where.reset else []
         )
+        simple += [self.of_rows, self.of_rows] if not where.reset else []
         simple += [self.quantified, self.quantified] if not where.searching else []
         simple += (
             [self.defined]
@@ -408,6 +473,12 @@ class Phrases:
             made = (
                 f"X.is({self.rng.choice(frame.states)})",
                 *(f"X.{n} > {self.rng.randint(0, 3)}" for n in frame.numbers),
+            )
+            made += tuple(
+                f"X.{row.name}{'' if row.keys is None else f'({self.key(row, where)})'} {how}"
+                for row in frame.rows
+                for how in (f"!= X.{row.name}" if row.keys is None else "> 1",)
+                if (row.holds == "number") == (row.keys is not None)
             )
             options += [self.asked_of(npc, condition) for condition in made]
         for npc, beliefs in self.declared.beliefs.items():

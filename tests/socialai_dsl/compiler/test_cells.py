@@ -8,7 +8,7 @@ from typing import Any, Literal
 import pytest
 
 from socialai_dsl.program import CELL
-from socialai_dsl.semantics.plans import Placing, Region, RulePlan
+from socialai_dsl.semantics.plans import Assignment, Placing, Region, RulePlan
 from socialai_dsl.semantics.terms import (
     BOOL,
     DIRECTION,
@@ -150,7 +150,10 @@ def test_sets_of_cells_do_not_nest() -> None:
 def test_a_rule_whose_pick_finds_no_cell_does_not_fire() -> None:
     for condition, fired in ((NONE, 0), (NEXT_TO_AGENT, 1)):
         rule = RulePlan(
-            "law", "rules[0]", SPAN, sets=(("let.spot", sited(cells("first", condition), "rules[0].set")),)
+            "law",
+            "rules[0]",
+            SPAN,
+            sets=(Assignment("let.spot", sited(cells("first", condition), "rules[0].set")),),
         )
         checked = replace(with_let(workbench(), "let.spot", cell(1, 1)), rules=(rule,))
         env = start(checked)

@@ -10,7 +10,7 @@ import pytest
 from socialai_dsl.compiler.tables import InvalidProgramError
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.program import FrameColumn, Header
-from socialai_dsl.semantics.plans import Activity, CheckedScenario, Drawn, Effect, RulePlan
+from socialai_dsl.semantics.plans import Activity, Assignment, CheckedScenario, Drawn, Effect, RulePlan
 from socialai_dsl.semantics.terms import (
     CELL,
     DIRECTION,
@@ -75,7 +75,7 @@ FREE = {"guide": {"at": [4, 2], "facing": "left"}}
 
 def test_what_is_set_has_the_value_of_before_the_move() -> None:
     column = sited(FieldOf(COLUMN, entity(GUIDE), "x"))
-    env = start(scenario(first(FORWARD, sets=(("guide.n", column),))), FREE)
+    env = start(scenario(first(FORWARD, sets=(Assignment("guide.n", column),))), FREE)
     step(env)
     assert guide(env)[0] == [3, 2]
     assert env.describe()["let"]["guide.n"] == 4
@@ -132,7 +132,7 @@ def test_a_place_is_the_one_of_before_the_move() -> None:
 
 def test_it_is_counted_once_and_fires_once() -> None:
     more = sited(Operation(COUNTED.type, "+", (COUNTED, number(1))))
-    env = start(scenario(first(FORWARD, sets=(("guide.n", more),), once=True)), FREE)
+    env = start(scenario(first(FORWARD, sets=(Assignment("guide.n", more),), once=True)), FREE)
     for _ in range(3):
         step(env)
     assert guide(env)[0] == [3, 2]
@@ -152,8 +152,8 @@ def test_a_rule_that_finds_nothing_does_nothing_at_all() -> None:
 def test_of_several_rules_the_one_that_fired_is_carried_out() -> None:
     early = Compare("==", FieldOf(COLUMN, entity(GUIDE), "x"), number(4))
     rules = (
-        first(FORWARD, when=sited(early), sets=(("guide.n", sited(number(7))),)),
-        replace(first(FORWARD, sets=(("guide.n", sited(number(9))),), goto="moved"), name="second"),
+        first(FORWARD, when=sited(early), sets=(Assignment("guide.n", sited(number(7))),)),
+        replace(first(FORWARD, sets=(Assignment("guide.n", sited(number(9))),), goto="moved"), name="second"),
     )
     env = start(scenario(*rules), FREE)
     step(env)
@@ -165,7 +165,7 @@ def test_of_several_rules_the_one_that_fired_is_carried_out() -> None:
 def test_nothing_is_left_behind() -> None:
     """Two moments that differ in nothing that matters are alike."""
     column = sited(FieldOf(COLUMN, entity(GUIDE), "x"))
-    env = start(scenario(first(FORWARD, sets=(("guide.n", column),), goto="moved")), FREE)
+    env = start(scenario(first(FORWARD, sets=(Assignment("guide.n", column),), goto="moved")), FREE)
     before = env.describe()["let"]
     step(env)
     assert env.describe()["let"] == before | {"guide.n": 4}

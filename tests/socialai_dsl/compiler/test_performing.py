@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from socialai_dsl.program import Header, LineColumn
-from socialai_dsl.semantics.plans import CheckedScenario, Effect, RulePlan, StepPlan
+from socialai_dsl.semantics.plans import Assignment, CheckedScenario, Effect, RulePlan, StepPlan
 from socialai_dsl.semantics.terms import ACTION, Compare, Const, Pattern, Read, Select, Term, Type
 from tests.socialai_dsl.compiler.workbench import (
     BOX,
@@ -124,7 +124,11 @@ def test_a_rule_of_first_performs_by_the_clock_of_its_state() -> None:
 def test_who_hears_a_performance_hears_the_class_of_the_text() -> None:
     look_down = Pattern(frozenset({(1, 1)}), "Look down")
     rule = RulePlan(
-        "heard", "statue/rule", SPAN, hears=(look_down,), sets=(("let.die", sited(Const(DIE.type, 3))),)
+        "heard",
+        "statue/rule",
+        SPAN,
+        hears=(look_down,),
+        sets=(Assignment("let.die", sited(Const(DIE.type, 3))),),
     )
     base = dancing(*DANCE)
     listening = replace(

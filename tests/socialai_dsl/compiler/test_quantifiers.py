@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from socialai_dsl.semantics.plans import RulePlan
+from socialai_dsl.semantics.plans import Assignment, RulePlan
 from socialai_dsl.semantics.terms import (
     BOOL,
     Compare,
@@ -98,7 +98,7 @@ def test_a_pick_of_all_but_one_draws_what_any_pick_does(first: int, size: int, i
 def test_none_that_fits(size: int, op: str) -> None:
     nothing: Term = Quantified(NUMBER, op, "n", group(size), remainder(9))  # type: ignore[arg-type]
     assert worth(nothing) == 10, "a value of the reset takes the first"
-    rule = RulePlan("law", "rules[0]", SPAN, sets=(("let.n", sited(nothing, "rules[0].set")),))
+    rule = RulePlan("law", "rules[0]", SPAN, sets=(Assignment("let.n", sited(nothing, "rules[0].set")),))
     env = start(replace(with_let(workbench(), "let.n", number(0), Type("int", 0, 300)), rules=(rule,)))
     step(env)
     assert env.counters()["rules"] == {"law": 0}

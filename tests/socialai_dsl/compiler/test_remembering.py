@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from socialai_dsl.program import Header
-from socialai_dsl.semantics.plans import CheckedScenario, Drawn, Effect, MemoryPlan, RulePlan
+from socialai_dsl.semantics.plans import Assignment, CheckedScenario, Drawn, Effect, MemoryPlan, RulePlan
 from socialai_dsl.semantics.terms import (
     ACTION,
     CELL,
@@ -55,7 +55,7 @@ def counting(*rules: RulePlan) -> CheckedScenario:
 def rule(name: str, when: Term | None = None, add: Term | None = None, **more: Any) -> RulePlan:
     """A rule that adds to the counter."""
     total = Operation(Type("int", -20, 20), "+", (COUNTER, add or number(1)))
-    sets = (("let.n", sited(total, f"rules.{name}.set")),)
+    sets = (Assignment("let.n", sited(total, f"rules.{name}.set")),)
     return RulePlan(name, f"rules.{name}", SPAN, when=sited(when, name) if when else None, sets=sets, **more)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from socialai_dsl.compiler.folding import Changes, When
 from socialai_dsl.program import Flag, Header
-from socialai_dsl.semantics.plans import CheckedScenario, Computed, Effect, RulePlan
+from socialai_dsl.semantics.plans import Assignment, CheckedScenario, Computed, Effect, RulePlan
 from socialai_dsl.semantics.terms import (
     BOOL,
     CELL,
@@ -278,7 +278,7 @@ def test_when_a_value_can_change(term: Term, when: When) -> None:
         "law",
         "rules[0]",
         SPAN,
-        sets=(("let.written", sited(number(1))),),
+        sets=(Assignment("let.written", sited(number(1))),),
         causes=(Effect("vanish", (entity(BOX),), SPAN),),
     )
     assert Changes(replace(checked, rules=(rule,))).of(term) == when

@@ -9,7 +9,7 @@ import pytest
 
 from socialai_dsl.compiler.tables import InvalidProgramError, verify
 from socialai_dsl.program import Flag, Header, LineColumn, Op, Program
-from socialai_dsl.semantics.plans import CheckedScenario, Drawn, FramePlan, RulePlan, StatePlan
+from socialai_dsl.semantics.plans import Assignment, CheckedScenario, Drawn, FramePlan, RulePlan, StatePlan
 from socialai_dsl.semantics.terms import (
     ACTION,
     BOOL,
@@ -73,7 +73,7 @@ def register(path: str, type_: Type, value: int) -> Drawn:
 
 def talking(*statues: RulePlan, hears: tuple[Pattern, ...] = (GO, LOOK_UP), **more: Any) -> CheckedScenario:
     """The guide notes who said what it hears; the statue talks."""
-    sets = (("guide.who", sited(WHO)), ("guide.which", sited(WHICH)))
+    sets = (Assignment("guide.who", sited(WHO)), Assignment("guide.which", sited(WHICH)))
     note = rule("guide", "then[0]", hears=hears, sets=more.pop("sets", sets), **more)
     checked = workbench()
     words = ("go", "up", "down", "look", "guide", "statue")
@@ -193,7 +193,7 @@ def test_lines_of_the_agent_have_the_nouns_of_their_pairs() -> None:
 
 def test_a_noun_that_the_agent_did_not_say_is_none() -> None:
     """The register says -1 while the agent is silent: a rule that needs the noun is false then."""
-    which = (("guide.which", sited(World(NOUN, "noun"))),)
+    which = (Assignment("guide.which", sited(World(NOUN, "noun"))),)
     env = start(talking(sets=which, hears=()), {"let": {"guide.which": "down"}})
     step(env)
     assert noted(env)[1] == "down"
@@ -211,7 +211,11 @@ def watching(question: SaidBy, *statues: RulePlan) -> CheckedScenario:
     more = replace(value, term=_plus_one(value.term))
     return replace(
         checked,
-        rules=(RulePlan("watch", "rules[0]", SPAN, when=sited(question), sets=(("let.noticed", more),)),),
+        rules=(
+            RulePlan(
+                "watch", "rules[0]", SPAN, when=sited(question), sets=(Assignment("let.noticed", more),)
+            ),
+        ),
     )
 
 

@@ -66,6 +66,18 @@ def test_values(block: list[Instruction], expected: int) -> None:
     assert result_of(block) == expected
 
 
+def test_registers_of_a_row_are_found_by_adding() -> None:
+    block = [
+        (Op.STORE_AT, constant(41), RESULT, constant(2)),
+        (Op.LOAD, temporary(1), constant(1)),
+        (Op.STORE_AT, constant(7), RESULT, temporary(1)),
+        (Op.READ_AT, temporary(0), RESULT + 1, constant(1)),
+        (Op.READ_AT, RESULT, RESULT, temporary(1)),
+        (Op.ADD, RESULT, RESULT, temporary(0)),
+    ]
+    assert result_of(block) == 48
+
+
 def test_picked_bits_are_the_drawn_ones() -> None:
     bits = draws.draw(draws.episode_key(7, 0, 0), draws.site("b"), 1, 3)
     members = [1, 2, 5, 9, 14]

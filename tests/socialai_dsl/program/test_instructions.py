@@ -115,6 +115,8 @@ class Trial:
     def _word(self, operand: Operand) -> int:
         h, pick = self.town.header, self.random.randint
         match operand.kind:
+            case Kind.VALUE if self.entry.operands[1].kind is Kind.REGISTER:
+                return self._temporary(self._between(-9, 9))
             case Kind.VALUE | Kind.UPDATED:
                 return self._temporary(self._interval(operand.low, operand.high))
             case Kind.ENTITY:
@@ -135,6 +137,8 @@ class Trial:
                 return site | pick(0, 90) << 16 | pick(2, 127) << 24 if operand.meaning == "packed" else site
             case Kind.INBOX:
                 return h(Header.INBOX)
+            case Kind.REGISTER:
+                return pick(0, h(Header.REGISTERS) - 1)
             case Kind.LITERAL:
                 if operand.meaning == "first and last entity":
                     first, last = self._between(0, h(Header.ENTITIES) - 1)
@@ -165,7 +169,9 @@ class Trial:
 
     def is_fine(self) -> bool:
         instruction = (int(self.entry.op), self.words[0], self.words[1], self.words[2])
-        return problem_of(instruction, self.town, self.known, frozenset()) is None
+        named = frozenset(name.register for name in self.town.registers)
+        writable = named if self.entry.op == Op.STORE_AT else frozenset()
+        return problem_of(instruction, self.town, self.known, writable) is None
 
     def run(self) -> None:
         """Run it, and compare what is there afterwards with what is known."""

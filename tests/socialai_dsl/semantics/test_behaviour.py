@@ -159,9 +159,9 @@ def register(meaning, start, change, horizon=20):
     frames = {"talk": {"let": {"n": start}, "states": {"a": {"then": [{"set": {"n": change}}]}}}}
     checked = meaning(frames=frames, cast={"guide": {"frame": "talk"}}, horizon=horizon)
     (drawn,) = [s for s in checked.setup if getattr(s, "path", "") == "guide.n"]
-    ((path, value),) = checked.frames[0].states[0].then[0].sets
-    assert path == "guide.n"
-    return drawn.type, value
+    (item,) = checked.frames[0].states[0].then[0].sets
+    assert item.path == "guide.n"
+    return drawn.type, item.value
 
 
 def test_a_counter_has_room_for_a_whole_episode(meaning):
