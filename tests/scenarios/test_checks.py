@@ -19,7 +19,15 @@ CLAIMING = {
 }
 """How many properties are tried, `knowable` among them."""
 
-NOVEL = {"culprit": 3, "haggling": 3, "implicature": 4, "interpreter": 2, "turn_taking": 2, "whisper": 3}
+NOVEL = {
+    "bargaining": 3,
+    "culprit": 3,
+    "haggling": 3,
+    "implicature": 4,
+    "interpreter": 2,
+    "turn_taking": 2,
+    "whisper": 3,
+}
 
 CLAIMING_NOTHING = [
     *("cointhief", "cointhief+tags", "dance", "showme", "showme+no_social"),

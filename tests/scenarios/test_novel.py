@@ -11,6 +11,7 @@ import socialai_dsl as sd
 from tests.scenarios.playing import FORWARD, Episode, beside, check_shares, distance, evenly, made, rooms
 
 NAMES = (
+    "bargaining",
     "culprit",
     "gaze_following",
     "haggling",
@@ -70,6 +71,27 @@ class TestWhisper:
         assert episode.act(say="The password is thistle").ended is None, "the guard is two cells away"
         assert episode.act("forward", "What is the password").heard == "Elder: The password is clover"
         assert episode.now()["exit"]["state"] == "locked", "nor did the guard hear the elder"
+
+
+class TestBargaining:
+    def test_any_thing_may_have_any_price(self) -> None:
+        drawn = [room["let"] for room in rooms("novel/bargaining", 1500)]
+        check_shares((let["wanted"] for let in drawn), evenly(("the cup", "the coat", "the clock")))
+        check_shares((let["tables.least[0]"] for let in drawn), evenly(range(3)))
+        check_shares((let["more"] for let in drawn), evenly(range(1, 5)))
+
+    @pytest.mark.parametrize(("coins", "ended"), [(3, None), (4, "success"), (6, "success"), (7, "failure")])
+    def test_a_bargain_costs_what_he_takes_to_what_he_asks(self, coins: int, ended: str | None) -> None:
+        prices = {f"tables.least[{k}]": k for k in (0, 1, 2)}
+        episode = Episode("novel/bargaining", {"let": {"wanted": "the coat", "more": 2, **prices}})
+        assert episode.act(say="How much is the coat").heard == "Sam: I ask 6 for the coat"
+        assert episode.act(say=f"I offer {coins} for the coat").ended == ended
+
+    def test_the_script_pays_no_coin_too_many(self) -> None:
+        for seed in range(100):
+            state, _, _ = played("novel/bargaining+oracle", seed)
+            bought = ("the cup", "the coat", "the clock").index(state["let"]["wanted"])
+            assert state["state"]["paid"] == (2, 4, 5)[state["let"][f"tables.least[{bought}]"]]
 
 
 class TestCulprit:
