@@ -14,19 +14,23 @@ from typing import Any
 import pytest
 
 from socialai_dsl.cli.main import main
+from socialai_dsl.experiments import work
 from socialai_dsl.experiments.folder import Run, read_experiment, runs_of
 
-ROOT = Path(__file__).parents[3]
+HERE = Path(__file__).parent
+ROOT = HERE.parents[2]
 
 EXPERIMENT = """\
 experiment: faults
-set: {frames: 7680, envs: 8, checkpoint_every: 1, eval_episodes: 10, seeds: 5}
+set: {frames: FRAMES, envs: 8, checkpoint_every: 1, eval_episodes: 10, seeds: SEEDS}
 conditions:
   - grid: {scenario: [help, dance], bonus: [none, auto]}
 overrides:
   - {where: {scenario: help}, set: {tests: [help_as_helper]}}
 """
-"""Twenty runs of thirty updates each, with a checkpoint after each."""
+"""Four conditions, whose runs have thirty updates each, with a checkpoint after each."""
+
+UPDATES = 30
 
 
 def runs_in(folder: Path) -> list[Run]:
@@ -41,7 +45,7 @@ def table(folder: Path) -> dict[str, Any]:
         result = run.result()
         assert result is not None, run.label
         weights = sorted((run.path / "checkpoints").glob("*.safetensors"))[-1]
-        digest = hashlib.sha256(tensors_of(weights)).hexdigest()
+        digest = result.get("digest") or hashlib.sha256(tensors_of(weights)).hexdigest()
         tested = {name: figures["success_rate"] for name, figures in run.tested().items()}
         found[run.label] = (result["eval"]["success_rate"], tested, weights.name, digest)
     return found
@@ -63,14 +67,28 @@ def until(holds: Any, seconds: float) -> Any:
     raise AssertionError("it did not happen")
 
 
+PRETENDING = """
+import sys
+import pretend
+from socialai_dsl.cli.main import main
+from socialai_dsl.experiments.engines import ray
+ray.perform = pretend.perform
+sys.exit(main(sys.argv[1:]))
+"""
+"""The command, whose workers know the runs of `pretend` alone."""
+
+
 class Cluster:
     """Two nodes of a core each, and the command that has them work."""
 
-    def __init__(self, place: Path) -> None:
+    def __init__(self, place: Path, pretends: bool) -> None:
         from ray.cluster_utils import Cluster as Nodes
 
+        self.pretends = pretends
+        self.update, self.seeds = (100, 2) if pretends else (256, 5)
         self.file = place / "faults.yaml"
-        self.file.write_text(EXPERIMENT, encoding="utf-8")
+        text = EXPERIMENT.replace("FRAMES", str(UPDATES * self.update)).replace("SEEDS", str(self.seeds))
+        self.file.write_text(text, encoding="utf-8")
         self.out = place / "out"
         settings = {"num_cpus": 1, "object_store_memory": 80_000_000, "include_dashboard": False}
         self.nodes = Nodes(initialize_head=True, head_node_args=settings)
@@ -79,16 +97,8 @@ class Cluster:
         self.drivers: list[subprocess.Popen[bytes]] = []
 
     def start(self) -> subprocess.Popen[bytes]:
-        command = [
-            sys.executable,
-            "-m",
-            "socialai_dsl",
-            "experiment",
-            "run",
-            str(self.file),
-            "--out",
-            str(self.out),
-        ]
+        program = ["-c", PRETENDING] if self.pretends else ["-m", "socialai_dsl"]
+        command = [sys.executable, *program, "experiment", "run", str(self.file), "--out", str(self.out)]
         command += ["--engine", "ray", "--address", self.nodes.address]
         self.drivers.append(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT))
         return self.drivers[-1]
@@ -104,7 +114,8 @@ class Cluster:
         """A run in training that has got past a checkpoint, perhaps one of a worker of the second node."""
         raylet = self.second.all_processes["raylet"][0].process.pid
         for run in runs_in(self.out):
-            begun = run.status().state == "running" and 0 < (run.checkpoint_frames() or 0) < 5000
+            frames = run.checkpoint_frames() or 0
+            begun = run.status().state == "running" and 0 < frames < 20 * self.update
             if run.id not in besides and begun and (not second or parent_of(owner(run)) == raylet):
                 return run
         return None
@@ -129,14 +140,20 @@ def parent_of(pid: int) -> int | None:
         return None
 
 
-@pytest.fixture
-def cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Cluster]:
+@pytest.fixture(params=[True, False], ids=["pretending", "training"])
+def cluster(
+    request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Cluster]:
     pytest.importorskip("ray", reason="install the extra ray")
     monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
     monkeypatch.setenv("RAY_worker_niceness", "0")  # Ray's 15 would starve the runs on a busy machine
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH")))))
+    monkeypatch.setenv("PRETEND_SECONDS", "0.3")
+    places = (str(HERE), str(ROOT), os.environ.get("PYTHONPATH"))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, places)))
     monkeypatch.chdir(tmp_path)
-    made = Cluster(tmp_path)
+    if request.param:
+        monkeypatch.setattr(work, "PROGRAM", "pretend")
+    made = Cluster(tmp_path, request.param)
     yield made
     made.close()
 
@@ -166,7 +183,7 @@ def test_nothing_is_lost_and_nothing_done_twice(cluster: Cluster, tmp_path: Path
     said, _ = again.communicate(timeout=1800)
     assert again.returncode == 0, said
     runs = runs_in(cluster.out)
-    assert len(runs) == 20
+    assert len(runs) == 4 * cluster.seeds
     for run in runs:
         status = run.status()
         assert status.state == "done", run.label
@@ -175,7 +192,7 @@ def test_nothing_is_lost_and_nothing_done_twice(cluster: Cluster, tmp_path: Path
         frames = [
             json.loads(line)["frames"] for line in (run.path / "metrics.jsonl").read_text().splitlines()
         ]
-        assert frames == list(range(256, 7681, 256)), "each update is there once"
+        assert frames == [cluster.update * (n + 1) for n in range(UPDATES)], "each update is there once"
         assert run.id not in ends or status.attempts == ends[run.id], "what was done is left alone"
     for run in (killed, lost, orphaned):
         assert any(attempt["from_frames"] > 0 for attempt in run.status().attempts), run.label

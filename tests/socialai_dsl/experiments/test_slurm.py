@@ -20,12 +20,6 @@ pytestmark = pytest.mark.filterwarnings(
 )  # submitit leaves its jobs' pipes to the collector
 
 
-def pretending(folder: Path, run_id: str) -> work.End:
-    """`perform` in a job, which is a process that does not know of the test's patches."""
-    work.PROGRAM = "pretend"
-    return work.perform(folder, run_id)
-
-
 @pytest.fixture
 def prepared(place: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
     """An experiment whose folder is ready, and nothing is done."""
@@ -50,10 +44,9 @@ class PretendJob(Job):
     """A job whose runs are those of `pretend`."""
 
     def __call__(self) -> work.End:
-        import sys
+        import pretend  # its folder is in PYTHONPATH
 
-        sys.path.insert(0, str(Path(__file__).parent))
-        return pretending(self.folder, self.run_id)
+        return pretend.perform(self.folder, self.run_id)
 
 
 def test_a_job_that_is_interrupted_is_submitted_again_as_it_was():
