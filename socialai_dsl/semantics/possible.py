@@ -432,6 +432,8 @@ class Possible:
             return True  # whoever is silent names no noun, and a register may hold nothing
         op, left, right = term.op, term.left, term.right
         a, b = self._values(left), self._values(right)
+        if not a or not b:
+            return True
         if not wanted:
             op = {"==": "!=", "!=": "==", "<": ">=", "<=": ">"}[op]  # type: ignore[assignment]
         match str(op):
@@ -448,7 +450,10 @@ class Possible:
         return a[-1] > b[0]
 
     def _values(self, term: Term) -> Sequence[int]:
-        """All that a term can be, at most, in ascending order. A range may have more members than `len` can count."""
+        """All that a term can be, at most, in ascending order; empty if that is not known.
+
+        A range may have more members than `len` can count.
+        """
         match term:
             case Const(value=value):
                 return (value,)
@@ -460,6 +465,8 @@ class Possible:
                 return sorted(found) or range(term.type.low, term.type.high + 1)
             case Select(values=values, default=default):
                 parts = [self._values(part) for part in (*values, default)]
+                if not all(parts):
+                    return ()
                 if any(part[-1] - part[0] > 256 for part in parts):
                     return range(min(part[0] for part in parts), max(part[-1] for part in parts) + 1)
                 return sorted({value for part in parts for value in part})
