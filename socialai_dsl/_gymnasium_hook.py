@@ -1,4 +1,7 @@
-"""Registers the Gymnasium ids once Gymnasium is imported, without importing it: checking a file does not need it."""
+"""Registers the Gymnasium ids once Gymnasium is imported, without importing it: checking a file does not need it.
+
+Gymnasium 1.x has no entry point for plug-ins: without this hook the ids would depend on the order of the two imports.
+"""
 
 from __future__ import annotations
 

@@ -67,6 +67,7 @@ def test_its_scenarios_have_no_findings(name: str, folder: Path) -> None:
     assert [str(diagnostic) for diagnostic in check(str(folder / name)).diagnostics] == []
 
 
+@pytest.mark.thorough("trains each example twice")
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: shlex.split(command)[-1])
 def test_an_example_trains_and_resumes_exactly(
     command: str, folder: Path, capsys: pytest.CaptureFixture[str]

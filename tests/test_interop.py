@@ -141,6 +141,18 @@ def test_videos(name: str, tmp_path: Path) -> None:
     assert video.stat().st_size > 1000
 
 
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import gymnasium; gymnasium.make('socialai_dsl:SocialAI/TalkItOut-v1')",
+        "import gymnasium, socialai_dsl; gymnasium.make('SocialAI/TalkItOut-v1')",
+        "import socialai_dsl, gymnasium; gymnasium.make('SocialAI/TalkItOut-v1')",
+    ],
+)
+def test_the_ids_are_known_in_whichever_order_the_two_are_imported(code: str) -> None:
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
+
+
 def test_looking_for_gymnasium_does_not_keep_the_ids_from_being_registered() -> None:
     code = (
         "import importlib.util, socialai_dsl, sys\n"

@@ -30,6 +30,7 @@ def test_a_notebook_has_no_outputs(path: Path) -> None:
     assert [cell.execution_count for cell in code] == [None] * len(code)
 
 
+@pytest.mark.thorough("starts a kernel and trains")
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.name)
 def test_a_notebook_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,5 +1,6 @@
 """The project's own files: what is locked, what a wheel carries, what the readme promises."""
 
+import os
 import re
 import subprocess
 import sys
@@ -82,3 +83,28 @@ def test_a_wheel_carries_the_scenarios_and_the_data_files(wheel: Path) -> None:
             if path.is_file() and "__pycache__" not in path.parts:
                 assert str(path.relative_to(ROOT)) in names
     assert not [name for name in names if name.startswith(("tests/", "runs/", "benchmarks/"))]
+
+
+@pytest.mark.thorough("builds a wheel, and starts its commands")
+def test_the_commands_of_a_wheel_need_no_checkout(wheel: Path, tmp_path: Path) -> None:
+    """Unpacked in front of everything else that is installed; in plain Python, which has nothing to compile."""
+    installed = tmp_path / "installed"
+    zipfile.ZipFile(wheel).extractall(installed)
+    environment = {**os.environ, "PYTHONPATH": str(installed), "NUMBA_DISABLE_JIT": "1"}
+
+    def command(name: str, *words: str) -> str:
+        code = f"import sys, socialai_dsl.cli.main as cli; print(cli.__file__); sys.exit(cli.{name}())"
+        result = subprocess.run(
+            [sys.executable, "-c", code, *words],
+            cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=280,
+        )  # fmt: skip
+        assert result.returncode == 0, result.stderr
+        place, _, said = result.stdout.partition("\n")
+        assert place.startswith(str(installed))
+        return said
+
+    assert "validate" in command("main", "--help")
+    assert "1 file checked: 0 errors" in command("main", "validate", "talkitout")
+    assert command("main", "codes", "S101").startswith("# S101")
+    random = ["--agent", "random", "--eval-episodes", "2", "--out", "run"]
+    assert "2 of the test set" in command("run_main", "cointhief", *random)

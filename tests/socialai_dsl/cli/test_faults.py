@@ -18,6 +18,8 @@ from socialai_dsl.cli.main import run_main
 from trainer import checkpoint as checkpoints
 from trainer.checkpoint import read
 
+pytestmark = pytest.mark.thorough("trains on disks that fail")
+
 Capture = pytest.CaptureFixture[str]
 
 RUN = [

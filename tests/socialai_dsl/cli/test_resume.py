@@ -17,6 +17,8 @@ import torch
 
 from trainer.checkpoint import read
 
+pytestmark = pytest.mark.thorough("kills and resumes whole processes")
+
 ROOT = Path(__file__).parents[3]
 HORIZONS = {"fast": 32, "paper-reference": 40}  # steps of each environment in an update
 TIMES = ("frames_per_second", "train_seconds")

@@ -13,7 +13,10 @@ from socialai_dsl.engine.jit import is_interpreted
 from socialai_dsl.loader.resolved import shipped_names
 from tests.test_agreement import FOLDERS, alone
 
-pytestmark = pytest.mark.skipif(is_interpreted(), reason="nothing is compiled")
+pytestmark = [
+    pytest.mark.skipif(is_interpreted(), reason="nothing is compiled"),
+    pytest.mark.thorough("processes compile anew"),
+]
 
 # `identify` compiles in a second; `serve` in twenty.
 IDENTIFY = """

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[3]
 CODE = """
 import hashlib
@@ -29,6 +31,7 @@ for name in ("talkitout", "cointhief"):
 """
 
 
+@pytest.mark.thorough("starts three processes that play everything")
 def test_three_processes_play_one_trajectory() -> None:
     """Each process with another hash seed, so that no order of a set or dictionary can matter."""
     outputs = []

@@ -12,6 +12,8 @@ import pytest
 
 from socialai_dsl.experiments.folder import Run
 
+pytestmark = pytest.mark.thorough("starts commands and workers, and kills them")
+
 
 def reasons(run: Run) -> list[str]:
     return [attempt["reason"] for attempt in run.status().attempts]
