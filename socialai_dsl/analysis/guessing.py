@@ -46,7 +46,7 @@ states."""
 
 
 Plan = Sequence[NDArray[np.int64]]
-"""Actions, int64 (4,) each, one after the other."""
+"""Actions, int64 (3 + slots,) each, one after the other."""
 
 
 class Answer(Enum):

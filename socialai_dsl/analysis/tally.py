@@ -59,7 +59,7 @@ def tally(
     Args:
         envs: environments that do not reset themselves (autoreset_mode "Disabled"), which nobody has played yet.
         scenarios: what the programs of the environments were compiled from.
-        choose: actions, int64 (E, 4), for an observation.
+        choose: actions, int64 (E, 3 + slots), for an observation.
         begin: is told in which environments an episode begins, bool (E,), and their numbers, int64 (E,), before
             `choose` is asked.
         episodes: how many; they are numbers 0, 1, ... of the seed (`index`).
