@@ -12,6 +12,7 @@ from tests.scenarios.playing import FORWARD, Episode, beside, check_shares, dist
 
 NAMES = (
     "bargaining",
+    "conventions",
     "culprit",
     "gaze_following",
     "haggling",
@@ -92,6 +93,35 @@ class TestBargaining:
             state, _, _ = played("novel/bargaining+oracle", seed)
             bought = ("the cup", "the coat", "the clock").index(state["let"]["wanted"])
             assert state["state"]["paid"] == (2, 4, 5)[state["let"][f"tables.least[{bought}]"]]
+
+
+class TestConventions:
+    def test_every_thing_comes_up_early_and_late(self) -> None:
+        for seed in range(50):
+            env = made("novel/conventions+oracle")
+            env.reset(seed=seed)
+            marked, ended = [], False
+            while not ended:
+                before = env.describe()
+                _, _, terminated, truncated, _ = env.step(env.scripted_action())
+                ended = terminated or truncated
+                if len(marked) == before["state"]["round"]:
+                    marked.append([thing["state"] for thing in before["things"]].index("tagged"))
+            assert sorted(marked[:3]) == sorted(marked[3:6]) == [0, 1, 2]
+
+    def test_a_code_of_one_s_own_fails_where_ann_has_named_a_thing(self) -> None:
+        """The agent calls the first thing `blik`, the second `dax`, the third `wug`, whatever Ann has said."""
+        right = 0
+        for seed in range(60):
+            episode = Episode("novel/conventions", seed=seed)
+            ended = None
+            while ended is None:
+                here = episode.now()
+                topic = [thing["state"] for thing in here["things"]].index("tagged")
+                asked = here["ann"]["state"] == "listening"
+                ended = episode.act(say=f"This is {('blik', 'dax', 'wug')[topic]}" if asked else None).ended
+            right += ended == "success"
+        assert right < 25
 
 
 class TestCulprit:
