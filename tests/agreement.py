@@ -219,8 +219,6 @@ def _state_of_reference(env: ScenarioEnv, reference: Reference) -> dict[str, Any
                 del member[key]
         if member.get("state", "") is None:
             member.pop("state"), member.pop("clock", None)
-        if isinstance(member.get("state"), int):
-            member["state"] = f"step{member['state']}"
         slots = {k: plain(v) for k, v in reference.world.cast[name].slots.items()}
         member["registers"] = {
             k: _as_nouns(v) if f"{name}.{k}" in nouns else v

@@ -1522,6 +1522,97 @@ def test_5_60_of_a_key_without_a_register_nothing_is_set(play: Folder) -> None:
     assert (run.value("ann.seen"), run.value("ann.trust")) == (1, {"people[0]": 4, "people[1]": 1})
 
 
+LEFT_OUT = """
+    frames:
+      walk:
+        let: {{asked: 0}}
+        steps:
+          - {{do: left}}
+          - {{when: {when}, do: stay, for: 3, state: waiting, set: {{asked: 1}}}}
+          - {{do: right, say: Gone on.}}
+    objects: {{doors: {{type: door, count: 2, at: [[4, 0], [5, 0]]}}}}
+    cast: {{ann: {{at: [5, 5], facing: right, frame: walk}}}}
+"""
+
+
+def test_5_61_when_is_read_at_the_start_of_the_first_turn(play: Folder) -> None:
+    run = play(LEFT_OUT.format(when="t == 2")).steps(4)
+    assert (run.facing("ann"), run.value("ann.asked")) == ("up", 1), "it lasted though t went on"
+    run = play(LEFT_OUT.format(when="t == 1 or t == 3")).steps(2)
+    assert (run.facing("ann"), run.info["utterance"]) == ("right", "Ann: Gone on."), "t was 2 in its turn"
+
+
+@pytest.mark.parametrize("when", ["t == 9", *(f"not {choice}.open" for choice in CHOICES)])
+def test_5_62_an_entry_that_is_left_out_takes_no_turn(play: Folder, when: str) -> None:
+    run = play(LEFT_OUT.format(when=f'"{when}"')).steps(2)
+    assert (run.facing("ann"), run.value("ann.asked"), run.status("ann")) == ("right", 0, "finished")
+
+
+ROUNDS = """
+    frames:
+      walk:
+        let: {{rounds: 0}}
+        steps:
+          - {{{keys}, steps: [{{do: turn(left), set: {{rounds: rounds + 1}}}}, {{do: turn(left)}}]}}
+          - {{say: Done.}}
+    cast: {{ann: {{at: [5, 5], facing: right, frame: walk}}}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("keys", "rounds"),
+    [
+        ("repeat: 3", 3),
+        ("when: t == 1, repeat: 3", 3),
+        ("when: t == 2, repeat: 3", 0),
+        ("when: t == 1", 1),
+        ("repeat: 3, while: t <= 3", 2),
+        ("repeat: 3, while: t > 1", 0),
+        ("repeat: 3, until: t == 1", 3),
+        ("repeat: 3, until: t == 3", 1),
+        ("repeat: 0", 0),
+    ],
+)
+def test_5_63_conditions_of_rounds(play: Folder, keys: str, rounds: int) -> None:
+    run = play(ROUNDS.format(keys=keys)).steps(2 * rounds)
+    assert run.info["utterance"] == "NA"
+    run.step()
+    assert (run.info["utterance"], run.value("ann.rounds")) == ("Ann: Done.", rounds)
+
+
+def test_5_64_the_next_round_begins_with_the_next_turn(play: Folder) -> None:
+    run = play(ROUNDS.format(keys="repeat: 2"))
+    seen = []
+    for _ in range(4):
+        seen.append((run.status("ann"), run.value("ann.rounds[0]")))
+        run.step()
+    assert seen == [("step0.0", 0), ("step0.1", 0), ("step0.0", 1), ("step0.1", 1)]
+    assert (run.status("ann"), run.value("ann.rounds[0]"), run.facing("ann")) == ("step1", 0, "right")
+
+
+def test_5_65_a_round_of_nothing_takes_no_turn(play: Folder) -> None:
+    run = play("""
+        frames:
+          walk:
+            steps:
+              - {do: left}
+              - repeat: 9
+                steps:
+                  - {when: t == 9, do: left}
+                  - {repeat: 9, while: t == 9, steps: [{do: left}]}
+                  - {do: go_to(self)}
+              - {do: right, say: Done.}
+        cast: {ann: {at: [5, 5], facing: right, frame: walk}}
+    """).steps(2)
+    assert (run.info["utterance"], run.facing("ann")) == ("Ann: Done.", "right")
+
+
+def test_5_66_what_is_next_is_the_state_even_if_it_is_left_out(play: Folder) -> None:
+    run = play(LEFT_OUT.format(when="false")).step()
+    assert run.status("ann") == "waiting"
+    assert run.step().status("ann") == "finished"
+
+
 # -- 6. memories -----------------------------------------------------------------------------------
 
 

@@ -123,7 +123,7 @@ SPOKEN_OF = (
     *(".move_into(", ".put(", ".reset", ".vanish", ".become(", ".reveal", "push(", "use(", "enter(", "flee("),
     *("slots:", "define:", "require:", "order:", "occlusion: true", "npcs: hidden", "image: before_npcs"),
     *("pointing", "egocentric", "own_voice: true", "reward:", "each_step:", "would_see(", "joint_attention("),
-    *(" if ", " else "),
+    *(" if ", " else ", "repeat:", "while:"),
 )
 """What authors can write, and what the random scenarios of the ordinary suite are to contain."""
 

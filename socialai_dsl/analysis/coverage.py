@@ -18,7 +18,7 @@ from socialai_dsl.compilation import compile_loaded
 from socialai_dsl.engine.calls import Task
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import Program, Register
-from socialai_dsl.semantics.plans import CheckedScenario
+from socialai_dsl.semantics.plans import FOR_EVER, CheckedScenario
 from socialai_dsl.source import Span
 
 _STEPS: Final = 200
@@ -102,8 +102,11 @@ _Key = tuple[str, int] | str
 def _parts(checked: CheckedScenario) -> Iterator[tuple[_Key, Part]]:
     for frame in checked.frames:
         for number, step in enumerate(frame.steps):
-            if step.duration != 0:  # else it is left out
-                yield (f"{frame.member}.frame", number), Part("step", step.name, step.span)
+            if step.duration == 0:  # it is left out
+                continue
+            in_a_row = frame.in_a_row or step.duration == FOR_EVER
+            key: _Key = (f"{frame.member}.frame", number) if in_a_row else f"rules {step.name}"
+            yield key, Part("step", step.name, step.span)
         for number, state in enumerate(frame.states):
             name = f"{frame.member}.{frame.frame}.{state.name}"
             yield (f"{frame.member}.frame", number), Part("state", name, state.span)

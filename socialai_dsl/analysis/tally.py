@@ -187,8 +187,8 @@ class _Frames:
         numbers = count()
         for frame, entered in zip(self.checked.frames, self._entered, strict=True):
             for number in range(len(frame.steps)):
-                next(numbers)
-                times[_step(frame, number)] += int(entered[number])
+                ended = counters[next(numbers)]
+                times[_step(frame, number)] += int(entered[number]) if frame.in_a_row else ended
             places = {state.name: _state(frame, number) for number, state in enumerate(frame.states)}
             for number, place in enumerate(places.values()):
                 times[place] += int(entered[number])

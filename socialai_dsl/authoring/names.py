@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -69,12 +70,18 @@ def declared(data: Data, path: DataPath, kind: str) -> list[Name]:
 def states(data: Data, frame: str) -> list[Name]:
     """The states of a frame, and those of its steps that have a name."""
     found = declared(data, ("frames", frame, "states"), f"a state of `{frame}`")
-    steps = part_at(data, ("frames", frame, "steps"))
+    named = _named_steps(data, ("frames", frame, "steps"))
+    return [*found, *(Name(name, f"a step of `{frame}`", path) for path, name in named)]
+
+
+def _named_steps(data: Data, path: DataPath) -> Iterator[tuple[DataPath, str]]:
+    """Where the steps at a path, and those nested in them, are given a name."""
+    steps = part_at(data, path)
     for number, step in enumerate(steps if isinstance(steps, list) else ()):
         if isinstance(step, dict) and isinstance(step.get("state"), str):
-            path = ("frames", frame, "steps", number, "state")
-            found.append(Name(step["state"], f"a step of `{frame}`", path))
-    return found
+            yield (*path, number, "state"), step["state"]
+        elif isinstance(step, dict) and "steps" in step:
+            yield from _named_steps(data, (*path, number, "steps"))
 
 
 def frame_of(data: Data, member: str) -> str | None:

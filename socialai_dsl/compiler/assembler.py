@@ -280,7 +280,7 @@ def said_path(speaker: Entity) -> str:
 
 
 def state_names(frame: FramePlan) -> tuple[str, ...]:
-    """Names of a frame's states in the order of their numbers; nameless entries of `steps` are step0, step1, ..."""
+    """Names of a frame's states in the order of their numbers; nameless entries of `steps` are step0, step1.0, ..."""
     if frame.states:
         return tuple(state.name for state in frame.states)
-    return (*(step.state or f"step{i}" for i, step in enumerate(frame.steps)), FINISHED)
+    return (*(step.state or f"step{step.place or i}" for i, step in enumerate(frame.steps)), FINISHED)

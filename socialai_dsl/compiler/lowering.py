@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -23,9 +23,28 @@ from socialai_dsl.compiler.expressions import Expressions, Lines, chance_word, n
 from socialai_dsl.compiler.folding import FALSE, SEVERAL, Classes, Facts, fold, fold_whole
 from socialai_dsl.compiler.questions import ask
 from socialai_dsl.compiler.setup import require, reset
+from socialai_dsl.compiler.step_order import (
+    Again,
+    Enter,
+    Leave,
+    begun_with,
+    entries_of,
+    first_entry,
+    levels,
+    way_after,
+)
+from socialai_dsl.grammar.ast import every
 from socialai_dsl.program import Body, Header, Op
 from socialai_dsl.semantics import plans, terms
-from socialai_dsl.semantics.plans import FOR_EVER, CheckedScenario, FramePlan, OutcomePlan, RulePlan, StepPlan
+from socialai_dsl.semantics.plans import (
+    FOR_EVER,
+    CheckedScenario,
+    FramePlan,
+    NestedSteps,
+    OutcomePlan,
+    RulePlan,
+    StepPlan,
+)
 from socialai_dsl.semantics.terms import BOOL, Type
 
 
@@ -164,6 +183,11 @@ class _FrameCompiler:
             )
             for k, step in enumerate(frame.steps)
             if has_aim(step.activity) and step.ends_with_its_activity
+        }
+        self.rounds = {
+            nested.register: shared.registers.add(nested.register, Type("int", 0, nested.rounds - 1))
+            for nested in every(NestedSteps, frame.nesting)
+            if nested.rounds > 1
         }
         self.speaker = shared.checked.entities[frame.entity]
         self._is_agents = frame.entity == AGENT
@@ -357,32 +381,119 @@ class _FrameCompiler:
     def _step_row(self, k: int) -> list[int]:
         step = self.frame.steps[k]
         return self._row(
-            k, step.activity, lambda to: self._skip_fulfilled(to, k), lambda to: self._end_step(to, k)
+            k, step.activity, lambda to: self._begin_turn(to, k), lambda to: self._end_step(to, k)
         )
 
-    def _next(self, k: int) -> int:
-        """The state after entry k: entries with `for: 0` are left out."""
-        k += 1
-        while k < len(self.frame.steps) and self.frame.steps[k].duration == 0:
-            k += 1
-        return k
-
-    def _skip_fulfilled(self, to: Expressions, k: int) -> None:
-        """Entries that are fulfilled before they begin are skipped without taking the step."""
+    def _begin_turn(self, to: Expressions, k: int) -> None:
+        """At the start of a turn in entry k: what is left out, or fulfilled before it begins, takes no turn."""
         block = to.block
-        entry = k
-        while entry < len(self.frame.steps) and self._skippable(self.frame.steps[entry]):
-            stop, leave = Label(), Label()
-            activities = self._noting_of_agent(to, entry)
-            activities.unless_finished(self.frame.steps[entry].activity, stop, stop)
-            block.skip(leave)
-            block.bind(stop)
-            self._stay_in(to, k, entry)
-            block.bind(leave)
-            entry = self._next(entry)
-        if entry < len(self.frame.steps):
-            self._noting_of_agent(to, entry)
-        self._stay_in(to, k, entry)
+        found = levels(self.frame.order, k)
+        exits = [(level.nested, Label()) for level in found if level.nested is not None]
+        left = self._first_turn(to, k, begun_with(found), {id(nested): exit for nested, exit in exits})
+        goes_on = self._take(to, k, begins=False)
+        for node in (left, *way_after(found)):
+            if isinstance(node, Leave | Label):
+                exit = node if isinstance(node, Label) else exits.pop()[1]
+                block.bind(exit)
+                goes_on = goes_on or bool(exit.uses)
+                if goes_on and isinstance(node, Leave) and node.nested.rounds > 1:
+                    block.emit(Op.LOAD, self.rounds[node.nested.register], constant(0))
+            elif isinstance(node, Enter):
+                exits.append((node.nested, Label()))
+                if goes_on:
+                    self._enter(to, node.nested, exits[-1][1])
+            elif isinstance(node, Again) and goes_on:
+                self._another_round(to, node.nested, exits[-1][1])
+            elif isinstance(node, int) and goes_on:
+                goes_on = self._take_or_leave(to, node)
+        if goes_on:
+            self._stay_in(to, len(self.frame.steps))
+
+    def _first_turn(
+        self, to: Expressions, k: int, begun: Sequence[NestedSteps], exits: Mapping[int, Label]
+    ) -> Label:
+        """In the first turn of entry k, what it needs to begin, and a round of nested steps that begins with it.
+
+        Where a round does not begin, on to its exit; where the entry does not, on to the label that is returned.
+        """
+        block, left, inside = to.block, Label(), Label()
+        when = self.frame.steps[k].when
+        if when is None and not any(nested.when or nested.going or nested.until for nested in begun):
+            return left
+        block.test(Op.IF_EQ, self.clock, constant(0), inside)
+        for i, nested in enumerate(begun):
+            begins = Label()
+            for inner in begun[i + 1 :]:  # else a round of these begins, within one of the others
+                if inner.rounds > 1:
+                    block.test(Op.IF_EQ, self.rounds[inner.register], constant(0), begins)
+            another = Label()
+            if nested.rounds > 1:
+                block.test(Op.IF_EQ, self.rounds[nested.register], constant(0), another)
+            self._enter(to, nested, exits[id(nested)])
+            if nested.rounds > 1:
+                block.skip(begins)
+                block.bind(another)
+                self._unless_over(to, nested, exits[id(nested)])
+            block.bind(begins)
+        if when is not None:
+            to.sited_condition(when, left)
+        block.bind(inside)
+        return left
+
+    def _enter(self, to: Expressions, nested: NestedSteps, exit: Label) -> None:
+        """Fall through if a first round begins."""
+        for condition in (nested.when, nested.going):
+            if condition is not None:
+                to.sited_condition(condition, exit)
+
+    def _unless_over(self, to: Expressions, nested: NestedSteps, exit: Label) -> None:
+        """Fall through if another round begins, of those that there are."""
+        if nested.going is not None:
+            to.sited_condition(nested.going, exit)
+        if nested.until is not None:
+            unfulfilled = Label()
+            to.sited_condition(nested.until, unfulfilled)
+            to.block.skip(exit)
+            to.block.bind(unfulfilled)
+
+    def _another_round(self, to: Expressions, nested: NestedSteps, exit: Label) -> None:
+        """Fall through if another round begins, and count it."""
+        self._count_round(to, nested, exit)
+        self._unless_over(to, nested, exit)
+
+    def _count_round(self, to: Expressions, nested: NestedSteps, last: Label) -> None:
+        block, register = to.block, self.rounds[nested.register]
+        block.test(Op.IF_LT, register, constant(nested.rounds - 1), last)
+        mark = block.taken
+        block.emit(
+            Op.MIN, register, to.into_temporary(Op.ADD, register, constant(1)), constant(nested.rounds - 1)
+        )
+        block.release(mark)
+
+    def _take_or_leave(self, to: Expressions, entry: int) -> bool:
+        """As `_take`, of an entry that begins unless it is left out."""
+        left = Label()
+        when = self.frame.steps[entry].when
+        if when is not None:
+            to.sited_condition(when, left)
+        goes_on = self._take(to, entry, begins=True)
+        to.block.bind(left)
+        return goes_on or bool(left.uses)
+
+    def _take(self, to: Expressions, entry: int, *, begins: bool) -> bool:
+        """Take this turn in an entry, which begins or goes on, unless it is fulfilled; whether it may be."""
+        block, step = to.block, self.frame.steps[entry]
+        activities = self._noting_of_agent(to, entry)
+        if not self._skippable(step):
+            self._stay_in(to, entry if begins else None)
+            return False
+        stop, leave = Label(), Label()
+        activities.unless_finished(step.activity, stop, stop)
+        block.skip(leave)
+        block.bind(stop)
+        self._stay_in(to, entry if begins else None)
+        block.bind(leave)
+        return True
 
     def _noting_of_agent(self, to: Expressions, entry: int) -> Activities:
         """Whoever plays a scripted agent may not do what its entry says, so what that notes is noted before it acts."""
@@ -392,9 +503,9 @@ class _FrameCompiler:
             activities.note(self.frame.steps[entry].activity)
         return activities
 
-    def _stay_in(self, to: Expressions, k: int, entry: int) -> None:
-        """Take this turn in an entry, where the frame was in entry k."""
-        if entry != k:
+    def _stay_in(self, to: Expressions, entry: int | None) -> None:
+        """Take this turn in an entry that begins; None: in the one that goes on."""
+        if entry is not None:
             to.block.emit(Op.GOTO, self.number, entry)
         to.block.halt()
 
@@ -433,12 +544,34 @@ class _FrameCompiler:
         start = len(block.instructions)
         block.emit(Op.COUNT, self.counters[step.name])
         self._effects(to).carry_out(step, operands, self.speaker)
-        block.emit(Op.GOTO, self.number, self._next(k))
-        block.halt()
+        self._go_on(to, k)
         block.fuse_answer(start)
         asked.report(to, running)
         block.bind(running)
         block.halt()
+
+    def _go_on(self, to: Expressions, k: int) -> None:
+        """Go to what follows entry k: the next one, the first of another round, or what comes after the rounds."""
+        block, end = to.block, len(self.frame.steps)
+        found = levels(self.frame.order, k)
+        if not found:  # it is left out for good, and nothing leads here
+            block.emit(
+                Op.GOTO, self.number, min((n for n in entries_of(self.frame.order) if n > k), default=end)
+            )
+            block.halt()
+        for level in reversed(found):
+            following = level.body[level.index + 1 :]
+            if following or level.nested is None:
+                block.emit(Op.GOTO, self.number, first_entry(following[0]) if following else end)
+                block.halt()
+                return
+            if level.nested.rounds > 1:
+                last = Label()
+                self._count_round(to, level.nested, last)
+                block.emit(Op.GOTO, self.number, first_entry(level.nested))
+                block.halt()
+                block.bind(last)
+                block.emit(Op.LOAD, self.rounds[level.nested.register], constant(0))
 
     def _after(self, duration: int, to: Expressions, ended: Label, running: Label | None) -> None:
         """Skip to `ended` once the entry has lasted long enough, else to `running` (None: fall through)."""

@@ -14,11 +14,11 @@ from socialai_dsl.compiler.cells import (
 from socialai_dsl.compiler.effects import ComputedStatuses, Homes
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import fold, mentions
+from socialai_dsl.compiler.step_order import first_entry
 from socialai_dsl.program import Counting, Field, Op, Register, Side
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.free_cells import EXACT
 from socialai_dsl.semantics.plans import (
-    FOR_EVER,
     CheckedScenario,
     Coloring,
     Drawn,
@@ -290,8 +290,7 @@ def first_state(frame: FramePlan) -> int:
     """The number of the state a frame begins in: entries of `steps` with `for: 0` are left out."""
     if frame.states:
         return state_names(frame).index(frame.start)
-    durations = [step.duration for step in frame.steps] + [FOR_EVER]
-    return next(k for k, duration in enumerate(durations) if duration != 0)
+    return first_entry(frame.order[0]) if frame.order else len(frame.steps)
 
 
 def _room(to: Expressions, room: RoomPlan) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, WithJsonSchema
 from pydantic.config import JsonDict
 
+from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import PRIMITIVES, Primitive
 
 
@@ -181,6 +183,26 @@ class Step(Effects):
     do: str | None = Field(None, description="an activity, until it is finished", examples=["go_to(exit)"])
     until: Expression | None = Field(None, description="a condition that finishes the step")
     for_: Expression | None = Field(None, alias="for", description="number of steps, or `ever`")
+    when: Expression | None = Field(
+        None, description="a condition; while it is false at the entry's turn, the entry is left out"
+    )
+    steps: Annotated[tuple[Step, ...], BeforeValidator(_as_tuple)] | None = Field(
+        None, description="nested entries, in place of an activity"
+    )
+    repeat: Expression | None = Field(
+        None, description="how often the nested `steps` are done, at most", examples=[3]
+    )
+    while_: Expression | None = Field(
+        None, alias="while", description="a condition for one more round of the nested `steps`"
+    )
+
+
+def _entries(steps: tuple[Step, ...], path: DataPath) -> Iterator[tuple[DataPath, Step]]:
+    for i, step in enumerate(steps):
+        if step.steps is None:
+            yield (*path, i), step
+        else:
+            yield from _entries(step.steps, (*path, i, "steps"))
 
 
 class Register(Model):
@@ -214,6 +236,15 @@ class Frame(Model):
     steps: Annotated[tuple[Step, ...], BeforeValidator(_as_tuple)] | None = Field(
         None, description="in place of states: activities in a row, each until it is finished"
     )
+
+    @property
+    def has_nested_steps(self) -> bool:
+        """Whether some entries of `steps` are nested."""
+        return any(step.steps is not None for step in self.steps or ())
+
+    def entries(self) -> Iterator[tuple[DataPath, Step]]:
+        """The entries of `steps`, nested ones in their place, each with where it is written in the frame."""
+        return _entries(self.steps or (), ("steps",))
 
 
 class Role(Model):
@@ -428,7 +459,9 @@ class UtteranceGrammar(Model):
     slots: dict[Word, Fillers] = Field(
         default_factory=dict,
         max_length=8,
-        description="in place of `nouns`, name: the values of <name>: words, things, members of the cast, `colors`, 1..6",
+        description=(
+            "in place of `nouns`, name: the values of <name>: words, things, members of the cast, `colors`, 1..6"
+        ),
         examples=[{"what": ["the ball", "the key"], "whom": "peers"}],
     )
 

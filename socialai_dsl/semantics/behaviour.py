@@ -13,6 +13,7 @@ from socialai_dsl.schema.scenario import Effects, FirstRule, Rule, State, Step, 
 from socialai_dsl.semantics import groups, object_facts, rows, texts
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.groups import performed
+from socialai_dsl.semantics.nesting import NestedPlanner
 from socialai_dsl.semantics.plans import (
     FOR_EVER,
     Activity,
@@ -339,8 +340,8 @@ def entries(played: PlayedFrame) -> Iterator[tuple[DataPath, str, Effects]]:
                     f"{address}.states.{name}.{part}[{rule.id or i}]",
                     rule,
                 )
-    for i, step in enumerate(played.model.steps or ()):
-        yield (*base, "steps", i), f"{address}.steps[{step.state or i}]", step
+    for path, step in played.model.entries():
+        yield (*base, *path), f"{address}.{dotted(path[:-1])}[{step.state or path[-1]}]", step
 
 
 def lines_of(resolver: Resolver, played: PlayedFrame) -> Spoken:
@@ -366,9 +367,12 @@ def plan(resolver: Resolver, played: PlayedFrame, spoken: Spoken) -> FramePlan:
     addresses = {path: address for path, address, _ in entries(played)}
     planner = _Planner(resolver, played, spoken, addresses)
     states = tuple(planner.state(name, state) for name, state in (frame.states or {}).items())
-    steps = tuple(planner.step(i, step) for i, step in enumerate(frame.steps or ()))
+    steps = tuple(planner.step(path, step) for path, step in frame.entries())
     start = (frame.start or next(iter(frame.states), "")) if frame.states else ""
-    return FramePlan(played.member, played.name, played.number, span, start, states, steps)
+    nested = (
+        NestedPlanner(resolver, played, planner.condition, steps).plan() if frame.has_nested_steps else ()
+    )
+    return FramePlan(played.member, played.name, played.number, span, start, states, steps, nesting=nested)
 
 
 def assigned(
@@ -455,7 +459,7 @@ class _Planner:
     def _rule(self, rule: ThenRule, path: DataPath, place: str) -> RulePlan:
         address = self.addresses[path]
         heard = self._hears(rule, path, address)
-        when = self._condition((*path, "when"), rule.when, address)
+        when = self.condition((*path, "when"), rule.when, address)
         do = rule.do if isinstance(rule, FirstRule) else None
         doing = self._activity((*path, "do"), do, address) if do is not None else None
         sets, causes = self._sets(rule, path, address), self._causes(rule, path, address)
@@ -534,7 +538,8 @@ class _Planner:
             return 0, Sited(late, f"{self.played.member}/{address}.after", resolver.findings.at(place))
         return 0, Sited(all_of([late, when.term]), when.site, when.span)
 
-    def _condition(self, path: DataPath, raw: object, address: str) -> Sited | None:
+    def condition(self, path: DataPath, raw: object, address: str) -> Sited | None:
+        """The condition at a path, of an entry with this address; None if none is written."""
         if raw is None:
             return None
         scope = self._scope(path, f"{address}.{path[-1]}")
@@ -601,11 +606,11 @@ class _Planner:
             findings.error("S301", message, findings.at(path, 0, len(target)), suggestion=near, hint=hint)
         return target
 
-    def step(self, index: int, step: Step) -> StepPlan:
-        path = (*self.played.path, "steps", index)
+    def step(self, written: DataPath, step: Step) -> StepPlan:
+        path = (*self.played.path, *written)
         address = self.addresses[path]
         doing = self._activity((*path, "do"), step.do, address)
-        name = f"{self.played.member}.{self.played.name}.steps[{index}]"
+        name = f"{self.played.member}.{self.played.name}.{dotted(written)}"
         self.resolver.readings.entries[name] = step
         duration, lasted = self._duration((*path, "for"), step.for_, f"{address}.for")
         head = (step.do or "").partition("(")[0].strip()
@@ -621,7 +626,9 @@ class _Planner:
             state=step.state,
             activity=doing or self._staying(path),
             span=self.resolver.findings.places.value_span(path),
-            until=self._condition((*path, "until"), step.until, address),
+            place=".".join(str(part) for part in written if part != "steps"),
+            when=self.condition((*path, "when"), step.when, address),
+            until=self.condition((*path, "until"), step.until, address),
             duration=duration,
             lasted=lasted,
             sets=self._sets(step, path, address),

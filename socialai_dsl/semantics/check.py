@@ -330,7 +330,7 @@ def _setters(scenario: Scenario) -> int:
         for state in (frame.states or {}).values()
         for rule in (*state.first, *state.then)
     ]
-    steps = [step for frame in scenario.frames.values() for step in frame.steps or ()]
+    steps = [step for frame in scenario.frames.values() for _, step in frame.entries()]
     own = sum(bool(entry.set) for entry in (*rules, *steps))
     return own + sum(bool(rule.set) for rule in scenario.rules)
 

@@ -673,7 +673,7 @@ def memories(resolver: Resolver) -> Iterator[MemoryPlan]:
 def performs(frame: Frame) -> bool:
     """Whether who follows a frame may perform a sequence, and so say whatever the grammar can."""
     states = (frame.states or {}).values()
-    doing = [step.do for step in frame.steps or ()] + [state.do for state in states]
+    doing = [step.do for _, step in frame.entries()] + [state.do for state in states]
     doing += [rule.do for state in states for rule in state.first]
     return any(do is not None and "perform" in do for do in doing)
 

@@ -138,7 +138,7 @@ def _sources(scenario: Scenario) -> dict[str, list[object]]:
 
 def _entries(frame: Frame) -> Iterator[Effects]:
     """Every rule and step of a frame."""
-    yield from frame.steps or ()
+    yield from (step for _, step in frame.entries())
     for state in (frame.states or {}).values():
         yield from (*state.first, *state.then)
 

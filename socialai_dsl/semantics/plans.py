@@ -163,7 +163,8 @@ class StepPlan:
     """An entry of `steps`.
 
     Attributes:
-        state: its name, if any. until: what ends it.
+        state: its name, if any. place: its number; of a nested entry those on the way to it, `2.0`.
+        when: without it, the entry is left out. until: what ends it.
         duration: for how many turns, or FOR_EVER.
         lasted: whether it has lasted for as many turns as a value that is computed says.
     """
@@ -172,6 +173,8 @@ class StepPlan:
     state: str | None
     activity: Activity
     span: Span
+    place: str = ""
+    when: Sited | None = None
     until: Sited | None = None
     duration: int | None = None
     lasted: Sited | None = None
@@ -183,6 +186,25 @@ class StepPlan:
     def ends_with_its_activity(self) -> bool:
         """Whether nothing else says how long it lasts."""
         return self.until is None and self.duration is None and self.lasted is None
+
+
+@dataclass(frozen=True, slots=True)
+class NestedSteps:
+    """Entries of `steps` that are repeated, or left out together.
+
+    Attributes:
+        body: numbers of entries, and what is nested in turn; not empty.
+        rounds: how often at most, at least once. register: the path of what counts the rounds that are over.
+        when: without it, all of them are left out. going: what a round needs to begin; until: what prevents it, but for
+            the first.
+    """
+
+    body: tuple[int | NestedSteps, ...]
+    rounds: int
+    register: str
+    when: Sited | None = None
+    going: Sited | None = None
+    until: Sited | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,6 +220,18 @@ class FramePlan:
     steps: tuple[StepPlan, ...] = ()
     written: bool = True
     """False: nobody wrote it; it is there for who only believes something."""
+    nesting: tuple[int | NestedSteps, ...] = ()
+    """Where some entries of `steps` are nested: their numbers in order, without those of `for: 0`."""
+
+    @property
+    def order(self) -> tuple[int | NestedSteps, ...]:
+        """The numbers of the entries of `steps` that are not left out for good, nested as they are written."""
+        return self.nesting or tuple(k for k, step in enumerate(self.steps) if step.duration != 0)
+
+    @property
+    def in_a_row(self) -> bool:
+        """Whether every entry of `steps` follows the one before it."""
+        return not self.nesting and all(step.when is None for step in self.steps)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,9 +10,10 @@ from itertools import product
 from typing import Final
 
 from socialai_dsl.diagnostics import did_you_mean
-from socialai_dsl.schema.scenario import Frame, Scenario, State
+from socialai_dsl.grammar.ast import every
+from socialai_dsl.schema.scenario import Frame, Scenario, State, Step
 from socialai_dsl.semantics import plans, terms
-from socialai_dsl.semantics.plans import CheckedScenario, Effect, FramePlan, RulePlan
+from socialai_dsl.semantics.plans import CheckedScenario, Effect, FramePlan, NestedSteps, RulePlan
 from socialai_dsl.semantics.scope import Findings, frames_of
 from socialai_dsl.semantics.terms import (
     Chance,
@@ -208,16 +209,45 @@ def _told(circle: list[str]) -> str:
 
 
 def _check_steps(frame: Frame, path: DataPath, findings: Findings) -> None:
-    steps = frame.steps or ()
-    names: dict[str, int] = {}
-    for i, step in enumerate(steps):
+    names: dict[str, str] = {}
+    for place, step in frame.entries():
         if step.state is not None and step.state in names:
-            span = findings.at((*path, "steps", i, "state"), 0, len(step.state))
+            span = findings.at((*path, *place, "state"), 0, len(step.state))
             findings.error("S213", f"`{step.state}` is the name of step {names[step.state]} already", span)
         if step.state is not None:
-            names.setdefault(step.state, i)
-        if step.for_ == "ever" and step.until is None and i + 1 < len(steps):
-            span = findings.places.value_span((*path, "steps", i + 1))
+            names.setdefault(step.state, ".".join(str(part) for part in place if part != "steps"))
+    _check_order(frame.steps or (), (*path, "steps"), findings)
+
+
+_OF_AN_ENTRY = ("do", "for", "state", "set", "cause", "say")
+_OF_NESTED_STEPS = ("repeat", "while")
+
+
+def _check_order(steps: Sequence[Step], path: DataPath, findings: Findings) -> None:
+    """Keys that belong to an entry, or to nested steps; entries after one that lasts for ever."""
+    for i, step in enumerate(steps):
+        place = (*path, i)
+        nested = step.steps is not None
+        written = findings.part(place)
+        keys = written if isinstance(written, dict) else {}
+        for key in keys.keys() & {*(_OF_AN_ENTRY if nested else _OF_NESTED_STEPS)}:
+            span = findings.places.key_span((*place, key))
+            message = f"`{key}` belongs to an entry, not to nested `steps`"
+            if not nested:
+                message = f"`{key}` belongs to nested `steps`: `{{repeat: 3, steps: [...]}}`"
+            findings.error("S107", message, span)
+        if step.steps is not None:
+            bounds = [key for key in ("while", "until") if key in keys]
+            if step.repeat is None and bounds:
+                message = f"`{bounds[0]}` needs `repeat`: how many rounds there are at most"
+                findings.error("S105", message, findings.places.key_span((*place, bounds[0])))
+            if not step.steps:
+                findings.error(
+                    "S105", "nested `steps` need an entry", findings.places.key_span((*place, "steps"))
+                )
+            _check_order(step.steps, (*place, "steps"), findings)
+        elif step.for_ == "ever" and step.until is None and step.when is None and i + 1 < len(steps):
+            span = findings.places.value_span((*path, i + 1))
             hint = "the step before it lasts for ever"
             findings.warning("W306", "this step is never reached", span, hint=hint)
             return
@@ -336,6 +366,9 @@ def check_possible(checked: CheckedScenario, findings: Findings) -> None:
     for span, conditions in _by_place(_rules(checked)):
         if (why := possible.never(conditions)) is not None:
             findings.warning("W311", "this rule never fires: its condition can never hold", span, hint=why)
+    for span, conditions in _by_place(_conditions_of_steps(checked)):
+        if (why := possible.never(conditions)) is not None:
+            findings.warning("W314", "these steps are always left out: this can never hold", span, hint=why)
     for span, conditions in _by_place(_untils(checked)):
         if (why := possible.never(conditions)) is not None:
             findings.warning("W314", "this step can never end: `until` can never hold", span, hint=why)
@@ -378,6 +411,15 @@ def _rules(checked: CheckedScenario) -> Iterator[tuple[Span, Sited]]:
     for rule in (*in_frames, *checked.rules):
         if rule.when is not None:
             yield rule.when.span, rule.when
+
+
+def _conditions_of_steps(checked: CheckedScenario) -> Iterator[tuple[Span, Sited]]:
+    for frame in checked.frames:
+        nested = every(NestedSteps, frame.nesting)
+        asked = [step.when for step in frame.steps] + [
+            c for block in nested for c in (block.when, block.going)
+        ]
+        yield from ((condition.span, condition) for condition in asked if condition is not None)
 
 
 def _untils(checked: CheckedScenario) -> Iterator[tuple[Span, Sited]]:

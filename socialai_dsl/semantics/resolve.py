@@ -335,7 +335,7 @@ def _is_in_state(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
         called = quoted(node.subject) if node.subject is not None else member
         raise resolver.fail("S310", f"`{called}` follows no frame, so it has no states", node, scope)
     states = list(frame.model.states or ())
-    states += [step.state for step in frame.model.steps or () if step.state] + (
+    states += [step.state for _, step in frame.model.entries() if step.state] + (
         [FINISHED] if frame.model.steps else []
     )
     if not isinstance(argument, ast.Name | ast.Truth):

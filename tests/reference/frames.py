@@ -9,7 +9,7 @@ from socialai_dsl.grammar import ast
 from tests.reference import bodies, chance, speech
 from tests.reference.effects import Cause, affect, assign, assignments, causes
 from tests.reference.evaluate import Context, NothingFoundError, evaluate, holds, pattern
-from tests.reference.script import Frame, Rule, Step
+from tests.reference.script import Entry, Frame, Rule, Step
 from tests.reference.source import Sources
 from tests.reference.world import Entity, World
 
@@ -133,37 +133,115 @@ class FrameRunner:
     # -- frames with steps ---------------------------------------------------------------------------------
 
     def begin_step(self, frame: Frame) -> Turn:
-        """The activity of the current entry; entries that are fulfilled already are skipped without a turn."""
-        assert frame.steps is not None
+        """The activity of the current entry; what is left out or fulfilled already is skipped without a turn."""
         assert isinstance(self.me.state, int)
-        self.skip_empty(frame)
-        while self.me.state < len(frame.steps):
-            entry = frame.steps[self.me.state]
-            if entry.do is None:
+        while self.me.state < len(frame.entries):
+            entry = frame.entries[self.me.state]
+            if self.me.clock == 0 and not self.begins(frame, entry):
+                continue
+            if entry.step.do is None:
                 return Turn(bodies.Activity("stay"))
-            activity = self.activity(f"{self.entry_path(entry)}.do", entry.do)
-            bare = entry.until is None and entry.for_ is None and not (entry.say or entry.set or entry.cause)
+            activity = self.activity(f"{self.path}.{entry.address}.do", entry.step.do)
+            timed = entry.step.until is not None or entry.step.for_ is not None
+            bare = not (timed or entry.step.say or entry.step.set or entry.step.cause)
             if self.me.gone or not (bare and activity.fulfilled(self.world, self.me)):
                 return Turn(activity)
-            self.advance(frame)
+            self.go_on(frame, self.me.state, entry.inside)
         return Turn(bodies.Activity("stay"))
+
+    def begins(self, frame: Frame, entry: Entry) -> bool:
+        """Whether the current entry begins, and with it the rounds of nested steps that it is the first of."""
+        number = self.me.state
+        assert isinstance(number, int)
+        for depth, (address, nested) in enumerate(entry.inside):
+            within = self.within(frame, address)
+            inner_rounds = any(self.me.rounds.get(inner, 0) for inner, _ in entry.inside[depth + 1 :])
+            if within[0] == number and not inner_rounds and not self.round_begins(address, nested):
+                for inner, _ in entry.inside[depth:]:
+                    self.me.rounds[inner] = 0
+                self.go_on(frame, within[-1], entry.inside[:depth])
+                return False
+        if entry.step.when is None or self.is_true(f"{entry.address}.when", entry.step.when):
+            return True
+        self.go_on(frame, number, entry.inside)
+        return False
+
+    def round_begins(self, address: str, nested: Step) -> bool:
+        """Whether the first or another round of nested steps begins, as far as their conditions go."""
+        first = not self.me.rounds.get(address, 0)
+        if first and nested.when is not None and not self.is_true(f"{address}.when", nested.when):
+            return False
+        if nested.while_ is not None and not self.is_true(f"{address}.while", nested.while_):
+            return False
+        return first or nested.until is None or not self.is_true(f"{address}.until", nested.until)
+
+    def is_true(self, address: str, source: Any) -> bool:
+        """Whether a condition of steps holds; where something is not found it does not."""
+        try:
+            return holds(self.expression(f"{self.path}.{address}", source), self.context())
+        except NothingFoundError:
+            return False
 
     def end_step(self, frame: Frame, turn: Turn) -> None:
         """Whether the entry ends with this turn; its effects happen when it does."""
-        assert frame.steps is not None
         assert isinstance(self.me.state, int)
-        if self.me.state == len(frame.steps):
+        if self.me.state == len(frame.entries):
             return
-        entry = frame.steps[self.me.state]
-        path = self.entry_path(entry)
-        if not self.entry_ends(entry, path, turn.activity):
+        entry = frame.entries[self.me.state]
+        path = f"{self.path}.{entry.address}"
+        if not self.entry_ends(entry.step, path, turn.activity):
             return
         try:
-            outcome = self.consequence(entry, path, self.context())
+            outcome = self.consequence(entry.step, path, self.context())
         except NothingFoundError:
             return
         self.perform(outcome, turn)
-        self.advance(frame)
+        self.go_on(frame, self.me.state, entry.inside)
+
+    def go_on(self, frame: Frame, number: int, inside: tuple[tuple[str, Step], ...]) -> None:
+        """What comes after an entry, or after nested steps that end with it: `inside` are those around."""
+        self.me.clock = 0
+        for address, nested in reversed(inside):
+            within = self.within(frame, address)
+            later = [one for one in within if one > number]
+            if later:
+                self.me.state = later[0]
+                return
+            over = self.me.rounds.get(address, 0) + 1
+            if over < self.number_of_rounds(address, nested):
+                self.me.rounds[address], self.me.state = over, within[0]
+                return
+            self.me.rounds[address] = 0
+        end = len(frame.entries)
+        self.me.state = min((one for one in self.present(frame) if one > number), default=end)
+
+    def skip_empty(self, frame: Frame) -> None:
+        """Before the first turn: the first entry that is not left out for good."""
+        self.me.state = min(self.present(frame), default=len(frame.entries))
+
+    def within(self, frame: Frame, address: str) -> list[int]:
+        """The entries of nested steps that are not left out for good."""
+        entries = frame.entries
+        return [one for one in self.present(frame) if address in dict(entries[one].inside)]
+
+    def present(self, frame: Frame) -> list[int]:
+        """The numbers of all entries but those of `for: 0`, and those in nested steps with `repeat: 0`."""
+        found = []
+        for number, entry in enumerate(frame.entries):
+            rounds = [self.number_of_rounds(address, nested) for address, nested in entry.inside]
+            try:
+                lasts = entry.step.for_ is None or self.turns_of(entry.step, entry.address) != 0
+            except NothingFoundError:
+                lasts = True
+            if lasts and all(rounds):
+                found.append(number)
+        return found
+
+    def number_of_rounds(self, address: str, nested: Step) -> int:
+        """How often nested steps are done at most."""
+        if nested.repeat is None:
+            return 1
+        return int(evaluate(self.expression(f"{self.path}.{address}.repeat", nested.repeat), self.context()))
 
     def entry_ends(self, entry: Step, path: str, activity: bodies.Activity) -> bool:
         """`for: n` turns, or until `until` holds, else until the activity is finished."""
@@ -171,7 +249,7 @@ class FrameRunner:
             return activity.finished(self.world, self.me)
         if entry.for_ is not None:
             try:
-                turns = self.turns_of(entry)
+                turns = self.turns_of(entry, path.removeprefix(f"{self.path}."))
             except NothingFoundError:
                 turns = None
             if turns is not None and self.me.clock >= turns:
@@ -183,38 +261,11 @@ class FrameRunner:
         except NothingFoundError:
             return False
 
-    def turns_of(self, entry: Step) -> int | None:
+    def turns_of(self, entry: Step, address: str) -> int | None:
         """How many turns `for:` asks for; None for `ever`."""
         if entry.for_ == "ever":
             return None
-        turns = evaluate(self.expression(f"{self.entry_path(entry)}.for", entry.for_), self.context())
-        return int(turns)
-
-    def advance(self, frame: Frame) -> None:
-        """Goes to the next entry."""
-        assert isinstance(self.me.state, int)
-        self.me.state += 1
-        self.me.clock = 0
-        self.skip_empty(frame)
-
-    def skip_empty(self, frame: Frame) -> None:
-        """`for: 0` means that the entry is skipped."""
-        assert frame.steps is not None
-        assert isinstance(self.me.state, int)
-        while self.me.state < len(frame.steps):
-            entry = frame.steps[self.me.state]
-            if self.me.clock > 0 or entry.for_ is None:
-                return
-            try:
-                if self.turns_of(entry) != 0:
-                    return
-            except NothingFoundError:
-                return
-            self.me.state += 1
-
-    def entry_path(self, entry: Step) -> str:
-        """Where an entry is written: by its name if it has one, else by its number."""
-        return f"{self.path}.steps[{entry.state or self.me.state}]"
+        return int(evaluate(self.expression(f"{self.path}.{address}.for", entry.for_), self.context()))
 
     # -- rules ---------------------------------------------------------------------------------------------
 

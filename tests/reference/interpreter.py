@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -94,7 +95,7 @@ class Reference:
             gestures="pointing" in scenario.observe.channels,
             canvas=self.canvas,
             step_names={
-                name: [entry.state for entry in frame.steps]
+                name: [entry.step.state for entry in frame.entries]
                 for name, frame in scenario.frames.items()
                 if frame.steps is not None
             },
@@ -399,21 +400,38 @@ class Reference:
             "kind_code": member.kind_code,
             "state": self.state_name(member),
             "clock": member.clock,
-            "registers": {name: plain(value) for name, value in member.registers.items()},
+            "registers": {name: plain(value) for name, value in member.registers.items()}
+            | self.rounds(member),
             "believes": {name: plain(value) for name, value in member.believes.items()},
             "gone": member.gone,
             "was_poked": member.was_poked,
             "once": sorted(member.fired_once),
         }
 
-    def state_name(self, member: Entity) -> str | int | None:
-        """The state it is in; an entry of `steps` by its name or number, `finished` after the last."""
+    def rounds(self, member: Entity) -> dict[str, int]:
+        """How many rounds of nested steps are over, where there are several: `rounds[1.2]` of steps[1].steps[2]."""
+        frame = self.sources.frame_of(member.frame)
+        runner = FrameRunner(self.sources, self.world, member)
+        entries = [] if frame is None else [frame.entries[number] for number in runner.present(frame)]
+        several = {
+            address: ".".join(re.findall(r"\d+", address))
+            for entry in entries
+            for address, nested in entry.inside
+            if runner.number_of_rounds(address, nested) > 1
+        }
+        return {f"rounds[{name}]": member.rounds.get(address, 0) for address, name in several.items()}
+
+    def state_name(self, member: Entity) -> str | None:
+        """The state it is in; an entry of `steps` by its name or by where it stands, `finished` after the last."""
         if not isinstance(member.state, int):
             return member.state
         names = self.world.step_names[str(member.frame)]
         if member.state == len(names):
             return "finished"
-        return names[member.state] or member.state
+        frame = self.sources.frame_of(member.frame)
+        assert frame is not None
+        place = re.findall(r"\d+", frame.entries[member.state].address)
+        return names[member.state] or f"step{'.'.join(place)}"
 
     @staticmethod
     def describe_object(thing: Entity) -> dict[str, Any]:

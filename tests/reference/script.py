@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any, Final
@@ -63,6 +63,31 @@ class Step:
     set: dict[str, Any] = field(default_factory=dict)
     cause: tuple[str, ...] = ()
     say: str | None = None
+    when: Any = None
+    steps: tuple[Step, ...] | None = None  # nested, in place of an activity
+    repeat: Any = None
+    while_: Any = None
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An entry of `steps`: where it is written, and the nested steps that it is in, outermost first."""
+
+    step: Step
+    address: str
+    inside: tuple[tuple[str, Step], ...] = ()
+
+
+def entries_of(
+    steps: tuple[Step, ...], before: str = "", inside: tuple[tuple[str, Step], ...] = ()
+) -> Iterator[Entry]:
+    """The entries of `steps` in the order in which they are written."""
+    for number, step in enumerate(steps):
+        here = f"{before}steps[{number}]"
+        if step.steps is None:
+            yield Entry(step, f"{before}steps[{step.state or number}]", inside)
+        else:
+            yield from entries_of(step.steps, f"{here}.", (*inside, (here, step)))
 
 
 @dataclass(frozen=True)
@@ -84,6 +109,11 @@ class Frame:
     start: str | None = None
     states: dict[str, State] | None = None
     steps: tuple[Step, ...] | None = None
+
+    @property
+    def entries(self) -> list[Entry]:
+        """The entries of `steps`, nested ones in their place."""
+        return list(entries_of(self.steps or ()))
 
 
 @dataclass(frozen=True)
@@ -425,6 +455,11 @@ def rules(entries: Any) -> tuple[Rule, ...]:
     return tuple(record(Rule, entry, {"hears": many, "cause": many}) for entry in entries)
 
 
+def steps_of(steps: Any) -> tuple[Step, ...]:
+    """Entries, with those that are nested."""
+    return tuple(record(Step, step, {"cause": many, "steps": steps_of}) for step in steps)
+
+
 def frame_of(entry: Any) -> Frame:
     """A frame."""
     return record(
@@ -434,7 +469,7 @@ def frame_of(entry: Any) -> Frame:
             "states": lambda states: {
                 name: record(State, state, {"first": rules, "then": rules}) for name, state in states.items()
             },
-            "steps": lambda steps: tuple(record(Step, step, {"cause": many}) for step in steps),
+            "steps": steps_of,
         },
     )
 

@@ -92,7 +92,7 @@ class Vocabulary(Words):
         frame_name, frame = self.version(member).frame, self.frame(member)
         if frame is None:
             return []
-        rules: list[Any] = list(frame.steps or ())
+        rules: list[Any] = [entry.step for entry in frame.entries]
         for state in (frame.states or {}).values():
             rules += [*state.first, *state.then]
         return [
@@ -256,7 +256,7 @@ class Vocabulary(Words):
         frame_name, frame = self.version(member).frame, self.frame(member)
         if frame is None or name not in frame.let:
             return []
-        entries: list[Any] = list(frame.steps or ())
+        entries: list[Any] = [entry.step for entry in frame.entries]
         for state in (frame.states or {}).values():
             entries += [*state.first, *state.then]
         start = frame.let[name]
@@ -379,6 +379,8 @@ class Vocabulary(Words):
     def performs(self, member: Who) -> bool:
         """Whether it may say what the grammar has: whoever performs a sequence."""
         frame = self.frame(member)
-        holders: list[Any] = [] if frame is None else [*(frame.steps or ()), *(frame.states or {}).values()]
+        if frame is None:
+            return False
+        holders: list[Any] = [*(entry.step for entry in frame.entries), *(frame.states or {}).values()]
         holders += [rule for holder in holders for rule in getattr(holder, "first", ())]
         return any("perform(" in str(holder.do) for holder in holders)

@@ -156,6 +156,7 @@ class Entity:
     frame: str | None = None
     state: str | int | None = None
     clock: int = 0
+    rounds: dict[str, int] = field(default_factory=dict)  # of nested steps: how many are over
     slots: dict[str, Any] = field(default_factory=dict)
     registers: dict[str, Any] = field(default_factory=dict)
     ranges: dict[str, tuple[int, int]] = field(default_factory=dict)  # of registers that saturate

@@ -58,10 +58,25 @@ class Behaviour:
     def by_steps(self, frame: Frame) -> dict[str, Any]:
         """A frame with steps, of which some have names."""
         where = Where(frame, acts=self.acts)
-        steps = [self.step(name, where) for name in frame.states if name != "finished"]
+        entries = [self.step(name, where) for name in frame.states if name != "finished"]
         if filled := self.filled(frame.rows, where):
-            steps[0]["set"] = filled
-        return {"steps": steps}
+            entries[0]["set"] = filled
+        return {"steps": self.nested(entries, where, 2)}
+
+    def nested(self, entries: list[dict[str, Any]], where: Where, depth: int) -> list[dict[str, Any]]:
+        """The same entries, some of them in nested steps."""
+        if depth == 0 or not self.often(0.4):
+            return entries
+        first = self.rng.randrange(len(entries))
+        last = self.rng.randint(first, len(entries) - 1)
+        made: dict[str, Any] = {"steps": self.nested(entries[first : last + 1], where, depth - 1)}
+        if self.often(0.7):
+            made["repeat"] = self.rng.choice((0, 1, 2, 2, 3, 4))
+            bounds = self.rng.choice(((), (), ("while",), ("until",), ("while", "until")))
+            made |= {key: self.phrases.condition(where) for key in bounds}
+        if self.often(0.3):
+            made["when"] = self.phrases.condition(where)
+        return [*entries[:first], made, *entries[last + 1 :]]
 
     def step(self, name: str, where: Where) -> dict[str, Any]:
         """One entry."""
@@ -73,6 +88,8 @@ class Behaviour:
             made["for"] = self.rng.randint(0 if not endless else 1, 3)
         if self.often(0.3):
             made["until"] = self.phrases.condition(where)
+        if self.often(0.2):
+            made["when"] = self.phrases.condition(where)
         return made | self.effects(where, 0.4)
 
     def rule(self, where: Where, states: list[str], later: list[str], first: bool) -> dict[str, Any]:

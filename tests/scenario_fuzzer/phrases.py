@@ -61,9 +61,10 @@ class Phrases:
             return value()
         self.choices += 1
         asked = self.plain_condition(where) if self.often(0.3) else self.short_condition(where)
-        made = f"({value()} if {asked} else {value()})"
+        one = value()
+        made = f"({one} if {asked} else {value()})"
         self.choices -= 1
-        return made
+        return made if len(made) < 120 else one
 
     def short_condition(self, where: Where) -> str:
         """A condition of few words."""
