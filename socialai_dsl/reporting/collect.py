@@ -279,12 +279,15 @@ def _read(path: Path, form: TypeAdapter[Content], problems: list[str]) -> Conten
 def _rooms(path: Path, problems: list[str]) -> pd.Series:
     """Success of each test episode that a run lists; nothing where it lists none."""
     try:
-        return pd.read_csv(path, usecols=["episode", "success"], dtype=int, index_col="episode")["success"]
+        rooms = pd.read_csv(path, usecols=["episode", "success"], dtype=int, index_col="episode")["success"]
+        if not (rooms.isin([0, 1]).all() and rooms.index.is_unique):
+            raise ValueError
+        return rooms
     except FileNotFoundError:
         pass
     except OSError as error:
         problems.append(f"{path.name} cannot be read ({error.strerror})")
-    except ValueError:  # which all of the parser's errors are
+    except (ValueError, OverflowError):  # among the former are all of the parser's
         problems.append(f"{path.name} is damaged")
     return pd.Series(dtype=float)
 

@@ -83,7 +83,16 @@ def test_damaged_files_are_problems_of_their_run(folder: Path, name: str, conten
 
 
 @pytest.mark.parametrize(
-    "content", ["episode,success\n0,maybe\n", "number\n0\n", "episode,success\n0\n", "\xff\x00\n"]
+    "content",
+    [
+        "episode,success\n0,maybe\n",
+        "number\n0\n",
+        "episode,success\n0\n",
+        "\xff\x00\n",
+        "episode,success\n0,1\n0,0\n",
+        "episode,success\n0,7\n",
+        "episode,success\n0,99999999999999999999\n",
+    ],
 )
 def test_a_damaged_list_of_episodes_is_a_problem(folder: Path, content: str) -> None:
     (folder / "runs" / "c0-s2" / "episodes.csv").write_text(content, encoding="latin-1")
