@@ -110,6 +110,7 @@ def refused(tmp_path_factory: pytest.TempPathFactory) -> tuple[int, int, int, di
     return before, after, size, took
 
 
+@pytest.mark.thorough("writes and reads files of megabytes")
 def test_what_is_too_large_is_refused_in_little_memory(refused) -> None:
     _, most, size, took = refused
     assert size > 100e6

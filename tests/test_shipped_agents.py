@@ -173,6 +173,7 @@ def test_training_options_make_no_sense_for_it(capsys: Capture) -> None:
     assert f"--frames: the agent '{PREFIX}{QUICK}' is not trained" in capsys.readouterr().err
 
 
+@pytest.mark.thorough("runs every command")
 def test_every_command_that_takes_a_trained_agent_takes_it(tmp_path: Path, capsys: Capture) -> None:
     agent, few = PREFIX + QUICK, ["--episodes", "10"]
 

@@ -91,6 +91,7 @@ LOOPS = [
 
 
 @pytest.mark.parametrize(("train", "words"), LOOPS)
+@pytest.mark.thorough("trains each peer")
 def test_learns_what_pays(train: Any, words: int) -> None:
     torch.manual_seed(0)
     envs = RaisedHand(16)
@@ -107,6 +108,7 @@ def test_learns_what_pays(train: Any, words: int) -> None:
 
 @pytest.mark.parametrize(("train", "words"), LOOPS)
 @pytest.mark.parametrize("trunk", [PaperTrunk, CellTrunk])
+@pytest.mark.thorough("trains each peer")
 def test_gradients_reach_every_weight(train: Any, words: int, trunk: type[nn.Module]) -> None:
     made: list[tuple[nn.Module, dict[str, Tensor]]] = []
 

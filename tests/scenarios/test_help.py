@@ -406,6 +406,7 @@ class TestHelper:
 
 
 @pytest.mark.parametrize("name", [*EXITER, *HELPER])
+@pytest.mark.thorough("plays many episodes by chance")
 def test_whatever_the_agent_does_nobody_leaves_without_eye_contact(name: str) -> None:
     rng, successes = random.Random(name), 0
     for seed in range(600):

@@ -363,6 +363,7 @@ def test_the_rooms_can_be_solved(problem: str, cue: str) -> None:
 
 
 @pytest.mark.parametrize("problem", PROBLEMS)
+@pytest.mark.thorough("plays many rooms of every problem")
 def test_they_can_be_solved_without_a_cue_and_with_misleading_ones(problem: str) -> None:
     assert solved(school(problem, "oracle"), 100) == 100
     for cue in ("color", "feedback", "pointing"):
@@ -417,6 +418,7 @@ class TestAlone:
 
     @pytest.mark.parametrize("variant", ["alone", "asocial", "asocial+alone", "alone+pointing"])
     @pytest.mark.parametrize("problem", PROBLEMS)
+    @pytest.mark.thorough("plays many rooms of every problem")
     def test_nothing_looks_odd(self, problem: str, variant: str) -> None:
         assert sd.load(school(problem, variant)).warnings == ()
 

@@ -350,6 +350,7 @@ print(json.dumps({{"hit": hit, "written": last, "files": sorted(path.name for pa
 """
 
 
+@pytest.mark.thorough("starts or kills many writers")
 def test_kills_while_writing_leave_no_unreadable_file(tmp_path: Path) -> None:
     """A process that does nothing but write is killed 50 times, many of them in the middle of a file."""
     result = subprocess.run(
@@ -368,6 +369,7 @@ def test_kills_while_writing_leave_no_unreadable_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO, errno.EROFS, errno.EDQUOT])
 @pytest.mark.parametrize("operation", ["open", "write", "fsync", "rename", "fsync of the folder"])
+@pytest.mark.thorough("starts or kills many writers")
 def test_a_write_that_fails_leaves_the_last_one_valid(
     operation: str, number: int, session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

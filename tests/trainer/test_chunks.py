@@ -129,6 +129,7 @@ def test_memories_not_yet_known_are_not_numbers() -> None:
 # -- batch statistics ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough("trains the paper's network")
 def test_batch_norm_sees_the_environments_while_acting_and_one_step_of_all_chunks_while_learning() -> None:
     config = configure(net="paper-reference")
     session = Session.start(config, EchoEnvs(16))

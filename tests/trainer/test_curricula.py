@@ -189,6 +189,7 @@ def test_a_curriculum_chooses_from_the_first_episode_on() -> None:
 
 
 @pytest.mark.parametrize("name", [MINE, "progress"])
+@pytest.mark.thorough("trains three times")
 def test_a_resumed_run_goes_on_to_the_same_bits(name: str, tmp_path: Path) -> None:
     whole = read(train(config(128 * 6, name), envs(), tmp_path / "whole"))
     train(config(128 * 3, name), envs(), tmp_path / "parts")

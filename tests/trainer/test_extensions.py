@@ -192,6 +192,7 @@ def test_a_file_that_was_changed_is_read_again(tmp_path: Path) -> None:
         assert build_net("mine:Net", SPEC, 0, folder=tmp_path).kind_size == size
 
 
+@pytest.mark.thorough("trains three times")
 def test_a_run_with_everything_of_ones_own_resumes_to_the_same_bits(
     tmp_path: Path, small_config: Any
 ) -> None:

@@ -44,6 +44,7 @@ def rows(run_dir: Path) -> list[dict[str, Any]]:
     return [{k: v for k, v in json.loads(line).items() if k != "frames_per_second"} for line in lines]
 
 
+@pytest.mark.thorough("trains for seconds")
 def test_it_learns_to_repeat_a_word_it_heard(tmp_path: Path) -> None:
     config = RunConfig(
         frames=45_000, envs=128, horizon=16, lr=2e-3, threads=1, tensorboard=False, bonus="none"
@@ -67,6 +68,7 @@ def test_it_learns_to_repeat_a_word_it_heard(tmp_path: Path) -> None:
         ("paper-reference", "none", 1, "chunks"),
     ],
 )
+@pytest.mark.thorough("trains for seconds")
 def test_a_run_stopped_three_times_ends_with_the_same_bits(
     net: str, bonus: str, threads: int, update: str, tmp_path: Path, small_config: Any
 ) -> None:
@@ -269,6 +271,7 @@ def test_figures_that_are_not_finite_stop_the_run(
     check_stopped(tmp_path, "approx_kl of the update is not a finite number", caught)
 
 
+@pytest.mark.thorough("trains for seconds")
 def test_a_full_disk_stops_the_run_and_spares_the_last_checkpoint(tmp_path: Path) -> None:
     """A child process may write files of 100 kB at most from its second checkpoint on, as on a full disk."""
     script = f"""
@@ -301,6 +304,7 @@ except TrainingStopped as error:
 
 
 @pytest.mark.parametrize("kills", [2, pytest.param(50, marks=[pytest.mark.slow, pytest.mark.timeout(900)])])
+@pytest.mark.thorough("kills and resumes processes")
 def test_a_killed_run_resumes_to_the_same_bits(kills: int, tmp_path: Path, small_config: Any) -> None:
     """SIGKILL at arbitrary moments, checkpoints after every update so that many kills hit a write."""
     script = f"""

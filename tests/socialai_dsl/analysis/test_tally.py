@@ -77,6 +77,7 @@ def explained(name: str, scripted: bool) -> tuple[Counter[tuple[str, str]], Coun
     ids=str,
 )
 @pytest.mark.parametrize("together", [1, 3, 7])
+@pytest.mark.thorough("plays every scenario step by step")
 def test_it_counts_what_happened(name: str, scripted: bool, together: int) -> None:
     counted = played(name, together, scripted)
     fired, endings = explained(name, scripted)

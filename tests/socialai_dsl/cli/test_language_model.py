@@ -70,6 +70,7 @@ def script(scenario: str) -> Any:
     return respond
 
 
+@pytest.mark.thorough("plays many episodes in text")
 def test_a_model_that_knows_the_script_does_what_the_script_does(tmp_path: Path, capsys: Capture) -> None:
     assert main(["evaluate", "oracle", "--on", "talkitout", "--episodes", "8", "--json"]) == 0
     (expected,) = json.loads(capsys.readouterr().out)
@@ -443,6 +444,7 @@ def test_the_truth_is_right_and_a_wrong_answer_is_not(tmp_path: Path, capsys: Ca
     assert [results[0][key] for key in same] == [results[1][key] for key in same]
 
 
+@pytest.mark.thorough("plays many episodes in text")
 def test_who_guesses_is_right_by_chance(tmp_path: Path) -> None:
     draw = random.Random(1)
     with endpoint(knowing("cointhief", lambda question: draw.choice(question.answers))) as stub:
@@ -474,6 +476,7 @@ def test_questions_stay_apart_from_play_unless_they_are_kept(tmp_path: Path) -> 
     assert "probes" not in figures(tmp_path / "off", BELIEF)["eval"]
 
 
+@pytest.mark.thorough("plays many episodes in text")
 def test_answers_are_paid_for_once_and_count_for_the_budget(tmp_path: Path, capsys: Capture) -> None:
     with endpoint(knowing(BELIEF, lambda question: f"Answer: {question.right}")) as stub:
         whole = tmp_path / "whole"

@@ -106,6 +106,7 @@ def test_a_run_says_no_to_another_scenario(trained: Path, capsys: Capture) -> No
     assert "holds a run already" in capsys.readouterr().err
 
 
+@pytest.mark.thorough("trains twice")
 def test_a_resumed_run_equals_one_that_never_stopped(trained: Path) -> None:
     shutil.copytree(trained, "stopped")
     assert run_main(["--resume", "stopped", "--frames", "4000"]) == 0
@@ -194,6 +195,7 @@ BONUSES = {
 }
 
 
+@pytest.mark.thorough("trains twice")
 def test_hyper_parameters_are_the_trainer_s_and_stay_with_the_run() -> None:
     given = [
         "--hyper",
@@ -411,6 +413,7 @@ def test_a_scripted_scenario_is_guided_unless_another_recipe_is_asked_for(capsys
     assert (result_of("plain")["recipe"], result_of("plain")["guide"]) == ("plain", "none")
 
 
+@pytest.mark.thorough("trains twice")
 def test_a_suite_of_which_one_member_has_no_script(capsys: Capture) -> None:
     Path("two.yaml").write_text("suite: two\nabout: One has a script.\nmembers: [corridor.yaml, help]\n")
     assert run_main(["two.yaml", *QUICK, "--recipe", "guided", "--out", "here"]) == 2

@@ -24,6 +24,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.thorough("trains on a suite")
 def test_a_run_and_what_it_says_of_each_member(capsys: Capture) -> None:
     assert run_main(["pair.yaml", *QUICK, "--out", "run"]) == 0
     printed = capsys.readouterr().out

@@ -53,6 +53,7 @@ def loops(term: Term) -> bool:
 
 
 @pytest.mark.parametrize("condition", SHAPES.values(), ids=SHAPES)
+@pytest.mark.thorough("compiles a scenario for each shape")
 def test_a_shape_has_the_cells_that_a_loop_finds(condition: Term) -> None:
     each = asked_one_by_one(condition)
     assert not loops(cells("count", condition, NUMBER))

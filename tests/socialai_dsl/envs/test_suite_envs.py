@@ -73,6 +73,7 @@ def test_spaces_cover_all_members() -> None:
 
 
 @pytest.mark.parametrize("variant", ["", "+loud"])
+@pytest.mark.thorough("plays every member twice")
 def test_a_member_plays_as_it_does_alone(variant: str) -> None:
     """Row by row the same pictures, texts and rewards, whatever is played around it and whatever was played before."""
     envs = sd.make_vec(PAIR + variant, 40, autoreset_mode="SameStep")

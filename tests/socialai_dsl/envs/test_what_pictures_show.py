@@ -97,6 +97,7 @@ def looks(env: ScenarioEnv, image: NDArray[np.uint8]) -> Iterator[tuple[int, int
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.thorough("draws every step of many episodes")
 def test_pictures_of_cells_that_differ_for_the_agent_differ(name: str) -> None:
     env: Any = sd.make(name, render_mode="rgb_array").unwrapped
     shown: dict[bytes, Look] = {}
@@ -139,6 +140,7 @@ def test_texts_of_rooms_that_differ_for_the_agent_differ(name: str) -> None:
 @pytest.mark.parametrize(
     "name", ["talkitout", "school/boxes+pointing", "school/boxes+emulation", "school/marbles"]
 )
+@pytest.mark.thorough("draws every step of many episodes")
 def test_films_show_what_pictures_show(name: str, tmp_path: Path) -> None:
     """A film has few colours; what the agent can tell apart has to be left."""
     env: Any = sd.make(name, render_mode="rgb_array").unwrapped

@@ -56,6 +56,7 @@ def moments(name: str) -> Iterator[tuple[dict[str, Any], dict[str, Any], Any]]:
 
 
 @pytest.mark.parametrize("name", PLAYED)
+@pytest.mark.thorough("plays every scenario in text")
 def test_texts_differ_exactly_where_observations_do(name: str) -> None:
     views = {style: TextView(sd.compile(sd.load(name)), style) for style in STYLES}
     texts: dict[Any, dict[str, Any]] = {style: {} for style in STYLES}
