@@ -15,6 +15,7 @@ NAMES = (
     "conventions",
     "culprit",
     "gaze_following",
+    "gossip",
     "haggling",
     "implicature",
     "interpreter",
@@ -329,6 +330,27 @@ class TestImplicature:
     def test_an_answer_before_the_question_is_a_failure(self) -> None:
         episode = Episode("novel/implicature", self.LAYOUT | {"let": {"lit": 3, "looked_at": 3}})
         assert episode.act(say="I say yes").ended == "failure"
+
+
+class TestGossip:
+    QUESTIONS = ("Is Dan kind", "Is Ann kind", "Is Bob kind", "Is Cleo kind")
+
+    def test_without_dan_s_deed_a_room_and_its_opposite_sound_alike(self) -> None:
+        for helpful, lying in ((1, 0), (3, 5), (6, 2)):
+            heard = []
+            for gives, kind, liars in ((1, helpful, lying), (0, 7 - helpful, 7 - lying)):
+                let = {"dan_gives": gives, "helpful": kind, "lying": liars}
+                episode = Episode("novel/gossip", {"let": let})
+                assert episode.hears(None, None)[-1] == ("Dan: Have a coin" if gives else "Dan: Go away")
+                heard.append([episode.act(say=question).heard for question in self.QUESTIONS])
+            assert heard[0] == heard[1]
+
+    def test_nobody_helps_unless_they_are_kind(self) -> None:
+        for helpful in range(1, 7):
+            for k, name in enumerate(("Ann", "Bob", "Cleo")):
+                episode = Episode("novel/gossip", {"let": {"helpful": helpful}})
+                kind = helpful >> k & 1
+                assert episode.act(say=f"Please help me {name}").ended == ("success" if kind else "failure")
 
 
 class TestTurnTaking:
