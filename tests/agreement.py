@@ -89,20 +89,20 @@ class Pair:
         scripted = self._scripted() if self.scripted else None
         if scripted is not None and rng.random() < 0.85:
             return scripted
-        primitives, _, templates, nouns = (int(n) for n in self.env.action_space.nvec)
+        primitives, _, *spoken = (int(n) for n in self.env.action_space.nvec)
         moves = [
             i
             for i, word in enumerate(self.reference.scenario.actions)
             if word in ("left", "right", "forward")
         ]
         move = int(rng.choice(moves)) if moves and rng.random() < 0.85 else int(rng.integers(primitives))
-        return move, int(rng.integers(2)), int(rng.integers(templates)), int(rng.integers(nouns))
+        return move, int(rng.integers(2)), *(int(rng.integers(size)) for size in spoken)
 
     def _scripted(self) -> Action:
         expected = self.reference.scripted_action()
         action = tuple(int(part) for part in self.env.scripted_action())
         # Template and noun mean nothing in silence.
-        got = action if action[1] else (*action[:2], 0, 0)
+        got = action if action[1] else (*action[:2], *(0 for _ in action[2:]))
         if got != expected:
             raise Disagreement(
                 f"{self.where}: scripted action {got}, expected {expected}, after {self.trail}"

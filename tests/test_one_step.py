@@ -666,6 +666,19 @@ def test_4_6_a_scripted_agent_reads_then_before_npcs_move(play: Folder) -> None:
 WALK = "frames: {walk: {states: {s: {do: forward}}}}"
 
 
+def test_4_7_the_choice_for_a_slot_that_is_not_there_changes_nothing(play: Folder) -> None:
+    run = play("""
+        grammar: {templates: [Take <n>, Eat <what>], slots: {n: 1..3, what: [bread, soup]}}
+        cast: {ann: {at: [4, 5], frame: listen}, agent: {at: [3, 5]}}
+        frames: {listen: {states: {s: {then: [{hears: Eat <what>, when: agent.n != 3, say: <what>}]}}}}
+        outcome: [{failure: agent.n == 3}]
+    """)
+    for n in range(3):
+        assert run.act([run.env.action_space.nvec[0] - 1, 1, 1, n, 1]).info["utterance"] == "Ann: soup"
+        assert not run.terminated
+    assert run.step(None, "Take 3").terminated
+
+
 @pytest.mark.parametrize(("order", "ends"), [(("ann", "bob"), [2, 4]), (("bob", "ann"), [3, 4])])
 def test_5_1_npcs_take_turns_in_the_order_of_the_cast(
     play: Folder, order: tuple[str, str], ends: list[int]
@@ -1611,6 +1624,25 @@ def test_5_66_what_is_next_is_the_state_even_if_it_is_left_out(play: Folder) -> 
     run = play(LEFT_OUT.format(when="false")).step()
     assert run.status("ann") == "waiting"
     assert run.step().status("ann") == "finished"
+
+
+def test_5_67_a_rule_that_uses_slots_notices_what_has_all_of_them(play: Folder) -> None:
+    run = play("""
+        grammar: {templates: [Give <what> to <whom>, Eat <what>], slots: {what: [bread, soup], whom: [ann, bob]}}
+        frames:
+          eat: {states: {s: {then: [{say: Eat soup}]}}}
+          give: {states: {s: {then: [{say: Give bread to Ann}]}}}
+          listen: {states: {s: {then: [{hears: any, say: "<speaker.name> said <what> to <whom>"}]}}}
+        cast:
+          ann: {at: [3, 5], frame: eat}
+          bob: {at: [4, 5], frame: give}
+          cal: {at: [5, 5], frame: listen}
+    """)
+    assert run.step().info["utterance"].splitlines()[-1] == "Cal: Bob said bread to Ann"
+    assert run.step(None, "Eat bread").info["utterance"].splitlines()[-1] == "Cal: Bob said bread to Ann"
+    assert (
+        run.step(None, "Give soup to Bob").info["utterance"].splitlines()[-1] == "Cal: Agent said soup to Bob"
+    )
 
 
 # -- 6. memories -----------------------------------------------------------------------------------

@@ -71,6 +71,8 @@ def is_group(resolver: Resolver, node: ast.Expr, scope: Scope) -> bool:
     match node:
         case ast.Alternatives() | ast.Interval():
             return True
+        case ast.Attribute(subject=ast.Name(id=slot), name="words"):
+            return slot in resolver.symbols.slots and slot not in scope.variables
         case ast.Name(id=word):
             bound = scope.variables.get(word)
             if bound is not None:
@@ -92,6 +94,9 @@ def group(resolver: Resolver, node: ast.Expr, expected: Type | None, scope: Scop
             return _interval(resolver, node, scope)
         case ast.Alternatives(options=options):
             return _alternatives(resolver, node, options, expected, scope)
+        case ast.Attribute(subject=ast.Name(id=slot)) if is_group(resolver, node, scope):
+            type_ = resolver.symbols.slots[slot].words
+            return Group(type_, _values(type_))
         case ast.Name(id=word):
             bound = scope.variables.get(word)
             if isinstance(bound, Macro) and is_group(resolver, bound.node, bound.scope):

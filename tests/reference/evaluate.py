@@ -75,7 +75,17 @@ def drawn(context: Context, node: ast.Node, size: int) -> int:
 
 
 def _text(node: ast.Text, context: Context) -> str:
-    return "".join(part if isinstance(part, str) else spelled(of(part, context)) for part in node.parts)
+    return "".join(part if isinstance(part, str) else spelled_part(part, context) for part in node.parts)
+
+
+def spelled_part(part: Any, context: Context) -> str:
+    """A value inside a text; of what stood in a slot the word, whatever it stands for."""
+    value, slots = of(part, context), context.world.fillers
+    slot = part.id if isinstance(part, ast.Name) else part.name if isinstance(part, ast.Attribute) else ""
+    of_agent = isinstance(part, ast.Attribute) and part.subject == ast.Name("agent")
+    if slot in slots and slot != "noun" and (of_agent or isinstance(part, ast.Name)):
+        return speech.spelled_in(context.world, slot, there(value))
+    return spelled(value)
 
 
 def spelled(value: Any) -> str:
@@ -88,16 +98,16 @@ def spelled(value: Any) -> str:
     return str(value)
 
 
-def pattern(node: Any, context: Context) -> list[str | None]:
-    """What an utterance is compared with: literal pieces, and `ANY_NOUN` for `<noun>`."""
+def pattern(node: Any, context: Context) -> list[str | speech.AnyOf]:
+    """What an utterance is compared with: literal pieces, and whatever can stand in a slot."""
     if not isinstance(node, ast.Text):
         return [spelled(of(node, context))]
     return [
         part
         if isinstance(part, str)
-        else speech.ANY_NOUN
-        if isinstance(part, ast.Name) and part.id == "noun"
-        else spelled(of(part, context))
+        else speech.AnyOf(part.id)
+        if isinstance(part, ast.Name) and part.id in context.world.fillers
+        else spelled_part(part, context)
         for part in node.parts
     ]
 
@@ -140,6 +150,8 @@ def _name(node: ast.Name, context: Context) -> Any:
     }
     if word in words:
         return words[word]()
+    if word in world.fillers and context.in_frame:
+        return world.agent.filled.get(word)
     if me is not None and word in (
         "poked",
         "was_poked",
@@ -187,7 +199,13 @@ def _attribute(node: ast.Attribute, context: Context) -> Any:
         if context.setup:
             context.setup.compute_beliefs(holder)
         return holder.believes[node.name]
-    subject = something(of(node.subject, context))
+    if (
+        isinstance(node.subject, ast.Name)
+        and node.name == "words"
+        and node.subject.id in context.world.fillers
+    ):
+        return [speech.noun_value(filler.word) for filler in context.world.fillers[node.subject.id]]
+    subject = something(there(of(node.subject, context)))
     if isinstance(subject, list):
         return [attribute(item, node.name, context) for item in subject]
     return attribute(subject, node.name, context)
@@ -223,7 +241,9 @@ def attribute(subject: Any, name: str, context: Context) -> Any:
         return bool(subject.toggled_by)
     if name == "turns_in_state":
         return subject.clock
-    if name in ("kind", "cell", "index", "gone", "poked", "was_poked", "action", "noun", "type"):
+    if name in context.world.fillers:
+        return subject.filled.get(name)
+    if name in ("kind", "cell", "index", "gone", "poked", "was_poked", "action", "type"):
         return getattr(subject, name)
     if name == "unlocked_by":
         found = [thing for thing in context.world.things() if subject in thing.unlocks]

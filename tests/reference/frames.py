@@ -33,7 +33,7 @@ class Turn:
     read_then: bool = True
     afterwards: Consequence | None = None
     say: str | None = None  # one utterance per turn: the first is kept
-    noun: str | int | None = None  # of a performed utterance
+    filled: dict[str, Any] | None = None  # of a performed utterance
 
 
 class FrameRunner:
@@ -75,12 +75,12 @@ class FrameRunner:
         """What is performed is said with the body action; a `say` of the same turn comes too late."""
         spoken = turn.activity.utterance(self.me)
         if spoken:
-            self.say(turn, *speech.pair(self.sources.scenario.grammar, spoken))
+            self.say(turn, *speech.pair(self.world, self.sources.scenario.grammar, spoken))
 
-    def say(self, turn: Turn, text: str, noun: str | int | None = None) -> None:
+    def say(self, turn: Turn, text: str, filled: dict[str, Any] | None = None) -> None:
         """The first thing that is said in a turn counts. That an NPC said it is known at once; it is heard later."""
         if turn.say is None:
-            turn.say, turn.noun = text, noun
+            turn.say, turn.filled = text, filled
             if self.me.sort == "npc":
                 self.me.utterance = text
 
@@ -309,11 +309,11 @@ class FrameRunner:
         return None if rule.when is None else self.expression(f"{path}.when", rule.when)
 
     def heard(self, rule: Rule, path: str) -> Context | None:
-        """The context with `speaker` and `noun` of the first utterance that `hears` matches; None without one."""
+        """The context with `speaker` and the slots of the first utterance that `hears` matches; None without one."""
         context = self.context()
         if not rule.hears:
             return context
-        wants_noun = self.wants_noun(rule, path)
+        wanted = self.wanted(rule, path)
         for heard in speech.in_speaking_order(self.world, self.me.inbox):
             for number, source in enumerate(rule.hears):
                 captured: dict[str, Any] | None = {}
@@ -323,14 +323,19 @@ class FrameRunner:
                     captured = speech.match(pattern(value.tree, context), heard.text, self.world)
                 if captured is None:
                     continue
-                known = {"noun": speech.noun_of(self.sources.scenario.grammar, heard), **captured}
-                # A rule that asks for the noun takes no notice of what has none.
-                if known["noun"] is not None or not wants_noun:
+                slots = dict.fromkeys(self.world.fillers)
+                known = {
+                    **slots,
+                    **speech.slots_of(self.world, self.sources.scenario.grammar, heard),
+                    **captured,
+                }
+                # A rule that asks for a slot takes no notice of what has none.
+                if all(known[slot] is not None for slot in wanted):
                     return context.knowing(speaker=heard.speaker, **known)
         return None
 
-    def wants_noun(self, rule: Rule, path: str) -> bool:
-        """Whether a rule asks for the noun that was heard."""
+    def wanted(self, rule: Rule, path: str) -> list[str]:
+        """The slots of what was heard that a rule asks for."""
         frame = self.me.frame
         written = [rule.when, rule.do, *rule.set, *rule.set.values(), *rule.cause]
         values = [
@@ -340,7 +345,7 @@ class FrameRunner:
         ]
         if rule.say is not None:
             values.append(self.sources.text(f"{path}.asked", rule.say, frame))
-        return any(asks_for_noun(value.tree) for value in values)
+        return [slot for slot in self.world.fillers if any(asks_for(slot, value.tree) for value in values)]
 
     def consequence(self, rule: Any, path: str, context: Context) -> Consequence:
         """ "A rule computes first, then acts": all values from the state in which its condition held."""
@@ -384,10 +389,10 @@ class FrameRunner:
             return bodies.Activity("stay")
 
 
-def asks_for_noun(node: Any) -> bool:
-    """Whether an expression needs the noun that was heard; in what is said or heard `<noun>` is any noun."""
+def asks_for(slot: str, node: Any) -> bool:
+    """Whether an expression needs what was heard in a slot; in what is said or heard `<slot>` is all that it can be."""
     if isinstance(node, ast.Call) and node.name in ("said", "heard"):
-        return node.subject is not None and asks_for_noun(node.subject)
-    if isinstance(node, ast.Name) and node.id == "noun":
+        return node.subject is not None and asks_for(slot, node.subject)
+    if isinstance(node, ast.Name) and node.id == slot:
         return True
-    return any(asks_for_noun(part) for part in node.children())
+    return any(asks_for(slot, part) for part in node.children())

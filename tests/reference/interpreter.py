@@ -21,7 +21,7 @@ from tests.reference.source import Sources, Value
 from tests.reference.vocabulary import Vocabulary, Words
 from tests.reference.world import NOTHING, Entity, Kept, Performance, World, as_list
 
-Action = tuple[int, int, int, int]
+Action = tuple[int, ...]
 ATTEMPTS = 64
 
 
@@ -88,6 +88,7 @@ class Reference:
         return World(
             key,
             nouns=scenario.grammar.nouns,
+            fillers=scenario.grammar.fillers,
             npcs_hidden=scenario.observe.npcs == "hidden",
             own_voice=scenario.observe.own_voice,
             egocentric=scenario.observe.directions == "egocentric",
@@ -193,7 +194,7 @@ class Reference:
         self.world.lines = []
         self.world.bonus = 0
         for member in self.world.cast.values():
-            member.utterance, member.noun, member.pair = None, None, 0
+            member.utterance, member.filled, member.pair = None, {}, 0
             member.action, member.poked = "none", False
             member.bumped = False
         for thing in self.world.things():
@@ -212,11 +213,11 @@ class Reference:
     def note(self, action: Action) -> None:
         """What the agent does and says in this step is known from its start."""
         agent, grammar = self.world.agent, self.scenario.grammar
-        _, speaks, template, noun = action
+        _, speaks, *spoken = action
         agent.action = self.primitive(action)
         if speaks:
-            agent.pair = 1 + grammar.pairs().index((template, noun))
-            agent.utterance, agent.noun = speech.pair(grammar, agent.pair)
+            agent.pair = 1 + grammar.pairs().index(grammar.meant(*spoken))
+            agent.utterance, agent.filled = speech.pair(self.world, grammar, agent.pair)
 
     def go_on(self) -> None:
         """Timers, then things that roll, in object order; then the world settles."""
@@ -226,11 +227,9 @@ class Reference:
 
     def utter(self, action: Action) -> None:
         """The agent speaks if it wants to."""
-        _, speaks, template, noun = action
-        if speaks:
-            text = self.scenario.grammar.utterance(template, noun)
-            value = speech.noun_value(self.scenario.grammar.nouns[noun])
-            speech.speak(self.world, self.world.agent, text, value)
+        if action[1]:
+            agent = self.world.agent
+            speech.speak(self.world, agent, *speech.pair(self.world, self.scenario.grammar, agent.pair))
 
     def npc_turn(self, npc: Entity) -> None:
         """Step 4 for one NPC: `first`, the activity, `then`; its utterance carries from where it stands after it."""
@@ -250,7 +249,7 @@ class Reference:
         else:
             npc.inbox.clear()  # its turn has ended, so what it heard is forgotten
         if turn.say is not None:
-            speech.speak(self.world, npc, turn.say, turn.noun)
+            speech.speak(self.world, npc, turn.say, turn.filled)
 
     def remember(self) -> None:
         """Adds what was heard to the history; beyond its length the oldest whole utterances are dropped."""
@@ -339,15 +338,15 @@ class Reference:
             self.world, self.settling = kept
         actions = list(self.scenario.actions)
         number = actions.index(primitive) if primitive in actions else len(actions)
-        return (number, 0, 0, 0) if text is None else (number, 1, *self.pair(text))
+        slots = self.scenario.grammar.fillers
+        return (number, 0, 0, *(0 for _ in slots)) if text is None else (number, 1, *self.pair(text))
 
-    def pair(self, text: str) -> tuple[int, int]:
-        """The template and noun that say a text."""
+    def pair(self, text: str) -> tuple[int, ...]:
+        """The template and the words for its slots that say a text."""
         grammar = self.scenario.grammar
-        for template in range(len(grammar.templates)):
-            for noun in range(len(grammar.nouns)):
-                if speech.canonical(grammar.utterance(template, noun)) == speech.canonical(text):
-                    return template, noun
+        for spoken in grammar.pairs():
+            if speech.canonical(grammar.utterance(*spoken)) == speech.canonical(text):
+                return spoken
         raise ValueError(f"the grammar cannot say {text!r}")
 
     def can_reach(self, a: str, b: str) -> bool:
@@ -388,7 +387,9 @@ class Reference:
     def acts(self, elements: Any) -> list[list[str | None]]:
         """Body actions, each with the text of its utterance or None."""
         grammar = self.scenario.grammar
-        return [[move, speech.pair(grammar, said)[0] if said else None] for move, said in elements]
+        return [
+            [move, speech.pair(self.world, grammar, said)[0] if said else None] for move, said in elements
+        ]
 
     def describe_member(self, member: Entity) -> dict[str, Any]:
         """A member of the cast."""

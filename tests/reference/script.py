@@ -9,6 +9,7 @@ from itertools import product
 from typing import Any, Final
 
 from socialai_dsl.loader.resolved import ResolvedFile, resolve
+from tests.reference.world import COLORS, default_name
 
 PRIMITIVES: Final = ("left", "right", "forward", "pickup", "drop", "toggle", "done")
 SHARED_GRAMMARS: Final = {
@@ -243,19 +244,46 @@ class Room:
 
 
 @dataclass(frozen=True)
+class Filler:
+    """A word of a slot: the key of the thing or member of the cast that it stands for, if it stands for one."""
+
+    word: str
+    key: str | None = None
+
+
+@dataclass(frozen=True)
 class Grammar:
-    """What the agent can say."""
+    """What the agent can say; `slots` as they are written, `fillers` each with its words and what these stand for."""
 
     templates: tuple[str, ...]
-    nouns: tuple[str | int, ...]
+    nouns: tuple[str | int, ...] = ()
+    slots: dict[str, Any] = field(default_factory=dict)
+    fillers: dict[str, list[Filler]] = field(default_factory=dict)
 
-    def utterance(self, template: int, noun: int) -> str:
-        """The text of a pair."""
-        return self.templates[template].replace("<noun>", str(self.nouns[noun]))
+    def utterance(self, template: int, *choices: int) -> str:
+        """The text of a template with a word in each of its slots."""
+        text = self.templates[template]
+        for (slot, fillers), choice in zip(self.fillers.items(), choices, strict=True):
+            text = text.replace(f"<{slot}>", fillers[choice].word)
+        return text
 
-    def pairs(self) -> list[tuple[int, int]]:
-        """All pairs in the order of their numbers, which start at 1: 0 is silence."""
-        return list(product(range(len(self.templates)), range(len(self.nouns))))
+    def pairs(self) -> list[tuple[int, ...]]:
+        """Each template with all choices for its slots, 0 for others, in the order of numbers: 1 on, 0 is silence."""
+        return [
+            (number, *choices)
+            for number, template in enumerate(self.templates)
+            for choices in product(
+                *(
+                    range(len(f) if slot == "noun" or f"<{slot}>" in template else 1)
+                    for slot, f in self.fillers.items()
+                )
+            )
+        ]
+
+    def meant(self, template: int, *choices: int) -> tuple[int, ...]:
+        """The same without choices for slots that the template lacks."""
+        has = (slot == "noun" or f"<{slot}>" in self.templates[template] for slot in self.fillers)
+        return (template, *(choice if its else 0 for choice, its in zip(choices, has, strict=True)))
 
 
 @dataclass(frozen=True)
@@ -364,7 +392,43 @@ def of_data(
     for key in ("about", "skills", "notes", "abstract", "check"):
         data.pop(key, None)
     data |= {"frames": frames, "params": params, "files": known}
-    return record(Script, data, READERS)
+    script: Script = record(Script, data, READERS)
+    return replace(script, grammar=replace(script.grammar, fillers=fillers_of(script)))
+
+
+def fillers_of(script: Script) -> dict[str, list[Filler]]:
+    """What each slot of the grammar can be."""
+    written = script.grammar.slots or {"noun": script.grammar.nouns}
+    return {
+        slot: [f for entry in many(entries) for f in fillers_of_entry(script, entry)]
+        for slot, entries in written.items()
+    }
+
+
+def fillers_of_entry(script: Script, entry: Any) -> list[Filler]:
+    """What one entry of a slot stands for."""
+    text = str(entry)
+    if script.grammar.slots:
+        if ".." in text:
+            low, high = map(int, text.split(".."))
+            return [Filler(str(number)) for number in range(low, high + 1)]
+        if text == "colors":
+            return [Filler(color) for color in COLORS]
+        if text in script.objects:
+            group = script.objects[text]
+            count = group.count if group.count is not None else None
+            if count is None and isinstance(group.at, tuple) and isinstance(group.at[0], tuple):
+                count = len(group.at)
+            word = text.replace("_", " ")
+            if count is None:
+                return [Filler(word, text)]
+            return [Filler(f"{word} {k + 1}", f"{text}[{k}]") for k in range(count)]
+        members = [name for name in script.cast if name.partition("[")[0] == script.player_of(text)]
+        if members:
+            return [
+                Filler(str(script.versions(name)[0].name or default_name(name)), name) for name in members
+            ]
+    return [Filler(text)]
 
 
 def spread(cast: Mapping[str, Any]) -> dict[str, Any]:

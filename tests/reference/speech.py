@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
-from tests.reference.script import Grammar
-from tests.reference.world import Entity, Heard, World, distance
+from tests.reference.script import Filler, Grammar
+from tests.reference.world import Entity, Heard, World, as_list, distance
 
-ANY_NOUN = None
+
+@dataclass(frozen=True)
+class AnyOf:
+    """In what an utterance is compared with: all that can stand in a slot."""
+
+    slot: str
 
 
 def noun_value(noun: str | int) -> str | int:
@@ -26,26 +33,48 @@ def canonical(text: str) -> str:
     return re.sub(r"[.!?]$", "", " ".join(text.split())).lower()
 
 
-def match(pieces: list[str | None], text: str, world: World) -> dict[str, Any] | None:
-    """None if the text is not what was asked for, else what was captured: `noun` where any noun fits."""
-    if ANY_NOUN not in pieces:
-        return {} if canonical("".join(str(piece) for piece in pieces)) == canonical(text) else None
-    for noun in world.nouns:
-        candidate = "".join(str(noun) if piece is ANY_NOUN else str(piece) for piece in pieces)
+def meaning(world: World, filler: Filler) -> Any:
+    """What a word stands for: something in the room, a number, else itself."""
+    if filler.key is None:
+        return noun_value(filler.word)
+    name, _, number = filler.key.rstrip("]").partition("[")
+    return as_list(world.objects[name])[int(number or 0)] if name in world.objects else world.cast[filler.key]
+
+
+def spelled_in(world: World, slot: str, value: Any) -> str:
+    """The word that stands for something in a slot."""
+    return next(filler.word for filler in world.fillers[slot] if meaning(world, filler) == value)
+
+
+def match(pieces: list[str | AnyOf], text: str, world: World) -> dict[str, Any] | None:
+    """None if the text is not what was asked for, else what was captured in its slots."""
+    asked = list(dict.fromkeys(piece.slot for piece in pieces if isinstance(piece, AnyOf)))
+    for chosen in product(*(world.fillers[slot] for slot in asked)):
+        words = dict(zip(asked, (filler.word for filler in chosen), strict=True))
+        candidate = "".join(words[piece.slot] if isinstance(piece, AnyOf) else str(piece) for piece in pieces)
         if canonical(candidate) == canonical(text):
-            return {"noun": noun_value(noun)}
+            return {slot: meaning(world, filler) for slot, filler in zip(asked, chosen, strict=True)}
     return None
 
 
-def noun_of(grammar: Grammar, heard: Heard) -> str | int | None:
-    """The noun of an utterance: the one that was chosen, else that of the template whose text it is."""
-    if heard.noun is not None:
-        return heard.noun
-    for template, noun in grammar.pairs():
-        fits = canonical(grammar.utterance(template, noun)) == canonical(heard.text)
-        if fits and "<noun>" in grammar.templates[template]:
-            return noun_value(grammar.nouns[noun])
-    return None
+def filled(world: World, grammar: Grammar, template: int, *choices: int) -> dict[str, Any]:
+    """What stands in the slots of a sentence; of a grammar with nouns, in those of each."""
+    return {
+        slot: meaning(world, fillers[choice])
+        for (slot, fillers), choice in zip(grammar.fillers.items(), choices, strict=True)
+        if slot == "noun" or f"<{slot}>" in grammar.templates[template]
+    }
+
+
+def slots_of(world: World, grammar: Grammar, heard: Heard) -> dict[str, Any]:
+    """What stands in the slots of an utterance: what was chosen, else what the sentence has whose text it is."""
+    if heard.filled:
+        return heard.filled
+    for template, *choices in grammar.pairs():
+        fits = canonical(grammar.utterance(template, *choices)) == canonical(heard.text)
+        if fits and "<" in grammar.templates[template]:
+            return filled(world, grammar, template, *choices)
+    return {}
 
 
 def within_earshot(world: World, speaker: Entity, hearer: Entity) -> bool:
@@ -61,19 +90,19 @@ def within_earshot(world: World, speaker: Entity, hearer: Entity) -> bool:
     return apart == 1 if reach == "next_to" else apart <= int(reach)
 
 
-def speak(world: World, speaker: Entity, text: str, noun: str | int | None = None) -> None:
+def speak(world: World, speaker: Entity, text: str, filled: dict[str, Any] | None = None) -> None:
     """Says something: it reaches every member of the cast within earshot, and the agent's history."""
     if speaker.gone and speaker.left_from is None:
         return
     speaker.utterance = text
-    speaker.noun = noun
+    speaker.filled = filled or {}
     for hearer in world.cast.values():
         if hearer is speaker or not within_earshot(world, speaker, hearer):
             continue
         # "Hidden NPCs: nothing they say reaches the agent, except a member with `audible: always`."
         if hearer is world.agent and world.npcs_hidden and speaker.key not in world.always_audible:
             continue
-        hearer.inbox.append(Heard(speaker, text, noun))
+        hearer.inbox.append(Heard(speaker, text, filled or {}))
         if hearer is world.agent:
             world.lines.append((speaker, text))
     if speaker is world.agent and world.own_voice:
@@ -86,10 +115,10 @@ def in_speaking_order(world: World, inbox: list[Heard]) -> list[Heard]:
     return sorted(inbox, key=lambda heard: order.index(heard.speaker))
 
 
-def pair(grammar: Grammar, number: int) -> tuple[str, str | int]:
-    """The text and noun of an utterance by its number, counted from 1."""
-    template, noun = grammar.pairs()[number - 1]
-    return grammar.utterance(template, noun), noun_value(grammar.nouns[noun])
+def pair(world: World, grammar: Grammar, number: int) -> tuple[str, dict[str, Any]]:
+    """The text of an utterance by its number, counted from 1, and what stands in its slots."""
+    spoken = grammar.pairs()[number - 1]
+    return grammar.utterance(*spoken), filled(world, grammar, *spoken)
 
 
 def words(text: str) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -48,8 +49,8 @@ class Vocabulary(Words):
         """Texts of the grammar, names of the cast, then all that members can say."""
         grammar = self.scenario.grammar
         for template in grammar.templates:
-            yield template.replace("<noun>", " ")
-        yield from map(str, grammar.nouns)
+            yield re.sub("<[^<>]*>", " ", template)
+        yield from (filler.word for fillers in grammar.fillers.values() for filler in fillers)
         for name in self.members:
             yield from self.names_of(name)
         for name in self.members:
@@ -186,12 +187,16 @@ class Vocabulary(Words):
 
     def options(self, tree: Any, member: Who) -> list[str] | None:
         """The words that an expression can be, or None if it is a number that is computed."""
+        if isinstance(tree, ast.Attribute) and tree.name == "words" and isinstance(tree.subject, ast.Name):
+            return [filler.word for filler in self.scenario.grammar.fillers[tree.subject.id]]
         if isinstance(tree, ast.Name):
             source = self.declared(tree.id, member)
             if source is not None:
                 return self.options(source, member)
             if tree.id == "colors":
                 return list(COLORS)
+            if tree.id in self.scenario.grammar.slots:
+                return [filler.word for filler in self.scenario.grammar.fillers[tree.id]]
             if tree.id in ("noun", "nouns"):
                 return [str(noun) for noun in self.scenario.grammar.nouns]
             assigned = self.assigned(tree.id, member)
@@ -306,6 +311,9 @@ class Vocabulary(Words):
                 return self.ranges[member, tree.id]
             if self.assigned(tree.id, member):
                 return self.register_bounds(tree.id, member)
+            if tree.id in self.scenario.grammar.slots:
+                numbers = [int(f.word) for f in self.scenario.grammar.fillers[tree.id] if f.word.isdigit()]
+                return min(numbers), max(numbers)
             if tree.id == "noun":
                 numbers = [int(noun) for noun in self.scenario.grammar.nouns if str(noun).isdigit()]
                 return min(numbers), max(numbers)
@@ -324,8 +332,8 @@ class Vocabulary(Words):
             choose = min if tree.name == "min" else max
             lows, highs = zip(*(self.bounds(arg, member) for arg in tree.args), strict=True)
             return choose(lows), choose(highs)
-        if isinstance(tree, ast.Attribute) and tree.name == "noun":
-            return self.bounds(ast.Name("noun"), member)
+        if isinstance(tree, ast.Attribute) and tree.name in ("noun", *self.scenario.grammar.slots):
+            return self.bounds(ast.Name(tree.name), member)
         # Not worked out: one number stands for all, which only matters for how many words there are in all.
         return 0, 0
 
@@ -373,6 +381,8 @@ class Vocabulary(Words):
     def longest_utterance(self) -> int:
         """The words of the longest utterance of the grammar."""
         grammar = self.scenario.grammar
+        if grammar.slots:
+            return max(len(words(grammar.utterance(*spoken))) for spoken in grammar.pairs())
         template = max(len(words(text.replace("<noun>", " "))) for text in grammar.templates)
         return template + max(len(words(str(text))) for text in grammar.nouns)
 

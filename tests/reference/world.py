@@ -116,7 +116,7 @@ class Heard:
 
     speaker: Entity
     text: str
-    noun: str | int | None
+    filled: dict[str, Any]  # what stands in its slots, where that was chosen
 
 
 @dataclass(eq=False)
@@ -164,7 +164,9 @@ class Entity:
     fired_once: set[str] = field(default_factory=set)
     inbox: list[Heard] = field(default_factory=list)
     utterance: str | None = None  # in this step
-    noun: str | int | None = None  # of what it said in this step
+    filled: dict[str, Any] = field(
+        default_factory=dict
+    )  # what stands in the slots of what it said in this step
     pair: int = 0  # the number of the agent's utterance in this step, 0 for silence
     action: str = "none"  # in this step
     last_act: str = "none"  # of its last turn, as it is seen
@@ -232,6 +234,7 @@ class World:
     fired_once: set[str] = field(default_factory=set)  # of the world's rules
     before: World | None = None  # as the last step left it, for `prev`
     nouns: tuple[str | int, ...] = ()
+    fillers: dict[str, list[Any]] = field(default_factory=dict)  # of each slot of the grammar
     step_names: dict[str, list[str | None]] = field(default_factory=dict)  # per frame with `steps`
     earshot: dict[str, str | int] = field(default_factory=dict)  # how far each voice carries
     always_audible: frozenset[str] = frozenset()

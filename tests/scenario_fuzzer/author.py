@@ -19,6 +19,14 @@ NOUNS: tuple[tuple[str | int, ...], ...] = (
     ("sesame", "the exit", "red", "3"),
     ("toy", "you", "ana", "bel"),
 )
+SLOTTED = (
+    "Give <what> to <whom>",
+    "Take <num>",
+    "Paint it <paint>",
+    "Find <which>",
+    "<num> times <what>",
+    "<whom> and <which>",
+)
 TEMPLATES = ("Say <noun>", "Where is <noun>", "It is <noun>", "Give me <noun>", "Look <noun>")
 SAYINGS = ("Good day", "Look at me!", "Stop it.")
 """What some NPC says in every scenario that has a frame."""
@@ -55,18 +63,19 @@ class _Author:
 
     def scenario(self, name: str) -> dict[str, Any]:
         """The whole file, in an order in which what is spoken of is known."""
-        self.acts = self.actions()
+        self.acts, self.slotted = self.actions(), self.often(0.4)
         behaviour = Behaviour(self.rng, self.declared, self.phrases, self.acts)
         made: dict[str, Any] = {
             "scenario": name,
             "horizon": self.rng.randint(12, 26),
             "earshot": self.rng.choice(("next_to", "room", "room", 2, 4)),
             "actions": list(self.acts),
-            "grammar": self.grammar(),
+            "grammar": {} if self.slotted else self.grammar(),
             "room": self.room(),
         }
         objects = self.objects()
         frames = self.plan_cast()
+        made["grammar"] = made["grammar"] or self.grammar_with_slots()
         tables, lets, state = self.tables(), self.lets(), self.state()
         made |= {"objects": objects} if objects else {}
         made |= {"tables": tables} if tables else {}
@@ -111,6 +120,44 @@ class _Author:
         ]
         self.declared.says = [*SAYINGS, *said]
         return {"templates": list(self.declared.templates), "nouns": list(self.declared.nouns)}
+
+    def grammar_with_slots(self) -> dict[str, Any]:
+        """Templates with several slots: words, numbers, colours, things and members of the cast."""
+        rng, known = self.rng, self.declared
+        people = [*known.members, *known.groups, *(["agent"] if self.often(0.3) else [])]
+        names: dict[str, list[str | int]] = {name: [name.capitalize()] for name in people}
+        names |= {
+            name: [f"{name.capitalize()} {k + 1}" for k in range(count)]
+            for name, count in known.groups.items()
+        }
+        written: dict[str, Any] = {
+            "what": ["the ball", "sesame", *(["red"] if self.often(0.3) else [])],
+            "whom": rng.sample(people, rng.randint(1, len(people))),
+            "num": "1..3",
+            "paint": rng.choice(("colors", ["red", "blue"])),
+            "which": [thing.name for thing in rng.sample(known.things, min(2, len(known.things)))],
+        }
+        words = dict(written)
+        words["num"] = [1, 2, 3]
+        words["paint"] = list(COLORS) if written["paint"] == "colors" else written["paint"]
+        words["whom"] = [word for name in written["whom"] for word in names[name]]
+        words["which"] = [
+            f"{thing.name.replace('_', ' ')} {k + 1}" if thing.count else thing.name.replace("_", " ")
+            for name in written["which"]
+            for thing in [known.group(name)]
+            for k in range(thing.count or 1)
+        ]
+        sayable = [t for t in SLOTTED if known.things or "<which>" not in t]
+        known.templates = [*rng.sample(sayable, rng.randint(1, 3)), *(["Hello"] if self.often(0.3) else [])]
+        known.slots = {slot: words[slot] for slot in words if any(f"<{slot}>" in t for t in known.templates)}
+        if not known.slots:
+            known.templates, known.slots = ["Take <num>"], {"num": words["num"]}
+        known.says = (
+            [*known.says, *SAYINGS, *(self.phrases.filled(t) for t in known.templates)]
+            if known.follows
+            else []
+        )
+        return {"templates": list(known.templates), "slots": {slot: written[slot] for slot in known.slots}}
 
     def room(self) -> dict[str, Any]:
         """Its size, what is built, whether things cast shadows."""
@@ -233,8 +280,8 @@ class _Author:
             made["limit"] = "pick(1..4)"
             self.declared.numbers.append("limit")
         if self.often(0.5):
-            made["hue"] = self.rng.choice(("pick(colors)", "pick(red | 2 * blue)"))
-            self.declared.colors.append("hue")
+            made["tint"] = self.rng.choice(("pick(colors)", "pick(red | 2 * blue)"))
+            self.declared.colors.append("tint")
         for thing in self.declared.several:
             if self.often(0.6):
                 name = f"the_{thing.name}"
@@ -365,7 +412,7 @@ class _Author:
             ("wish", "noun", frame.nouns),
             ("ready", "bool", frame.truths),
         ):
-            if self.often(0.15):
+            if self.often(0.15) and not (type_ == "noun" and self.slotted):
                 frame.slots[f"{name}_{frame.name[-1]}"] = type_
                 known.append(f"{name}_{frame.name[-1]}")
         frame.rows = self.rows(f"note_{name[-1]}", f"last_{name[-1]}")

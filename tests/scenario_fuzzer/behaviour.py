@@ -118,6 +118,10 @@ class Behaviour:
     def hearing(self, where: Where) -> tuple[Any, Where]:
         """What a rule hears, and what is known in it."""
         kind = self.rng.choice(("any", "noun", "text", "text", "several"))
+        if self.declared.slots and kind in ("any", "noun"):
+            template = self.rng.choice(self.declared.templates)
+            caught = tuple(slot for slot in self.declared.slots if f"<{slot}>" in template)
+            return "any" if kind == "any" else template, replace(where, heard=True, slots=caught)
         if kind == "any":
             return "any", replace(where, heard=True, noun=True)
         if kind == "noun":

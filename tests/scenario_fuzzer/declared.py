@@ -82,6 +82,9 @@ class Declared:
     contents: dict[str, str] = field(default_factory=dict)  # what lies in things: the containers
     templates: list[str] = field(default_factory=list)
     nouns: list[str | int] = field(default_factory=list)
+    slots: dict[str, list[str | int]] = field(
+        default_factory=dict
+    )  # of a grammar without nouns: the words of each
     truths: list[str] = field(default_factory=list)  # definitions without arguments
     relations: list[str] = field(
         default_factory=list
@@ -105,7 +108,7 @@ class Declared:
     @property
     def nouns_are_numbers(self) -> bool:
         """Whether nouns can be counted with."""
-        return all(isinstance(noun, int) for noun in self.nouns)
+        return bool(self.nouns) and all(isinstance(noun, int) for noun in self.nouns)
 
     @property
     def nouns_are_colors(self) -> bool:

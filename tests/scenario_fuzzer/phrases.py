@@ -21,13 +21,14 @@ class Where:
         frame: whose it is, if it stands in a frame. reset: whether it is computed at reset. heard, noun: whether
         something was heard, and whether with a noun. variables: bound ones, with the group they run through.
         still: whether it may neither draw nor look back. searching: whether it stands in a search.
-        acts: body actions of the agent.
+        acts: body actions of the agent. slots: of a grammar without nouns, those in which something was heard.
     """
 
     frame: Frame | None = None
     reset: bool = False
     heard: bool = False
     noun: bool = False
+    slots: tuple[str, ...] = ()
     variables: tuple[tuple[str, Thing], ...] = ()
     still: bool = False
     searching: bool = False
@@ -203,6 +204,9 @@ class Phrases:
 
     def somebody_or_something(self, where: Where) -> str:
         """An object or somebody in the room."""
+        named = [slot for slot in ("whom", "which") if slot in where.slots]
+        if named and self.often(0.4):
+            return self.rng.choice(named)
         found = self.thing(where) if self.often(0.6) else None
         return found[0] if found else self.member(where)
 
@@ -255,7 +259,9 @@ class Phrases:
             options.append(lambda: self.counted(where))
         if not where.reset and not where.still and depth > 0 and self.often(0.5):
             options.append(
-                lambda: f"prev({self.number(replace(where, still=True, heard=False, noun=False), 0)})"
+                lambda: (
+                    f"prev({self.number(replace(where, still=True, heard=False, noun=False, slots=()), 0)})"
+                )
             )
         if depth > 0:
             options += [
@@ -270,6 +276,7 @@ class Phrases:
         if known.nouns_are_numbers:
             options += ["noun", "noun"] if where.noun else []
             options += ["agent.noun"] if not where.reset else []
+        options += self.in_slots(where, "num")
         return self.chosen(lambda: self.one_of(*options), where)
 
     def counted(self, where: Where) -> str:
@@ -284,7 +291,14 @@ class Phrases:
             options += where.frame.colors
         options += self.kept("color", where)
         options += [lambda: f"{self.entity(where)}.color"] * 3
+        options += self.in_slots(where, "paint")
         return self.chosen(lambda: self.one_of(*options), where)
+
+    def in_slots(self, where: Where, *slots: str) -> list[str]:
+        """What was heard or said in some slots."""
+        heard = [slot for slot in slots if slot in where.slots]
+        said = [f"agent.{slot}" for slot in slots if slot in self.declared.slots and not where.reset]
+        return [*heard, *heard, *said]
 
     def direction(self, where: Where) -> str:
         """A direction."""
@@ -447,8 +461,9 @@ class Phrases:
             "agent.spoke",
             lambda: f'agent.said("{self.utterance()}")',
             lambda: f'agent.said("{self.utterance()}")',
-            lambda: f"agent.noun == {self.noun()}",
+            lambda: f"agent.noun == {self.noun()}" if known.nouns else self.of_slot(where),
         ]
+        options += [lambda: self.of_slot(where)] * (2 * len(where.slots))
         options += [f"{npc}.spoke" for npc in known.members if npc in known.follows]
         if where.frame is not None and not (where.searching or where.still):
             options += [lambda: f'heard("{self.heard()}")'] * 2
@@ -501,7 +516,7 @@ class Phrases:
 
     def looking_back(self, where: Where) -> str:
         """How something was when the step began."""
-        earlier = replace(where, still=True, heard=False, noun=False)
+        earlier = replace(where, still=True, heard=False, noun=False, slots=())
         return self.one_of(
             lambda: f"prev(({self.condition(earlier, 1)}))",
             lambda: f"prev({self.number(earlier, 1)}) {self.rng.choice(('<', '!='))} {self.number(where, 0)}",
@@ -509,6 +524,29 @@ class Phrases:
         )
 
     # -- what is said ------------------------------------------------------------------------------------------
+
+    def of_slot(self, where: Where) -> str:
+        """What was heard or said in a slot, compared."""
+        slot = self.rng.choice([*self.declared.slots, *where.slots, *where.slots])
+        value = slot if slot in where.slots and self.often(0.7) else f"agent.{slot}"
+        is_ = self.rng.choice(("==", "!="))
+        word = self.rng.choice(self.declared.slots[slot])
+        return {
+            "what": lambda: f'{value} {is_} "{word}"',
+            "num": lambda: f"{value} {self.rng.choice(('<', '==', '!=', '>='))} {self.number(where, 0)}",
+            "paint": lambda: f"{value} {is_} {self.color(where)}",
+            "whom": lambda: f"{value} {is_} {self.member(replace(where, still=True))}",
+            "which": lambda: f"{value} {is_} {self.thing(where)[0]}",  # type: ignore[index] - then there are things
+        }[slot]()
+
+    def filled(self, template: str, probability: float = 1) -> str:
+        """A template with words in its slots, or in some of them."""
+        for slot, words in self.declared.slots.items():
+            if f"<{slot}>" in template and self.often(probability):
+                template = template.replace(f"<{slot}>", str(self.rng.choice(words)))
+        if self.declared.nouns:
+            template = template.replace("<noun>", str(self.rng.choice(self.declared.nouns)))
+        return template
 
     def noun(self) -> str:
         """A noun as it is written in an expression."""
@@ -518,11 +556,7 @@ class Phrases:
     def utterance(self) -> str:
         """Something the agent can say, or with any noun."""
         template = self.rng.choice(self.declared.templates)
-        return (
-            template
-            if self.often(0.4)
-            else template.replace("<noun>", str(self.rng.choice(self.declared.nouns)))
-        )
+        return template if self.often(0.4) else self.filled(template, 0.7)
 
     def heard(self) -> str:
         """Something that can be heard: of the agent or of an NPC."""
@@ -541,7 +575,7 @@ class Phrases:
         """A text of few possible values to say."""
         known = self.declared
         if where.frame is not None and where.frame.of_agent:
-            return self.rng.choice(known.templates).replace("<noun>", str(self.rng.choice(known.nouns)))
+            return self.filled(self.rng.choice(known.templates))
         options: list[str | Callable[[], str]] = [*known.says, *known.says]
         options += [
             lambda: f"It is <{self.in_text(self.color, where)}>",
@@ -557,8 +591,10 @@ class Phrases:
             options += ["Hello <speaker.name>"] * 2
         if where.noun:
             options += ["You said <noun>"] * 3
+        options += [f"You said <{slot}>" for slot in where.slots] * 3
         if not where.reset:
-            options += ["Was it <agent.noun>"]
+            slots = [f"agent.{slot}" for slot in self.declared.slots] or ["agent.noun"]
+            options += [lambda: f"Was it <{self.rng.choice(slots)}>"]
         if known.tables:
             options += [
                 lambda: f"They say <{self.rng.choice(known.tables)}({self.in_text(self.color, where)})>"
