@@ -1,1 +1,1 @@
-"""The comparisons of `make bench`; they stay in the repository, no wheel carries them."""
+"""This package holds what `make bench` compares with; it stays in the repository, no wheel carries it."""

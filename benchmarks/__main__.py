@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.main import run_alone
+from socialai_dsl.errors import UsageError
 
 SUMMARY: Final = "measure the speed of the environments, or of training, on this machine"
 

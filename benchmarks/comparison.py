@@ -1,4 +1,4 @@
-"""The measurements of peers for `make bench`."""
+"""Measures what `make bench` compares our environments with."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, Final

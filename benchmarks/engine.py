@@ -1,4 +1,4 @@
-"""The measurements of `make bench`, ours and the peers', in one run on one core."""
+"""This module takes the measurements of `make bench`, ours and those of others, in one run on one core."""
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The measurements of our environments for `make bench`."""
+"""This module measures our environments for `make bench`."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final

@@ -1,4 +1,4 @@
-"""The figure of `make bench`: steps per second over the number of environments."""
+"""This module draws what `make bench` measured: steps per second over the number of environments."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The yardstick of `make bench`: a fixed loop whose speed is this machine's."""
+"""This module is the yardstick of `make bench`: a fixed loop whose speed says how fast this machine is."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""The report of `make bench`: its rows and comparisons, as JSON and as a table."""
+"""This module is what `make bench` says: its rows, what they are compared with, as JSON and as a table."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field

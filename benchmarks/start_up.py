@@ -1,4 +1,4 @@
-"""Waiting times for `make bench`: for a check, for a program, for the first step."""
+"""This module measures for `make bench` how long one waits: for a check, for a program, for the first step."""
 
 import os
 import statistics

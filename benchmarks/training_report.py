@@ -1,4 +1,4 @@
-"""The report of `make bench ARGS=--train`, as text."""
+"""What `make bench ARGS=--train` measured, as text."""
 
 from __future__ import annotations
 

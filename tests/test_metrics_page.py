@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import socialai_dsl
-from socialai_dsl.cli.evaluation import evaluate_agent
-from socialai_dsl.cli.player import Player
+from socialai_dsl.evaluation.players import Player
+from socialai_dsl.evaluation.testing import evaluate_agent
 from trainer.config import RunConfig
 from trainer.ppo import train
 

@@ -10,8 +10,8 @@ import pytest
 import torch
 from safetensors import safe_open
 
-from socialai_dsl.cli.errors import UsageError
 from socialai_dsl.cli.main import main, run_main
+from socialai_dsl.errors import UsageError
 from tools import ship_agent
 from tools.ship_agent import INDEX, Refused, chance_of_difference, compare, halved, ship
 from trainer.checkpoint import read

@@ -8,9 +8,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.main import run_alone
-from socialai_dsl.cli.run_folder import write_text
+from socialai_dsl.errors import UsageError
+from socialai_dsl.run_folder import write_text
 from tools.fidelity_page import page
 from tools.fidelity_statistics import Comparison, Published, compare
 
@@ -80,7 +81,7 @@ def chosen(names: list[str]) -> Iterator[tuple[str, Published]]:
 
 
 def _compare(name: str, published: Published, episodes: int, seed: int) -> Comparison:
-    from socialai_dsl.cli.random_play import play_at_random
+    from socialai_dsl.evaluation.chance import play_at_random
 
     return compare(published, play_at_random(name, episodes, seed))
 

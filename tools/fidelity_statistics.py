@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from socialai_dsl.cli.random_play import Sample
+from socialai_dsl.evaluation.chance import Sample
 
 LIMIT: Final = 3.5
 """How many combined standard errors two mean lengths may lie apart."""

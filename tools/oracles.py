@@ -4,27 +4,20 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.main import run_alone
-from socialai_dsl.cli.oracle_play import OracleReport, Room, play_oracle
-from socialai_dsl.cli.run_folder import write_text
 from socialai_dsl.cli.terminal import ProgressLine
+from socialai_dsl.errors import UsageError
+from socialai_dsl.evaluation.scripts import UNPROVEN, VERDICTS, Room, ScriptReport, play_script
 from socialai_dsl.loader.shipped import shipped_scenarios, variants_of
+from socialai_dsl.run_folder import write_text
 
 SUMMARY: Final = "let the scenarios' own scripts play, and search the rooms that they do not solve"
 
-_ROOMS_SHOWN: Final = 12
 _STATES: Final = 300_000
-_UNPROVEN: Final = ", as far as chance was tried"
-_MEANING: Final = {
-    "unsolvable": "cannot be solved",
-    "solvable": "can be solved: a fault of the script, or only luck would find it",
-    "undecided": "are undecided: too many states",
-}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,42 +58,18 @@ def execute(arguments: argparse.Namespace) -> Exit:
     reports, progress = [], ProgressLine(sys.stderr)
     for name in names:
         clock = Clock(None, progress.show)
-        reports.append(play_oracle(name, arguments.episodes, arguments.seed, arguments.states, clock))
+        reports.append(play_script(name, arguments.episodes, arguments.seed, arguments.states, clock))
         progress.clear()
         if not arguments.json:
-            print("\n".join(summary(reports[-1])), flush=True)
+            print("\n".join(reports[-1].lines()), flush=True)
     if arguments.json:
-        print(json.dumps([as_object(report) for report in reports], indent=2))
+        print(json.dumps([report.as_object() for report in reports], indent=2))
     if arguments.out is not None:
         write_text(arguments.out, _page(reports, arguments.states))
     return Exit.FINDINGS if any(report.found("solvable") for report in reports) else Exit.GOOD
 
 
-def summary(report: OracleReport) -> list[str]:
-    """A report in a few lines."""
-    rate, error = report.success_rate, report.success_se
-    lines = [
-        f"{report.scenario}: {report.solved:,} of {report.rooms:,} rooms solved, {rate:.2%} ± {error:.2%}, "
-        f"in {report.mean_length:.1f} steps; no policy succeeds in more than {report.ceiling:.2%}"
-    ]
-    for verdict, meaning in _MEANING.items():
-        if rooms := report.found(verdict):
-            proven = "" if all(room.exact for room in rooms) or verdict != "unsolvable" else _UNPROVEN
-            lines.append(f"  {len(rooms)} {meaning}{proven} (seed {report.seed}, index {_indices(rooms)})")
-    return lines
-
-
-def as_object(report: OracleReport) -> dict[str, Any]:
-    """A report for JSON."""
-    return {
-        **asdict(report),
-        "success_rate": report.success_rate,
-        "success_rate_se": report.success_se,
-        "ceiling": report.ceiling,
-    }
-
-
-def _page(reports: list[OracleReport], states: int) -> str:
+def _page(reports: list[ScriptReport], states: int) -> str:
     rows = [
         "# What the scripts solve\n",
         "Each scenario's own script (its variant `oracle`) plays rooms of one seed. A room",
@@ -110,7 +79,7 @@ def _page(reports: list[OracleReport], states: int) -> str:
         "|---|---|---|---|---|---|---|",
     ]
     for report in reports:
-        counts = [str(len(report.found(verdict))) for verdict in _MEANING]
+        counts = [str(len(report.found(verdict))) for verdict in VERDICTS]
         rows.append(
             f"| `{report.scenario}` | {report.rooms:,} | {report.success_rate:.2%} ± {report.success_se:.2%} "
             f"| {report.ceiling:.2%} | {' | '.join(counts)} |"
@@ -129,16 +98,9 @@ def _page(reports: list[OracleReport], states: int) -> str:
 
 
 def _row(room: Room) -> str:
-    verdict = room.verdict if room.exact or room.verdict != "unsolvable" else room.verdict + _UNPROVEN
+    verdict = room.verdict if room.exact or room.verdict != "unsolvable" else room.verdict + UNPROVEN
     steps = "" if room.steps is None else f"{room.steps} steps"
     return f"| {room.index} | {room.outcome} | {verdict} | {room.states:,} | {steps} |"
-
-
-def _indices(rooms: tuple[Room, ...]) -> str:
-    """The first of the rooms; the JSON has them all."""
-    shown = ", ".join(str(room.index) for room in rooms[:_ROOMS_SHOWN])
-    more = len(rooms) - _ROOMS_SHOWN
-    return shown + (f" and {more} more" if more > 0 else "")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.main import run_alone
-from socialai_dsl.cli.run_folder import read_json, write_json, write_text
+from socialai_dsl.errors import UsageError
 from socialai_dsl.loader.shipped import shipped_scenarios, variants_of
+from socialai_dsl.run_folder import read_json, write_json, write_text
 
 if TYPE_CHECKING:
     import numpy as np
@@ -121,8 +122,8 @@ def _measure(names: list[str], folder: Path) -> None:
 
 def measure(name: str, episodes: int = _EPISODES, rooms: int = _ROOMS, seed: int = 0) -> dict[str, Any]:
     """Figures of the random policy and, where there is one, of the scenario's own script."""
-    from socialai_dsl.cli.oracle_play import play_oracle
-    from socialai_dsl.cli.random_play import play_at_random
+    from socialai_dsl.evaluation.chance import play_at_random
+    from socialai_dsl.evaluation.scripts import play_script
 
     sample = play_at_random(name, episodes, seed)
     figures: dict[str, Any] = {
@@ -136,7 +137,7 @@ def measure(name: str, episodes: int = _EPISODES, rooms: int = _ROOMS, seed: int
         }
     }
     if "oracle" in variants_of(name):
-        report = play_oracle(name, rooms, seed, _STATES)
+        report = play_script(name, rooms, seed, _STATES)
         figures["oracle"] = {
             "rooms": report.rooms,
             "seed": seed,

@@ -12,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 
 import socialai_dsl
-from socialai_dsl.evaluation import Observation, Streams
+from socialai_dsl.evaluation.episodes import Observation, Streams
 from trainer import actions as heads
 from trainer import checkpoint as checkpoints
 from trainer.checkpoint import CheckpointMeta

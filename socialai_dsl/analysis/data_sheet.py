@@ -1,40 +1,63 @@
-"""The data sheet of a scenario: its file in tables, and its measurements."""
+"""The data sheet of a scenario: what its file says, in tables, and what was measured."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.analysis.sheet_text import code, entries, flow, frame, items, rule, table
+from socialai_dsl.loader.reader import display_name
+from socialai_dsl.loader.shipped import IDS, base_of, file_of, is_shipped, variants_of
 
 if TYPE_CHECKING:
     from socialai_dsl.checking.loaded import Loaded, LoadedScenario, LoadedSuite
     from socialai_dsl.schema.scenario import CastMember
 
 _GENERATED: Final = "<!-- Written by `make sheets`; change the scenario's file and run it again. -->"
+_MEMBERS_SHOWN: Final = 40
 _FILES: Final = "../../scenarios"
 _DEFAULTS: Final = {"kind": "peer", "place": "anywhere", "facing": "random", "color": "random"}
 
 
+def sheet(name: str, loaded: "Loaded") -> str:
+    """The data sheet of any scenario or suite as Markdown, without pictures and measurements.
+
+    Args:
+        name: a path or a name, as `load` takes it.
+        loaded: the same, loaded.
+    """
+    data = _data(loaded)
+    about = _about(name, data) if is_shipped(name) else str(data.get("about", ""))
+    lines = [f"# {name}", "", about, ""] if about else [f"# {name}", ""]
+    return _sheet(lines, name, loaded)
+
+
 def page(name: str, loaded: "Loaded", measured: Mapping[str, Any] | None) -> str:
-    """The sheet of a shipped scenario or suite as Markdown.
+    """The sheet of a shipped scenario or suite as a page of the documentation.
 
     Args:
         name: as it is shipped.
         loaded: the scenario.
         measured: its entry among the measurements; None if there is none.
     """
-    from socialai_dsl.checking.loaded import LoadedSuite
-
-    data = _data(loaded)
-    lines = [f"# {name}", "", _GENERATED, "", _about(name, data), ""]
+    lines = [f"# {name}", "", _GENERATED, "", _about(name, _data(loaded)), ""]
     lines += [f"![rooms of {name} at the start of an episode]({name}.png)", ""]
     lines += [
         "The arrow is the agent; what it sees is outlined. An NPC's dark triangle shows where it looks.",
         "",
     ]
-    lines += [*_facts(name, loaded, data), ""]
-    body = _suite(loaded) if isinstance(loaded, LoadedSuite) else _scenario(loaded, data)
-    for section in (*body, _variants(name), _measured(measured), _as_coded(name)):
+    return _sheet(lines, name, loaded, measured, f"{_FILES}/{name}.yaml")
+
+
+def _sheet(
+    lines: list[str], name: str, loaded: "Loaded", measured: Mapping[str, Any] | None = None, link: str = ""
+) -> str:
+    from socialai_dsl.checking.loaded import LoadedSuite
+
+    data = _data(loaded)
+    lines += [*_facts(name, loaded, data, link), ""]
+    body = _suite(loaded, bool(link)) if isinstance(loaded, LoadedSuite) else _scenario(loaded, data)
+    ships = (_variants(name), _measured(measured), _as_coded(name)) if is_shipped(name) else ()
+    for section in (*body, *ships):
         if section:
             lines += [*section, ""]
     return "\n".join(lines).rstrip() + "\n"
@@ -77,18 +100,15 @@ def _data(loaded: "Loaded") -> dict[str, Any]:
 
 def _about(name: str, data: Mapping[str, Any]) -> str:
     """What a scenario says it is about; a variant that does not say it says what it changes."""
-    from socialai_dsl.loader.shipped import base_of
-
     about, base = str(data.get("about", "")), base_of(name)
     if not base:
         return about
-    changes = _first_comment(_file_of(name))
+    changes = _first_comment(file_of(name))
     return f"{changes[:1].upper()}{changes[1:]}. A variant of [{base}]({base}.md): {about}"
 
 
-def _facts(name: str, loaded: "Loaded", data: Mapping[str, Any]) -> list[str]:
+def _facts(name: str, loaded: "Loaded", data: Mapping[str, Any], link: str) -> list[str]:
     from socialai_dsl.compilation import compile_loaded
-    from socialai_dsl.loader.shipped import IDS
     from socialai_dsl.program import Header
     from socialai_dsl.program_suite import ProgramSuite
 
@@ -101,7 +121,7 @@ def _facts(name: str, loaded: "Loaded", data: Mapping[str, Any]) -> list[str]:
     horizons = sorted({program.header(Header.HORIZON) for program in programs})
     skills = data.get("skills") or []
     rows = [
-        ("file", f"[`scenarios/{name}.yaml`]({_FILES}/{name}.yaml)"),
+        ("file", f"[`scenarios/{name}.yaml`]({link})" if link else code(display_name(loaded.resolved.path))),
         ("Gymnasium", ", ".join(ids)),
         ("skills", ", ".join(skills if isinstance(skills, list) else [skills]).replace("_", " ")),
         ("horizon", " or ".join(map(str, horizons)) + " steps"),
@@ -117,10 +137,8 @@ def _facts(name: str, loaded: "Loaded", data: Mapping[str, Any]) -> list[str]:
 
 
 def _variants(name: str) -> list[str]:
-    from socialai_dsl.loader.shipped import variants_of
-
     lines = [
-        f"* {code(f'{name}+{variant}')}: {_first_comment(_file_of(name, variant))}"
+        f"* {code(f'{name}+{variant}')}: {_first_comment(file_of(name, variant))}"
         for variant in variants_of(name)
     ]
     return ["## Variants", "", *lines] if lines else []
@@ -128,20 +146,11 @@ def _variants(name: str) -> list[str]:
 
 def _as_coded(name: str) -> list[str]:
     """What the code of the paper does otherwise: the variant itself, since every line of it is one difference."""
-    from socialai_dsl.loader.shipped import variants_of
-
     if "as_coded" not in variants_of(name):
         return []
-    text = _file_of(name, "as_coded").read_text(encoding="utf-8").rstrip()
+    text = file_of(name, "as_coded").read_text(encoding="utf-8").rstrip()
     return ["## Paper and code", "", "The scenario follows the paper's text. Its code differs in this:", "",
             "```yaml", text, "```"]  # fmt: skip
-
-
-def _file_of(name: str, variant: str | None = None) -> Path:
-    """The file of a shipped scenario, or of its variant: its own, or one of what it is itself a variant of."""
-    from socialai_dsl.loader.shipped import file_of
-
-    return file_of(name, variant)
 
 
 def _first_comment(path: Path) -> str:
@@ -174,11 +183,16 @@ def _share(figures: Mapping[str, Any] | None) -> str:
 # --- suites
 
 
-def _suite(loaded: "LoadedSuite") -> Iterator[list[str]]:
+def _suite(loaded: "LoadedSuite", linked: bool) -> Iterator[list[str]]:
     data = _data(loaded)
-    members = [Path(str(member)).stem for member in data["members"]]
-    yield ["## Members", "", "Each episode plays one of them, all with the same probability.", "",
-           *(f"* [{member}]({member}.md)" for member in members)]  # fmt: skip
+    names = loaded.member_names
+    plays = "all of them, one after another" if loaded.in_sequence else "one of them"
+    if not loaded.in_sequence and len(set(loaded.weights)) == 1:
+        plays += ", all with the same probability"
+    members = [f"* [{name}]({name}.md)" if linked else f"* {code(name)}" for name in names[:_MEMBERS_SHOWN]]
+    more = len(names) - _MEMBERS_SHOWN
+    members += [f"* and {more} more"] if more > 0 else []
+    yield ["## Members", "", f"Each episode plays {plays}.", "", *members]
     yield [
         "## Grammar",
         "",

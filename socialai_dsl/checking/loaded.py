@@ -84,3 +84,9 @@ class LoadedSuite:
 
 Loaded = LoadedScenario | LoadedSuite
 """What `load` returns."""
+
+
+def about_of(loaded: Loaded) -> str:
+    """What a file says of itself."""
+    data = loaded.resolved.data
+    return str(data.get("about", "")) if isinstance(data, dict) else ""

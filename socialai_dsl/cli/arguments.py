@@ -2,6 +2,7 @@
 
 import argparse
 import math
+from collections.abc import Callable
 
 
 def positive(text: str) -> int:
@@ -16,20 +17,44 @@ def natural(text: str) -> int:
 
 def seconds(text: str) -> float:
     """A time above 0; it may have a fraction."""
-    try:
-        found = float(text)
-    except ValueError:
-        found = 0.0
+    found = _fraction(text)
     if not (0 < found < math.inf):
         raise argparse.ArgumentTypeError(f"expected a number of seconds above 0, got {text!r}")
     return found
+
+
+def percent(text: str) -> float:
+    """A number from 0 to 100."""
+    found = _fraction(text)
+    if not (0 <= found <= 100):
+        raise argparse.ArgumentTypeError(f"got {text}, expected a per cent from 0 to 100")
+    return found
+
+
+def at_least(least: float) -> Callable[[str], float]:
+    """A finite number that is not below `least`."""
+
+    def number(text: str) -> float:
+        found = _fraction(text)
+        if not (least <= found < math.inf):
+            raise argparse.ArgumentTypeError(f"got {text}, expected at least {least:g}")
+        return found
+
+    return number
+
+
+def _fraction(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
 
 
 def _number(text: str, least: int) -> int:
     try:
         number = int(text.replace("_", "").replace(",", ""))
     except ValueError:
-        number = least - 1
+        raise argparse.ArgumentTypeError(f"got {text!r}, expected a whole number") from None
     if number < least:
-        raise argparse.ArgumentTypeError(f"expected a whole number of at least {least}, got {text!r}")
+        raise argparse.ArgumentTypeError(f"got {number}, expected at least {least}")
     return number

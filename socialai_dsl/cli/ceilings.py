@@ -5,12 +5,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from socialai_dsl.cli.errors import UsageError
-from socialai_dsl.cli.run_folder import read_json, write_json
+from socialai_dsl.errors import UsageError
+from socialai_dsl.run_folder import read_json, write_json
 
 if TYPE_CHECKING:
-    from socialai_dsl.checking.loaded import Loaded
-    from socialai_dsl.reporting.analysis import Ceilings, Level
+    from socialai_dsl.reporting.analysis import Ceilings
     from socialai_dsl.reporting.collect import Experiment
 
 FILE: Final = "ceilings.json"
@@ -36,22 +35,20 @@ def known_ceilings(experiment: "Experiment") -> "dict[str, Ceilings]":
 
 
 def measured_ceilings(scenario: str) -> "Ceilings":
-    """Play the test episodes with the script and at random, and search for what is possible without the NPCs.
+    """What `baselines` measures, as reports take it.
 
     Raises:
         ScenarioError: the scenario has mistakes, or is no longer there.
     """
-    import socialai_dsl
-    from socialai_dsl.checking.loaded import LoadedScenario
-    from socialai_dsl.reporting.analysis import Ceilings
+    from socialai_dsl.evaluation import baselines
+    from socialai_dsl.reporting.analysis import Ceilings, Level
 
-    loaded = socialai_dsl.load(scenario)
-    return Ceilings(
-        oracle=_played(scenario, "oracle"),
-        random=_played(scenario, "random"),
-        alone=_alone(loaded) if isinstance(loaded, LoadedScenario) else None,
-        program_sha256=socialai_dsl.compile(loaded).sha256,
+    found = baselines(scenario, _EPISODES, _ROOMS)
+    script, chance, alone = (
+        None if level is None else Level(level.value, level.error, level.sample)
+        for level in (found.script, found.chance, found.without_npcs)
     )
+    return Ceilings(oracle=script, random=chance, alone=alone, program_sha256=found.program_sha256)
 
 
 def read_ceilings(path: Path) -> "dict[str, Ceilings]":
@@ -85,34 +82,6 @@ def is_current(scenario: str, ceilings: "Ceilings") -> bool:
 def scenarios_of(experiment: "Experiment") -> Iterable[str]:
     """The scenarios of its conditions, each once."""
     return dict.fromkeys(condition.entry.scenario for condition in experiment.conditions)
-
-
-def _played(scenario: str, agent: str) -> "Level | None":
-    """None where the scenario has no script."""
-    from socialai_dsl.cli.evaluation import evaluate_agent
-    from socialai_dsl.cli.player import Player
-    from socialai_dsl.reporting.analysis import Level
-
-    try:
-        result = evaluate_agent(Player(agent), scenario, _EPISODES).result
-    except UsageError:
-        return None
-    return Level(result.success_rate, result.success_rate_se, f"{_EPISODES} test episodes")
-
-
-def _alone(loaded: "Loaded") -> "Level | None":
-    """None where there is no NPC."""
-    from socialai_dsl.analysis.depth import without_npcs
-    from socialai_dsl.analysis.effort import Effort
-    from socialai_dsl.checking.loaded import LoadedScenario
-    from socialai_dsl.reporting.analysis import Level
-
-    assert isinstance(loaded, LoadedScenario), "internal: a suite is no room"
-    alone = without_npcs(loaded, Effort(rooms=_ROOMS))
-    if alone is None:
-        return None
-    undecided = f", {alone.undecided} undecided" if alone.undecided else ""
-    return Level(alone.success, alone.error, f"{alone.rooms} rooms{undecided}")
 
 
 def _error(rate: float, episodes: int) -> float:

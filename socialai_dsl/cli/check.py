@@ -1,28 +1,23 @@
-"""`socialai check`: tries the claims of scenarios in drawn rooms."""
+"""`socialai check`: what scenarios claim about themselves is tried, and what they contain is played."""
 
 import argparse
 import json
 import sys
-from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
-from socialai_dsl.cli.check_report import ScenarioReport
-from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.arguments import at_least, natural, percent, positive
+from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import ProgressLine
 
 if TYPE_CHECKING:
-    from socialai_dsl.analysis.effort import Effort
-    from socialai_dsl.checking.loaded import LoadedScenario
+    from socialai_dsl.analysis.scenario_report import ScenarioReport
 
-SUMMARY: Final = "verify what scenarios claim in `check`, and that everything in them can happen and be known"
+SUMMARY: Final = "test by playing what scenarios claim, and whether everything in them can happen"
 
 ROOMS: Final = 100
 STATES: Final = 50_000
 SECONDS: Final = 20.0
-
-Say = Callable[[str], None]
-"""Takes a line of the report."""
+PARTS: Final = ("claims", "coverage", "script")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,55 +26,107 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "scenarios",
         nargs="+",
         metavar="SCENARIO",
-        help="a path or a name; of a suite every member is checked",
+        help="a path or a name; in a suite every member is checked",
     )
-    add_effort(parser)
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the rooms (default: 0)")
     parser.add_argument(
-        "--states",
-        type=int,
-        default=STATES,
-        metavar="N",
-        help=f"how many states of a room are searched before it is undecided (default: {STATES})",
+        "--part",
+        action="append",
+        choices=PARTS,
+        dest="parts",
+        help="what to check (repeatable). claims, the default: what the file claims, and whether everything can "
+        "be known and can happen. coverage: what happens while agents play. script: which rooms the script of the "
+        "scenario solves, and whether the other rooms can be solved",
     )
     parser.add_argument(
         "--deep",
         action="store_true",
-        help="also tell how long a success takes, whether the script succeeds, and what an agent gets that neither "
-        "sees nor hears the NPCs",
+        help="for claims: also find the shortest successes, play the script in the same rooms, and measure the success "
+        "that is possible without seeing or hearing an NPC",
     )
-    parser.add_argument("--format", choices=("text", "json"), default="text", help="default: text")
+    add_effort(parser)
+    parser.add_argument("--seed", type=natural, default=0, metavar="N", help="seed of the rooms (default: 0)")
     parser.add_argument(
-        "--strict", action="store_true", help="what is undecided, and warnings, count as failures too"
+        "--states",
+        type=positive,
+        default=STATES,
+        metavar="N",
+        help=f"for claims and script: give up on a room after N states (default: {STATES})",
+    )
+    parser.add_argument(
+        "--agent",
+        action="append",
+        metavar="AGENT",
+        help="for coverage: the agent that plays (repeatable): oracle, random, shipped, a checkpoint or a run folder "
+        "(default: random, and oracle where the scenario has a script)",
+    )
+    parser.add_argument(
+        "--episodes",
+        type=positive,
+        default=200,
+        metavar="N",
+        help="for coverage: number of episodes of each agent (default: 200)",
+    )
+    parser.add_argument(
+        "--fail-under",
+        type=percent,
+        metavar="PERCENT",
+        help="for coverage: exit with 1 if less than this share happened",
+    )
+    parser.add_argument("--json", action="store_true", help="print the reports as a JSON array")
+    parser.add_argument(
+        "--alone", action="store_true", help=argparse.SUPPRESS
+    )  # the object that `coverage` printed
+    parser.add_argument(
+        "--strict", action="store_true", help="for claims: also fail for warnings and for what is undecided"
     )
 
 
 def add_effort(parser: argparse.ArgumentParser) -> None:
     """Declare how much is tried, and for how long."""
     parser.add_argument(
-        "--rooms", type=int, default=ROOMS, metavar="N", help=f"rooms to try (default: {ROOMS})"
+        "--rooms",
+        type=positive,
+        default=ROOMS,
+        metavar="N",
+        help=f"number of rooms (default: {ROOMS})",
     )
     parser.add_argument(
         "--seconds",
-        type=float,
+        type=at_least(0.0),
         default=SECONDS,
         metavar="S",
-        help=f"how long to try each scenario; 0 takes as long as it needs (default: {SECONDS:g})",
+        help=f"time limit for each scenario, 0 for none (default: {SECONDS:g})",
     )
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Check every scenario that was named; what fails is a finding. Ctrl-C ends with what is known."""
-    check_effort(arguments)
-    if arguments.states < 1:
-        raise UsageError(f"--states: got {arguments.states}, expected at least 1")
-    if arguments.seed < 0:
-        raise UsageError(f"--seed: got {arguments.seed}, expected at least 0")
+    parts = arguments.parts or ["claims"]
+    documents: list[dict[str, Any]] = []
+    ends = []
+    if "claims" in parts:
+        reports = _claims(arguments)
+        documents += [report.as_object() for report in reports]
+        if any(report.interrupted for report in reports):
+            ends.append(Exit.INTERRUPTED)
+        elif any(report.fails(arguments.strict) for report in reports):
+            ends.append(Exit.FINDINGS)
+    if "coverage" in parts and Exit.INTERRUPTED not in ends:
+        ends.append(_coverage(arguments, documents))
+    if "script" in parts and Exit.INTERRUPTED not in ends:
+        ends.append(_scripts(arguments, documents))
+    if arguments.json:
+        print(json.dumps(documents[0] if arguments.alone else documents, indent=2, ensure_ascii=False))
+    return max(ends, default=Exit.GOOD)
+
+
+def _claims(arguments: argparse.Namespace) -> "list[ScenarioReport]":
+    from socialai_dsl.analysis.check import check_scenario, scenarios_of
     from socialai_dsl.analysis.effort import Clock, Effort
 
     progress = ProgressLine(sys.stderr)
+    say = None if arguments.json else progress.above(sys.stdout)
     reports: list[ScenarioReport] = []
-    say = progress.above(sys.stdout) if arguments.format == "text" else None
     for scenario, called in (pair for name in arguments.scenarios for pair in scenarios_of(name)):
         clock = Clock(arguments.seconds or None, progress.show)
         effort = Effort(arguments.rooms, arguments.seed, arguments.states, clock)
@@ -87,105 +134,33 @@ def execute(arguments: argparse.Namespace) -> Exit:
         if clock.interrupted:
             break
     progress.clear()
-    if arguments.format == "json":
-        print(json.dumps([report.as_object() for report in reports], indent=2))
-    if any(report.interrupted for report in reports):
-        return Exit.INTERRUPTED
-    failed = any(report.fails(arguments.strict) for report in reports)
-    return Exit.FINDINGS if failed else Exit.GOOD
+    return reports
 
 
-def check_effort(arguments: argparse.Namespace) -> None:
-    """Raise UsageError for numbers of rooms or seconds that make no sense."""
-    if arguments.rooms < 1:
-        raise UsageError(f"--rooms: got {arguments.rooms}, expected at least 1")
-    if not 0 <= arguments.seconds < float("inf"):
-        raise UsageError(f"--seconds: got {arguments.seconds:g}, expected at least 0")
+def _coverage(arguments: argparse.Namespace, documents: list[dict[str, Any]]) -> Exit:
+    from socialai_dsl.evaluation import coverage
+
+    found = coverage(arguments.scenarios, arguments.agent or (), arguments.episodes, arguments.seed)
+    documents.append(found.as_object())
+    if not arguments.json:
+        print("\n".join(found.lines()))
+    least = arguments.fail_under
+    return Exit.FINDINGS if least is not None and found.percent < least else Exit.GOOD
 
 
-def check_scenario(
-    loaded: "LoadedScenario", called: str, effort: "Effort", deep: bool = False, say: Say | None = None
-) -> ScenarioReport:
-    """Try what a scenario claims, whether it can be known, and whether everything in it can happen.
+def _scripts(arguments: argparse.Namespace, documents: list[dict[str, Any]]) -> Exit:
+    """A room that can be solved and was not is a finding."""
+    from socialai_dsl.analysis.effort import Clock
+    from socialai_dsl.evaluation import play_script
 
-    Args:
-        loaded: the scenario.
-        called: its name, to which `+oracle` can be added.
-        effort: how much to try, and for how long.
-        deep: also try what success takes.
-        say: takes the lines of the report as they come.
-    """
-    from socialai_dsl.analysis.coverage import coverage
-    from socialai_dsl.analysis.depth import depth
-    from socialai_dsl.analysis.properties import Trial, by_default
-
-    place = loaded.resolved.key_span(("outcome",))
-    report = ScenarioReport(called, effort.rooms, effort.seed, place)
-    said = 0
-
-    def part(tasks: int) -> "Effort":
-        return replace(effort, clock=effort.clock.part(tasks))
-
-    def tell() -> None:
-        nonlocal said
-        lines = list(report.lines())
-        for line in lines[said:] if say is not None else ():
-            say(line)  # type: ignore[misc]
-        said = len(lines)
-
-    tell()
-    try:
-        scripted = _scripted(loaded, called)
-        trial = Trial(loaded, effort, scripted)
-        plans = by_default(loaded, place)
-        for number, plan in enumerate(plans):
-            found = trial.check(plan, part(len(plans) - number + 1 + 2 * deep))
-            report.tried += ((plan, found),)
-            tell()
-            if effort.clock.interrupted:
-                break
-        if not effort.clock.interrupted:
-            report.coverage = coverage(loaded, part(1 + 2 * deep), scripted)
-            tell()
-        if deep and not effort.clock.interrupted:
-            report.depth = depth(trial, part(1))
-            tell()
-    except KeyboardInterrupt:
-        effort.clock.interrupt()
-    report.interrupted, report.in_time = effort.clock.interrupted, not effort.clock.is_over
-    report.complete = True
-    tell()
-    return report
-
-
-def scenarios_of(name: str) -> "list[tuple[LoadedScenario, str]]":
-    """The scenario of a name, or the members of a suite, each with its own."""
-    from socialai_dsl.checking.loaded import LoadedSuite
-    from socialai_dsl.frontend import load
-
-    loaded = load(name)
-    if isinstance(loaded, LoadedSuite):
-        return list({member.name: (member, member.name) for member in loaded.members}.values())
-    return [(loaded, name)]
-
-
-def _scripted(loaded: "LoadedScenario", called: str) -> "LoadedScenario | None":
-    """The scenario with a frame for the agent: itself, or its variant `oracle`; None without either."""
-    from socialai_dsl.checking.loaded import LoadedScenario
-    from socialai_dsl.diagnostics import ScenarioError
-    from socialai_dsl.frontend import load
-
-    if any(frame.entity == 0 for frame in loaded.checked.frames):
-        return loaded
-    base, mark, parameters = called.partition("?")
-    try:
-        scripted = load(f"{base}+oracle{mark}{parameters}")
-    except ScenarioError as error:
-        if any(diagnostic.code not in _UNKNOWN for diagnostic in error.diagnostics):
-            raise
-        return None
-    return scripted if isinstance(scripted, LoadedScenario) else None
-
-
-_UNKNOWN: Final[frozenset[Any]] = frozenset({"S503", "S504", "S508"})
-"""Codes of names that do not exist; a member of a suite may have no name of its own."""
+    progress, end = ProgressLine(sys.stderr), Exit.GOOD
+    for name in arguments.scenarios:
+        clock = Clock(None, progress.show)
+        found = play_script(name, arguments.rooms, arguments.seed, arguments.states, clock)
+        progress.clear()
+        documents.append(found.as_object())
+        if not arguments.json:
+            print("\n".join(found.lines()), flush=True)
+        if found.found("solvable"):
+            end = Exit.FINDINGS
+    return end

@@ -1,44 +1,28 @@
-"""`socialai curves`: the learning curves of several runs in one picture and one table."""
+"""`socialai report --curves`: the learning curves of several runs in one picture and one table."""
 
-import argparse
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.errors import Exit
+from socialai_dsl.errors import UsageError
 
 if TYPE_CHECKING:
     from socialai_dsl.reporting.analysis import Summary
-
-SUMMARY: Final = "draw the learning curves of several runs, seeds of one condition together"
 
 _ROWS: Final = 8
 _WORTH_SHOWING: Final = 0.005
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of this command."""
-    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN_DIR", help="folders of runs")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        default=Path("curves.png"),
-        metavar="FILE",
-        help="picture to write (default: curves.png)",
-    )
-
-
-def execute(arguments: argparse.Namespace) -> Exit:
+def draw_curves(runs: Sequence[Path], out: Path) -> Exit:
     """Group the runs by everything but their seed, draw them, and print a table in Markdown."""
-    from socialai_dsl.cli.report import require_libraries
-
-    require_libraries()
     from socialai_dsl.reporting.analysis import Summary
     from socialai_dsl.reporting.collect import read_runs
     from socialai_dsl.reporting.plots import conditions_figure
 
     try:
-        experiment = read_runs(arguments.runs)
+        experiment = read_runs(runs)
     except ValueError as error:
         raise UsageError(str(error)) from error
     for run in experiment.runs:
@@ -46,10 +30,10 @@ def execute(arguments: argparse.Namespace) -> Exit:
             said = "; ".join(run.problems) or "it has no metrics.jsonl that can be read"
             raise UsageError(f"{run.folder}: expected the folder of a run that has learned, {said}")
     summaries = [Summary(condition) for condition in experiment.conditions]
-    conditions_figure(summaries).savefig(arguments.out)
+    conditions_figure(summaries).savefig(out)
     for summary in summaries:
         print(_table(summary))
-    print(f"written to {arguments.out}")
+    print(f"written to {out}")
     return Exit.GOOD
 
 

@@ -1,4 +1,4 @@
-"""Exit codes of commands, and the errors that end one."""
+"""The ways a command can end."""
 
 from collections.abc import Iterable
 from enum import IntEnum
@@ -14,16 +14,9 @@ class Exit(IntEnum):
     FINDINGS = 1  # a file has mistakes, or a check failed
     USAGE = 2  # wrong usage, unreadable input, unwritable output
     INTERNAL = 3  # a bug of ours
+    STOPPED = 4  # a run stopped by itself: numbers that are not finite, a full disk, a spent budget
     INTERRUPTED = 130  # Ctrl-C, as shells count it
     BROKEN_PIPE = 141  # the reader of our output went away, as shells count it
-
-
-class UsageError(Exception):
-    """The caller asked for something that cannot be done; the message says what was got and expected."""
-
-
-class RunFailed(Exception):  # noqa: N818 - it says what happened
-    """Training broke down although everything was asked for rightly."""
 
 
 def is_usage(diagnostics: Iterable[Diagnostic]) -> bool:

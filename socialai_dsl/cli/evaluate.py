@@ -8,16 +8,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from socialai_dsl.cli.arguments import natural, positive
-from socialai_dsl.cli.errors import Exit, UsageError
-from socialai_dsl.cli.language_model import PREFIX, add_options, default_folder
-from socialai_dsl.cli.run_folder import REPLAY, RESULT, SETTINGS, read_json, versions, write_json, write_text
+from socialai_dsl.cli.errors import Exit
+from socialai_dsl.cli.model_options import add_options, model_options
+from socialai_dsl.errors import UsageError
+from socialai_dsl.run_folder import REPLAY, RESULT, SETTINGS, versions, write_json, write_text
 from trainer.config import code_folder
 
 if TYPE_CHECKING:
-    from socialai_dsl.cli.evaluation import Evaluation
-    from socialai_dsl.cli.player import Player
+    from socialai_dsl.evaluation.players import Player
+    from socialai_dsl.evaluation.testing import Evaluation
 
-SUMMARY: Final = "evaluate a trained agent, a script, chance or a language model on a scenario's test set"
+SUMMARY: Final = "test a trained agent, a script, chance or a language model on a fixed set of episodes"
 FIGURES: Final = "evaluation.json"
 _RECORDED: Final = 3
 
@@ -27,31 +28,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "run",
         metavar="RUN_DIR",
-        help="a run's folder or a checkpoint; also shipped:NAME, shipped (the agent of each scenario), random, oracle "
-        "or llm:MODEL",
+        help="the agent: the folder of a run, a checkpoint, shipped:NAME, shipped (the agent of each scenario), "
+        "random, oracle or llm:MODEL",
     )
     parser.add_argument(
-        "--on", action="append", metavar="SCENARIO", help="what to play (default: the run's own); repeatable"
+        "--on",
+        action="append",
+        metavar="SCENARIO",
+        help="the scenario to play (repeatable; default: that of the run)",
     )
     parser.add_argument(
-        "--episodes", type=positive, default=500, metavar="N", help="of the test set (default: 500)"
+        "--episodes", type=positive, default=500, metavar="N", help="number of test episodes (default: 500)"
     )
     parser.add_argument(
         "--greedy",
         action="store_true",
-        help="take the most probable action (default: sample, as the paper does)",
+        help="take the most probable action (default: sample)",
     )
     parser.add_argument(
         "--seed",
         type=natural,
         default=0,
         metavar="N",
-        help="of the sampling (default: 0); rooms never change",
+        help="seed of the sampling (default: 0); the rooms are always the same",
     )
-    parser.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help="default: auto")
     parser.add_argument(
-        "--net", metavar="mine:Net", help="import this code, for an agent with a network of your own"
+        "--device",
+        choices=("auto", "cpu", "cuda"),
+        default="auto",
+        help="where the network runs (default: auto)",
     )
+    parser.add_argument("--net", metavar="mine:Net", help="import this code, for a network of your own")
     parser.add_argument(
         "--out",
         type=Path,
@@ -63,19 +70,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--record",
         type=natural,
         metavar="N",
-        help=f"with --out: how many failures and how many successes are recorded (default: {_RECORDED})",
+        help=f"with --out: record up to N failures and N successes (default: {_RECORDED})",
     )
     parser.add_argument(
-        "--json", action="store_true", help="print an array with one object for each scenario"
+        "--json", action="store_true", help="print a JSON array with one object for each scenario"
     )
     add_options(parser)
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Evaluate on each scenario."""
-    from socialai_dsl.cli.agents import named_agent
-    from socialai_dsl.cli.evaluation import evaluate_agent
-    from socialai_dsl.cli.evaluation_report import write_episodes
+    from socialai_dsl.evaluation.players import named_agent
+    from socialai_dsl.evaluation.recordings import record
+    from socialai_dsl.evaluation.testing import evaluate_agent
 
     if arguments.record is not None and arguments.out is None:
         raise UsageError("--record: expected --out DIR as well, where the recordings go")
@@ -84,7 +91,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     player = _player(arguments)
     out = player.out if player.options is not None else arguments.out
     results = []
-    for scenario in arguments.on or [own_scenario(arguments.run)]:
+    for scenario in arguments.on or [_own_scenario(arguments.run)]:
         playing = replace(player, agent=named_agent(player.agent, scenario))
         evaluation = evaluate_agent(playing, scenario, arguments.episodes)
         for warning in evaluation.warnings:
@@ -94,7 +101,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
             print(_table(evaluation, results[-1]["eval"]), flush=True)
         if out is not None:
             count = _RECORDED if arguments.record is None else arguments.record
-            place = write_episodes(evaluation, out, count, f"agent {arguments.run}")
+            place = record(evaluation, out, count, f"agent {arguments.run}")
             # As a run that trained nothing, so that reports take it as one.
             write_json(place / SETTINGS, {key: results[-1][key] for key in ("scenario", "agent", "seed")})
             write_json(place / RESULT, results[-1])
@@ -109,16 +116,21 @@ def execute(arguments: argparse.Namespace) -> Exit:
 
 
 def _player(arguments: argparse.Namespace) -> "Player":
-    """Who plays; a trained agent needs PyTorch, the others do not."""
-    from socialai_dsl.cli.player import Player
+    """Who plays, and how."""
+    from socialai_dsl.evaluation.players import (
+        MODEL_PREFIX,
+        Player,
+        default_folder,
+        folder_of,
+        require_trainer,
+        resolve_device,
+    )
 
     agent = arguments.run
-    if agent.startswith(PREFIX):
-        return Player(agent, out=arguments.out or default_folder(agent), options=arguments)
+    if agent.startswith(MODEL_PREFIX):
+        return Player(agent, out=arguments.out or default_folder(agent), options=model_options(arguments))
     if agent in ("random", "oracle", "human"):
         return Player(agent, seed=arguments.seed)
-    from socialai_dsl.cli.agents import folder_of, require_trainer, resolve_device
-
     require_trainer()
     has_own = arguments.on is None or (folder_of(agent) / SETTINGS).is_file()
     return Player(
@@ -127,8 +139,17 @@ def _player(arguments: argparse.Namespace) -> "Player":
         arguments.greedy,
         arguments.seed,
         arguments.net,
-        code_folder(own_scenario(agent) if has_own else arguments.on[0]),
+        code_folder(_own_scenario(agent) if has_own else arguments.on[0]),
     )
+
+
+def _own_scenario(agent: str) -> str:
+    from socialai_dsl.evaluation.testing import own_scenario
+
+    try:
+        return own_scenario(agent)
+    except UsageError as error:
+        raise UsageError(f"--on: {error}") from None
 
 
 def _text(results: list[dict[str, Any]]) -> str:
@@ -149,13 +170,7 @@ def _result(evaluation: "Evaluation") -> dict[str, Any]:
 
 
 def _table(evaluation: "Evaluation", figures: dict[str, Any]) -> str:
-    from socialai_dsl.cli.evaluation_report import (
-        aligned,
-        ending_lines,
-        probe_lines,
-        rule_lines,
-        summary_rows,
-    )
+    from socialai_dsl.evaluation.summary import aligned, ending_lines, probe_lines, rule_lines, summary_rows
 
     parts = [
         [f"{evaluation.scenario}, agent {evaluation.player.agent}"],
@@ -165,27 +180,3 @@ def _table(evaluation: "Evaluation", figures: dict[str, Any]) -> str:
         rule_lines(figures),
     ]
     return "\n\n".join("\n".join(lines) for lines in parts if lines)
-
-
-def own_scenario(agent: str) -> str:
-    """The scenario on which the agent of a run's folder, or one that ships, was trained.
-
-    Raises:
-        UsageError: it is neither.
-    """
-    from socialai_dsl.cli.agents import folder_of
-
-    run = folder_of(agent)
-    if not (run / SETTINGS).is_file():
-        raise UsageError(f"--on: {run} does not say which scenario it was trained on; name one")
-    scenario = read_json(run / SETTINGS).get("scenario")
-    if not isinstance(scenario, str):
-        raise UsageError(f"{run / SETTINGS}: scenario: expected a text, got {scenario!r}")
-    return str(run / scenario) if _comes_along(run, scenario) else scenario
-
-
-def _comes_along(run: Path, scenario: str) -> bool:
-    """Whether the scenario's file lies in the folder itself, as in an exported one."""
-    from socialai_dsl.cli.export import SCENARIO
-
-    return scenario.startswith(f"{SCENARIO}/") and (run / SCENARIO).is_dir()

@@ -8,16 +8,18 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from socialai_dsl.cli import report
 from socialai_dsl.cli.arguments import positive
-from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.errors import Exit
 from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.errors import UsageError
 
 if TYPE_CHECKING:
     from socialai_dsl.checking.experiments import LoadedExperiment
     from socialai_dsl.experiments.engines import Engine
     from socialai_dsl.experiments.folder import Run
 
-SUMMARY: Final = "plan, run and look after the runs that an experiment file declares"
+SUMMARY: Final = "plan, run and watch the runs that an experiment file declares"
 
 ENGINES: Final = ("local", "ray", "slurm")
 
@@ -25,19 +27,24 @@ ENGINES: Final = ("local", "ray", "slurm")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command's commands."""
     commands = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
-    _add_plan(commands.add_parser("plan", help="list the runs, how long they will take and how far they are"))
-    _add_run(commands.add_parser("run", help="do what is left to do; repeat it to go on"))
-    status = commands.add_parser("status", help="how far the runs of an experiment are")
-    status.add_argument("--each", action="store_true", help="a line for each run, not for each condition")
-    retry = commands.add_parser("retry", help="let the next `run` try again what failed or was cancelled")
-    cancel = commands.add_parser("cancel", help="give runs up, wherever they are being worked on")
+    _add_plan(commands.add_parser("plan", help="list the runs, the time they need and their progress"))
+    _add_run(commands.add_parser("run", help="do the runs that are left; repeat the command to continue"))
+    status = commands.add_parser("status", help="show the progress of an experiment")
+    status.add_argument(
+        "--each", action="store_true", help="show a line for each run, not for each condition"
+    )
+    retry = commands.add_parser("retry", help="let the next `run` repeat failed and cancelled runs")
+    cancel = commands.add_parser("cancel", help="give up runs, also those in progress")
     for command, execute in ((status, _status), (retry, _retry), (cancel, _cancel)):
         command.add_argument("folder", type=Path, metavar="DIR", help="the experiment's folder")
-        command.add_argument("--json", action="store_true", help="print one JSON object")
+        command.add_argument("--json", action="store_true", help="print a JSON object")
         command.set_defaults(act=execute)
+    page = commands.add_parser("report", help=report.SUMMARY)
+    report.add_arguments(page)
+    page.set_defaults(act=report.execute)
     for command in (retry, cancel):
         command.add_argument(
-            "runs", nargs="*", metavar="RUN", help="ids of runs or names of conditions (default: all)"
+            "runs", nargs="*", metavar="RUN", help="id of a run or name of a condition (default: all)"
         )
 
 
@@ -45,56 +52,56 @@ def _add_file(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "file",
         metavar="FILE",
-        help="an experiment's file, the name of a shipped one, or its folder once it was run",
+        help="the file of an experiment, the name of one that ships, or the folder of one that was started",
     )
-    parser.add_argument("--profile", metavar="NAME", help="a profile of the file (default: as the file says)")
+    parser.add_argument("--profile", metavar="NAME", help="profile of the file (default: the file's)")
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="the experiment's folder (default: runs/experiments/NAME)"
     )
     parser.add_argument(
-        "--workers", type=positive, metavar="N", help="runs at once (default: one for each core)"
+        "--workers", type=positive, metavar="N", help="number of runs at once (default: one for each core)"
     )
 
 
 def _add_plan(parser: argparse.ArgumentParser) -> None:
     _add_file(parser)
-    parser.add_argument("--each", action="store_true", help="a line for each run, not for each condition")
     parser.add_argument(
-        "--measure", action="store_true", help="measure the speed of networks of which none is known"
+        "--each", action="store_true", help="show a line for each run, not for each condition"
     )
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument(
+        "--measure", action="store_true", help="measure the speed of networks whose speed is not known"
+    )
+    parser.add_argument("--json", action="store_true", help="print a JSON object")
     parser.set_defaults(act=_plan)
 
 
 def _add_run(parser: argparse.ArgumentParser) -> None:
     _add_file(parser)
     parser.add_argument(
-        "--engine", choices=ENGINES, default="local", help="who does the runs (default: local)"
+        "--engine", choices=ENGINES, default="local", help="what does the runs (default: local)"
     )
     parser.add_argument(
-        "--address", metavar="ADDRESS", help="of the Ray cluster (default: a cluster of this machine)"
+        "--address", metavar="ADDRESS", help="address of the Ray cluster (default: a cluster of this machine)"
     )
     parser.add_argument(
         "--slurm",
         type=_parameter,
         action="append",
         metavar="NAME=VALUE",
-        help="a parameter of the Slurm jobs, such as timeout_min=600 or slurm_partition=cpu; repeatable",
+        help="parameter of the Slurm jobs, such as timeout_min=600 or slurm_partition=cpu (repeatable)",
     )
     parser.add_argument(
         "--runs",
         type=Path,
         metavar="DIR",
-        help="keep the runs in this folder, which other experiments may share (default: runs in the experiment's)",
+        help="folder of the runs, which other experiments may share (default: `runs` in the experiment's folder)",
     )
     parser.add_argument(
         "--update",
         action="store_true",
-        help="let the folder follow a file that has changed; runs that are the same are kept",
+        help="update the folder to a changed file; runs that did not change are kept",
     )
-    parser.add_argument(
-        "--json", action="store_true", help="print one JSON object at the end, and nothing else"
-    )
+    parser.add_argument("--json", action="store_true", help="print only a JSON object, at the end")
     parser.set_defaults(act=_run)
 
 
@@ -128,7 +135,7 @@ def _plan(arguments: argparse.Namespace) -> Exit:
 
 
 def _run(arguments: argparse.Namespace) -> Exit:
-    from socialai_dsl.cli.agents import require_trainer
+    from socialai_dsl.evaluation.players import require_trainer
     from socialai_dsl.experiments.folder import runs_of
 
     require_trainer()

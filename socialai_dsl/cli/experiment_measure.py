@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Final
 
-from socialai_dsl.cli.errors import RunFailed
+from socialai_dsl.errors import RunFailed
 from socialai_dsl.experiments.arguments import typed
 
 if TYPE_CHECKING:

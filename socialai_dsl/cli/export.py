@@ -1,44 +1,38 @@
-"""`socialai export`: writes a trained agent as a folder for others."""
+"""`socialai export`: a trained agent as a folder that can be given to others."""
 
 import argparse
 import shutil
 import sys
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
-from socialai_dsl.atomic import write_json, write_text
-from socialai_dsl.cli.errors import Exit, UsageError
-from socialai_dsl.cli.run_folder import RESULT, SETTINGS, read_json, scenario_folder_name
+from socialai_dsl.cli.errors import Exit
+from socialai_dsl.errors import UsageError
+from socialai_dsl.run_folder import RESULT, read_json, scenario_folder_name
 
 if TYPE_CHECKING:
-    from socialai_dsl.checking.loaded import Loaded
-    from trainer.checkpoint import Checkpoint
     from trainer.config import RunConfig
 
-SUMMARY: Final = "make a folder of a trained agent that can be given to others"
-CARD: Final = "README.md"
-VOCABULARY: Final = "vocabulary.json"
-SCENARIO: Final = "scenario"
+SUMMARY: Final = "make a folder of a trained agent to give to others"
 _FILM: Final = "episode.gif"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
-    parser.add_argument("run", metavar="RUN_DIR", help="folder of a finished run, or shipped:NAME")
+    parser.add_argument("run", metavar="RUN_DIR", help="the folder of a finished run, or shipped:NAME")
     parser.add_argument(
         "--out",
         type=Path,
         metavar="DIR",
-        help="folder to make (default: exports/<scenario>-<network>-s<seed>)",
+        help="folder to write (default: exports/<scenario>-<network>-s<seed>)",
     )
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Write the folder."""
     import socialai_dsl
-    from socialai_dsl.cli.agents import folder_of, require_trainer
+    from socialai_dsl.evaluation.export import finished_agent, write_agent
+    from socialai_dsl.evaluation.players import folder_of, require_trainer
 
     require_trainer()
     run = folder_of(arguments.run)
@@ -53,31 +47,6 @@ def execute(arguments: argparse.Namespace) -> Exit:
     return Exit.GOOD
 
 
-def finished_agent(run: Path) -> "tuple[RunConfig, Loaded, Checkpoint]":
-    """The configuration, the scenario and the network of a run's or an agent's folder.
-
-    Raises:
-        UsageError: it is not such a folder, it is not finished, or its agent was not trained.
-    """
-    import socialai_dsl
-    from socialai_dsl.cli.agents import read_config
-    from trainer import checkpoint as checkpoints
-    from trainer.errors import CheckpointError
-
-    config = read_config(run)
-    if not config.trains:
-        raise UsageError(f"{run}: the agent {config.agent!r} is not trained, there is nothing to export")
-    if not (run / RESULT).is_file():
-        raise UsageError(f"{run}: expected a finished run, it has no {RESULT}")
-    loaded = socialai_dsl.load(config.scenario)
-    try:
-        whole = checkpoints.read_agent(run)
-        weights = {name: value for name, value in whole.tensors.items() if name.startswith("net.")}
-        return config, loaded, checkpoints.Checkpoint(whole.meta, weights)
-    except CheckpointError as error:
-        raise UsageError(str(error)) from error
-
-
 def _name(config: "RunConfig") -> str:
     net = config.net.replace(":", ".")
     return f"{scenario_folder_name(config.scenario)}-{net}-s{config.seed}"
@@ -88,112 +57,3 @@ def _new_folder(out: Path) -> Path:
         raise UsageError(f"--out: {out} is there already; choose another folder")
     out.mkdir(parents=True, exist_ok=True)
     return out
-
-
-def write_agent(
-    out: Path,
-    config: "RunConfig",
-    loaded: "Loaded",
-    checkpoint: "Checkpoint",
-    result: Mapping[str, Any],
-    agent: str = ".",
-) -> None:
-    """Write the folder of an agent: its weights, what they are for, its card, and the scenario unless that ships.
-
-    Args:
-        out: the folder, which is there.
-        config: of the run.
-        loaded: its scenario.
-        checkpoint: its network.
-        result: content of the run's `result.json`.
-        agent: by which name `CheckpointPolicy.load` finds the agent, for its card.
-    """
-    from socialai_dsl.cli.evaluation import about_of
-    from socialai_dsl.cli.model_card import model_card
-    from trainer import checkpoint as checkpoints
-    from trainer.config import code_folder
-    from trainer.shipped import WEIGHTS
-
-    moved = Moved.of(loaded, config.scenario)
-    moved.copy(out)
-    code = config.own_files.get("net")
-    if code is not None:
-        there = out / code_folder(moved.scenario) / code.relative_to(config.code_folder.resolve())
-        there.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(code, there)
-    # Paths of this machine stay here.
-    kept = {"scenario": moved.scenario, "curriculum": _without_place(config.curriculum), "wandb": None}
-    config = config.model_copy(update=kept)
-    meta = checkpoint.meta.model_copy(update={"config": config})
-    checkpoints.write_file(out / WEIGHTS, checkpoints.Checkpoint(meta, checkpoint.tensors))
-    words = {name: getattr(meta, name) for name in ("vocabulary", "actions", "templates", "nouns")}
-    write_json(out / VOCABULARY, words)
-    result = moved.told({**result, "scenario": moved.scenario})
-    write_text(out / CARD, model_card(config, result, about_of(loaded), agent, WEIGHTS))
-    write_json(out / SETTINGS, config.model_dump())
-    write_json(out / RESULT, result)  # last, so that its presence means a complete folder
-
-
-def _without_place(text: str) -> str:
-    """A file's name without its folders; anything else as it is."""
-    return Path(text).name if text.endswith((".yaml", ".yml")) else text
-
-
-@dataclass(frozen=True)
-class Moved:
-    """The scenario's own files, which go along; those that ship stay where they are.
-
-    Attributes:
-        scenario: as it is named from the new folder.
-        texts: file in the new folder -> its text.
-        names: how the old folder's files were called -> how they are called now.
-    """
-
-    scenario: str
-    texts: Mapping[str, str]
-    names: Mapping[str, str]
-
-    @classmethod
-    def of(cls, loaded: "Loaded", spec: str) -> "Moved":
-        """The files of a scenario that was named `spec`.
-
-        Raises:
-            UsageError: one lies outside the scenario's folder and what ships.
-        """
-        from socialai_dsl.diagnostics import DiagnosticBag
-        from socialai_dsl.loader.library import name_source, parse_name, shipped_folder
-
-        source = name_source(spec)
-        start = source.span(0, 1)
-        base = parse_name(spec, start, DiagnosticBag(), Path.cwd()).base.text
-        rest = spec[len(base) :]
-        path, shipped = loaded.resolved.path, shipped_folder().resolve()
-        if path.is_relative_to(shipped):
-            return cls(path.relative_to(shipped).with_suffix("").as_posix() + rest, {}, {})
-        texts, names = {}, {}
-        for name, file in loaded.resolved.files.items():
-            there = Path(name).resolve()
-            if not there.is_file() or there.is_relative_to(shipped):
-                continue
-            if not there.is_relative_to(path.parent):
-                raise UsageError(f"{name}: lies outside the folder of {path.name}, so it cannot go along")
-            new = f"{SCENARIO}/{there.relative_to(path.parent).as_posix()}"
-            texts[new] = file.text
-            names[name] = names[str(there)] = new
-        return cls(f"{SCENARIO}/{path.name}{rest}", texts, names)
-
-    def copy(self, out: Path) -> None:
-        """Write the files."""
-        for name, text in self.texts.items():
-            (out / name).parent.mkdir(parents=True, exist_ok=True)
-            write_text(out / name, text)
-
-    def told(self, value: Any) -> Any:
-        """A JSON value in which files are called as in the new folder, and no place of this machine is left."""
-        if isinstance(value, dict):
-            return {key: self.told(part) for key, part in value.items()}
-        if isinstance(value, list):
-            return [self.told(part) for part in value]
-        if isinstance(value, str):
-            return self.names.get(value, Path(value).name if Path(value).is_absolute() else value)
-        return value

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from socialai_dsl.cli.errors import UsageError
+from socialai_dsl.errors import UsageError
 
 if TYPE_CHECKING:
     from socialai_dsl.source import Source

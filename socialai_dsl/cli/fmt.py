@@ -16,7 +16,7 @@ from socialai_dsl.diagnostics import ScenarioError, render_text
 if TYPE_CHECKING:
     from socialai_dsl.source import Source
 
-SUMMARY: Final = "rewrite scenario files in one style; comments stay"
+SUMMARY: Final = "format scenario files; comments stay"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,12 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "paths",
         nargs="+",
         metavar="PATH",
-        help="a file, a folder, or - for standard input to standard output",
+        help="a file, a folder, or - to read standard input and write standard output",
     )
     parser.add_argument(
-        "--check", action="store_true", help="write nothing; exit with 1 if a file is not in this style"
+        "--check", action="store_true", help="write nothing; exit with 1 if a file is not formatted"
     )
-    parser.add_argument("--diff", action="store_true", help="write nothing; print what would change")
+    parser.add_argument("--diff", action="store_true", help="write nothing; print the changes")
 
 
 def execute(arguments: argparse.Namespace) -> Exit:

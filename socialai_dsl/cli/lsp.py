@@ -3,14 +3,17 @@
 import argparse
 from typing import Final
 
-from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.errors import Exit
+from socialai_dsl.errors import UsageError
 
 SUMMARY: Final = "run the language server for editors, on standard input and output"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
-    parser.add_argument("--stdio", action="store_true", help="what editors ask for; the only way there is")
+    parser.add_argument(
+        "--stdio", action="store_true", help="accepted because editors send it; there is no other way"
+    )
 
 
 def execute(arguments: argparse.Namespace) -> Exit:

@@ -1,4 +1,4 @@
-"""The entry point: reads the command line, runs one command, turns the result into an exit code."""
+"""Reads the command line, runs one command and turns whatever happens into an exit code."""
 
 import argparse
 import gc
@@ -6,41 +6,31 @@ import os
 import sys
 import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import Any, Final, NoReturn
 
-from socialai_dsl.cli.errors import Exit, RunFailed, UsageError, is_usage
+from socialai_dsl.cli import former
+from socialai_dsl.cli.errors import Exit, is_usage
 from socialai_dsl.cli.terminal import shows_color
 from socialai_dsl.diagnostics import ScenarioError, printable, render_text
 from socialai_dsl.engine.calls import RoomError
+from socialai_dsl.errors import RunFailed, UsageError
 
 _NEW_OBJECTS_BETWEEN_COLLECTIONS: Final = 50_000
 """Importing makes many objects that stay; to look through them every 700 takes a tenth of a short command."""
 
-_COMMANDS: Final = (
-    "run",
-    "new",
-    "validate",
-    "codes",
-    "fmt",
-    "schema",
-    "lsp",
-    "show",
-    "evaluate",
-    "serve",
-    "play",
-    "trace",
-    "replay",
-    "studio",
-    "coverage",
-    "check",
-    "curves",
-    "report",
-    "export",
-    "experiment",
-)
-"""Each is a module beside this one."""
+_GROUPS: Final = {
+    "write scenarios": ("new", "list", "validate", "check", "explain", "show", "fmt"),
+    "see them played": ("play", "trace", "replay", "studio"),
+    "train and evaluate agents": ("run", "evaluate", "export", "serve"),
+    "many runs": ("experiment", "report"),
+    "editors": ("schema", "lsp"),
+}
+"""What users do -> the commands for it; each is a module beside this one."""
+
+_COMMANDS: Final = tuple(name for names in _GROUPS.values() for name in names)
 
 _FOR_MAINTAINERS: Final = {
     "bench": "bench",
@@ -54,28 +44,50 @@ _FOR_MAINTAINERS: Final = {
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `socialai COMMAND ...` and return its exit code."""
-    parser = _Parser(
-        prog="socialai", description="Check, train on and measure social scenarios written in YAML."
-    )
-    parser.add_argument("--version", action=_Version)
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    words = sys.argv[1:] if argv is None else argv
-    if words and words[0] in _FOR_MAINTAINERS:
+    typed = sys.argv[1:] if argv is None else argv
+    words, advice = former.current(typed)
+    if advice is not None:
         print(
-            f"socialai: {words[0]} is for maintainers: `make {_FOR_MAINTAINERS[words[0]]}` in a checkout",
+            f"socialai: {printable(typed[0])}: write {advice}; this still works in this version",
             file=sys.stderr,
         )
+    if words and words[0] in former.FOR_MAINTAINERS:
+        target = former.FOR_MAINTAINERS[words[0]]
+        print(f"socialai: {words[0]} is for maintainers: `make {target}` in a checkout", file=sys.stderr)
         return Exit.USAGE
-    # The others are needed for their summaries alone, and loading them would double the time to start.
+    # Loading all commands doubles the time to start; the others are needed for their summaries alone.
     named = words[:1] if words and words[0] in _COMMANDS else _COMMANDS
-    for name in named:
-        module = import_module(f"socialai_dsl.cli.{name}")
-        summary = module.SUMMARY
-        command = commands.add_parser(name, help=summary, description=_sentence(summary))
+    modules = {name: import_module(f"socialai_dsl.cli.{name}") for name in named}
+    parser = _Parser(
+        prog="socialai",
+        usage="%(prog)s COMMAND ...",
+        description="Check, play and train on social scenarios written in YAML.",
+        epilog=_overview(modules) if named is _COMMANDS else None,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action=_Version)
+    parser.add_argument("--print-completion", action=_Completion)
+    commands = parser.add_subparsers(
+        dest="command", metavar="COMMAND", prog="socialai", help=argparse.SUPPRESS
+    )
+    for name, module in modules.items():
+        command = commands.add_parser(name, help=module.SUMMARY, description=_sentence(module.SUMMARY))
         module.add_arguments(command)
         command.set_defaults(execute=module.execute)
         _add_debug(command)
-    return _guarded(parser, argv)
+    if not words:
+        parser.print_help()
+        return Exit.GOOD
+    return _guarded(parser, words)
+
+
+def _overview(modules: Mapping[str, Any]) -> str:
+    """Every command with its summary, grouped by what users do."""
+    width = max(map(len, modules))
+    lines = []
+    for title, names in _GROUPS.items():
+        lines += ["", f"{title}:", *(f"  {name:<{width}}  {modules[name].SUMMARY}" for name in names)]
+    return "\n".join([*lines, "", "`socialai COMMAND --help` lists the options of a command."]).lstrip("\n")
 
 
 def run_main(argv: Sequence[str] | None = None) -> int:
@@ -104,7 +116,7 @@ def _sentence(summary: str) -> str:
 
 
 def _add_debug(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--debug", action="store_true", help="show the whole traceback of an error")
+    parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
 
 
 def _guarded(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> int:
@@ -116,7 +128,10 @@ def _guarded(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> int
     warnings.formatwarning = lambda message, *_, **__: f"{parser.prog}: warning: {printable(str(message))}\n"
     try:
         try:
-            arguments = parser.parse_args(argv)
+            try:
+                arguments = parser.parse_args(argv)
+            except SystemExit as end:  # argparse has printed what was asked for, or what is wrong
+                return int(end.code or 0)
             debug = arguments.debug
             return int(arguments.execute(arguments))
         finally:
@@ -142,7 +157,9 @@ def _explain(program: str, error: Exception) -> Exit:
         return Exit.USAGE if is_usage(error.diagnostics) else Exit.FINDINGS
     if isinstance(error, UsageError | RunFailed | RoomError):
         print(f"{program}: {printable(str(error))}", file=sys.stderr)
-        return Exit.USAGE if isinstance(error, UsageError) else Exit.FINDINGS
+        if isinstance(error, UsageError):
+            return Exit.USAGE
+        return Exit.STOPPED if isinstance(error, RunFailed) else Exit.FINDINGS
     if isinstance(error, OSError):
         place = f": {error.filename}" if error.filename is not None else ""
         print(printable(f"{program}: {error.strerror or error}{place}"), file=sys.stderr)
@@ -179,3 +196,45 @@ class _Version(argparse.Action):
 
         print(f"{parser.prog} {version('socialai-dsl')}")
         parser.exit(Exit.GOOD)
+
+
+class _Completion(argparse.Action):
+    """Print a script that lets a shell complete commands, options and their values."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str) -> None:
+        super().__init__(
+            option_strings,
+            dest,
+            choices=("bash", "zsh", "fish"),
+            metavar="SHELL",
+            help="print a completion script for bash, zsh or fish, and exit",
+        )
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: object,
+        option_string: str | None = None,
+    ) -> None:
+        import shtab
+
+        for action in _actions(parser):
+            if isinstance(action, argparse._SubParsersAction):
+                action.help = None  # `--help` lists the commands in groups instead
+            if action.type is Path or (action.metavar in _FILES_OR_NAMES and action.choices is None):
+                action.complete = shtab.FILE  # type: ignore[attr-defined]
+        print(shtab.complete(parser, shell=str(values)))
+        parser.exit(Exit.GOOD)
+
+
+_FILES_OR_NAMES: Final = ("SCENARIO", "PATH", "FILE", "RUN", "CODE|SCENARIO", "RUN|SCENARIO|TRACES")
+
+
+def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
+    """The options of a parser and of its commands."""
+    for action in parser._actions:
+        yield action
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                yield from _actions(command)

@@ -5,23 +5,13 @@ import re
 from pathlib import Path
 from typing import Final
 
-from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.authoring.templates import SCHEMA, TEMPLATES, template_files
+from socialai_dsl.cli.errors import Exit
+from socialai_dsl.errors import UsageError
 
 SUMMARY: Final = "write a commented scenario to start from, with a script that solves it"
 
-TEMPLATES: Final = {
-    "ask-a-guide": "ask an NPC which of four doors is the right one (the default)",
-    "imitate": "watch what a peer does, then do the same",
-    "hidden-information": "only the caretaker knows which box, and points at it",
-    "role-swap": "two who need each other; the agent can have either part",
-    "empty": "a room, a door and an agent",
-}
-"""Name -> one line; the files are in the folder `templates`."""
-
-_FOLDER: Final = Path(__file__).with_name("templates")
 _WORD: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}")
-_STANDING_NAME: Final = "my_scenario"
-_SCHEMA: Final = "socialai.schema.json"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,15 +20,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "name",
         metavar="NAME",
         nargs="?",
-        help="the scenario's name; NAME.yaml and its variants are written here",
+        help="name of the scenario; writes NAME.yaml and its variants into this folder",
     )
     parser.add_argument(
         "--template",
         choices=TEMPLATES,
         default="ask-a-guide",
-        help="what to start from (default: ask-a-guide)",
+        help="template to start from (default: ask-a-guide)",
     )
-    parser.add_argument("--list", action="store_true", help="list the templates")
+    parser.add_argument("--list", action="store_true", help="list the templates and exit")
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
@@ -61,22 +51,11 @@ def execute(arguments: argparse.Namespace) -> Exit:
     for path, text in files.items():
         with open(path, "x", encoding="utf-8") as file:
             file.write(text)
-    _write_schema(Path(_SCHEMA))
+    _write_schema(Path(SCHEMA))
     print(f"wrote {', '.join(map(str, files))}; check with: socialai validate {name}.yaml")
     print(f"play with: socialai play {name}.yaml")
     print(f"see it while you write: socialai studio {name}.yaml")
     return Exit.GOOD
-
-
-def template_files(template: str, name: str) -> dict[Path, str]:
-    """Path -> text, for the files of a template under the name of a scenario; the scenario itself first."""
-    modeline = f"# yaml-language-server: $schema={_SCHEMA}\n"
-    sources = [path for path in _FOLDER.glob(f"{template}*.yaml") if path.stem.partition("_")[0] == template]
-    return {
-        Path(name + path.stem.removeprefix(template) + ".yaml"): modeline
-        + path.read_text(encoding="utf-8").replace(_STANDING_NAME, name)
-        for path in sorted(sources, key=lambda path: len(path.stem))
-    }
 
 
 def _write_schema(path: Path) -> None:

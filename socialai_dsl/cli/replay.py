@@ -7,14 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.cli.arguments import natural, positive
-from socialai_dsl.cli.errors import Exit, UsageError
-from socialai_dsl.cli.run_folder import REPLAY, SETTINGS, read_json, write_text
+from socialai_dsl.cli.errors import Exit
+from socialai_dsl.errors import UsageError
+from socialai_dsl.run_folder import REPLAY, SETTINGS, read_json, write_text
 
 if TYPE_CHECKING:
-    from socialai_dsl.cli.evaluation import Evaluation
+    from socialai_dsl.evaluation.testing import Evaluation
     from socialai_dsl.replay import Trace
 
-SUMMARY: Final = "write a page on which episodes can be watched, step by step, with rules and reasons"
+SUMMARY: Final = "write a web page to watch episodes step by step, with rules and reasons"
 _RECORDED: Final = 5
 
 
@@ -23,7 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "source",
         metavar="RUN|SCENARIO|TRACES",
-        help="a run's folder, or shipped:NAME; a scenario's path or name; or traces as `-o episodes.json` writes them",
+        help="the folder of a run, shipped:NAME, the path or name of a scenario, or traces written by `--out "
+        "episodes.json`",
     )
     parser.add_argument(
         "-o",
@@ -31,27 +33,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=Path(REPLAY),
         metavar="FILE",
-        help=f"the page (default: {REPLAY}), or with the ending .json the traces alone",
+        help=f"file of the page (default: {REPLAY}); a name that ends in .json gets the traces instead",
     )
     parser.add_argument(
         "--agent",
         metavar="AGENT",
-        help="who plays a scenario: oracle, random, shipped, or a run's folder (default: oracle if there is one, else "
-        "random)",
+        help="the agent that plays a scenario: oracle, random, shipped, or a run's folder (default: oracle if "
+        "there is one, else random)",
     )
     parser.add_argument(
-        "--episodes", type=positive, default=100, metavar="N", help="of the test set (default: 100)"
+        "--episodes",
+        type=positive,
+        default=100,
+        metavar="N",
+        help="number of test episodes to play (default: 100)",
     )
     parser.add_argument(
         "--record",
         type=positive,
         default=_RECORDED,
         metavar="N",
-        help=f"so many failures and so many successes are kept (default: {_RECORDED})",
+        help=f"keep up to N failures and N successes (default: {_RECORDED})",
     )
-    parser.add_argument("--test-episode", type=natural, metavar="N", help="keep test episode N alone")
+    parser.add_argument("--test-episode", type=natural, metavar="N", help="keep only test episode N")
     parser.add_argument(
-        "--greedy", action="store_true", help="a trained agent takes its most probable action"
+        "--greedy",
+        action="store_true",
+        help="take the most probable action of a trained agent (default: sample)",
     )
 
 
@@ -112,11 +120,9 @@ def _played(arguments: argparse.Namespace) -> "list[Trace]":
 
 
 def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
-    from socialai_dsl.cli.agents import folder_of, named_agent, require_trainer, scripted_name
-    from socialai_dsl.cli.evaluate import own_scenario
-    from socialai_dsl.cli.evaluation import evaluate_agent, evaluation_of_model
-    from socialai_dsl.cli.language_model import PREFIX
-    from socialai_dsl.cli.player import Player
+    from socialai_dsl.evaluation.players import MODEL_PREFIX, Player, folder_of, named_agent
+    from socialai_dsl.evaluation.scripts import scripted_name
+    from socialai_dsl.evaluation.testing import evaluate_agent, evaluation_of_model, own_scenario
 
     source = arguments.source
     folder = folder_of(source)
@@ -127,14 +133,12 @@ def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":
             )
         agent, scenario = source, own_scenario(source)
         played_by = str(read_json(folder / SETTINGS).get("agent"))
-        if played_by.startswith(PREFIX):
+        if played_by.startswith(MODEL_PREFIX):
             return evaluation_of_model(folder, played_by, scenario, episodes)
     else:
         scenario = source
         usual = "oracle" if scripted_name(scenario) is not None else "random"
         agent = named_agent(arguments.agent or usual, scenario)
-    if agent not in ("oracle", "random", "human"):
-        require_trainer()
     return evaluate_agent(Player(agent, greedy=arguments.greedy), scenario, episodes)
 
 

@@ -6,14 +6,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from socialai_dsl.cli.errors import Exit, UsageError
-from socialai_dsl.cli.run_folder import write_text
+from socialai_dsl.cli.curves import draw_curves
+from socialai_dsl.cli.errors import Exit
+from socialai_dsl.errors import UsageError
+from socialai_dsl.run_folder import write_text
 
 if TYPE_CHECKING:
     from socialai_dsl.reporting.analysis import Analysis, Ceilings
     from socialai_dsl.reporting.collect import Experiment
 
-SUMMARY: Final = "write a page, figures and tables about the runs of an experiment, finished or not"
+SUMMARY: Final = "write a page with figures and tables about runs, finished or not"
 FIGURES: Final = "figures"
 FOLDER: Final = "report"
 
@@ -21,24 +23,32 @@ FOLDER: Final = "report"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
     parser.add_argument(
-        "folders", nargs="+", type=Path, metavar="DIR", help="folder of an experiment, or folders of runs"
+        "folders", nargs="+", type=Path, metavar="DIR", help="the folder of an experiment, or folders of runs"
     )
     parser.add_argument(
         "--out",
         type=Path,
         metavar="DIR",
-        help="where to write (default: `report` in the experiment's folder, or here for runs)",
+        help="folder to write (default: `report` in the experiment's folder, or here for runs)",
+    )
+    parser.add_argument(
+        "--curves",
+        type=Path,
+        metavar="FILE",
+        help="draw only the learning curves, seeds of one condition together, and print them as a table",
     )
     parser.add_argument(
         "--no-ceilings",
         action="store_true",
-        help="measure nothing; show what conditions and earlier reports tell of script, chance and guesses",
+        help="do not measure script, chance and success without NPCs; show only what is known",
     )
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Read, compute, draw, write."""
     require_libraries()
+    if arguments.curves is not None:
+        return draw_curves(arguments.folders, arguments.curves)
     from socialai_dsl.reporting.analysis import analyse
 
     experiment, place = _experiment(arguments.folders)
@@ -83,7 +93,6 @@ def ceilings_of(
     experiment: "Experiment", out: Path, only_known: bool
 ) -> "tuple[dict[str, Ceilings], list[str]]":
     """Baselines by scenario: from conditions, from an earlier report, or measured now and kept."""
-    from socialai_dsl.cli.agents import require_trainer
     from socialai_dsl.cli.ceilings import (
         FILE,
         is_current,
@@ -94,6 +103,7 @@ def ceilings_of(
         write_ceilings,
     )
     from socialai_dsl.diagnostics import ScenarioError
+    from socialai_dsl.evaluation.players import require_trainer
     from socialai_dsl.reporting.analysis import Ceilings
 
     if not only_known:

@@ -61,7 +61,7 @@ def report_text(checked: Sequence[Checked], color: bool) -> str:
     counts.append(_count(len(diagnostics) - errors, "warning"))
     summary = f"{_count(len(checked), 'file')} checked: {', '.join(counts)}"
     more = (
-        [f"`socialai codes {diagnostics[0].code}` says more about {diagnostics[0].code}"]
+        [f"`socialai explain {diagnostics[0].code}` says more about {diagnostics[0].code}"]
         if diagnostics
         else []
     )

@@ -7,29 +7,41 @@ from importlib.util import find_spec
 from typing import Final
 
 from socialai_dsl.cli.arguments import natural, positive
-from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.errors import Exit
+from socialai_dsl.errors import UsageError
 
-SUMMARY: Final = "serve a scenario to trainers of language models"
+SUMMARY: Final = "serve a scenario to programs that train language models"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of this command."""
-    parser.add_argument("interface", choices=("openenv",), help="what the trainer speaks")
     parser.add_argument(
-        "--scenario",
-        required=True,
-        metavar="SCENARIO",
-        help="a path or a name, with +variants and ?parameters",
+        "scenario", metavar="SCENARIO", help="a path or a name, with +variants and ?parameters"
     )
     parser.add_argument(
-        "--host", default="127.0.0.1", help="address to serve on (default: this machine only)"
+        "--protocol",
+        choices=("openenv",),
+        default="openenv",
+        help="protocol (default: openenv)",
     )
     parser.add_argument(
-        "--port", type=natural, default=8000, metavar="N", help="default: 8000; 0 is any free one"
+        "--host", default="127.0.0.1", help="address to listen on (default: this machine only)"
     )
-    parser.add_argument("--style", choices=("prose", "grid", "json"), default="prose", help="of observations")
     parser.add_argument(
-        "--sessions", type=positive, default=100, metavar="N", help="that may play at once (default: 100)"
+        "--port", type=natural, default=8000, metavar="N", help="port (default: 8000); 0 takes any free one"
+    )
+    parser.add_argument(
+        "--style",
+        choices=("prose", "grid", "json"),
+        default="prose",
+        help="style of the observations (default: prose)",
+    )
+    parser.add_argument(
+        "--sessions",
+        type=positive,
+        default=100,
+        metavar="N",
+        help="largest number of sessions at once (default: 100)",
     )
 
 

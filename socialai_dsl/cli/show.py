@@ -11,7 +11,7 @@ from socialai_dsl.diagnostics import printable
 if TYPE_CHECKING:
     from socialai_dsl.loader.resolved import ResolvedFile
 
-SUMMARY: Final = "print a scenario after extends and variants, or the program it compiles to"
+SUMMARY: Final = "print a scenario after `extends` and variants, or its compiled program"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -19,11 +19,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "scenario",
         metavar="SCENARIO",
-        help="a path or a name, with +variants and ?parameters; any other file of the language but for --program",
+        help="a path or a name, with +variants and ?parameters; without --program also any other file of the language",
     )
     choice = parser.add_mutually_exclusive_group()
-    choice.add_argument("--program", action="store_true", help="print the compiled program's listing instead")
-    choice.add_argument("--origin", action="store_true", help="print where each value was written instead")
+    choice.add_argument("--program", action="store_true", help="print the compiled program")
+    choice.add_argument("--origin", action="store_true", help="print the file and line of each value")
 
 
 def execute(arguments: argparse.Namespace) -> Exit:

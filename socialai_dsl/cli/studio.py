@@ -9,7 +9,8 @@ import webbrowser
 from pathlib import Path
 from typing import Final
 
-from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.errors import Exit
+from socialai_dsl.errors import UsageError
 from socialai_dsl.frontend import SUFFIXES
 
 SUMMARY: Final = "write, see and play scenarios in the browser"
@@ -25,15 +26,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=Path(),
         metavar="PATH",
-        help="a scenario's file, or a folder of scenarios (default: this folder)",
+        help="the file of a scenario, or a folder of scenarios (default: this folder)",
     )
     parser.add_argument(
-        "--host", default="127.0.0.1", metavar="ADDRESS", help="where to listen (default: this machine alone)"
+        "--host",
+        default="127.0.0.1",
+        metavar="ADDRESS",
+        help="address to listen on (default: this machine only)",
     )
     parser.add_argument(
-        "--port", type=int, metavar="N", help=f"default: {_PORT}, or the next one that is free"
+        "--port", type=int, metavar="N", help=f"port (default: {_PORT}, or the next free one)"
     )
-    parser.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
+    parser.add_argument(
+        "--no-browser", action="store_true", help="print the address and do not open a browser"
+    )
 
 
 def execute(arguments: argparse.Namespace) -> Exit:

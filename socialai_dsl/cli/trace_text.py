@@ -5,13 +5,13 @@ from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 from typing import Any, Final
 
-from socialai_dsl.cli.trace_episode import Trace, TraceStep, is_among
 from socialai_dsl.diagnostics import printable
+from socialai_dsl.evaluation.episode_trace import Trace, TraceStep, is_among
+from socialai_dsl.replay.state import found, present
 
 _WIDTH: Final = 100
 _GAP: Final = "    "
 _BOLD, _DIM, _GREEN, _RESET = "\x1b[1m", "\x1b[2m", "\x1b[32m", "\x1b[0m"
-_AGENT: Final = "agent"
 _QUIET: Final = ("facing", "at", "clock", "poked", "last")
 """Ends of addresses that the picture or the list of those present shows already, or that only count."""
 
@@ -87,8 +87,8 @@ class Text:
         """Whoever was named and had no rule to be asked, as in a state without rules."""
         for name in self._names:
             if not any(is_among(rule["who"], [name]) for rule in (*step.fired, *step.others)):
-                found = _found(step.state, name) or {}
-                state = f" in {found['state']}" if "state" in found else ""
+                known = found(step.state, name) or {}
+                state = f" in {known['state']}" if "state" in known else ""
                 yield printable(f"none   {name}{state}: no rule was asked")
 
     def _is_asked_for(self, rule: dict[str, Any]) -> bool:
@@ -107,32 +107,6 @@ class Text:
 
     def _paint(self, text: str, style: str) -> str:
         return f"{style}{text}{_RESET}" if self._color and style else text
-
-
-def present(cast: Sequence[str], state: dict[str, Any]) -> list[str]:
-    """Each member of the cast: its cell, direction, state, colour and gestures."""
-    width = max(map(len, cast), default=0)
-    lines = []
-    for name in cast:
-        found = _found(state, name)
-        if found is None:
-            continue
-        place = "gone" if found.get("at") is None else f"{found['at'][0]},{found['at'][1]}"
-        told = [str(found["state"])] if "state" in found else []
-        told += [found["color"]] if name != _AGENT else []
-        told += [f"points {found['pointing']}"] if "pointing" in found else []
-        told += [f"did {found['last']}"] if found.get("last") not in (None, "none") else []
-        lines.append(f"{name:<{width}}  {place:<5} {found.get('facing', ''):<5}  {', '.join(told)}".rstrip())
-    return lines
-
-
-def _found(state: dict[str, Any], name: str) -> dict[str, Any] | None:
-    """What is known about an inhabitant; `peers[1]` is the second of a group."""
-    key, _, index = name.rstrip("]").partition("[")
-    found = state.get(key)
-    if isinstance(found, list):
-        found = found[int(index)] if index else None
-    return found if isinstance(found, dict) else None
 
 
 def _beside(picture: str, facts: list[str]) -> list[str]:

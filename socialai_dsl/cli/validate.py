@@ -7,8 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from socialai_dsl.cli.check import add_effort, check_effort
-from socialai_dsl.cli.errors import Exit, UsageError, is_usage
+from socialai_dsl.cli.arguments import positive
+from socialai_dsl.cli.check import add_effort
+from socialai_dsl.cli.errors import Exit, is_usage
 from socialai_dsl.cli.files import STDIN, standard_input, yaml_files
 from socialai_dsl.cli.reporters import REPORTERS, Checked, limited
 from socialai_dsl.cli.terminal import ProgressLine, shows_color
@@ -17,7 +18,7 @@ from socialai_dsl.diagnostics import Diagnostic, ScenarioError
 if TYPE_CHECKING:
     from socialai_dsl.frontend import CheckResult
 
-SUMMARY: Final = "check scenario files and folders of them"
+SUMMARY: Final = "find mistakes in scenario files without playing"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,37 +27,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "paths",
         nargs="+",
         metavar="PATH",
-        help="a file, a folder, a scenario's name such as dance+unsocial, or - for standard input",
+        help="a file, a folder, the name of a scenario such as dance+unsocial, or - for standard input",
     )
     parser.add_argument(
         "--format",
-        choices=sorted(REPORTERS),
+        choices=tuple(sorted(REPORTERS.keys() - {"json"})),
         default="text",
-        help="how to print the findings (default: text); json prints an array",
+        help="format of the findings (default: text)",
     )
-    parser.add_argument("--strict", action="store_true", help="warnings count as failures too")
+    parser.add_argument(
+        "--json", action="store_const", const="json", dest="format", help="print the findings as a JSON array"
+    )
+    parser.add_argument("--strict", action="store_true", help="also fail for warnings")
     parser.add_argument(
         "--deep",
         action="store_true",
-        help="also try every scenario that has no errors out, as `socialai check --deep` does",
+        help="also play every scenario without errors, as `socialai check --deep` does",
     )
     add_effort(parser)
     parser.add_argument(
-        "--max-errors", type=int, metavar="N", help="report at most N errors; the exit code stays the same"
+        "--max-errors",
+        type=positive,
+        metavar="N",
+        help="show only the first N errors; the exit code stays the same",
     )
     parser.add_argument(
         "--stdin-filename",
         default="stdin.yaml",
         metavar="PATH",
-        help="what the file read from standard input is called, and where the files it names are looked for",
+        help="name for the file on standard input; files that it names are looked up beside this path",
     )
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
     """Check everything that was named, then print one report."""
-    if arguments.max_errors is not None and arguments.max_errors < 1:
-        raise UsageError(f"--max-errors: expected a positive number, got {arguments.max_errors}")
-    check_effort(arguments)
     results = [_checked(name, arguments.stdin_filename) for name in _expand(arguments.paths)]
     checked = _without_used(results)
     if arguments.deep:
@@ -125,15 +129,15 @@ def _tried(result: "CheckResult", arguments: argparse.Namespace) -> tuple[Diagno
     """What trying the scenario of a file out shows, or the members of a suite; told to people as it goes."""
     if result.checked is None and result.suite is None:
         return ()
+    from socialai_dsl.analysis.check import check_scenario, scenarios_of
     from socialai_dsl.analysis.effort import Clock, Effort
-    from socialai_dsl.cli.check import STATES, check_scenario, scenarios_of
 
     found: list[Diagnostic] = []
     progress = ProgressLine(sys.stderr)
     say = progress.above(sys.stdout) if arguments.format == "text" else None
     for scenario, called in scenarios_of(result.name):
         clock = Clock(arguments.seconds or None, progress.show)
-        effort = Effort(arguments.rooms, 0, STATES, clock)
+        effort = Effort(arguments.rooms, clock=clock)
         report = check_scenario(scenario, called, effort, deep=True, say=say)
         progress.clear()
         found += report.findings()

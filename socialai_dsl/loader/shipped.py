@@ -1,12 +1,13 @@
-"""The scenarios that ship, without the files that are only variants of them."""
+"""Which scenarios ship, and which of the other files are only variants of them."""
 
+import posixpath
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-import yaml
-
 from socialai_dsl.loader.library import shipped_folder
+from socialai_dsl.loader.reader import read_document
 
 IDS: Final = {
     "TalkItOut": "talkitout",
@@ -24,50 +25,124 @@ IDS: Final = {
 """Gymnasium's id without `SocialAI/` and `-v1`, as the paper calls a scenario -> its name."""
 
 
+@dataclass(frozen=True)
+class Shipped:
+    """A scenario or suite that ships.
+
+    Attributes:
+        name: as `load` takes it. about: what it says of itself.
+        variants: what may follow the name after a `+`.
+        parameters: what may follow after a `?` -> its values, the default first.
+    """
+
+    name: str
+    about: str
+    variants: tuple[str, ...]
+    parameters: dict[str, tuple[str, ...]]
+
+
+def catalogue() -> list[Shipped]:
+    """Everything that ships and can be played, those of the paper first, then those in folders."""
+    documents = _documents()
+    in_folders = [name for name, content in documents.items() if "/" in name and _stands_alone(content)]
+    return [
+        Shipped(
+            name,
+            " ".join(str(_own_or_inherited(name, "about") or "").split()),
+            tuple(variants_of(name)),
+            _parameters(name),
+        )
+        for name in (*shipped_scenarios(), *in_folders)
+    ]
+
+
 @cache
 def _documents() -> dict[str, dict[str, Any]]:
-    """Name (of the file, without its suffix) -> top level of each file in the folder of shipped scenarios."""
-    files = sorted(shipped_folder().glob("*.yaml"))
-    read = {path.stem: yaml.safe_load(path.read_text("utf-8")) for path in files}
+    """Name (path in the folder of shipped scenarios, without its suffix) -> top level of each file."""
+    folder = shipped_folder()
+    files = sorted(folder.rglob("*.yaml"))
+    read = {path.relative_to(folder).with_suffix("").as_posix(): read_document(path).data for path in files}
     return {name: content for name, content in read.items() if isinstance(content, dict)}
 
 
 def shipped_scenarios() -> list[str]:
-    """The scenarios of the paper, then other scenarios and suites, and variants that say what they are about."""
+    """The scenarios of the paper, then others and suites beside them, and variants that say what they are about."""
     documents = _documents()
     of_the_paper = [name for name in IDS.values() if name in documents]
-    others = [name for name, content in documents.items() if _stands_alone(content)]
+    others = [name for name, content in documents.items() if "/" not in name and _stands_alone(content)]
     return list(dict.fromkeys([*of_the_paper, *others]))
 
 
 def variants_of(scenario: str) -> list[str]:
-    """The variants that can follow a scenario's name after a `+`: its own, then those of any scenario.
+    """What can follow a scenario's name after a `+`: variants of its own, then those that suit every scenario.
 
     A variant of what the scenario is itself a variant of counts too, where it has none of that name.
     """
-    documents, standing = _documents(), set(shipped_scenarios())
+    documents = _documents()
     own: list[str] = []
     base = scenario
     while base in documents:
         own += [
             name.removeprefix(f"{base}_")
             for name, content in documents.items()
-            if name.startswith(f"{base}_") and name not in standing and _base(content) == base
+            if name.startswith(f"{base}_") and not _stands_alone(content) and _base(name) == base
         ]
-        base = _base(documents[base])
-    shared = [name for name, content in documents.items() if _base(content) == "any" and name not in standing]
+        base = _base(base)
+    shared = [
+        name for name, one in documents.items() if "/" not in name and _base(name) == "any" and "of" in one
+    ]
     return list(dict.fromkeys([*own, *shared]))
 
 
+def is_shipped(name: str) -> bool:
+    """Whether a name, without variants and parameters, is that of a scenario or suite that ships."""
+    return name in _documents() and _stands_alone(_documents()[name])
+
+
 def base_of(scenario: str) -> str:
-    """The base of a shipped variant without a description of its own; else nothing."""
-    content = _documents()[scenario]
-    return "" if "about" in content else _base(content)
+    """What a shipped scenario is a variant of, if it does not say for itself what it is about; else nothing."""
+    return "" if "about" in _documents()[scenario] else _base(scenario)
 
 
-def _base(content: dict[str, Any]) -> str:
+def _base(name: str) -> str:
     """What a file is a variant of; empty for a scenario."""
-    return Path(str(content["of"])).stem if "variant" in content and "of" in content else ""
+    content = _documents()[name]
+    return _named(name, content["of"]) if "variant" in content and "of" in content else ""
+
+
+def _named(name: str, file: object) -> str:
+    """The name of a file that another one names."""
+    written = str(file)
+    if written == "any":
+        return written
+    return posixpath.normpath(posixpath.join(posixpath.dirname(name), posixpath.splitext(written)[0]))
+
+
+def _own_or_inherited(name: str, key: str) -> Any:
+    """The value of a key in a file, or in what it extends or is a variant of; None if there is none."""
+    content = _documents().get(name, {})
+    if key in content:
+        return content[key]
+    above = content.get("extends") or content.get("of")
+    return None if above in (None, "any") else _own_or_inherited(_named(name, above), key)
+
+
+def _parameters(name: str) -> dict[str, tuple[str, ...]]:
+    content = _documents().get(name, {})
+    above = content.get("extends") or content.get("of")
+    found = {} if above in (None, "any") else _parameters(_named(name, above))
+    for parameter, said in (content.get("params") or {}).items():
+        values = said.get("values") or ()
+        default = said.get("default")
+        if isinstance(values, dict):  # names of values, of which the default may be written as either
+            default = next((name for name, value in values.items() if value == default), default)
+        found[parameter] = tuple(dict.fromkeys(map(_written, (default, *values))))
+    removed = {path.removeprefix("params.") for path in content.get("remove") or ()}
+    return {parameter: values for parameter, values in found.items() if parameter not in removed}
+
+
+def _written(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _stands_alone(content: dict[str, Any]) -> bool:
@@ -83,6 +158,6 @@ def file_of(scenario: str, variant: str | None = None) -> Path:
         names, base = [], scenario
         while base in _documents():
             names.append(f"{base}_{variant}")
-            base = _base(_documents()[base])
+            base = _base(base)
         names.append(variant)
     return shipped_folder() / f"{next(name for name in names if name in _documents())}.yaml"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 from socialai_dsl.program import Program
@@ -45,3 +45,29 @@ def _leaves(value: Any, address: str) -> Iterator[tuple[str, Any]]:
             yield from _leaves(part, f"{address}[{index}]")
     else:
         yield address, value
+
+
+def present(cast: Sequence[str], state: dict[str, Any]) -> list[str]:
+    """Where everybody of the cast is, where they look, the state of their frames, their colour, and what they show."""
+    width = max(map(len, cast), default=0)
+    lines = []
+    for name in cast:
+        one = found(state, name)
+        if one is None:
+            continue
+        place = "gone" if one.get("at") is None else f"{one['at'][0]},{one['at'][1]}"
+        told = [str(one["state"])] if "state" in one else []
+        told += [one["color"]] if name != "agent" else []
+        told += [f"points {one['pointing']}"] if "pointing" in one else []
+        told += [f"did {one['last']}"] if one.get("last") not in (None, "none") else []
+        lines.append(f"{name:<{width}}  {place:<5} {one.get('facing', ''):<5}  {', '.join(told)}".rstrip())
+    return lines
+
+
+def found(state: dict[str, Any], name: str) -> dict[str, Any] | None:
+    """What is known about an inhabitant; `peers[1]` is the second of a group."""
+    key, _, index = name.rstrip("]").partition("[")
+    one = state.get(key)
+    if isinstance(one, list):
+        one = one[int(index)] if index else None
+    return one if isinstance(one, dict) else None

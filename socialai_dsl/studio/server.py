@@ -17,7 +17,7 @@ from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from socialai_dsl.cli.new import TEMPLATES, template_files
+from socialai_dsl.authoring.templates import TEMPLATES, template_files
 from socialai_dsl.loader.shipped import file_of, shipped_scenarios, variants_of
 from socialai_dsl.replay.scripts import static_text
 from socialai_dsl.studio.engine import Engine, EngineLostError, start_worker

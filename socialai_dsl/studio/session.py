@@ -11,19 +11,18 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite
-from socialai_dsl.cli.endings import endings_of
-from socialai_dsl.cli.evaluation import about_of
-from socialai_dsl.cli.typed import Phrases, split_line
+from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite, about_of
 from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs import ScenarioEnv
+from socialai_dsl.envs.typed import Phrases, split_line
 from socialai_dsl.frontend import Loaded, check, load
 from socialai_dsl.library import prelude
 from socialai_dsl.loader.reader import display_name
 from socialai_dsl.program_suite import unscripted
 from socialai_dsl.replay import Thought, Tracer
+from socialai_dsl.replay.endings import endings_of
 from socialai_dsl.replay.page import replay_page
 from socialai_dsl.source import Source
 from socialai_dsl.studio.layouts import start_layout, suite_text, with_layout
@@ -210,9 +209,9 @@ class Session:
         return {"page": replay_page([self._tracer.trace()])}
 
     def check(self, path: str, text: str, seconds: float = 20.0) -> Reply:
-        """The report of `socialai check` about a text."""
+        """What `socialai check` says of a text."""
+        from socialai_dsl.analysis.check import check_scenario
         from socialai_dsl.analysis.effort import Clock, Effort
-        from socialai_dsl.cli.check import check_scenario
 
         try:
             loaded = load(path, {Path(path): Source(display_name(Path(path)), text)})
@@ -296,9 +295,8 @@ def _is_cell(at: Any, room: Mapping[str, int]) -> bool:
 
 
 def _policy(run: str, env: Any) -> Any:
-    from socialai_dsl.cli.agents import require_trainer
-    from socialai_dsl.cli.errors import UsageError
-    from socialai_dsl.cli.player import Player, make_policy
+    from socialai_dsl.errors import UsageError
+    from socialai_dsl.evaluation.players import Player, make_policy, require_trainer
 
     try:
         require_trainer()

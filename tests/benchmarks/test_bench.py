@@ -79,9 +79,7 @@ def test_wrong_usage(capsys: Capture) -> None:
     assert main(["--only", "nobody"]) == 2
     assert "expected one of ours, rules, programs, start" in capsys.readouterr().err
     assert main(["--train", "--plot", "x.png"]) == 2
-    with pytest.raises(SystemExit) as ended:
-        main(["--batch", "1,x"])
-    assert ended.value.code == 2
+    assert main(["--batch", "1,x"]) == 2
 
 
 def peer(name: str, version: str | None, start: Callable[[int], Any], block: int = 1) -> SimpleNamespace:

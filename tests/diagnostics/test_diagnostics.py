@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from socialai_dsl.analysis.check import check_scenario, scenarios_of
 from socialai_dsl.analysis.effort import Effort
-from socialai_dsl.cli.check import check_scenario, scenarios_of
 from socialai_dsl.diagnostics import CODES, render_text
 from socialai_dsl.frontend import CheckResult, check
 

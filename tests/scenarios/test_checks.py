@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 import socialai_dsl
+from socialai_dsl.analysis.check import check_scenario
 from socialai_dsl.analysis.effort import Effort
-from socialai_dsl.cli.check import check_scenario
 from socialai_dsl.loader.library import shipped_folder
 
 CLAIMING = {

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import socialai_dsl as sd
-from socialai_dsl.cli.oracle_play import play_oracle
+from socialai_dsl.evaluation.scripts import play_script
 from tests.scenarios.playing import (
     FORWARD,
     NPC,
@@ -93,7 +93,7 @@ def apples(episode: Episode) -> list[bool]:
 class TestAll:
     @pytest.mark.parametrize("name", ALL)
     def test_its_script_solves_it(self, name: str) -> None:
-        assert play_oracle(name, 200, 1, 1000).solved >= 198
+        assert play_script(name, 200, 1, 1000).solved >= 198
 
     @pytest.mark.parametrize("name", ALL)
     def test_done_does_nothing_and_time_runs_out_after_eighty_steps(self, name: str) -> None:

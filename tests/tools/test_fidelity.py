@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from socialai_dsl.cli.errors import UsageError
-from socialai_dsl.cli.random_play import Sample
+from socialai_dsl.errors import UsageError
+from socialai_dsl.evaluation.chance import Sample
 from tools import fidelity
 from tools.fidelity import chosen, main
 from tools.fidelity_page import page

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 import socialai_dsl
-from socialai_dsl.cli.errors import UsageError
-from socialai_dsl.cli.oracle_play import play_oracle
+from socialai_dsl.errors import UsageError
+from socialai_dsl.evaluation.scripts import play_script
 from tools.oracles import main
 
 Capture = pytest.CaptureFixture[str]
@@ -59,7 +59,7 @@ def starts_on_the_right(scenario: str, index: int, seed: int) -> bool:
 
 
 def test_what_is_not_solved_is_proven_unsolvable(halves: str) -> None:
-    report = play_oracle(halves, 40, 5, 10_000)
+    report = play_script(halves, 40, 5, 10_000)
     right = sum(starts_on_the_right(halves, index, 5) for index in range(40))
     assert 0 < right < 40
     assert report.solved == right
@@ -76,7 +76,7 @@ def test_what_is_not_solved_is_proven_unsolvable(halves: str) -> None:
 
 
 def test_a_script_that_gives_up_is_at_fault(halves: str) -> None:
-    report = play_oracle(lazy(halves), 40, 5, 10_000)
+    report = play_script(lazy(halves), 40, 5, 10_000)
     assert report.solved == 0
     assert report.mean_length == 0
     for room in report.unsolved:
@@ -86,7 +86,7 @@ def test_a_script_that_gives_up_is_at_fault(halves: str) -> None:
 
 
 def test_a_search_may_give_up(halves: str) -> None:
-    report = play_oracle(halves, 40, 5, 3)
+    report = play_script(halves, 40, 5, 3)
     assert len(report.found("undecided")) == 40 - report.solved
     assert report.ceiling == 1, "nothing is proven"
 
@@ -94,14 +94,14 @@ def test_a_search_may_give_up(halves: str) -> None:
 def test_without_a_script_there_is_nothing_to_play(halves: str) -> None:
     Path(halves).with_name("halves_oracle.yaml").unlink()
     with pytest.raises(UsageError, match="the agent has no frame, and there is no variant `oracle`"):
-        play_oracle(halves, 4, 0, 10)
+        play_script(halves, 4, 0, 10)
 
 
 def test_the_command(halves: str, capsys: Capture, tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     assert main([halves, "--episodes", "40", "--seed", "5", "--out", str(page)]) == 0
     printed = capsys.readouterr().out
-    report = play_oracle(halves, 40, 5, 10_000)
+    report = play_script(halves, 40, 5, 10_000)
     assert f"{report.solved} of 40 rooms solved" in printed
     assert f"{40 - report.solved} cannot be solved (seed 5, index {report.unsolved[0].index}" in printed
     rows = [line for line in page.read_text().splitlines() if line.startswith("| ")]
@@ -118,7 +118,7 @@ def test_a_fault_is_a_finding(halves: str, capsys: Capture) -> None:
 
 def test_the_script_of_talkitout(capsys: Capture) -> None:
     """About 3.4 per cent of its rooms cannot be solved."""
-    report = play_oracle("talkitout", 400, 0, 10_000)
+    report = play_script("talkitout", 400, 0, 10_000)
     assert 0.92 < report.success_rate < 0.99
     assert report.success_rate <= report.ceiling < 1
     assert not report.found("undecided")

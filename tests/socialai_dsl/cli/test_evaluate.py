@@ -10,11 +10,11 @@ import pytest
 from PIL import Image
 
 import socialai_dsl
-from socialai_dsl.cli.endings import Ending, endings_of
-from socialai_dsl.cli.evaluation import Evaluation
 from socialai_dsl.cli.main import main, run_main
-from socialai_dsl.cli.player import Player
 from socialai_dsl.evaluation import EvalResult, wilson_interval
+from socialai_dsl.evaluation.players import Player
+from socialai_dsl.evaluation.testing import Evaluation
+from socialai_dsl.replay.endings import Ending, endings_of
 
 Capture = pytest.CaptureFixture[str]
 

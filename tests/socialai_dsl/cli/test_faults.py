@@ -13,8 +13,8 @@ import pytest
 import torch
 
 from socialai_dsl.cli import run as run_command
-from socialai_dsl.cli.errors import UsageError
 from socialai_dsl.cli.main import run_main
+from socialai_dsl.errors import UsageError
 from trainer import checkpoint as checkpoints
 from trainer.checkpoint import read
 

@@ -13,10 +13,10 @@ import pytest
 
 from socialai_dsl import load
 from socialai_dsl.cli.main import main
-from socialai_dsl.cli.run_folder import scenario_folder_name
 from socialai_dsl.envs.asking import Question
 from socialai_dsl.llm import Episode
 from socialai_dsl.llm.episode import scripted_reply
+from socialai_dsl.run_folder import scenario_folder_name
 from tests.socialai_dsl.llm.endpoint import completion, endpoint, slowly
 
 pytest.importorskip("httpx", reason="language models need the extra llm")
@@ -329,7 +329,7 @@ def test_endpoints_that_are_none_are_told_of_at_once(
 
 
 def test_progress_tells_of_costs(tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("socialai_dsl.cli.language_model._SECONDS_BETWEEN_LINES", 0.0)
+    monkeypatch.setattr("socialai_dsl.evaluation.language_model._SECONDS_BETWEEN_LINES", 0.0)
     with endpoint(lambda _: "Act: done") as stub:
         assert evaluate(stub.url, tmp_path, "--prices", "1,2") == 0
     said = capsys.readouterr().err

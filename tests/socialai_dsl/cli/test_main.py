@@ -12,9 +12,10 @@ import pytest
 
 from socialai_dsl.cli import main as cli
 from socialai_dsl.cli import validate
-from socialai_dsl.cli.errors import Exit, UsageError
+from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError
+from socialai_dsl.errors import RunFailed, UsageError
 from socialai_dsl.source import Span
 
 Capture = pytest.CaptureFixture[str]
@@ -89,28 +90,44 @@ def test_a_reader_that_went_away_is_no_error() -> None:
     assert (process.wait(60), errors) == (141, b"")
 
 
-@pytest.mark.parametrize(
-    "arguments", [[], ["dance"], ["validate"], ["validate", "--format", "xml", "a.yaml"]]
-)
+@pytest.mark.parametrize("arguments", [["dance"], ["validate"], ["validate", "--format", "xml", "a.yaml"]])
 def test_wrong_usage(arguments: list[str], capsys: Capture) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    assert ended.value.code == 2
+    assert main(arguments) == 2
     assert "usage: socialai" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("entry", [main, run_main])
 def test_help_and_version(entry: Callable[[list[str]], int], capsys: Capture) -> None:
     for option, expected in (("--help", "usage: "), ("--version", "socialai")):
-        with pytest.raises(SystemExit) as ended:
-            entry([option])
-        assert ended.value.code == 0
+        assert entry([option]) == 0
         assert expected in capsys.readouterr().out
 
 
 def test_every_command_explains_itself(capsys: Capture) -> None:
     for command in cli._COMMANDS:
-        with pytest.raises(SystemExit) as ended:
-            main([command, "--help"])
-        assert ended.value.code == 0
+        assert main([command, "--help"]) == 0
         assert "--debug" in capsys.readouterr().out
+
+
+def test_without_a_command_it_explains_itself(capsys: Capture) -> None:
+    assert main([]) == 0
+    printed = capsys.readouterr().out
+    assert all(f"\n  {name} " in printed for name in cli._COMMANDS)
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_knows_commands_and_options(shell: str, capsys: Capture) -> None:
+    assert main(["--print-completion", shell]) == 0
+    script = capsys.readouterr().out
+    assert all(name in script for name in cli._COMMANDS)
+    assert "stdin-filename" in script
+
+
+def test_the_completion_script_is_sound(capsys: Capture) -> None:
+    assert main(["--print-completion", "bash"]) == 0
+    subprocess.run(["bash", "-n"], input=capsys.readouterr().out, text=True, check=True, timeout=30)
+
+
+def test_a_run_that_stops_by_itself(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    assert ending_with(monkeypatch, RunFailed("the loss is not finite"))() == 4
+    assert capsys.readouterr().err == "socialai: the loss is not finite\n"

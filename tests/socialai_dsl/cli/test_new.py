@@ -6,9 +6,9 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from socialai_dsl.authoring.templates import TEMPLATES, template_files
 from socialai_dsl.cli.main import main
-from socialai_dsl.cli.new import TEMPLATES, template_files
-from socialai_dsl.cli.oracle_play import play_oracle
+from socialai_dsl.evaluation.scripts import play_script
 from socialai_dsl.loader.reader import read_document
 
 Capture = pytest.CaptureFixture[str]
@@ -44,7 +44,7 @@ def test_every_template_is_solved_by_its_script(template: str) -> None:
     main(["new", "corridor", "--template", template])
     scenarios = ["corridor.yaml"] + ["corridor.yaml+swapped"] * Path("corridor_swapped.yaml").exists()
     for scenario in scenarios:
-        report = play_oracle(scenario, rooms=200, seed=3, states=0)
+        report = play_script(scenario, rooms=200, seed=3, states=0)
         assert report.success_rate == 1, (scenario, report.unsolved)
 
 

@@ -18,10 +18,10 @@ from textual.widgets import Input, Static
 
 import socialai_dsl
 from socialai_dsl.cli.main import main, run_main
-from socialai_dsl.cli.play_app import PlayApp
-from socialai_dsl.cli.play_game import Game
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.envs.view import ahead
+from socialai_dsl.play.game import Game
+from socialai_dsl.play.screen import PlayApp
 
 SEED = 0
 ROWS, COLUMNS = 24, 80

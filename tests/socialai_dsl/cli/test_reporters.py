@@ -31,7 +31,7 @@ def test_text_points_at_the_line_and_counts_shared_findings_once() -> None:
         "b,c:d.yaml:4:7: W306 50% <odd> & more",
         "  help: remove it",
         "3 files checked: 1 error, 1 warning",
-        "`socialai codes S101` says more about S101",
+        "`socialai explain S101` says more about S101",
     ]
 
 

@@ -12,10 +12,10 @@ import pytest
 from PIL import Image
 
 import socialai_dsl
-from socialai_dsl.cli.agents import new_config
-from socialai_dsl.cli.errors import UsageError
 from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.cli.run import add_arguments
+from socialai_dsl.cli.run_options import new_config
+from socialai_dsl.errors import UsageError
 from trainer.config import RunConfig, configure
 
 DATA = Path(__file__).parents[2] / "data"
@@ -159,7 +159,7 @@ def test_the_number_of_environments_is_the_preset_s_unless_given(
         trained.append(config)
         raise UsageError("far enough")
 
-    monkeypatch.setattr("socialai_dsl.cli.agents.train_agent", train_agent)
+    monkeypatch.setattr("socialai_dsl.cli.training.train_agent", train_agent)
     assert run_main(["corridor.yaml", "--net", net, "--explo", "cell"]) == 2
     (config,) = trained
     usual = configure(config.recipe, net=net)

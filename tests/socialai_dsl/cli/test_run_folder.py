@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from socialai_dsl.cli import run_folder
-from socialai_dsl.cli.errors import UsageError
-from socialai_dsl.cli.run_folder import (
+from socialai_dsl import run_folder
+from socialai_dsl.errors import UsageError
+from socialai_dsl.run_folder import (
     SETTINGS,
     create_run_folder,
     read_json,

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from socialai_dsl.cli.main import main, run_main
-from socialai_dsl.cli.play_app import PlayApp
+from socialai_dsl.play.screen import PlayApp
 
 Capture = pytest.CaptureFixture[str]
 DATA = Path(__file__).parents[2] / "data" / "suites"
@@ -67,7 +67,7 @@ def test_a_person_plays_members(monkeypatch: pytest.MonkeyPatch) -> None:
         asyncio.run(keys(app))
         return app.return_value
 
-    monkeypatch.setattr("socialai_dsl.cli.play._require_terminal", lambda: None)
+    monkeypatch.setattr("socialai_dsl.play._require_terminal", lambda: None)
     monkeypatch.setattr(PlayApp, "run", run)
     assert run_main(["pair.yaml?split=test", "--agent", "human", "--eval-episodes", "8", "--out", "run"]) == 0
     result = json.loads(Path("run/result.json").read_text())

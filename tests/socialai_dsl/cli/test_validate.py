@@ -113,7 +113,7 @@ def test_fewer_errors_than_asked_for(capsys: Capture) -> None:
     assert main(["validate", "broken.yaml", "--max-errors", "1"]) == 1
     assert capsys.readouterr().out.splitlines()[-2] == "1 file checked: 1 error, 0 warnings"
     assert main(["validate", "broken.yaml", "--max-errors", "0"]) == 2
-    assert "expected a positive number" in capsys.readouterr().err
+    assert "--max-errors: got 0, expected at least 1" in capsys.readouterr().err
 
 
 # -- parameters ----------------------------------------------------------------------------------------------------

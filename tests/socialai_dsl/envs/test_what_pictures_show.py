@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import socialai_dsl as sd
-from socialai_dsl.cli.episode import record
-from socialai_dsl.cli.play_game import Game
 from socialai_dsl.cli.trace_text import present
 from socialai_dsl.envs import ScenarioEnv
 from socialai_dsl.envs.picture import frame
 from socialai_dsl.library import prelude
 from socialai_dsl.loader.resolved import shipped_names
+from socialai_dsl.play.game import Game
 from socialai_dsl.program import LAST_ACTS, VIEW, Flag, Header
 from socialai_dsl.render import tiles
 from socialai_dsl.render.gestures import Gesture
 from socialai_dsl.render.tiles import draw_tile
+from socialai_dsl.replay.film import record
 from socialai_dsl.replay.state import cast_of, played
 from tests.quick import one_in
 

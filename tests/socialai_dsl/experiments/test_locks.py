@@ -10,10 +10,10 @@ import pytest
 from filelock import FileLock
 
 from socialai_dsl.cli import run_folder
-from socialai_dsl.cli.errors import UsageError
-from socialai_dsl.cli.run_folder import only_writer
+from socialai_dsl.errors import UsageError
 from socialai_dsl.experiments.folder import Run, Status, is_locked
 from socialai_dsl.experiments.work import Outcome, _performed_alone, cancel, retry
+from socialai_dsl.run_folder import only_writer
 
 
 @pytest.fixture

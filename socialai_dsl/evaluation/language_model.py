@@ -1,6 +1,5 @@
-"""Test episodes of `socialai evaluate llm:MODEL`: options, progress, results."""
+"""Lets a language model play test episodes, and says what came of it."""
 
-import argparse
 import os
 import re
 import sys
@@ -11,10 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlsplit
 
-from socialai_dsl.cli.arguments import positive, seconds
-from socialai_dsl.cli.endings import Ending
-from socialai_dsl.cli.errors import RunFailed, UsageError
-from socialai_dsl.cli.run_folder import scenario_folder_name
+from socialai_dsl.errors import RunFailed, UsageError
+from socialai_dsl.evaluation.players import MODEL_PREFIX, ModelOptions
+from socialai_dsl.replay.endings import Ending
+from socialai_dsl.run_folder import scenario_folder_name
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,13 +22,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from socialai_dsl.checking.loaded import Loaded
-    from socialai_dsl.evaluation import EvalResult
+    from socialai_dsl.evaluation.episodes import EvalResult
     from socialai_dsl.llm.players import Budget, PlayedEpisode
     from socialai_dsl.program_suite import Playable
 
-PREFIX: Final = "llm:"
 TRANSCRIPTS: Final = "transcripts"
-_KEY: Final = "OPENAI_API_KEY"
 _LOCAL: Final = ("localhost", "127.0.0.1", "::1")
 _SECONDS_BETWEEN_LINES: Final = 5.0
 _BUDGET: Final = re.compile(r"(\d[\d_,]*(?:\.\d+)?) ?(tokens|usd)?", re.IGNORECASE)
@@ -52,68 +49,6 @@ class Played:
     figures: dict[str, Any]
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Declare what counts for language models alone."""
-    group = parser.add_argument_group("language models", "for RUN_DIR llm:MODEL")
-    group.add_argument(
-        "--base-url",
-        metavar="URL",
-        help="of an OpenAI-compatible interface, up to /v1 (default: OpenAI's)",
-    )
-    group.add_argument(
-        "--key-from",
-        default=_KEY,
-        metavar="NAME",
-        help=f"environment variable with the key (default: {_KEY})",
-    )
-    group.add_argument("--style", choices=("prose", "grid", "json"), default="prose", help="of observations")
-    group.add_argument(
-        "--mode", choices=("text", "json", "tools"), default="text", help="how the model gives its actions"
-    )
-    group.add_argument(
-        "--history", type=positive, default=16, metavar="N", help="observations in a request (default: 16)"
-    )
-    group.add_argument("--temperature", type=float, metavar="X", help="default: the server's")
-    group.add_argument(
-        "--max-tokens", type=positive, metavar="N", help="that a reply may have (default: the server's)"
-    )
-    group.add_argument(
-        "--on-invalid",
-        choices=("noop", "retry", "fail"),
-        default="noop",
-        help="a reply without an action passes the turn (default), is asked for again, or ends the episode",
-    )
-    group.add_argument(
-        "--goal", default="", metavar="TEXT", help="what to tell the model of the aim (default: nothing)"
-    )
-    group.add_argument(
-        "--grammar", action="store_true", help="hold replies to a grammar, which llama.cpp's server can"
-    )
-    group.add_argument(
-        "--probes",
-        choices=("apart", "kept", "off"),
-        default="apart",
-        help="ask the scenario's probes: apart from play (default), kept in later requests, or not at all",
-    )
-    group.add_argument(
-        "--concurrency", type=positive, default=4, metavar="N", help="episodes played at once (default: 4)"
-    )
-    group.add_argument(
-        "--timeout", type=seconds, default=120.0, metavar="SECONDS", help="for one reply (default: 120)"
-    )
-    group.add_argument(
-        "--budget", metavar="N", help="what this command may spend: 200000 tokens, or 2.50usd with --prices"
-    )
-    group.add_argument(
-        "--prices", metavar="IN,OUT", help="US dollars for a million tokens of requests and of replies"
-    )
-
-
-def default_folder(agent: str) -> Path:
-    """Where the episodes of a model go unless the user says otherwise."""
-    return Path("runs", "llm", re.sub(r"[^\w.-]+", "_", agent.removeprefix(PREFIX)).strip(".") or "model")
-
-
 def let_a_model_play(
     agent: str,
     scenario: str,
@@ -121,7 +56,7 @@ def let_a_model_play(
     program: "Playable",
     episodes: int,
     out: Path,
-    options: argparse.Namespace,
+    options: ModelOptions,
 ) -> "Played":
     """Let a model play test episodes 0 to `episodes - 1`, those that are in transcripts already excepted.
 
@@ -132,7 +67,7 @@ def let_a_model_play(
         program: its program.
         episodes: how many.
         out: gets `SCENARIO/transcripts`.
-        options: as `add_options` declares them.
+        options: how it is asked.
 
     Raises:
         UsageError: the endpoint does not answer, or an option is not what was expected.
@@ -201,7 +136,7 @@ def episodes_of_model(run: Path, program: "Playable", most: int) -> "Played":
     return _outcome(played, program)
 
 
-def _endpoint(kind: Any, agent: str, options: argparse.Namespace) -> Any:
+def _endpoint(kind: Any, agent: str, options: ModelOptions) -> Any:
     from socialai_dsl.llm.endpoint import OPENAI
 
     url = options.base_url or OPENAI
@@ -216,9 +151,9 @@ def _endpoint(kind: Any, agent: str, options: argparse.Namespace) -> Any:
             f"{parts.hostname} asks for a key, and the environment has none in {options.key_from}; "
             "export it, or name another variable with --key-from"
         )
-    model = agent.removeprefix(PREFIX)
+    model = agent.removeprefix(MODEL_PREFIX)
     if not model:
-        raise UsageError(f"got the agent {agent!r}, expected the name of a model behind {PREFIX}")
+        raise UsageError(f"got the agent {agent!r}, expected the name of a model behind {MODEL_PREFIX}")
     asked = {"temperature": options.temperature, "max_tokens": options.max_tokens}
     return kind(model, url, key.strip(), asked, options.timeout, _prices(options.prices))
 
@@ -256,7 +191,7 @@ def _outcome(
 ) -> "Played":
     import numpy as np
 
-    from socialai_dsl.evaluation import EvalResult
+    from socialai_dsl.evaluation.episodes import EvalResult
     from socialai_dsl.llm.episode import INVALID
 
     results = [episode.result for episode in played]

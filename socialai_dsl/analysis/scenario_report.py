@@ -1,4 +1,4 @@
-"""The findings of `socialai check`: lines for people, objects for tools."""
+"""What was found out about a scenario by trying it, as lines for people, objects for tools, and findings."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass

@@ -1,4 +1,4 @@
-"""The name of a run's folder, and its small files."""
+"""The folder of a run: its name, and its small files."""
 
 import contextlib
 import json
@@ -7,15 +7,18 @@ import time
 from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from filelock import FileLock, Timeout
 
 from socialai_dsl.atomic import write_json as write_json
 from socialai_dsl.atomic import write_text as write_text
-from socialai_dsl.cli.errors import UsageError
+from socialai_dsl.errors import UsageError
 from socialai_dsl.experiments.folder import EPISODES as EPISODES
 from socialai_dsl.experiments.folder import REPLAY as REPLAY
+
+if TYPE_CHECKING:
+    from trainer.config import RunConfig
 
 RESULT: Final = "result.json"
 SETTINGS: Final = "config.json"
@@ -102,3 +105,24 @@ def versions() -> dict[str, str]:
         except PackageNotFoundError:
             continue
     return found
+
+
+def read_config(folder: Path) -> "RunConfig":
+    """The configuration of a run's folder.
+
+    Raises:
+        UsageError: it is not a run's folder, or its configuration is damaged.
+    """
+    if not (folder / SETTINGS).is_file():
+        raise UsageError(f"{folder} is not a run's folder, it has no {SETTINGS}")
+    from pydantic import ValidationError
+
+    from trainer.config import RunConfig
+
+    try:
+        # As JSON, because strict validation takes no lists for tuples from Python.
+        return RunConfig.model_validate_json(json.dumps(read_json(folder / SETTINGS)))
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise UsageError(f"{folder / SETTINGS}: {place}: {first['msg']}") from None

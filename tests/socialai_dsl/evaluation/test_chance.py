@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from socialai_dsl.cli.random_play import _Tally, play_at_random
+from socialai_dsl.evaluation.chance import _Tally, play_at_random
 
 WAITING = """
 scenario: waiting

@@ -6,9 +6,9 @@ from typing import Any, Final
 
 import yaml
 
-from socialai_dsl.cli.evaluation_report import ending_rows, summary_rows
-from socialai_dsl.cli.run_folder import scenario_folder_name
+from socialai_dsl.evaluation.summary import ending_rows, summary_rows
 from socialai_dsl.experiments.arguments import typed
+from socialai_dsl.run_folder import scenario_folder_name
 from trainer.config import FLAGS, WITHOUT_EFFECT, RunConfig, configure
 from trainer.shipped import PREFIX
 

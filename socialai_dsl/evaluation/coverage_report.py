@@ -1,108 +1,75 @@
-"""`socialai coverage`: counts how often every rule, state and outcome of a scenario happened in play."""
+"""How often everything in scenarios came about while agents played them, and what never did."""
 
-import argparse
-import json
-import sys
+from __future__ import annotations
+
+import warnings
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from socialai_dsl.cli.errors import Exit, UsageError
 from socialai_dsl.diagnostics import printable
+from socialai_dsl.errors import UsageError
+from socialai_dsl.evaluation.players import Player, make_policy, named_agent, require_trainer
+from socialai_dsl.evaluation.scripts import scripted_name, with_script
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from socialai_dsl.analysis.tally import Part, Tally
-    from socialai_dsl.checking.loaded import Loaded
-
-SUMMARY: Final = "count how often each rule, state and outcome came about, and say what never did"
 
 _TOGETHER: Final = 250
 _KINDS: Final = ("rule", "state", "step", "outcome")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of this command."""
-    parser.add_argument(
-        "scenarios", nargs="+", metavar="SCENARIO", help="a path or a name; several make one report"
-    )
-    parser.add_argument(
-        "--agent",
-        action="append",
-        metavar="AGENT",
-        help="oracle, random, shipped, or a checkpoint or run folder; may be given several times "
-        "(default: random, and oracle where there is one)",
-    )
-    parser.add_argument(
-        "--episodes", type=int, default=200, metavar="N", help="of each agent in each scenario (default: 200)"
-    )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="default: 0")
-    parser.add_argument(
-        "--fail-under", type=float, metavar="PERCENT", help="exit code 1 if less than this came about"
-    )
-    parser.add_argument("--json", action="store_true", help="print the report as one JSON object")
+def coverage(
+    scenarios: Sequence[str], agents: Sequence[str] = (), episodes: int = 200, seed: int = 0
+) -> Coverage:
+    """Let agents play scenarios, and count how often each rule, state, step and outcome came about.
+
+    Args:
+        scenarios: paths or names; of a suite every member counts.
+        agents: `oracle`, `random`, `shipped`, a checkpoint or a run's folder (default: random, and oracle where a
+            scenario has a script).
+        episodes: of each agent in each scenario: rooms 0 to episodes - 1 of the seed.
+        seed: of the rooms, and of what agents draw.
+
+    Raises:
+        ScenarioError: a scenario has mistakes.
+        UsageError: an agent cannot play a scenario.
+    """
+    found = Coverage()
+    for scenario in scenarios:
+        found.parts.update(dict.fromkeys(_parts(scenario)))
+        found.scenarios.append(scenario)
+        for agent in agents or ("random", "oracle"):
+            played = scenario
+            if agent == "oracle":
+                scripted = with_script(scenario) if agents else scripted_name(scenario)
+                if scripted is None:
+                    continue
+                played = scripted
+            found.add(agent, _played(played, agent, episodes, seed))
+    return found
 
 
-def execute(arguments: argparse.Namespace) -> Exit:
-    """Play, count, report."""
-    if arguments.episodes < 1:
-        raise UsageError(f"--episodes: got {arguments.episodes}, expected at least 1")
-    if arguments.seed < 0:
-        raise UsageError(f"--seed: got {arguments.seed}, expected at least 0")
-    least = arguments.fail_under
-    if least is not None and not 0 <= least <= 100:
-        raise UsageError(f"--fail-under: got {least:g}, expected a per cent from 0 to 100")
-    report = Report()
-    for name in arguments.scenarios:
-        _add(report, name, arguments)
-    if arguments.json:
-        print(json.dumps(report.as_object(), indent=2, ensure_ascii=False))
-    else:
-        print("\n".join(report.lines()))
-    return Exit.FINDINGS if least is not None and report.percent < least else Exit.GOOD
-
-
-def _add(report: "Report", name: str, arguments: argparse.Namespace) -> None:
-    """Let the agents play one scenario."""
+def _parts(scenario: str) -> list[Part]:
+    """Everything in a scenario that can come about."""
     from socialai_dsl.analysis.tally import parts_of
     from socialai_dsl.checking.loaded import LoadedSuite
     from socialai_dsl.frontend import load
 
-    loaded = load(name)
+    loaded = load(scenario)
     members = loaded.members if isinstance(loaded, LoadedSuite) else (loaded,)
-    report.parts.update(dict.fromkeys(part for member in members for part in parts_of(member.checked)))
-    report.scenarios.append(name)
-    for agent in arguments.agent or ("random", "oracle"):
-        played = _scripted(name, loaded, required=bool(arguments.agent)) if agent == "oracle" else name
-        if played is not None:
-            report.add(agent, _played(played, agent, arguments.episodes, arguments.seed))
+    return [part for member in members for part in parts_of(member.checked)]
 
 
-def _scripted(name: str, loaded: "Loaded", required: bool) -> str | None:
-    """The name under which the script plays a scenario; None if there is none.
-
-    Raises:
-        UsageError: there is none, and it is required.
-    """
-    from socialai_dsl.cli.agents import with_script
-
-    try:
-        return with_script(name)
-    except UsageError:
-        if required:
-            raise
-        return None
-
-
-def _played(scenario: str, agent: str, episodes: int, seed: int) -> "Tally":
+def _played(scenario: str, agent: str, episodes: int, seed: int) -> Tally:
     import numpy as np
 
     import socialai_dsl
     from socialai_dsl.analysis.tally import tally
-    from socialai_dsl.cli.agents import named_agent, require_trainer
-    from socialai_dsl.cli.player import Player, make_policy
     from socialai_dsl.compilation import scenarios_of
     from socialai_dsl.frontend import load
 
@@ -112,9 +79,7 @@ def _played(scenario: str, agent: str, episodes: int, seed: int) -> "Tally":
     )
     try:
         if agent == "oracle":
-            return tally(
-                envs, played, lambda seen: envs.scripted_actions(), _nothing_to_forget, episodes, seed
-            )
+            return tally(envs, played, lambda seen: envs.scripted_actions(), _forget_nothing, episodes, seed)
         if agent == "random":
             generator, sizes = np.random.default_rng(seed), envs.single_action_space.nvec
             shape = (envs.num_envs, len(sizes))
@@ -122,14 +87,14 @@ def _played(scenario: str, agent: str, episodes: int, seed: int) -> "Tally":
                 envs,
                 played,
                 lambda seen: generator.integers(0, sizes, shape),
-                _nothing_to_forget,
+                _forget_nothing,
                 episodes,
                 seed,
             )
         require_trainer()
         policy, told = make_policy(Player(named_agent(agent, scenario), seed=seed), envs)
         for warning in told:
-            print(f"socialai: {printable(warning)}", file=sys.stderr)
+            warnings.warn(warning, stacklevel=2)
         return tally(envs, played, policy.act, policy.reset, episodes, seed)
     except ValueError as error:
         raise UsageError(str(error)) from error
@@ -137,24 +102,25 @@ def _played(scenario: str, agent: str, episodes: int, seed: int) -> "Tally":
         envs.close()
 
 
-def _nothing_to_forget(rows: "NDArray[np.bool_]", episodes: "NDArray[np.int64]") -> None:
+def _forget_nothing(rows: NDArray[np.bool_], episodes: NDArray[np.int64]) -> None:
     """An agent without a memory."""
 
 
 @dataclass
-class _Row:
+class Row:
     """A part and how often it came about with each agent."""
 
-    part: "Part"
+    part: Part
     times: dict[str, int]
 
     @property
     def total(self) -> int:
+        """The sum over all agents."""
         return sum(self.times.values())
 
 
-class Report:
-    """The parts of scenarios that happened, by agent.
+class Coverage:
+    """What came about with which agent, of everything that could.
 
     Attributes:
         scenarios: what was played. parts: what could come about.
@@ -166,7 +132,7 @@ class Report:
         self.parts: dict[Part, None] = {}
         self.tallies: dict[str, Tally] = {}
 
-    def add(self, agent: str, played: "Tally") -> None:
+    def add(self, agent: str, played: Tally) -> None:
         """Add what came about with an agent."""
         known = self.tallies.setdefault(agent, played)
         if known is not played:
@@ -175,10 +141,10 @@ class Report:
             known.episodes += played.episodes
 
     @property
-    def rows(self) -> list[_Row]:
+    def rows(self) -> list[Row]:
         """One for each part, in the order of files and lines; what members share counts once."""
         return [
-            _Row(part, {agent: played.times[part] for agent, played in self.tallies.items()})
+            Row(part, {agent: played.times[part] for agent, played in self.tallies.items()})
             for part in sorted(self.parts)
         ]
 
@@ -247,7 +213,7 @@ class Report:
         }
 
 
-def _place(part: "Part") -> str:
+def _place(part: Part) -> str:
     return printable(f"{part.span.file}:{part.span.line}")
 
 

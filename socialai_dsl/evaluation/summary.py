@@ -1,15 +1,9 @@
-"""The result of an evaluation: a table on the terminal, and a folder of episodes."""
+"""What an evaluation found, as rows of text."""
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from socialai_dsl.cli.run_folder import EPISODES, REPLAY, RESULT, scenario_folder_name, write_text
-
-if TYPE_CHECKING:
-    from socialai_dsl.cli.evaluation import Evaluation
+from socialai_dsl.run_folder import RESULT
 
 _NUMBERS_SHOWN: Final = 8
 _RULES_SHOWN: Final = 12
@@ -98,54 +92,6 @@ def aligned(rows: Sequence[Row]) -> list[str]:
     """Two columns."""
     width = max(len(name) for name, _ in rows)
     return [f"{name:<{width}}  {value}" for name, value in rows]
-
-
-def write_episodes(evaluation: "Evaluation", folder: Path, count: int, label: str) -> Path:
-    """Record up to `count` failures and as many successes, a page with them included, and list all episodes.
-
-    Args:
-        evaluation: what was played.
-        folder: gets a folder named after the scenario, which is returned.
-        count: films and transcripts of either kind.
-        label: how the recordings call the agent.
-
-    Raises:
-        OSError: a file cannot be written.
-    """
-    from socialai_dsl.replay.page import replay_page
-
-    place = folder / scenario_folder_name(evaluation.scenario)
-    place.mkdir(parents=True, exist_ok=True)
-    for success in (False, True):
-        for number in evaluation.pick(success, count):
-            if evaluation.is_cut_short(number):  # no step ended it, so a film has no end to show
-                continue
-            episode = evaluation.record(number, label)
-            name = f"{'success' if success else 'failure'}-{number:03d}"
-            write_text(place / f"{name}.txt", episode.transcript())
-            episode.save_film(place / f"{name}.gif")
-    if traces := evaluation.traces(count):
-        write_text(place / REPLAY, replay_page(traces))
-    write_text(place / EPISODES, _episodes(evaluation))
-    return place
-
-
-def _episodes(evaluation: "Evaluation") -> str:
-    """One line for each test episode."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("episode", "success", "outcome", "length", "return"))
-    result = evaluation.result
-    columns = zip(
-        result.success.tolist(),
-        result.outcome.tolist(),
-        result.lengths.tolist(),
-        result.returns.tolist(),
-        strict=True,
-    )
-    for number, (success, outcome, length, total) in enumerate(columns):
-        writer.writerow((number, int(success), result.names[outcome], length, f"{total:.6g}"))
-    return text.getvalue()
 
 
 def _comma(text: str) -> str:

@@ -1,24 +1,26 @@
-"""Plays the test set with an agent and keeps the data to count, describe and record its episodes."""
+"""Plays the test set with an agent and keeps what is needed to count, describe and record its episodes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from socialai_dsl.cli.endings import Ending, endings_of
-from socialai_dsl.cli.errors import UsageError
-from socialai_dsl.cli.player import Player, make_policy
+from socialai_dsl.checking.loaded import about_of
+from socialai_dsl.errors import UsageError
+from socialai_dsl.evaluation.players import Player, folder_of, make_policy, named_agent, require_trainer
+from socialai_dsl.replay.endings import Ending, endings_of
+from socialai_dsl.run_folder import SETTINGS, read_json
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from socialai_dsl.checking.loaded import Loaded
-    from socialai_dsl.cli.episode import Episode
-    from socialai_dsl.cli.language_model import Played
-    from socialai_dsl.evaluation import EvalResult, Policy
+    from socialai_dsl.evaluation.episodes import EvalResult, Policy
+    from socialai_dsl.evaluation.language_model import Played
     from socialai_dsl.program_suite import Playable
     from socialai_dsl.replay import Trace
+    from socialai_dsl.replay.film import Episode
     from socialai_dsl.replay.tracing import Think
 
 # Test episodes played together: enough to be fast, and no result depends on it.
@@ -97,7 +99,7 @@ class Evaluation:
             label: how the recording calls the agent.
         """
         import socialai_dsl
-        from socialai_dsl.cli.episode import record
+        from socialai_dsl.replay.film import record
 
         env = socialai_dsl.make(self.scenario, render_mode="rgb_array")
         title = f"{self.scenario}, test episode {number}, {label}"
@@ -165,20 +167,21 @@ class Evaluation:
         return think
 
 
-def about_of(loaded: "Loaded") -> str:
-    """A file's own description."""
-    data = loaded.resolved.data
-    return str(data.get("about", "")) if isinstance(data, dict) else ""
-
-
-def evaluate_agent(player: Player, scenario: str, episodes: int) -> Evaluation:
+def evaluate_agent(agent: str | Player, scenario: str, episodes: int = 500) -> Evaluation:
     """Play test episodes 0 to `episodes - 1` of a scenario.
+
+    Args:
+        agent: `random`, `oracle` (the scenario's own script), `human`, `shipped`, `shipped:NAME`, or the path of a run
+            or of a checkpoint; as a `Player` with a device, a seed and the like, and for `llm:MODEL` with its options.
+        scenario: a path or a name, with `+variants` and `?parameters`.
+        episodes: how many. Rooms are the same for every agent, on every machine.
 
     Raises:
         ScenarioError: the scenario has mistakes.
         UsageError: the checkpoint or the script does not fit it, or a language model does not answer.
         RunFailed: a language model has spent its budget.
     """
+    player = agent if isinstance(agent, Player) else Player(named_agent(agent, scenario))
     import socialai_dsl
 
     loaded = socialai_dsl.load(scenario)
@@ -188,16 +191,18 @@ def evaluate_agent(player: Player, scenario: str, episodes: int) -> Evaluation:
         result, actions = _let_a_person_play(scenario, program, episodes)
         return Evaluation(scenario, about_of(loaded), program, player, result, endings, actions)
     if player.options is not None:
-        from socialai_dsl.cli.language_model import let_a_model_play
+        from socialai_dsl.evaluation.language_model import let_a_model_play
 
         played = let_a_model_play(
             player.agent, scenario, loaded, program, episodes, player.out, player.options
         )
         return _of_model(played, scenario, loaded, program, player)
 
-    from socialai_dsl.cli.agents import with_script
-    from socialai_dsl.evaluation import evaluate
+    from socialai_dsl.evaluation.episodes import evaluate
+    from socialai_dsl.evaluation.scripts import with_script
 
+    if player.is_trained:
+        require_trainer()
     envs = socialai_dsl.make_vec(
         with_script(scenario) if player.agent == "oracle" else scenario,
         num_envs=min(_TOGETHER, episodes),
@@ -224,7 +229,7 @@ def evaluation_of_model(run: Path, agent: str, scenario: str, most: int) -> Eval
         UsageError: the folder holds no episodes of this scenario.
     """
     import socialai_dsl
-    from socialai_dsl.cli.language_model import episodes_of_model
+    from socialai_dsl.evaluation.language_model import episodes_of_model
 
     loaded = socialai_dsl.load(scenario)
     program = socialai_dsl.compile(loaded)
@@ -279,8 +284,8 @@ def _let_a_person_play(
     """Let a person play test episodes until they quit."""
     import numpy as np
 
-    from socialai_dsl.cli.play import play
-    from socialai_dsl.evaluation import EvalResult
+    from socialai_dsl.evaluation.episodes import EvalResult
+    from socialai_dsl.play import play
 
     def episode(number: int) -> tuple[str, dict[str, Any]] | None:
         title = f"{scenario}, test episode {number}"
@@ -314,3 +319,25 @@ def _by_member(program: "Playable", shares: Mapping[str, float]) -> dict[str, An
         won = sum(shares[name] for name in names & successes)
         members[member] = {"share": share, "success_rate": won / share if share else None}
     return {"members": members}
+
+
+def own_scenario(agent: str) -> str:
+    """The scenario on which the agent of a run's folder, or one that ships, was trained.
+
+    Raises:
+        UsageError: it is neither.
+    """
+    run = folder_of(agent)
+    if not (run / SETTINGS).is_file():
+        raise UsageError(f"{run} does not say which scenario it was trained on; name one")
+    scenario = read_json(run / SETTINGS).get("scenario")
+    if not isinstance(scenario, str):
+        raise UsageError(f"{run / SETTINGS}: scenario: expected a text, got {scenario!r}")
+    return str(run / scenario) if _comes_along(run, scenario) else scenario
+
+
+def _comes_along(run: Path, scenario: str) -> bool:
+    """Whether the scenario's file lies in the folder itself, as in an exported one."""
+    from socialai_dsl.evaluation.export import SCENARIO
+
+    return scenario.startswith(f"{SCENARIO}/") and (run / SCENARIO).is_dir()

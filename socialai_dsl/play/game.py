@@ -8,14 +8,13 @@ from numpy.typing import NDArray
 
 import socialai_dsl
 from socialai_dsl.checking.loaded import Loaded, LoadedSuite
-from socialai_dsl.cli.endings import Ending, endings_of
-from socialai_dsl.cli.trace_text import present
-from socialai_dsl.cli.typed import Phrases
+from socialai_dsl.envs.typed import Phrases
 from socialai_dsl.envs.view import View
 from socialai_dsl.program import Flag, Header
 from socialai_dsl.program_suite import Playable, ProgramSuite, outcome_name
 from socialai_dsl.render.panel import DialogueLine
-from socialai_dsl.replay.state import cast_of, played
+from socialai_dsl.replay.endings import Ending, endings_of
+from socialai_dsl.replay.state import cast_of, played, present
 from socialai_dsl.replay.steps import describe_step
 from socialai_dsl.vocabulary import DIRECTIONS
 

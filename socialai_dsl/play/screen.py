@@ -14,11 +14,11 @@ from textual.screen import ModalScreen
 from textual.suggester import Suggester
 from textual.widgets import Input, OptionList, Static
 
-from socialai_dsl.cli.play_game import Game, Played
-from socialai_dsl.cli.typed import Phrases, split_line
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.engine.calls import RoomError
+from socialai_dsl.envs.typed import Phrases, split_line
 from socialai_dsl.envs.view import ahead
+from socialai_dsl.play.game import Game, Played
 from socialai_dsl.render.canvas import INK
 from socialai_dsl.render.panel import DialogueLine
 from socialai_dsl.render.tiles import PALETTE

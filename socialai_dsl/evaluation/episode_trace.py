@@ -1,13 +1,14 @@
-"""Plays one episode and asks for an explanation after each step."""
+"""Plays one episode and asks after each step why things went as they did."""
 
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+import json
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from socialai_dsl.cli.errors import UsageError
-from socialai_dsl.cli.typed import Phrases, split_line
-from socialai_dsl.diagnostics import printable
+from socialai_dsl.envs.typed import Phrases, split_line
+from socialai_dsl.errors import UsageError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -65,6 +66,7 @@ class Trace:
         cast: the agent and the NPCs. names: of the cast of everything that may be played.
         picture, state: before the first step.
         length, reward: so far. outcome: how it ended, None while it has not. success: whether that is one.
+        steps: of `trace` alone, all of them.
     """
 
     scenario: str
@@ -79,6 +81,7 @@ class Trace:
     reward: float = 0.0
     outcome: str | None = None
     success: bool = False
+    steps: list[TraceStep] = field(default_factory=list)
 
     def as_object(self, steps: list[dict[str, Any]]) -> dict[str, Any]:
         """The trace for JSON, with these steps."""
@@ -97,6 +100,70 @@ class Trace:
         }
 
 
+def trace(
+    scenario: str,
+    agent: str | None = None,
+    do: Sequence[str] | None = None,
+    **episode: Any,
+) -> Trace:
+    """Play one episode, and say of every step which rules fired and why the others did not.
+
+    Args:
+        scenario: a path or a name, with `+variants` and `?parameters`.
+        agent: oracle, random, shipped, or a checkpoint or run folder (default: oracle where there is one, else random).
+        do: what the agent does, step by step, as typed in `socialai play`; then no other agent plays.
+        episode: which one, as for `reset_of`: `seed`, `index`, `test_episode`, `layout`.
+
+    Raises:
+        ScenarioError: the scenario has mistakes.
+        UsageError: the agent cannot play this, or there is no such episode.
+    """
+    reset = reset_of(**episode)
+    traced = Traced(scenario, agent, do, episode.get("seed") or 0)
+    try:
+        found = traced.begin(reset)
+        found.steps = list(traced.steps(found))
+    finally:
+        traced.close()
+    return found
+
+
+def reset_of(
+    seed: int = 0,
+    index: int | None = None,
+    test_episode: int | None = None,
+    layout: Path | Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """The arguments of `env.reset` for an episode.
+
+    Args:
+        seed: of the rooms.
+        index: which room of the seed, from 0, as `check` and `validate` number them.
+        test_episode: a number of the fixed test set, instead of seed and index.
+        layout: a room to start from, or a JSON file with one (docs/layouts.md).
+
+    Raises:
+        UsageError: these cannot go together, or the file is no JSON.
+    """
+    options: dict[str, Any] = {}
+    if test_episode is not None:
+        if index is not None:
+            raise UsageError(
+                "index: the test set has rooms of its own; leave out the index or the test episode"
+            )
+        options["test_episode"] = test_episode
+    if index is not None:
+        options["index"] = index
+    if isinstance(layout, Path):
+        try:
+            options["layout"] = json.loads(layout.read_text(encoding="utf-8"))
+        except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+            raise UsageError(f"layout: {layout} is no JSON: {error}") from None
+    elif layout is not None:
+        options["layout"] = layout
+    return {"options": options or None} | ({} if test_episode is not None else {"seed": seed})
+
+
 class Traced:
     """Plays an episode of a scenario.
 
@@ -110,9 +177,10 @@ class Traced:
         UsageError: the agent cannot play this.
     """
 
-    def __init__(self, scenario: str, agent: str | None, lines: list[str] | None, seed: int) -> None:
+    def __init__(self, scenario: str, agent: str | None, lines: Sequence[str] | None, seed: int) -> None:
         import socialai_dsl
-        from socialai_dsl.cli.agents import named_agent, with_script
+        from socialai_dsl.evaluation.players import named_agent
+        from socialai_dsl.evaluation.scripts import with_script
 
         self.agent = "typed" if agent is None else named_agent(agent, scenario)
         self._lines, self._seed = lines, seed
@@ -221,12 +289,11 @@ class Traced:
         try:
             action: NDArray[np.int64] = env.encode_action(split_line(line.strip(), phrases.actions))
         except ValueError:
-            raise UsageError(f"--do: {phrases.problem(line.strip())}") from None
+            raise UsageError(f"do: {phrases.problem(line.strip())}") from None
         return action
 
     def _policy(self) -> Any:
-        from socialai_dsl.cli.agents import require_trainer
-        from socialai_dsl.cli.player import Player, make_policy
+        from socialai_dsl.evaluation.players import Player, make_policy, require_trainer
 
         require_trainer()
         try:
@@ -234,7 +301,7 @@ class Traced:
         except ValueError as error:
             raise UsageError(f"{self.scenario}: {error}") from error
         for warning in told:
-            print(f"socialai: {printable(warning)}", file=sys.stderr)
+            warnings.warn(warning, stacklevel=2)
         return policy
 
 

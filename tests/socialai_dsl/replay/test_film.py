@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from socialai_dsl.cli.endings import Ending
-from socialai_dsl.cli.episode import Episode, record
 from socialai_dsl.program import Program
 from socialai_dsl.render.panel import DialogueLine
+from socialai_dsl.replay.endings import Ending
+from socialai_dsl.replay.film import Episode, record
 from socialai_dsl.replay.steps import Step, describe_step
 
 

@@ -1,10 +1,11 @@
-"""Plays many rooms with a scenario's own script, and searches those that it does not solve."""
+"""Scripts: which one a scenario has for its agent, how many rooms it solves, and whether the others can be solved."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from socialai_dsl.cli.errors import UsageError
+from socialai_dsl.errors import UsageError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -14,6 +15,57 @@ if TYPE_CHECKING:
     from socialai_dsl.analysis.search import Finding
 
 _TOGETHER: Final = 1000
+_ROOMS_SHOWN: Final = 12
+UNPROVEN: Final = ", as far as chance was tried"
+VERDICTS: Final = {
+    "unsolvable": "cannot be solved",
+    "solvable": "can be solved: a fault of the script, or only luck would find it",
+    "undecided": "are undecided: too many states",
+}
+"""What may be found of a room that the script does not solve -> the same in words."""
+
+
+def scripted_name(scenario: str) -> str | None:
+    """The scenario itself if it scripts the agent, else its variant `oracle`; None if there is no script.
+
+    Raises:
+        ScenarioError: the scenario, or its variant, has mistakes.
+    """
+    name, lacking = _closest_script(scenario)
+    return None if lacking else name
+
+
+def with_script(scenario: str) -> str:
+    """`scripted_name`, which there must be.
+
+    Raises:
+        UsageError: there is no script.
+    """
+    name, lacking = _closest_script(scenario)
+    if lacking:
+        raise UsageError(
+            f"{scenario}: the agent of {lacking[0]} has no frame, and there is no variant `oracle`"
+        )
+    return name
+
+
+def _closest_script(scenario: str) -> tuple[str, Sequence[str]]:
+    """The scenario itself or its variant `oracle`, and which of its members have no script even there."""
+    import socialai_dsl
+    from socialai_dsl.program_suite import unscripted
+
+    lacking = unscripted(socialai_dsl.compile(socialai_dsl.load(scenario)))
+    if not lacking:
+        return scenario, ()
+    name, mark, parameters = scenario.partition("?")
+    scripted = f"{name}+oracle{mark}{parameters}"
+    try:
+        loaded = socialai_dsl.load(scripted)
+    except socialai_dsl.ScenarioError as error:
+        if all(diagnostic.code == "S503" for diagnostic in error.diagnostics):
+            return scenario, lacking
+        raise
+    return scripted, unscripted(socialai_dsl.compile(loaded))
 
 
 @dataclass(frozen=True)
@@ -38,7 +90,7 @@ class Room:
 
 
 @dataclass(frozen=True)
-class OracleReport:
+class ScriptReport:
     """How a scenario's own script did.
 
     Attributes:
@@ -74,10 +126,39 @@ class OracleReport:
         """The unsolved rooms with this verdict."""
         return tuple(room for room in self.unsolved if room.verdict == verdict)
 
+    def lines(self) -> list[str]:
+        """The report in a few lines."""
+        rate, error = self.success_rate, self.success_se
+        lines = [
+            f"{self.scenario}: {self.solved:,} of {self.rooms:,} rooms solved, {rate:.2%} ± {error:.2%}, "
+            f"in {self.mean_length:.1f} steps; no policy succeeds in more than {self.ceiling:.2%}"
+        ]
+        for verdict, meaning in VERDICTS.items():
+            if rooms := self.found(verdict):
+                proven = "" if all(room.exact for room in rooms) or verdict != "unsolvable" else UNPROVEN
+                lines.append(f"  {len(rooms)} {meaning}{proven} (seed {self.seed}, index {_indices(rooms)})")
+        return lines
 
-def play_oracle(
+    def as_object(self) -> dict[str, Any]:
+        """The report for JSON."""
+        return {
+            **asdict(self),
+            "success_rate": self.success_rate,
+            "success_rate_se": self.success_se,
+            "ceiling": self.ceiling,
+        }
+
+
+def _indices(rooms: Sequence[Room]) -> str:
+    """The first of the rooms; the JSON has them all."""
+    shown = ", ".join(str(room.index) for room in rooms[:_ROOMS_SHOWN])
+    more = len(rooms) - _ROOMS_SHOWN
+    return shown + (f" and {more} more" if more > 0 else "")
+
+
+def play_script(
     scenario: str, rooms: int, seed: int, states: int, clock: "Clock | None" = None
-) -> OracleReport:
+) -> ScriptReport:
     """Let the script play, then search every room that it left unsolved.
 
     Args:
@@ -92,7 +173,7 @@ def play_oracle(
     """
     import numpy as np
 
-    scripted = _with_script(scenario)
+    scripted = with_script(scenario)
     success, lengths = np.zeros(rooms, np.bool_), np.zeros(rooms, np.int64)
     outcomes = [""] * rooms
     for first in range(0, rooms, _TOGETHER):
@@ -107,22 +188,7 @@ def play_oracle(
         for index, f in zip(failed, findings, strict=True)
     )
     mean = float(lengths[success].mean()) if success.any() else 0.0
-    return OracleReport(scenario, seed, rooms, int(success.sum()), mean, unsolved)
-
-
-def _with_script(scenario: str) -> str:
-    """The variant `oracle` of a scenario; where there is none, the scenario itself."""
-    import socialai_dsl
-
-    name, mark, parameters = scenario.partition("?")
-    scripted = f"{name}+oracle{mark}{parameters}"
-    try:
-        socialai_dsl.load(scripted)
-    except socialai_dsl.ScenarioError as error:
-        if all(diagnostic.code == "S503" for diagnostic in error.diagnostics):
-            return scenario
-        raise
-    return scripted
+    return ScriptReport(scenario, seed, rooms, int(success.sum()), mean, unsolved)
 
 
 def _play(
@@ -143,7 +209,7 @@ def _play(
         envs.reset(seed=seed, options={"index": indices})
         running = np.ones(len(indices), np.bool_)
         while running.any():
-            _, _, terminated, truncated, infos = envs.step(_scripted_actions(envs, scripted))
+            _, _, terminated, truncated, infos = envs.step(envs.scripted_actions())
             lengths[indices[running]] += 1
             now = running & (terminated | truncated)
             if now.any():
@@ -153,14 +219,6 @@ def _play(
                 running &= ~now
     finally:
         envs.close()
-
-
-def _scripted_actions(envs: Any, scripted: str) -> "NDArray[np.int64]":
-    try:
-        actions: NDArray[np.int64] = envs.scripted_actions()
-    except ValueError:
-        raise UsageError(f"{scripted}: the agent has no frame, and there is no variant `oracle`") from None
-    return actions
 
 
 def _search(

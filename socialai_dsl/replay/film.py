@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from socialai_dsl.cli.endings import Ending
 from socialai_dsl.diagnostics import printable
 from socialai_dsl.program_suite import Playable
 from socialai_dsl.render.panel import DialogueLine, Face, compose_frame
+from socialai_dsl.replay.endings import Ending
 from socialai_dsl.replay.steps import Step, describe_step
 
 _STEP_MILLISECONDS: Final = 450

@@ -1,0 +1,94 @@
+"""Tries what a scenario claims, whether it can be known, and whether everything in it can happen."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, Final
+
+from socialai_dsl.analysis.coverage import coverage
+from socialai_dsl.analysis.depth import depth
+from socialai_dsl.analysis.effort import Effort
+from socialai_dsl.analysis.properties import Trial, by_default
+from socialai_dsl.analysis.scenario_report import ScenarioReport
+from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite
+from socialai_dsl.diagnostics import ScenarioError
+from socialai_dsl.frontend import load
+
+Say = Callable[[str], None]
+"""Takes a line of the report."""
+
+
+def check_scenario(
+    loaded: LoadedScenario, called: str, effort: Effort, deep: bool = False, say: Say | None = None
+) -> ScenarioReport:
+    """Try what a scenario claims, whether it can be known, and whether everything in it can happen.
+
+    Args:
+        loaded: the scenario.
+        called: its name, to which `+oracle` can be added.
+        effort: how much to try, and for how long.
+        deep: also try what success takes.
+        say: takes the lines of the report as they come.
+    """
+    place = loaded.resolved.key_span(("outcome",))
+    report = ScenarioReport(called, effort.rooms, effort.seed, place)
+    said = 0
+
+    def part(tasks: int) -> Effort:
+        return replace(effort, clock=effort.clock.part(tasks))
+
+    def tell() -> None:
+        nonlocal said
+        lines = list(report.lines())
+        for line in lines[said:] if say is not None else ():
+            say(line)  # type: ignore[misc]
+        said = len(lines)
+
+    tell()
+    try:
+        scripted = _scripted(loaded, called)
+        trial = Trial(loaded, effort, scripted)
+        plans = by_default(loaded, place)
+        for number, plan in enumerate(plans):
+            found = trial.check(plan, part(len(plans) - number + 1 + 2 * deep))
+            report.tried += ((plan, found),)
+            tell()
+            if effort.clock.interrupted:
+                break
+        if not effort.clock.interrupted:
+            report.coverage = coverage(loaded, part(1 + 2 * deep), scripted)
+            tell()
+        if deep and not effort.clock.interrupted:
+            report.depth = depth(trial, part(1))
+            tell()
+    except KeyboardInterrupt:
+        effort.clock.interrupt()
+    report.interrupted, report.in_time = effort.clock.interrupted, not effort.clock.is_over
+    report.complete = True
+    tell()
+    return report
+
+
+def scenarios_of(name: str) -> list[tuple[LoadedScenario, str]]:
+    """The scenario of a name, or the members of a suite, each with its own."""
+    loaded = load(name)
+    if isinstance(loaded, LoadedSuite):
+        return list({member.name: (member, member.name) for member in loaded.members}.values())
+    return [(loaded, name)]
+
+
+def _scripted(loaded: LoadedScenario, called: str) -> LoadedScenario | None:
+    """The scenario with a frame for the agent: itself, or its variant `oracle`; None without either."""
+    if any(frame.entity == 0 for frame in loaded.checked.frames):
+        return loaded
+    base, mark, parameters = called.partition("?")
+    try:
+        scripted = load(f"{base}+oracle{mark}{parameters}")
+    except ScenarioError as error:
+        if any(diagnostic.code not in _UNKNOWN for diagnostic in error.diagnostics):
+            raise
+        return None
+    return scripted if isinstance(scripted, LoadedScenario) else None
+
+
+_UNKNOWN: Final[frozenset[Any]] = frozenset({"S503", "S504", "S508"})
+"""Codes of names that do not exist; a member of a suite may have no name of its own."""

@@ -1,0 +1,55 @@
+"""`socialai explain`: the page of a finding's code, or the data sheet of a scenario."""
+
+import argparse
+import re
+from pathlib import Path
+from typing import Final
+
+from socialai_dsl.cli.errors import Exit
+from socialai_dsl.diagnostics import CODES, did_you_mean
+from socialai_dsl.errors import UsageError
+
+SUMMARY: Final = "explain the code of a finding, or describe a scenario"
+
+_CODE: Final = re.compile(r"[A-Za-z]\d{3}")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this command."""
+    parser.add_argument(
+        "subject",
+        nargs="?",
+        metavar="CODE|SCENARIO",
+        help="a code such as S101, or a scenario's path or name (default: list all codes)",
+    )
+
+
+def execute(arguments: argparse.Namespace) -> Exit:
+    """Print the page of a code, the data sheet of a scenario, or the list of codes."""
+    subject = arguments.subject
+    if subject is None:
+        print("\n".join(f"{code}  {title}" for code, title in CODES.items()))
+    elif _CODE.fullmatch(subject) and not Path(subject).exists():
+        print(_page(subject), end="")
+    else:
+        import socialai_dsl
+        from socialai_dsl.analysis.data_sheet import sheet
+
+        print(sheet(subject, socialai_dsl.load(subject)), end="")
+    return Exit.GOOD
+
+
+def _page(typed: str) -> str:
+    code = typed.upper()
+    if code not in CODES:
+        near = did_you_mean(code, CODES)
+        hint = f"did you mean {near}?" if near else "`socialai explain` lists all codes"
+        raise UsageError(f"CODE: there is no {typed!r}; {hint}")
+    return (pages_folder() / f"{code}.md").read_text(encoding="utf-8")
+
+
+def pages_folder() -> Path:
+    """The folder with a page for each code, in a checkout as well as installed."""
+    package = Path(__file__).resolve().parent.parent
+    installed = package / "pages"
+    return installed if installed.is_dir() else package.parent / "docs" / "diagnostics"

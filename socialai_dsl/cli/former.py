@@ -1,0 +1,91 @@
+"""What was spelt otherwise in earlier versions: it still works in this one, and says what to write now."""
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+FOR_MAINTAINERS: Final = {
+    "bench": "bench",
+    "fidelity": "fidelity",
+    "reference": "reference",
+    "sheets": "sheets",
+}
+"""A command of earlier versions -> the target of make that does the same in a checkout."""
+
+_OPTIONS_OF_ORACLES: Final = {"--episodes": "--rooms"}
+_OPTIONS_OF_CURVES: Final = {"--out": "--curves"}
+
+
+def current(words: Sequence[str]) -> tuple[list[str], str | None]:
+    """A command line as it is written now, and what to tell its author; None where nothing has changed."""
+    command, rest = (words[0], list(words[1:])) if words else ("", [])
+    match command:
+        case "codes":
+            return ["explain", *rest], "`explain` instead of `codes`"
+        case "coverage":
+            return [
+                "check",
+                *rest,
+                "--part",
+                "coverage",
+                "--alone",
+            ], "`check --part coverage` instead of `coverage`"
+        case "oracles":
+            return ["check", *_oracles(rest)], "`check --part script` instead of `oracles`"
+        case "curves":
+            rest = _renamed(rest, _OPTIONS_OF_CURVES)
+            if not any(word.partition("=")[0] == "--curves" for word in rest):
+                rest += ["--curves", "curves.png"]
+            return ["report", *rest], "`report --curves FILE` instead of `curves`"
+        case "check" | "validate" if (found := _format(rest)) is not None:
+            index, length, named = found
+            if named == "json":
+                rest[index : index + length] = ["--json"]
+                return [command, *rest], "`--json` instead of `--format json`"
+            if command == "check" and named == "text":
+                del rest[index : index + length]
+                return [command, *rest], "nothing instead of `--format text`"
+        case "serve" if rest[:1] == ["openenv"] and any(word.startswith("--scenario") for word in rest):
+            return [
+                "serve",
+                *_served(rest[1:]),
+            ], "`serve SCENARIO` instead of `serve openenv --scenario SCENARIO`"
+    return list(words), None
+
+
+def _oracles(rest: list[str]) -> list[str]:
+    """Options of `oracles` as those of `check`; without a scenario it played all that ship and have a script."""
+    from socialai_dsl.loader.shipped import shipped_scenarios, variants_of
+
+    rest = _renamed(rest, _OPTIONS_OF_ORACLES)
+    named = {word.partition("=")[0] for word in rest}
+    if not rest or rest[0].startswith("-"):
+        rest = [*(name for name in shipped_scenarios() if "oracle" in variants_of(name)), *rest]
+    rest += [] if "--rooms" in named else ["--rooms", "5000"]
+    rest += [] if "--states" in named else ["--states", "300000"]
+    return [*rest, "--part", "script"]
+
+
+def _renamed(words: Sequence[str], names: Mapping[str, str]) -> list[str]:
+    """The words with options renamed, whether their value follows after a blank or after `=`."""
+    parts = [word.partition("=") for word in words]
+    return [names.get(option, option) + equals + value for option, equals, value in parts]
+
+
+def _format(rest: Sequence[str]) -> tuple[int, int, str] | None:
+    """Where `--format` stands, how many words it takes, and what it names."""
+    for index, word in enumerate(rest):
+        if word.startswith("--format="):
+            return index, 1, word.partition("=")[2]
+        if word == "--format" and index + 1 < len(rest):
+            return index, 2, rest[index + 1]
+    return None
+
+
+def _served(rest: Sequence[str]) -> list[str]:
+    """The scenario first."""
+    for index, word in enumerate(rest):
+        if word.startswith("--scenario="):
+            return [word.partition("=")[2], *rest[:index], *rest[index + 1 :]]
+        if word == "--scenario" and index + 1 < len(rest):
+            return [rest[index + 1], *rest[:index], *rest[index + 2 :]]
+    return list(rest)

@@ -1,0 +1,43 @@
+"""`socialai list`: the scenarios that ship."""
+
+import argparse
+import json
+from dataclasses import asdict
+from typing import Final
+
+from socialai_dsl.cli.errors import Exit
+from socialai_dsl.loader.shipped import Shipped, catalogue
+
+SUMMARY: Final = "list the scenarios that ship, with their variants and parameters"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of this command."""
+    parser.add_argument(
+        "words",
+        nargs="*",
+        metavar="WORD",
+        help="list only scenarios whose name or description has all these words",
+    )
+    parser.add_argument("--json", action="store_true", help="print the list as a JSON array")
+
+
+def execute(arguments: argparse.Namespace) -> Exit:
+    """Print the list; none that fits is a finding."""
+    words = [word.lower() for word in arguments.words]
+    chosen = [one for one in catalogue() if all(word in f"{one.name} {one.about}".lower() for word in words)]
+    if arguments.json:
+        print(json.dumps([asdict(one) for one in chosen], indent=2, ensure_ascii=False))
+    else:
+        print("\n".join(line for one in chosen for line in _lines(one)) or "no scenario mentions all of this")
+    return Exit.GOOD if chosen else Exit.FINDINGS
+
+
+def _lines(one: Shipped) -> list[str]:
+    lines = [one.name, f"    {one.about}"]
+    if one.variants:
+        lines.append("    " + " ".join(f"+{variant}" for variant in one.variants))
+    for parameter, (default, *others) in one.parameters.items():
+        values = ", ".join([f"{default} (default)", *others])
+        lines.append(f"    ?{parameter}={values}")
+    return lines

@@ -1,0 +1,238 @@
+"""The options of a run: from what is typed to its configuration."""
+
+import argparse
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final, get_args
+
+from pydantic import ValidationError
+
+from socialai_dsl.diagnostics import did_you_mean
+from socialai_dsl.errors import UsageError
+from socialai_dsl.evaluation.players import folder_of, named_agent, resolve_device
+from socialai_dsl.evaluation.scripts import scripted_name
+from socialai_dsl.experiments.settings import resolved_config
+from socialai_dsl.run_folder import read_config
+from trainer.config import FLAGS, HYPER, NET_PRESETS, RECIPES, RunConfig
+
+_AUTOMATIC: Final = {
+    "device": "a graphics card where there is one",
+    "threads": "one per core, at most 4",
+    "envs": "256, or the preset's number",
+    "frames": "what the recipe needs for this scenario, or the preset's number",
+    "guide": "the recipe's",
+}
+"""Options without one default: what stands in its place in the help."""
+
+_OF_ANY_AGENT: Final = ("agent", "seed", "device", "eval_episodes", "net")
+"""Options that matter to agents that are not trained."""
+
+_MOST_THREADS: Final = 4
+"""More threads than this wait for Python's interpreter lock rather than compute."""
+
+PLAIN_FRAMES: Final = 600_000
+
+
+# -- options ------------------------------------------------------------------------------------------------------
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Declare a flag for each option of `RunConfig` that has one, `--recipe` and `--hyper`."""
+    for name in FLAGS:
+        field = RunConfig.model_fields[name]
+        words = [f"--{name.replace('_', '-')}"] + (["--explo"] if name == "bonus" else [])
+        default = _AUTOMATIC.get(name, field.default)
+        about = (
+            field.description if default in (None, "none") else f"{field.description} (default: {default})"
+        )
+        choices = ("auto", "cpu", "cuda") if name == "device" else _choices(field.annotation)
+        number = field.annotation is int
+        metavar = None if choices else "N" if number else "NAME"
+        kind: Any = _whole_number if number else str
+        parser.add_argument(
+            *words, dest=name, type=kind, choices=choices, metavar=metavar, help=_escaped(about)
+        )
+    parser.add_argument(
+        "--recipe",
+        choices=tuple(RECIPES),
+        help="the way of learning: guided (the scenario's script shows the task first), plain or paper (from "
+        "the reward alone) (default: guided if the scenario has a script)",
+    )
+    parser.add_argument(
+        "--hyper",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="any other option of the trainer, such as lr=1e-4 or entropy_coef=0.02 (repeatable)",
+    )
+
+
+def _choices(annotation: Any) -> tuple[str, ...] | None:
+    words = tuple(word for word in get_args(annotation) if isinstance(word, str))
+    return words or None
+
+
+def _escaped(text: str | None) -> str:
+    return (text or "").replace("%", "%%")
+
+
+def _whole_number(text: str) -> int:
+    """`1_000` and `1,000` are 1000; the bounds are `RunConfig`'s."""
+    try:
+        return int(text.replace("_", "").replace(",", ""))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a whole number, got {text!r}") from None
+
+
+BUILT_IN_AGENTS: Final = ("ppo", "random", "oracle", "human")
+
+
+def started(arguments: argparse.Namespace) -> RunConfig:
+    """The configuration of a new run."""
+    if arguments.scenario is None:
+        raise UsageError("expected a scenario (a path or a name), or --resume RUN_DIR")
+    arguments.agent = agent = named_agent(arguments.agent or "ppo", arguments.scenario)
+    if agent not in BUILT_IN_AGENTS and not folder_of(agent).exists():
+        known = ", ".join(BUILT_IN_AGENTS)
+        raise UsageError(f"--agent: expected {known}, shipped or the path of a checkpoint, got {agent!r}")
+    if agent == "human" and arguments.json:
+        raise UsageError("--json: the agent 'human' plays on standard output")
+    return new_config(arguments)
+
+
+def resumed(arguments: argparse.Namespace) -> RunConfig:
+    """The configuration of a run that was stopped; `--frames` may be raised, and W&B be told from now on."""
+    folder: Path = arguments.resume
+    if arguments.scenario is not None or arguments.out is not None:
+        raise UsageError(
+            "--resume: the run's folder says which scenario it is; give neither SCENARIO nor --out"
+        )
+    try:
+        config = read_config(folder)
+    except UsageError as error:
+        raise UsageError(f"--resume: {error}") from None
+    if not config.trains:
+        raise UsageError(f"--resume: the agent {config.agent!r} of {folder} is not trained")
+    asked = {"frames": arguments.frames, "wandb": arguments.wandb}
+    changes = {name: value for name, value in asked.items() if value is not None}
+    resumed = checked_config(config.model_dump() | changes)
+    if config.depends_on_frames and resumed.frames != config.frames:  # before its folder says otherwise
+        raise UsageError(
+            f"--frames: got {resumed.frames}, expected {config.frames}, because guide and schedules of this run "
+            "reach from its first frame to its last"
+        )
+    return resumed
+
+
+def new_config(arguments: argparse.Namespace) -> RunConfig:
+    """The configuration of a new run, with everything resolved.
+
+    Raises:
+        UsageError: an option is unknown or out of bounds, or options contradict each other.
+    """
+    given = {name: getattr(arguments, name) for name in FLAGS if getattr(arguments, name) is not None}
+    hyper = _read_hyper(arguments.hyper)
+    trains = given.get("agent", "ppo") == "ppo"
+    if not trains:
+        _refuse_training_options(given, arguments)
+    given["device"] = resolve_device(given.get("device", "auto"))
+    given["scenario"] = arguments.scenario
+    if not trains:
+        return checked_config(given | {"frames": 0})
+    given.setdefault("threads", automatic_threads())
+    recipe = arguments.recipe or _usual_recipe(given | hyper, arguments.scenario)
+    if "frames" not in given and given.get("net") not in NET_PRESETS:
+        given["frames"] = frames_for(recipe, arguments.scenario)
+    return checked_config({"recipe": recipe} | given | hyper)
+
+
+def checked_config(given: dict[str, Any]) -> RunConfig:
+    """`resolved_config`, with what is wrong said as the option was typed.
+
+    Raises:
+        UsageError: a value is out of bounds.
+    """
+    try:
+        return resolved_config(given)
+    except ValidationError as error:
+        first = error.errors()[0]
+        said = first["msg"].removeprefix("Value error, ")
+        if first["loc"]:
+            name, said = str(first["loc"][0]), f"{said}, got {first['input']!r}"
+        else:  # of options that contradict each other, the message begins with one
+            name, _, said = said.partition(": ")
+        typed = f"--{name.replace('_', '-')}" if name in FLAGS else f"--hyper {name}"
+        raise UsageError(f"{typed}: {said}") from None
+
+
+def _refuse_training_options(given: dict[str, Any], arguments: argparse.Namespace) -> None:
+    asked = [name for name in given if name not in _OF_ANY_AGENT]
+    asked += ["hyper"] * bool(arguments.hyper) + ["recipe"] * bool(arguments.recipe)
+    if asked:
+        option = asked[0].replace("_", "-")
+        raise UsageError(f"--{option}: the agent {given['agent']!r} is not trained")
+
+
+def _read_hyper(given: Sequence[str]) -> dict[str, Any]:
+    """Options given as NAME=VALUE, by name; whether their values are possible is `RunConfig`'s to say."""
+    found: dict[str, Any] = {}
+    for text in given:
+        name, equals, written = text.partition("=")
+        if not equals or not written:
+            raise UsageError(f"--hyper: got {text!r}, expected NAME=VALUE, such as lr=1e-4")
+        if name in FLAGS:
+            raise UsageError(f"--hyper: {name} has an option of its own, --{name.replace('_', '-')}")
+        if name not in HYPER:
+            near = did_you_mean(name, HYPER)
+            hint = f"did you mean {near}?" if near else f"expected one of {', '.join(HYPER)}"
+            raise UsageError(f"--hyper: got {name!r}; {hint}")
+        if name in found:
+            raise UsageError(f"--hyper: {name} is given twice")
+        found[name] = _plain_value(name, written)
+    return found
+
+
+def _plain_value(name: str, written: str) -> bool | int | float | str | None:
+    """A number, true, false or null as JSON writes them; else the word itself."""
+    try:
+        value = json.loads(written)
+    except ValueError:
+        return written
+    if not isinstance(value, bool | int | float | str | None):
+        raise UsageError(f"--hyper: got {name}={written}, expected a number, a word, true, false or null")
+    return value
+
+
+# -- what is not typed --------------------------------------------------------------------------------------------
+
+
+def automatic_threads() -> int:
+    """Threads where nobody says how many."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, min(cores, _MOST_THREADS))
+
+
+def _usual_recipe(given: dict[str, Any], scenario: str) -> str:
+    """`guided` where the scenario has a script and nothing is asked for that excludes a guide, else `plain`."""
+    if given.get("net") in NET_PRESETS or given.get("update") == "chunks":
+        return "paper"
+    if given.get("guide", "script") != "script" or given.get("curriculum", "none") != "none":
+        return "plain"
+    return "guided" if scripted_name(scenario) is not None else "plain"
+
+
+GUIDED_FRAMES: Final = 2_000_000
+GUIDED_FRAMES_OF_A_SUITE: Final = 6_000_000
+
+
+def frames_for(recipe: str, scenario: str) -> int:
+    """Frames where nobody says how many: measured to be enough for every scenario of the paper (docs/mastery.md)."""
+    import socialai_dsl
+    from socialai_dsl.program_suite import ProgramSuite
+
+    if recipe != "guided":
+        return PLAIN_FRAMES
+    is_suite = isinstance(socialai_dsl.compile(socialai_dsl.load(scenario)), ProgramSuite)
+    return GUIDED_FRAMES_OF_A_SUITE if is_suite else GUIDED_FRAMES

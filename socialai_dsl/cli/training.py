@@ -1,0 +1,182 @@
+"""From a run's configuration to a trained agent, with its progress on the terminal."""
+
+import contextlib
+import json
+import traceback
+from collections.abc import Mapping
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any, Final
+
+from socialai_dsl.errors import RunFailed, UsageError
+from socialai_dsl.evaluation.scripts import scripted_name, with_script
+from socialai_dsl.run_folder import LOCK, REPLAY, SETTINGS, scenario_folder_name, write_text
+from trainer.config import RunConfig
+
+if TYPE_CHECKING:
+    from socialai_dsl.checking.loaded import Loaded
+    from socialai_dsl.evaluation.testing import Evaluation
+    from socialai_dsl.program_suite import Playable
+    from trainer.logging import WandbTracker
+
+
+def train_in(
+    config: "RunConfig", loaded: "Loaded", program: "Playable", folder: Path, resume: bool, stream: IO[str]
+) -> str:
+    """Train in the run's folder and return the path of the final checkpoint."""
+    try:
+        return str(train_agent(config, loaded, program, folder, resume, stream))
+    except UsageError:
+        _discard_unstarted(folder)
+        raise
+
+
+def _discard_unstarted(folder: Path) -> None:
+    """Take back the folder of a run that could not even begin, so that the same command can be given again."""
+    from trainer.checkpoint import FOLDER
+
+    checkpoints = folder / FOLDER
+    if not any(checkpoints.glob("*.safetensors")):
+        for file in (SETTINGS, LOCK):
+            (folder / file).unlink(missing_ok=True)
+        for empty in (checkpoints, folder):
+            with contextlib.suppress(OSError):  # it is not there, or holds files of the user's
+                empty.rmdir()
+
+
+def training_figures(folder: Path) -> dict[str, Any]:
+    """Frames, seconds and speed of the whole run, all its parts together if it was resumed."""
+    lines = (folder / "metrics.jsonl").read_text(encoding="utf-8").splitlines()
+    seconds, frames = 0.0, 0
+    for row in map(json.loads, lines):
+        seconds += (row["frames"] - frames) / row["frames_per_second"]
+        frames = row["frames"]
+    return {
+        "frames": frames,
+        "train_seconds": round(seconds, 3),
+        "frames_per_second": round(frames / seconds, 1),
+    }
+
+
+def train_agent(
+    config: RunConfig, loaded: "Loaded", program: "Playable", folder: Path, resume: bool, stream: IO[str]
+) -> Path:
+    """Train, show the progress on `stream`, and return the path of the final checkpoint.
+
+    Args:
+        config: of the run.
+        loaded: its scenario.
+        program: the same, compiled.
+        folder: of the run.
+        resume: go on where the run was stopped.
+        stream: where the progress is shown.
+
+    Raises:
+        UsageError: the run cannot start, or its folder cannot be written.
+        RunFailed: training broke down.
+        KeyboardInterrupt: with a message that says how to go on.
+    """
+    import socialai_dsl
+    from socialai_dsl.cli.learnt import Learnt
+    from socialai_dsl.cli.progress import TrainingProgress
+    from socialai_dsl.replay.endings import endings_of
+    from trainer.errors import TrainingStopped
+    from trainer.ppo import train
+
+    played = _played(config)
+    envs = socialai_dsl.make_vec(played, num_envs=config.envs, copy=False, autoreset_mode="SameStep")
+    total = config.updates * config.frames_per_update
+    learnt = Learnt(loaded, endings_of(loaded, program))
+    try:
+        with TrainingProgress(total, stream) as shown:
+
+            def report(row: Mapping[str, Any]) -> None:
+                shown.update(row["frames"], row["success"], row["frames_per_second"], learnt.sentence(row))
+
+            return train(config, envs, folder, report, resume, _tracker(config, folder), program)
+    except TrainingStopped as error:
+        raise RunFailed(str(error)) from error
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"interrupted; go on with: socialai-run --resume {folder}") from None
+    except Exception as error:
+        if (place := _place_in_own_code(config, error)) is not None:
+            raise UsageError(f"{place}: {type(error).__name__}: {error}") from error
+        if isinstance(
+            error, ValueError
+        ):  # what the trainer says about options or a checkpoint that do not fit
+            raise UsageError(str(error)) from error
+        raise
+    finally:
+        envs.close()
+
+
+def _played(config: RunConfig) -> str:
+    """What is played while training: where a guide leads, the variant with the script that it may follow."""
+    if config.guide == "none":
+        return config.scenario
+    if config.guide == "script":
+        return with_script(config.scenario)
+    return scripted_name(config.scenario) or config.scenario
+
+
+def _place_in_own_code(config: RunConfig, error: BaseException) -> str | None:
+    """`file:line` where the user's network, bonus, curriculum or guide raised an error; None if none of them did."""
+    files = {str(file) for file in config.own_files.values()}
+    places = [
+        f"{frame.filename}:{frame.lineno}"
+        for frame in traceback.extract_tb(error.__traceback__)
+        if frame.filename in files
+    ]
+    return places[-1] if places else None
+
+
+def _tracker(config: RunConfig, folder: Path) -> "WandbTracker | None":
+    """Where the figures go besides the folder, if anywhere."""
+    if config.wandb is None:
+        return None
+    from trainer.logging import WandbTracker
+
+    name = f"{scenario_folder_name(config.scenario)} {folder.name}"
+    return WandbTracker(config.wandb, folder, config.model_dump(), name)
+
+
+def draw_curve(config: "RunConfig", folder: Path, result: dict[str, Any]) -> None:
+    """Draw the learning curve of a run into its folder."""
+    from socialai_dsl.reporting.curve import draw_learning_curve, read_curve
+
+    test = (result["frames"], result["eval"]["success_rate"], *result["eval"]["success_interval"])
+    curve = read_curve(folder / "metrics.jsonl", result["eval"]["endings"], test)
+    title = f"{scenario_folder_name(config.scenario)}, {config.agent}, seed {config.seed}"
+    draw_learning_curve(curve, title, folder / "learning_curve.png")
+
+
+def write_card(
+    config: "RunConfig", loaded: "Loaded", folder: Path, weights: Path, result: dict[str, Any]
+) -> None:
+    """Write the model card of a run into its folder."""
+    from socialai_dsl.checking.loaded import about_of
+    from socialai_dsl.evaluation.model_card import FILE, model_card
+
+    place = weights.relative_to(folder).as_posix()
+    write_text(folder / FILE, model_card(config, result, about_of(loaded), folder.as_posix(), place))
+
+
+_REPLAYED: Final = 5
+"""So many failures, and so many successes."""
+
+
+def record_run(evaluation: "Evaluation", folder: Path, label: str) -> None:
+    """Film the first success, or the first episode if there is none, and where there are both, the first failure.
+
+    A page replays some failures and successes.
+    """
+    from socialai_dsl.replay.page import replay_page
+
+    write_text(folder / REPLAY, replay_page(evaluation.traces(_REPLAYED)))
+    success = evaluation.result.success
+    shown = {"episode": int(success.argmax())}
+    if success.any() and not success.all():
+        shown["failure"] = int(success.argmin())
+    for name, number in shown.items():
+        episode = evaluation.record(number, label)
+        write_text(folder / ("transcript.txt" if name == "episode" else f"{name}.txt"), episode.transcript())
+        episode.save_film(folder / f"{name}.gif")

@@ -1,0 +1,183 @@
+"""Who plays: random actions, a script, a person, a language model or a trained network."""
+
+import re
+import warnings
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from socialai_dsl.errors import UsageError
+from trainer.shipped import PREFIX, located, shipped_agents
+
+if TYPE_CHECKING:
+    from socialai_dsl.evaluation.episodes import Policy
+
+MODEL_PREFIX: Final = "llm:"
+
+
+@dataclass(frozen=True)
+class ModelOptions:
+    """How a language model is asked.
+
+    Attributes:
+        base_url: of an OpenAI-compatible interface, up to `/v1`; None: OpenAI's.
+        key_from: the environment variable with the key.
+        style: of observations. mode: how the model gives its actions.
+        history: observations in a request.
+        temperature, max_tokens: of replies; None: the server's.
+        on_invalid: whether a reply without an action passes the turn, is asked for again, or ends the episode.
+        goal: what the model is told of the aim.
+        grammar: whether replies are held to a grammar, which llama.cpp's server can.
+        probes: whether the scenario's probes are asked apart from play, kept in later requests, or not asked.
+        concurrency: episodes played at once.
+        timeout: seconds for one reply.
+        budget: what may be spent: `200000 tokens`, or `2.50usd` with prices.
+        prices: US dollars for a million tokens of requests and of replies: `0.15,0.60`.
+    """
+
+    base_url: str | None = None
+    key_from: str = "OPENAI_API_KEY"
+    style: Literal["prose", "grid", "json"] = "prose"
+    mode: Literal["text", "json", "tools"] = "text"
+    history: int = 16
+    temperature: float | None = None
+    max_tokens: int | None = None
+    on_invalid: Literal["noop", "retry", "fail"] = "noop"
+    goal: str = ""
+    grammar: bool = False
+    probes: Literal["apart", "kept", "off"] = "apart"
+    concurrency: int = 4
+    timeout: float = 120.0
+    budget: str | None = None
+    prices: str | None = None
+
+
+@dataclass(frozen=True)
+class Player:
+    """Who plays, and how.
+
+    Attributes:
+        agent: `random`, `oracle`, `human`, `llm:MODEL`, `shipped:NAME`, or the path of a run, of a folder of
+            checkpoints or of one.
+        device: where a network runs.
+        greedy: whether a network takes its most probable action instead of sampling.
+        seed: of what a network or `random` draws; rooms do not depend on it.
+        net: name of a network that does not ship, whose code is imported if a checkpoint asks for it.
+        folder: where the file of such a network is looked for first.
+        out, options: where the transcripts of a language model go, and how it is asked.
+    """
+
+    agent: str
+    device: str = "cpu"
+    greedy: bool = False
+    seed: int = 0
+    net: str | None = None
+    folder: Path = Path()
+    out: Path = Path()
+    options: ModelOptions | None = None
+
+    @property
+    def is_trained(self) -> bool:
+        """Whether a network plays."""
+        return self.agent not in ("random", "oracle", "human") and not self.agent.startswith(MODEL_PREFIX)
+
+    @property
+    def manner(self) -> str:
+        """How actions come about, in a phrase; empty where there is nothing to say."""
+        if self.options is not None:
+            return f"{self.options.style} and {self.options.mode}, {self.options.history} observations"
+        if self.agent in ("oracle", "human"):
+            return ""
+        return "most probable actions" if self.greedy else f"sampled actions, seed {self.seed}"
+
+
+def make_policy(player: Player, envs: Any) -> "tuple[Policy, list[str]]":
+    """What plays, and what is to be known about it, such as that it was trained on something else.
+
+    Raises:
+        ValueError: the checkpoint does not fit the environments.
+    """
+    from socialai_dsl.evaluation.episodes import RandomPolicy, ScriptedPolicy
+
+    if player.agent == "random":
+        return RandomPolicy(tuple(int(n) for n in envs.single_action_space.nvec), player.seed), []
+    if player.agent == "oracle":
+        return ScriptedPolicy(envs), []
+    from trainer.play import CheckpointPolicy
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        policy = CheckpointPolicy.load(
+            player.agent, envs, player.greedy, player.seed, player.device, player.net, player.folder
+        )
+    return policy, [str(warning.message) for warning in caught]
+
+
+def require_trainer() -> None:
+    """Say how to install the trainer if it is missing.
+
+    Raises:
+        UsageError: it is.
+    """
+    if find_spec("torch") is None:
+        raise UsageError("training and evaluating need PyTorch: pip install 'socialai-dsl[train]'")
+
+
+def resolve_device(device: str) -> str:
+    """`auto` is a graphics card where there is one.
+
+    Raises:
+        UsageError: `cuda` was asked for and is not there.
+    """
+    import torch
+
+    available = torch.cuda.is_available()
+    if device == "cuda" and not available:
+        raise UsageError("--device cuda: PyTorch finds no CUDA device on this machine")
+    return "cuda" if device == "cuda" or (device == "auto" and available) else "cpu"
+
+
+def folder_of(agent: str) -> Path:
+    """Where a trained agent is kept: for `shipped:NAME` the folder that comes with the product.
+
+    Raises:
+        UsageError: no agent of that name ships.
+    """
+    try:
+        return located(agent)
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+
+
+def named_agent(agent: str, scenario: str) -> str:
+    """What `--agent` stands for: the word `shipped` is the agent that ships for the scenario, as `shipped:NAME`.
+
+    A variant is played by the agent of what it is a variant of, unless it has one of its own.
+
+    Raises:
+        ScenarioError: the scenario has mistakes.
+        UsageError: none ships for it.
+    """
+    import socialai_dsl
+    from socialai_dsl.loader.library import shipped_folder
+
+    if agent != "shipped":
+        return agent
+    path, shipped = socialai_dsl.load(scenario).resolved.path, shipped_folder().resolve()
+    _, *variants = scenario.partition("?")[0].split("+")
+    known = shipped_agents()
+    if path.is_relative_to(shipped):
+        base = path.relative_to(shipped).with_suffix("").as_posix()
+        for count in range(len(variants), -1, -1):
+            name = "_".join([base, *variants[:count]])
+            if name in known:
+                return PREFIX + name
+    raise UsageError(f"{scenario}: no agent ships for it; these scenarios have one: {', '.join(known)}")
+
+
+def default_folder(agent: str) -> Path:
+    """Where the episodes of a model go unless the user says otherwise."""
+    return Path(
+        "runs", "llm", re.sub(r"[^\w.-]+", "_", agent.removeprefix(MODEL_PREFIX)).strip(".") or "model"
+    )

@@ -1,0 +1,56 @@
+"""What an evaluation leaves in a folder: films, transcripts, a page that replays episodes, and a list of all."""
+
+import csv
+import io
+from pathlib import Path
+
+from socialai_dsl.evaluation.testing import Evaluation
+from socialai_dsl.run_folder import EPISODES, REPLAY, scenario_folder_name, write_text
+
+
+def record(evaluation: Evaluation, folder: Path, count: int = 3, label: str = "") -> Path:
+    """Record up to `count` failures and as many successes, a page with them included, and list all episodes.
+
+    Args:
+        evaluation: what was played.
+        folder: gets a folder named after the scenario, which is returned.
+        count: films and transcripts of either kind.
+        label: how the recordings call the agent (default: by its name).
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    from socialai_dsl.replay.page import replay_page
+
+    place = folder / scenario_folder_name(evaluation.scenario)
+    place.mkdir(parents=True, exist_ok=True)
+    for success in (False, True):
+        for number in evaluation.pick(success, count):
+            if evaluation.is_cut_short(number):  # no step ended it, so a film has no end to show
+                continue
+            episode = evaluation.record(number, label or f"agent {evaluation.player.agent}")
+            name = f"{'success' if success else 'failure'}-{number:03d}"
+            write_text(place / f"{name}.txt", episode.transcript())
+            episode.save_film(place / f"{name}.gif")
+    if traces := evaluation.traces(count):
+        write_text(place / REPLAY, replay_page(traces))
+    write_text(place / EPISODES, _episodes(evaluation))
+    return place
+
+
+def _episodes(evaluation: Evaluation) -> str:
+    """One line for each test episode."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("episode", "success", "outcome", "length", "return"))
+    result = evaluation.result
+    columns = zip(
+        result.success.tolist(),
+        result.outcome.tolist(),
+        result.lengths.tolist(),
+        result.returns.tolist(),
+        strict=True,
+    )
+    for number, (success, outcome, length, total) in enumerate(columns):
+        writer.writerow((number, int(success), result.names[outcome], length, f"{total:.6g}"))
+    return text.getvalue()

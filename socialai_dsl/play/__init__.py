@@ -1,0 +1,62 @@
+"""A person plays a scenario in the terminal, moving and speaking."""
+
+import os
+import sys
+from typing import TYPE_CHECKING
+
+from socialai_dsl.errors import UsageError
+
+if TYPE_CHECKING:
+    from socialai_dsl.play.game import Played
+    from socialai_dsl.play.screen import Episodes
+
+__all__ = ["play"]
+
+
+def play(scenario: str, episodes: "Episodes", practice: bool = True) -> "list[Played]":
+    """Let somebody at the terminal play; the episodes that were played to their end.
+
+    Args:
+        scenario: a path or a name.
+        episodes: which ones.
+        practice: whether steps may be taken back and the like.
+
+    Raises:
+        ScenarioError: the scenario has mistakes.
+        UsageError: there is no terminal.
+    """
+    _require_terminal()
+    from socialai_dsl.play.game import Game
+    from socialai_dsl.play.screen import PlayApp
+
+    game = Game(scenario)
+    try:
+        first = episodes(0)
+        assert first is not None, "internal: there is at least one episode to play"
+        game.begin(*first)
+        app = PlayApp(game, episodes, practice)
+        done = app.run() or []
+        if app.failure is not None:
+            raise app.failure
+        return done
+    finally:
+        game.close()
+
+
+def _require_terminal() -> None:
+    """Say so where nobody could see or type anything.
+
+    Raises:
+        UsageError: standard input, output or error output is no terminal, or one that shows lines only.
+    """
+    streams = {"input": sys.stdin, "output": sys.stdout, "error output": sys.stderr}
+    for name, stream in streams.items():
+        if not stream.isatty():
+            raise UsageError(
+                f"playing needs a terminal, and standard {name} is none; "
+                "`socialai trace SCENARIO --do forward --do ...` plays given steps without one"
+            )
+    if os.environ.get("TERM", "dumb") in ("dumb", "unknown"):
+        raise UsageError(
+            f"playing needs a terminal that can move its cursor; TERM is {os.environ.get('TERM')!r}"
+        )
