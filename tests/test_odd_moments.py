@@ -491,3 +491,22 @@ outcome: [{failure: agent.did(done)}]
         seen.append((state["agent"]["at"][0], state["marble"]["at"][0], state["door"]["state"]))
     # It pushes the marble, which rolls on at once; then it follows, and the marble rolls on.
     assert seen == [(2, 4, "open"), (3, 5, "closed"), (4, 6, "closed")]
+
+
+@pytest.mark.parametrize("value", ["word", 'word if t > 0 else "none yet"'])
+def test_an_empty_register_cannot_be_said(tmp_path: Path, value: str) -> None:
+    run = Folder(tmp_path)(f"""
+        frames:
+          repeat_it:
+            let: {{word: {{start: none}}}}
+            states:
+              s:
+                then:
+                  - {{hears: Say <noun>, set: {{word: noun}}}}
+                  - {{say: It was <{value}>.}}
+                  - {{say: Nothing.}}
+        cast: {{ann: {{at: [5, 5], frame: repeat_it}}}}
+    """).step()
+    assert run.info["utterance"] == "Ann: Nothing."
+    run.step(said="Say hello")
+    assert run.step().info["utterance"] == "Ann: It was hello."
