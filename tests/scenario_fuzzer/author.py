@@ -312,14 +312,16 @@ class _Author:
 
     def rows(self, kept: str, single: str) -> list[Row]:
         """Registers for each of a group, and single ones that begin with nothing."""
-        groups = ["colors", "nouns", "cast", "1..4", *(thing.name for thing in self.declared.several)]
+        nouns = [] if self.slotted else ["noun"]
+        groups = ["colors", *(["nouns"] if nouns else []), "cast", "1..4"]
+        groups += [thing.name for thing in self.declared.several]
         groups += ["crowd"] if "crowd" in self.declared.groups else []
         made = []
         for number in range(self.rng.choice((0, 0, 1, 2))):
-            holds = self.rng.choice(("number", "color", "noun"))
+            holds = self.rng.choice(("number", "color", *nouns))
             made.append(Row(f"{kept}_{number}", self.rng.choice(groups), holds, self.often(0.5)))
         if self.often(0.3):
-            made.append(Row(single, None, self.rng.choice(("color", "noun")), True))
+            made.append(Row(single, None, self.rng.choice(("color", *nouns)), True))
         return made
 
     def starts(self, rows: list[Row]) -> dict[str, Any]:
