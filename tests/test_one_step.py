@@ -1645,6 +1645,38 @@ def test_5_67_a_rule_that_uses_slots_notices_what_has_all_of_them(play: Folder) 
     )
 
 
+TOLD = """
+    grammar: {templates: [It is <noun>, Hello], nouns: [red, blue]}
+    objects: {ball: {type: ball, at: [3, 3], color: red}}
+    cast:
+      ann: {at: [4, 5]}
+      bob:
+        at: [5, 5]
+        beliefs:
+          hue:
+            start: none
+            from:
+              - {hears: Hello, of: blue}
+              - {hears: It is <noun>, when: speaker == agent, of: first(c in colors where c == noun)}
+              - {when: t == 4, of: ball.color}
+            forget: 2
+    earshot: room
+"""
+
+
+def test_5_68_the_first_source_that_holds_counts(play: Folder) -> None:
+    run = play(TOLD)
+    believed = [
+        run.step(said=said).state["bob"]["believes"]["hue"] for said in (None, "It is red", "Hello", None)
+    ]
+    assert believed == ["none", "red", "blue", "red"]
+
+
+def test_5_69_without_a_source_a_belief_is_forgotten(play: Folder) -> None:
+    run = play(TOLD).step(said="Hello")
+    assert [run.step().state["bob"]["believes"]["hue"] for _ in range(2)] == ["blue", "none"]
+
+
 # -- 6. memories -----------------------------------------------------------------------------------
 
 

@@ -226,6 +226,8 @@ class Registers:
                 registers.add(found_path(item.path), BOOL, fleeting=True)
         for memory in checked.memories:
             registers._add_memory(memory)
+        for path, lasts in {item.path: item.lasts for item in checked.beliefs if item.lasts}.items():
+            registers.add(age_path(path), Type("int", 0, lasts))
         for entity in checked.entities:
             if entity.timer:
                 registers.add(f"{label(entity)}.timer", Type("int", 0, entity.timer))
@@ -272,6 +274,11 @@ def label(entity: Entity) -> str:
 def found_path(path: str) -> str:
     """The register of whether there was a value for another register."""
     return f"{path}.found"
+
+
+def age_path(belief: str) -> str:
+    """The register of for how many turns a belief that is forgotten has had no source."""
+    return f"{belief}.age"
 
 
 def said_path(speaker: Entity) -> str:

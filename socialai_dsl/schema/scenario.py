@@ -258,11 +258,30 @@ class Role(Model):
     frame: Word | None = Field(None, description="the frame an NPC in this role follows")
 
 
+class Source(Model):
+    """A source of a belief: something seen, or told."""
+
+    of: Expression = Field(description="what is believed then")
+    when: Expression | None = Field(None, description="a condition", examples=["sees(toy)"])
+    hears: Texts = Field((), description="an utterance, or a list of alternatives")
+
+
 class Belief(Model):
     """A belief of a member of the cast: its latest observation of a value."""
 
-    of: Expression = Field(description="the value that it is about, such as toy.inside")
+    of: Expression | None = Field(None, description="the value that it is about, such as toy.inside")
     when: Expression | None = Field(None, description="the condition of an observation; default always")
+    start: Expression | None = Field(
+        None, description="its value at first; default: the true one; `none`: nothing yet"
+    )
+    from_: Annotated[tuple[Source, ...], BeforeValidator(_as_tuple)] = Field(
+        (),
+        alias="from",
+        description="in place of `of`: its sources, of which the first that holds in a turn counts",
+    )
+    forget: Expression | None = Field(
+        None, description="number of turns without a source, or a condition, after which it holds nothing"
+    )
 
 
 class Character(Model):

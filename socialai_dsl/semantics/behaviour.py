@@ -35,7 +35,6 @@ from socialai_dsl.semantics.scope import (
     at_every_step,
     described,
     dotted,
-    is_nothing,
     quoted,
     reset_scope,
     surviving,
@@ -65,7 +64,6 @@ from socialai_dsl.semantics.terms import (
 )
 from socialai_dsl.semantics.texts import Alternative, asked_of_heard, binding, bound, with_slots
 from socialai_dsl.source import DataPath
-from socialai_dsl.vocabulary import is_number
 
 _STATUS_AFTER = {"reveal": "opened", "open": "open", "close": "closed", "lock": "locked", "unlock": "locked"}
 """The status that an object must be able to have for an effect to make sense."""
@@ -385,7 +383,7 @@ def assigned(
     """
     register = register_of(key.partition("(")[0].strip())
     value = Sited(
-        _value_for(resolver, register, raw, path, scope), scope.draws.site, resolver.findings.at(path)
+        texts.value_for(resolver, register, raw, path, scope), scope.draws.site, resolver.findings.at(path)
     )
     own = scope.at((*path, KEY), f"{scope.draws.site}.key")
     node = resolver.findings.expression(own.path, key)
@@ -399,32 +397,6 @@ def assigned(
             yield Assignment(register, value, target, own.draws.site)
         elif isinstance(target, Read):
             yield Assignment(target.path, value)
-
-
-def _value_for(resolver: Resolver, register: str, raw: object, path: DataPath, scope: Scope) -> Term:
-    """The value that a register is set to; one that may hold nothing can be set to `none`."""
-    registers = resolver.registers
-    known = registers.holds(register)
-    if registers.starts_with_nothing(register) and is_nothing(raw):
-        base = registers.read(register)
-        assert isinstance(base, Read), "internal: a register that is set is no constant"
-        return Const(base.type, base.nothing if base.nothing is not None else 0)
-    if is_nothing(raw) and known is not None and known.kind != "action" and known.words != TURN.words:
-        message = "only a register that starts with `none` can hold nothing"
-        raise resolver.findings.fail("S204", message, resolver.findings.at(path))
-    expected = INT if known is not None and known.kind == "int" and not known.words else known
-    if known is None and isinstance(raw, str) and _is_noun(resolver, raw.strip(), scope):
-        expected = resolver.symbols.nouns
-    term = resolver.written(path, raw, expected, scope)  # type: ignore[arg-type]
-    registers.widen(register, term.type)
-    return term
-
-
-def _is_noun(resolver: Resolver, raw: str, scope: Scope) -> bool:
-    """Whether a value is a noun of the grammar, and nothing else, or a quoted one."""
-    words = resolver.symbols.nouns.words
-    quoted_noun = raw[:1] == raw[-1:] and raw[:1] in ("'", '"') and raw[1:-1] in words
-    return quoted_noun or (raw in words and not is_number(raw) and resolver.means_nothing(raw, scope))
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,13 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import ParseProblem, parse_expression
 from socialai_dsl.schema.scenario import Effects, Frame, Register, Scenario
 from socialai_dsl.semantics import groups
+from socialai_dsl.semantics.believing import Believed
 from socialai_dsl.semantics.plans import Activity, BeliefPlan, Computed, FramePlan, StatePlan
-from socialai_dsl.semantics.resolver import ENTITY, Declaration, Resolver
+from socialai_dsl.semantics.resolver import ENTITY, Resolver
 from socialai_dsl.semantics.scope import (
     FailedError,
     Objects,
     Scope,
-    at_every_step,
     frames_of,
     object_scope,
     of_each,
@@ -449,17 +449,11 @@ def register_of(member: str, key: str) -> str:
 
 
 def declare(resolver: Resolver) -> None:
-    """Make every belief known; it starts with what is true when the episode begins."""
+    """Make every belief known; by default it starts with what is true when the episode begins."""
     for name, member in resolver.symbols.cast.items():
         for key, belief in member.beliefs.items():
-            path = _path(resolver, name, key, "of")
-            register = register_of(name, key)
-            scope = reset_scope(path, f"cast.{name}.beliefs.{key}", name)
-            resolver.registers.declare(Declaration(register, key, path, belief.of, scope))
-
-
-def _path(resolver: Resolver, member: str, key: str, part: str) -> DataPath:
-    return (*resolver.symbols.member_path(member, "beliefs"), key, part)
+            with surviving():
+                resolver.registers.declare(Believed(resolver, name, key, belief).declaration())
 
 
 def beliefs(resolver: Resolver) -> Iterator[BeliefPlan]:
@@ -467,18 +461,8 @@ def beliefs(resolver: Resolver) -> Iterator[BeliefPlan]:
     for name, member in resolver.symbols.cast.items():
         for key, belief in member.beliefs.items():
             with surviving():
-                register = register_of(name, key)
-                of, when = _path(resolver, name, key, "of"), _path(resolver, name, key, "when")
-                start = resolver.registers.read(register)
-                scope = at_every_step(reset_scope(of, f"cast.{name}.beliefs.{key}", name))
-                value = resolver.written(of, belief.of, start.type, scope)
-                condition: Sited | None = None
-                if belief.when is not None:
-                    asked = at_every_step(reset_scope(when, f"cast.{name}.beliefs.{key}.when", name))
-                    term = resolver.written(when, belief.when, BOOL, asked)
-                    condition = Sited(term, asked.draws.site, resolver.findings.at(when))
-                noted = Sited(value, scope.draws.site, resolver.findings.at(of))
-                yield BeliefPlan(name, register, noted, condition)
+                if register_of(name, key) in resolver.registers:
+                    yield from Believed(resolver, name, key, belief).plans()
 
 
 def watching(member: str, number: int, span: Span) -> FramePlan:
@@ -501,6 +485,8 @@ def believed(resolver: Resolver, owner: ast.Attribute, node: ast.Attribute, scop
             called = (resolver.symbols.group_of(member) or (member, 0))[0]
             message = f"`{called}` has no belief `{node.name}`"
             raise resolver.fail("S201", message, node, scope, suggestion=near, hint=hint)
+    if any(register_of(str(member), node.name) not in resolver.registers for member in members):
+        raise FailedError  # what it starts with is missing, which has been reported
     return of_each(who, [resolver.registers.read(register_of(str(m), node.name)) for m in members])
 
 

@@ -358,13 +358,16 @@ class Computed:
 class BeliefPlan:
     """A belief of a member: at the start of each of its turns the register takes `value` if `when` holds.
 
-    It starts, as a `Drawn` of the setup, with what is true when the episode begins.
+    It starts, as a `Drawn` of the setup, with what is true when the episode begins. Of several for one register the
+    first that holds counts; where none does, it holds nothing if `forget` holds, or after `lasts` turns (0: never).
     """
 
     member: str
     path: str
     value: Sited
     when: Sited | None
+    forget: Sited | None = None
+    lasts: int = 0
 
 
 @dataclass(frozen=True, slots=True)

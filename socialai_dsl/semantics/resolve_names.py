@@ -461,9 +461,9 @@ def _language(resolver: Resolver, node: ast.Name, scope: Scope) -> Term | None:
             return _size("width", symbols.width)
         case "H":
             return _size("height", symbols.height)
-        case "noun" if scope.frame is not None and not scope.at_reset:
+        case "noun" if _is_in_turn(scope):
             return texts.noun(resolver, node, scope)
-        case word if word in symbols.slots and scope.frame is not None and not scope.at_reset:
+        case word if word in symbols.slots and _is_in_turn(scope):
             return _in_slot(resolver, word, scope.hearing)
         case word if word in symbols.slots and scope.frame is None:
             hint = f"write `agent.{word}`: what the agent said there in this step"
@@ -481,6 +481,11 @@ def _in_slot(resolver: Resolver, name: str, heard: bool) -> Term:
     if value != word and not heard:
         resolver.slot_words[value] = slot, word
     return value
+
+
+def _is_in_turn(scope: Scope) -> bool:
+    """Whether an expression belongs to a turn of a member of the cast, who may have heard something."""
+    return (scope.frame is not None or scope.hearing) and not scope.at_reset
 
 
 def _size(which: str, sizes: tuple[int, int]) -> Term:

@@ -184,6 +184,7 @@ class Declaration:
         constant: a known value needs no register.
         imagined: it is only looked at, and never drawn.
         for_each: the keys of the group of which each has one. starts_with_nothing: until it is set.
+        gathers: it has room for whatever things it is set to. forgets: it may hold nothing again.
     """
 
     path: str
@@ -198,6 +199,8 @@ class Declaration:
     others: tuple[tuple[DataPath, Scalar], ...] = ()
     for_each: tuple[Const, ...] = ()
     starts_with_nothing: bool = False
+    gathers: bool = False
+    forgets: bool = False
 
 
 class Registers:
@@ -335,8 +338,9 @@ class Registers:
 
     def drawn_at_reset(self, path: str) -> Term | None:
         """The value that a register gets at reset and keeps; None for a constant, or if rules can set it."""
-        drawn = self._drawn.get(path, ())
-        return drawn[0].value.term if len(drawn) == 1 and not self.is_set(path) else None
+        drawn, declaration = self._drawn.get(path, ()), self._declared.get(path)
+        gathers = declaration is not None and (declaration.gathers or declaration.forgets)
+        return drawn[0].value.term if len(drawn) == 1 and not (gathers or self.is_set(path)) else None
 
     def is_set(self, path: str) -> bool:
         """Whether a register is one that rules can set: of a frame's `let`, or of `state`."""
@@ -362,15 +366,15 @@ class Registers:
             self.words[path] = type_
             self.learned = True
         counted = type_.kind == "int" and not type_.words
-        if declaration.range is None and (
-            counted or (declaration.starts_with_nothing and type_.kind == "entity")
-        ):
+        if declaration.range is None and (counted or (declaration.gathers and type_.kind == "entity")):
             own = self.ranges.get(path) or self._started(path) or type_
             self.ranges[path] = _union(own, type_)
 
     def _started(self, path: str) -> Type | None:
         """The type of all that a register starts with; None if that is nothing."""
-        found = [drawn.value.term.type for drawn in self._drawn.get(path, ()) if drawn.nothing is None]
+        if self._declared[path].starts_with_nothing:
+            return None
+        found = [drawn.value.term.type for drawn in self._drawn.get(path, ())]
         return reduce(_union, found) if found else None
 
     def _resolve(self, declaration: Declaration) -> None:
@@ -386,12 +390,13 @@ class Registers:
             self._terms[path] = first.term
             return
         type_ = self._common_type(declaration, [start.term for start, _ in starts])
-        may_widen = declaration.starts_with_nothing and type_.kind == "entity"
+        may_widen = declaration.gathers and type_.kind == "entity"
         if path in self._given_ranges and (may_widen or (type_.kind == "int" and not type_.words)):
             type_ = _union(type_, self._given_ranges[path])
-        nothing = nothing_of(type_) if declaration.starts_with_nothing else None
+        empties = declaration.starts_with_nothing or declaration.forgets
+        nothing = nothing_of(type_) if empties else None
         self._terms[path] = Read(type_, path, nothing)
-        if nothing is not None:
+        if declaration.starts_with_nothing and nothing is not None:
             starts = [(replace(start, term=Const(type_, nothing)), called) for start, called in starts]
         self._drawn[path] = tuple(Drawn(called, type_, start, nothing) for start, called in starts)
 

@@ -13,7 +13,7 @@ from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.groups import must_be_agent, subject_of, values_of
 from socialai_dsl.semantics.plans import RulePlan
-from socialai_dsl.semantics.resolver import MAX_TEXTS, Resolver, texts_of, words_of_values
+from socialai_dsl.semantics.resolver import INT, MAX_TEXTS, Resolver, texts_of, words_of_values
 from socialai_dsl.semantics.scope import (
     Draws,
     FailedError,
@@ -21,12 +21,14 @@ from socialai_dsl.semantics.scope import (
     by_value,
     described,
     drawn,
+    is_nothing,
     quoted,
     select,
     spoken,
 )
 from socialai_dsl.semantics.signatures import VALUES
 from socialai_dsl.semantics.terms import (
+    TURN,
     Compare,
     Const,
     Digit,
@@ -49,7 +51,7 @@ from socialai_dsl.semantics.terms import (
     walk,
 )
 from socialai_dsl.source import DataPath, Span
-from socialai_dsl.vocabulary import NOUN, Sentences, normal, words
+from socialai_dsl.vocabulary import NOUN, Sentences, is_number, normal, words
 
 _JOINED = re.compile(r"\s*\|\s*|\s+or\s+")
 """What an author may put between alternatives."""
@@ -654,6 +656,35 @@ def _of_what_is_meant(asked: Speaker | HeardNoun, heard: Sequence[Alternative], 
         tuple(_of_what_is_meant(asked, others, (*patterns, *always, pattern)) for pattern, _ in sometimes),
         otherwise,
     )
+
+
+# -- what a register is set to, where only that says what it holds -----------------------------------------
+
+
+def value_for(resolver: Resolver, register: str, raw: object, path: DataPath, scope: Scope) -> Term:
+    """The value that a register is set to; one that may hold nothing can be set to `none`."""
+    registers = resolver.registers
+    known = registers.holds(register)
+    if registers.starts_with_nothing(register) and is_nothing(raw):
+        base = registers.read(register)
+        assert isinstance(base, Read), "internal: a register that is set is no constant"
+        return Const(base.type, base.nothing if base.nothing is not None else 0)
+    if is_nothing(raw) and known is not None and known.kind != "action" and known.words != TURN.words:
+        message = "only a register that starts with `none` can hold nothing"
+        raise resolver.findings.fail("S204", message, resolver.findings.at(path))
+    expected = INT if known is not None and known.kind == "int" and not known.words else known
+    if known is None and isinstance(raw, str) and _is_noun(resolver, raw.strip(), scope):
+        expected = resolver.symbols.nouns
+    term = resolver.written(path, raw, expected, scope)  # type: ignore[arg-type]
+    registers.widen(register, term.type)
+    return term
+
+
+def _is_noun(resolver: Resolver, raw: str, scope: Scope) -> bool:
+    """Whether a value is a noun of the grammar, and nothing else, or a quoted one."""
+    words = resolver.symbols.nouns.words
+    quoted_noun = raw[:1] == raw[-1:] and raw[:1] in ("'", '"') and raw[1:-1] in words
+    return quoted_noun or (raw in words and not is_number(raw) and resolver.means_nothing(raw, scope))
 
 
 # -- words -----------------------------------------------------------------------------------------------------

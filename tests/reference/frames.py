@@ -8,10 +8,10 @@ from typing import Any
 from socialai_dsl.grammar import ast
 from tests.reference import bodies, chance, speech
 from tests.reference.effects import Cause, affect, assign, assignments, causes
-from tests.reference.evaluate import Context, NothingFoundError, evaluate, holds, pattern
-from tests.reference.script import Entry, Frame, Rule, Step
+from tests.reference.evaluate import Context, NothingFoundError, evaluate, holds, pattern, there
+from tests.reference.script import Belief, Entry, Frame, Rule, Source, Step
 from tests.reference.source import Sources
-from tests.reference.world import Entity, World
+from tests.reference.world import NOTHING, Entity, World
 
 
 @dataclass
@@ -51,17 +51,39 @@ class FrameRunner:
     # -- a turn --------------------------------------------------------------------------------------------
 
     def perceive(self) -> None:
-        """Step 4a: beliefs whose `when` holds take the value of what they are about."""
+        """Step 4a: each belief takes the value of its first source that holds; without one it may be forgotten."""
         for name, belief in self.sources.beliefs_of(self.me):
             site = f"cast.{self.me.key}.beliefs.{name}"
-            context = Context(self.world, self.me)
-            try:
-                if belief.when is None or holds(
-                    self.sources.expression(f"{site}.when", belief.when), context
-                ):
-                    self.me.believes[name] = evaluate(self.sources.expression(site, belief.of), context)
-            except NothingFoundError:
-                continue
+            found = (self.said_by_source(belief, place, source) for place, source in belief.sources(site))
+            value = next((one for one in found if one is not NOTHING), NOTHING)
+            if value is not NOTHING:
+                self.me.believes[name], self.me.ages[name] = value, 0
+            elif belief.forget is not None and self.forgets(name, belief, site):
+                self.me.believes[name] = NOTHING
+
+    def said_by_source(self, belief: Belief, place: str, source: Source) -> Any:
+        """What a source says now; nothing if it does not hold."""
+        context: Context | None = Context(self.world, self.me)
+        frame = self.me.frame if belief.from_ else None
+        try:
+            if belief.from_:
+                context = self.heard(Rule(when=source.when, hears=source.hears, set={"it": source.of}), place)
+            when = (
+                None if source.when is None else self.sources.expression(f"{place}.when", source.when, frame)
+            )
+            if context is None or not holds(when, context):
+                return NOTHING
+            return there(evaluate(self.sources.expression(place, source.of, frame), context))
+        except NothingFoundError:
+            return NOTHING
+
+    def forgets(self, name: str, belief: Belief, site: str) -> bool:
+        """Whether a belief without any source is given up: after so many turns, or on a condition."""
+        value = evaluate(self.expression(f"{site}.forget", belief.forget), self.context())
+        if isinstance(value, bool):
+            return value
+        self.me.ages[name] = min(self.me.ages[name] + 1, value)
+        return bool(self.me.ages[name] == value)
 
     def begin(self) -> Turn:
         """Step 4b, first part: `first`, and which activity runs."""

@@ -403,7 +403,8 @@ class Reference:
             "clock": member.clock,
             "registers": {name: plain(value) for name, value in member.registers.items()}
             | self.rounds(member),
-            "believes": {name: plain(value) for name, value in member.believes.items()},
+            "believes": {name: plain(value) for name, value in member.believes.items()}
+            | {f"{name}.age": age for name, age in member.ages.items()},
             "gone": member.gone,
             "was_poked": member.was_poked,
             "once": sorted(member.fired_once),

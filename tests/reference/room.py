@@ -397,7 +397,16 @@ class Setup:
         """Beliefs start with what is the case."""
         for name, belief in self.sources.beliefs_of(member):
             if name not in member.believes:
-                value = self.sources.expression(f"cast.{member.key}.beliefs.{name}", belief.of)
+                site = f"cast.{member.key}.beliefs.{name}"
+                member.ages[name] = 0
+                if str(belief.start) == "none":
+                    member.believes[name] = NOTHING
+                    continue
+                first = next((s for s in belief.sources(site) if not s[1].hears), (f"{site}.start", None))
+                place, source = first if belief.start is None else (f"{site}.start", None)
+                written = belief.start if source is None else source.of
+                frame = member.frame if belief.from_ else None
+                value = self.sources.expression(place, written, frame)
                 member.believes[name] = evaluate(value, self.context(member))
 
     def distinct_colors(self, path: str, group: list[Entity]) -> None:

@@ -118,11 +118,29 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Belief:
-    """What a member takes for true: what it saw last."""
+class Source:
+    """One way to come to believe something."""
 
     of: Any
     when: Any = None
+    hears: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What a member takes for true: what the first of its sources says that holds."""
+
+    of: Any = None
+    when: Any = None
+    start: Any = None
+    from_: tuple[Source, ...] = ()
+    forget: Any = None
+
+    def sources(self, site: str) -> list[tuple[str, Source]]:
+        """Each with the place where it is written."""
+        if not self.from_:
+            return [(site, Source(self.of, self.when))]
+        return [(f"{site}.from[{number}]", source) for number, source in enumerate(self.from_)]
 
 
 @dataclass(frozen=True)
@@ -501,7 +519,7 @@ def substituted(data: Any, params: Mapping[str, Any]) -> Any:
 
 def record(kind: type, data: Any, readers: Mapping[str, Callable[[Any], Any]]) -> Any:
     """A record of this kind; words that Python reserves get an underscore; unknown keys are refused."""
-    reserved = {"for": "for_", "while": "while_", "with": "with_"}
+    reserved = {"for": "for_", "while": "while_", "with": "with_", "from": "from_"}
     values = {reserved.get(key, key): value for key, value in (data or {}).items()}
     known = {**kind.__dataclass_fields__}  # type: ignore[attr-defined]
     unknown = values.keys() - known.keys()
@@ -541,7 +559,14 @@ def frame_of(entry: Any) -> Frame:
 def member_of(entry: Any) -> Member:
     """A member of the cast; where several files can be it, they are read apart from it."""
     kept = {key: value for key, value in (entry or {}).items() if key != "one_of"}
-    return record(Member, kept, {"beliefs": each(lambda belief: record(Belief, belief, {}))})
+    return record(
+        Member, kept, {"beliefs": each(lambda belief: record(Belief, belief, {"from_": sources_of}))}
+    )
+
+
+def sources_of(entries: Any) -> tuple[Source, ...]:
+    """The sources of a belief."""
+    return tuple(record(Source, entry, {"hears": many}) for entry in entries)
 
 
 def let_of(entry: Any) -> Any:

@@ -173,6 +173,7 @@ class Entity:
     bumped: bool = False  # it went forward in this step and did not get there
     pointing: str | None = None
     believes: dict[str, Any] = field(default_factory=dict)
+    ages: dict[str, int] = field(default_factory=dict)  # of beliefs: turns without a source
     poked: bool = False
     was_poked: bool = False
 

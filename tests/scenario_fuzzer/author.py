@@ -521,9 +521,25 @@ class _Author:
             "cell": lambda: "agent.cell",
             "thing": lambda: f"{self.phrases.one(self.declared.group(what), where)}.inside",
         }
-        made = {"of": of[sort]()}
-        if self.often(0.7):
-            made["when"] = self.rng.choice(("sees(agent)", "next_to(agent)", "agent.sees(self)"))
+
+        def source(hears: bool) -> dict[str, Any]:
+            found: dict[str, Any] = {"of": of[sort]()}
+            if hears:
+                found["hears"] = self.rng.choice(("any", self.phrases.heard(), self.phrases.heard()))
+            if not hears or self.often(0.3):
+                found["when"] = self.rng.choice(("sees(agent)", "next_to(agent)", "agent.sees(self)"))
+            return found
+
+        made: dict[str, Any] = source(False)
+        if self.often(0.3):
+            del made["when"]
+        if self.often(0.4):
+            made = {"from": [made, source(True), source(False)][: self.rng.randint(1, 3)]}
+            self.rng.shuffle(made["from"])
+            if self.often(0.5) or "hears" in made["from"][0]:
+                made["start"] = "none"
+        if self.often(0.4):
+            made["forget"] = self.rng.choice((1, 2, 3, "t % 3 == 0", "agent.next_to(self)"))
         return made
 
     # -- how it ends, and how it looks -------------------------------------------------------------------------

@@ -10,6 +10,9 @@ from tests.scenario_fuzzer.declared import STATUSES, Declared, Frame, Row, Thing
 
 COLORS = ("red", "green", "blue", "purple", "yellow", "grey")
 DIRECTIONS = ("right", "down", "left", "up")
+LONGEST = 450
+"""Characters of a condition; an expression may have 500."""
+
 SEARCHING = ("sees", "looks_at", "faces_toward", "joint_attention", "points_at", "would_see", "eye_contact")
 
 
@@ -318,6 +321,13 @@ class Phrases:
     # -- conditions --------------------------------------------------------------------------------------------
 
     def condition(self, where: Where, depth: int = 2) -> str:
+        """Something true or false, short enough for an expression."""
+        while True:
+            made = self.any_condition(where, depth)
+            if len(made) < LONGEST:
+                return made
+
+    def any_condition(self, where: Where, depth: int) -> str:
         """Something true or false."""
         if depth > 0 and self.often(0.35):
             return self.one_of(

@@ -69,3 +69,30 @@ def test_of_one_of_several_the_one_that_is_meant_is_asked(believing):
 def test_beliefs_that_nobody_has(examine, condition, message):
     result = examine(objects=BOXES, cast={"sally": SALLY}, outcome=[{"success": condition}])
     assert [d.message for d in result.diagnostics] == [message]
+
+
+def test_a_belief_with_one_source_in_a_list_is_the_short_form(meaning):
+    short = {"hue": {"of": "exit.color", "when": "sees(exit)"}}
+    listed = {"hue": {"from": [{"of": "exit.color", "when": "sees(exit)"}]}}
+    plans = [meaning(cast={"guide": {"beliefs": one}}).beliefs for one in (short, listed)]
+    (a,), (b,) = plans
+    assert (a.value.term, a.when.term, a.path) == (b.value.term, b.when.term, b.path)
+
+
+def test_a_belief_has_room_for_the_things_of_all_its_sources(meaning):
+    beliefs = {"who": {"start": "none", "from": [{"of": "agent", "when": "t > 3"}, {"of": "exit"}]}}
+    checked = meaning(cast={"guide": {"beliefs": beliefs}})
+    (drawn,) = [item for item in checked.setup if getattr(item, "path", "") == "guide.believes.who"]
+    assert (drawn.type.kind, drawn.type.low, drawn.nothing) == ("entity", 0, -1)
+
+
+def test_a_belief_of_a_belief(meaning):
+    cast = {
+        "guide": {"beliefs": {"hue": {"of": "exit.color", "when": "sees(exit)"}}},
+        "witness": {"beliefs": {"guide_thinks": {"of": "guide.believes.hue", "when": "sees(guide)"}}},
+    }
+    checked = meaning(cast=cast)
+    assert [belief.path for belief in checked.beliefs] == [
+        "guide.believes.hue",
+        "witness.believes.guide_thinks",
+    ]
