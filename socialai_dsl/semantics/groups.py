@@ -46,6 +46,7 @@ from socialai_dsl.semantics.terms import (
     between,
     entity,
     number,
+    where_there_is,
 )
 from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import is_number, is_plain
@@ -483,7 +484,8 @@ def looked_up(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
             return values[keys.index(word)]
         cases.append((Compare("==", key, Const(key.type, value)), values[keys.index(word)]))
     *others, (_, default) = cases
-    return Select(default.type, tuple(c for c, _ in others), tuple(v for _, v in others), default)
+    found = Select(default.type, tuple(c for c, _ in others), tuple(v for _, v in others), default)
+    return where_there_is(key, found)
 
 
 def _key(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> Term:

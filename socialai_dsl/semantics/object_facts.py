@@ -40,6 +40,7 @@ from socialai_dsl.semantics.terms import (
     draws,
     number,
     walk,
+    where_there_is,
 )
 from socialai_dsl.source import DataPath, Span
 
@@ -269,12 +270,13 @@ def unlocker(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Ter
     if len(shifts) == 1:
         return _shifted(who, shifts.pop(), type_)
     *others, last = zip(numbers, keys, strict=True)
-    return Select(
+    chosen = Select(
         type_,
         tuple(Compare("==", who, Const(who.type, lock)) for lock, _ in others),
         tuple(Const(type_, key) for _, key in others),
         Const(type_, last[1]),
     )
+    return where_there_is(who, chosen)
 
 
 def _some_failed(resolver: Resolver) -> bool:

@@ -70,6 +70,7 @@ from socialai_dsl.semantics.terms import (
     number,
     one_of,
     walk,
+    where_there_is,
 )
 from socialai_dsl.vocabulary import FINISHED
 
@@ -276,7 +277,7 @@ def _toggled_by(resolver: Resolver, what: Term, node: ast.Expr, scope: Scope) ->
     cases = []
     for one in (Const(who.type, value) for value in range(who.type.low, who.type.high + 1)):
         cases.append(all_of([Compare("==", who, one), toggled_by(one, what)]))
-    return any_of(cases)
+    return where_there_is(who, any_of(cases))
 
 
 def _points_at(subject: Term, other: Term) -> Term:
@@ -359,7 +360,7 @@ def _is_each_in_state(resolver: Resolver, who: Term, node: ast.Call, scope: Scop
         asked = replace(node, subject=ast.Name(member, at=node.at))
         its = _is_in_state(resolver, asked, replace(scope, variables={}))
         cases.append(all_of([Compare("==", who, Const(who.type, who.type.low + i)), its]))
-    return any_of(cases)
+    return where_there_is(who, any_of(cases))
 
 
 def _member(resolver: Resolver, who: Const | None, node: ast.Expr, scope: Scope) -> str:

@@ -49,6 +49,7 @@ from socialai_dsl.semantics.terms import (
     arithmetic,
     nothing_of,
     number,
+    where_there_is,
 )
 from socialai_dsl.source import DataPath, Span
 from socialai_dsl.vocabulary import Sentences, is_number, is_plain, normal
@@ -737,7 +738,10 @@ def _number_of(noun: Term) -> Term | None:
     if values == list(range(values[0], values[0] + len(values))):
         return arithmetic("+", place, number(values[0])) if values[0] else place
     cases = [Compare("==", place, number(i)) for i in range(len(values) - 1)]
-    return Select(type_, tuple(cases), tuple(Const(type_, v) for v in values[:-1]), Const(type_, values[-1]))
+    return where_there_is(
+        noun,
+        Select(type_, tuple(cases), tuple(Const(type_, v) for v in values[:-1]), Const(type_, values[-1])),
+    )
 
 
 def same_kind(actual: Type, expected: Type) -> bool:

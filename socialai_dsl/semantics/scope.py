@@ -27,6 +27,7 @@ from socialai_dsl.semantics.terms import (
     all_of,
     may_be_nothing,
     one_of,
+    where_there_is,
 )
 from socialai_dsl.source import DataPath, Positions, Span
 from socialai_dsl.vocabulary import NOUN, Sentences, Slot
@@ -648,13 +649,13 @@ def of_each(who: Term, values: Sequence[Term]) -> Term:
         for number, value in zip(numbers, values, strict=True)
     ]
     if len(set(values)) == 1:
-        return values[0]
+        return where_there_is(who, values[0])
     if values[0].type.kind == "text":
-        return text_of(cases)
+        return where_there_is(who, text_of(cases))
     low, high = min(v.type.low for v in values), max(v.type.high for v in values)
     *others, (_, last) = cases
     conditions, chosen = tuple(c for c, _ in others), tuple(v for _, v in others)
-    return Select(replace(last.type, low=low, high=high), conditions, chosen, last)
+    return where_there_is(who, Select(replace(last.type, low=low, high=high), conditions, chosen, last))
 
 
 def text_of(cases: Sequence[tuple[Term, Term]]) -> Term:

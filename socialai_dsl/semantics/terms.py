@@ -504,6 +504,14 @@ def may_be_nothing(term: Term) -> bool:
     return isinstance(term, Read | ReadEach) and term.nothing is not None
 
 
+def where_there_is(needed: Term, result: Term) -> Term:
+    """A value that follows from another, which is asked for first: of an empty register nothing is found."""
+    if not may_be_nothing(needed):
+        return result
+    never = Compare("<", needed, Const(needed.type, needed.type.low))
+    return Select(result.type, (never,), (Const(result.type, result.type.low),), result)
+
+
 def holds_nothing(term: Term) -> Term:
     """Whether a register holds nothing."""
     if isinstance(term, Select):
