@@ -118,7 +118,7 @@ def test_a_disk_that_fails_while_training(
 
     with monkeypatch.context() as broken:
         broken.setattr(checkpoints.os, "fsync", fail_later)
-        assert run_main([*RUN, "--out", str(run)]) == 2
+        assert run_main([*RUN, "--out", str(run)]) == 4
     check_clear(
         capsys.readouterr().err, "training stopped after ", "cannot write: ", os.strerror(number), str(run)
     )
@@ -142,7 +142,7 @@ def test_numbers_that_are_not_finite(
             optimizer.param_groups[0]["params"][0].data.fill_(torch.nan)
 
     monkeypatch.setattr(torch.optim.Adam, "step", spoiling)
-    assert run_main([*RUN, "--out", str(run)]) == 1
+    assert run_main([*RUN, "--out", str(run)]) == 4
     check_clear(
         capsys.readouterr().err,
         "training stopped after 768 frames (update 3)",

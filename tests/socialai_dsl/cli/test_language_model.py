@@ -244,11 +244,11 @@ def test_a_failure_loses_nothing_and_the_same_command_goes_on(tmp_path: Path, ca
 
 def test_a_budget_is_kept_to_and_can_be_added_to(tmp_path: Path, capsys: Capture) -> None:
     with endpoint(lambda _: "Act: left") as stub:
-        assert evaluate(stub.url, tmp_path, "--budget", "1_800", "--concurrency", "1") == 1
+        assert evaluate(stub.url, tmp_path, "--budget", "1_800", "--concurrency", "1") == 4
         assert len(stub.requests) == 150
         assert "1 of 3 episodes are over" in capsys.readouterr().err
         money = ["--budget", "0.000695 usd", "--prices", "0.5,1.0", "--concurrency", "1"]
-        assert evaluate(stub.url, tmp_path, *money) == 1
+        assert evaluate(stub.url, tmp_path, *money) == 4
         assert len(stub.requests) == 150 + 100
         assert evaluate(stub.url, tmp_path) == 0
     assert figures(tmp_path)["eval"]["replies"] == 300
