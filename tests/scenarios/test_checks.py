@@ -32,7 +32,7 @@ NOVEL = {
 
 CLAIMING_NOTHING = [
     *("cointhief", "cointhief+tags", "dance", "showme", "showme+no_social"),
-    *("novel/conventions", "novel/gaze_following", "novel/sally_anne", "novel/shop"),
+    *("novel/conventions", "novel/gaze_following", "novel/sally_anne", "novel/second_order", "novel/shop"),
 ]
 SCHOOL = [
     *("apple_stealing", "apple_stealing+asocial", "boxes+alone", "doors_alone", "marbles_alone"),

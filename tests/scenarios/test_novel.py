@@ -20,6 +20,7 @@ NAMES = (
     "implicature",
     "interpreter",
     "sally_anne",
+    "second_order",
     "shop",
     "turn_taking",
     "whisper",
@@ -351,6 +352,22 @@ class TestGossip:
                 episode = Episode("novel/gossip", {"let": {"helpful": helpful}})
                 kind = helpful >> k & 1
                 assert episode.act(say=f"Please help me {name}").ended == ("success" if kind else "failure")
+
+
+class TestSecondOrder:
+    def test_max_waits_for_anne_in_half_of_the_rooms(self) -> None:
+        check_shares((room["let"]["waits"] for room in rooms("novel/second_order", 1000)), evenly((0, 1)))
+
+    @pytest.mark.parametrize("waits", [0, 1])
+    def test_anne_knows_what_sally_was_told_if_she_was_there(self, waits: int) -> None:
+        for seed in range(20):
+            env = made("novel/second_order")
+            env.reset(seed=seed, options={"layout": {"let": {"waits": waits}}})
+            while env.describe()["teller"]["state"] != "listening":
+                env.step(env.encode_action((None, None)))
+            now = env.describe()
+            assert now["sally"]["believes"]["ball_in"] == now["let"]["other"]
+            assert now["anne"]["believes"]["sally_thinks"] == now["let"]["other" if waits else "home"]
 
 
 class TestTurnTaking:

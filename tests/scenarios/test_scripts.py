@@ -18,12 +18,16 @@ NOVEL = tuple(
     f"novel/{name}"
     for name in (
         *(
+            "bargaining",
+            "conventions",
             "culprit",
             "gaze_following",
+            "gossip",
             "haggling",
             "implicature",
             "interpreter",
             "sally_anne",
+            "second_order",
             "shop",
             "turn_taking",
         ),
