@@ -10,7 +10,7 @@ from hashlib import sha256
 from itertools import chain
 from typing import Any
 
-from socialai_dsl.program import Flag, Header, Outcome, Program
+from socialai_dsl.program import CHANNELS, Flag, Header, Outcome, Program
 from socialai_dsl.vocabulary import NOUN, Sentences, Slot
 
 Positions = tuple[int, ...]
@@ -113,6 +113,12 @@ class ProgramSuite:
 
 Playable = Program | ProgramSuite
 """What environments are made of."""
+
+
+def channels_of(programs: Iterable[Program]) -> tuple[str, ...]:
+    """The channels of pictures in which several programs are shown: those that one of them has."""
+    shown = {name for program in programs for name in program.channels}
+    return tuple(name for name in CHANNELS if name in shown)
 
 
 def unscripted(playable: Playable) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from tests.tiny import Folder, Play
 
 PAGE = Path(__file__).parents[1] / "docs" / "one_step.md"
 
-EMPTY, DOOR, NPC, MARBLE = 1, 4, 11, 16
+EMPTY, DOOR, BALL, NPC, MARBLE = 1, 4, 6, 11, 16
 """Codes of types in the picture."""
 
 BLUE = 2
@@ -2045,3 +2045,187 @@ def test_10_7_asking_changes_nothing(play: Folder) -> None:
     probe = "  first: {when: t == 0, ask: How many, answer: rounds}\n"
     plain, probed = play(PROBED.removesuffix("probes:\n")).env, play(PROBED + probe).env
     assert plain.program.sha256 == probed.program.sha256
+
+
+# -- hands -----------------------------------------------------------------------------------------
+
+
+def _with_toy(more: str = "", **keys: str) -> str:
+    """A toy ahead of the agent, more objects, and other keys of the scenario."""
+    toy = "toy: {type: ball, color: red, carryable: true, at: [2, 1]}"
+    text = f"objects: {{{', '.join([toy, more] if more else [toy])}}}"
+    return "\n".join([text, *(f"{key}: {value}" for key, value in keys.items())])
+
+
+def _carries(run: Play, who: str = "agent") -> str | None:
+    found: str | None = run.state[who].get("carries")
+    return found
+
+
+def test_11_1_pickup_takes_the_last_that_can_be_carried(play: Folder) -> None:
+    run = play("""
+        objects:
+          under: {type: ball, at: [2, 1], carryable: true}
+          over: {type: ball, at: [2, 1], carryable: true, overlap: true}
+          fixed: {type: floor, at: [2, 1], overlap: true}
+    """).step("pickup")
+    assert (_carries(run), run.at("over"), run.at("under")) == ("over", None, [2, 1])
+    assert _carries(play("objects: {ball: {type: ball, at: [2, 1]}}").step("pickup")) is None
+
+
+@pytest.mark.parametrize("npcs", ["shown", "hidden"])
+def test_11_2_nothing_from_where_somebody_is_nor_what_is_held_back(play: Folder, npcs: str) -> None:
+    for at, taken in (("[5, 5]", "mat"), ("[2, 1]", None)):
+        run = play(f"""
+            objects: {{mat: {{type: floor, at: [2, 1], carryable: true}}}}
+            cast: {{ann: {{at: {at}}}}}
+            observe: {{npcs: {npcs}}}
+        """)
+        assert _carries(run.step("pickup")) == taken
+    run = play("objects: {boxes: {type: box, at: [[2, 1], [1, 2]], carryable: true, exclusive: true}}")
+    assert _carries(run.step("toggle").step("right").step("pickup")) is None
+    assert _carries(run.step("left").step("pickup")) == "boxes[0]"
+
+
+def test_11_3_one_thing_at_a_time(play: Folder) -> None:
+    run = play("objects: {toys: {type: ball, at: [[2, 1], [1, 2]], carryable: true}}")
+    run.step("pickup").step("right").step("pickup")
+    assert (_carries(run), run.state["toys"][1]["at"]) == ("toys[0]", [1, 2])
+
+
+def test_11_4_it_is_out_of_the_room_and_goes_along(play: Folder) -> None:
+    run = play(_with_toy(outcome="[{failure: agent.carries(toy) and not toy.gone}]")).step("pickup")
+    assert run.at("toy") is None
+    run.step("forward").step("forward").step("right").step("drop")
+    assert (run.at("agent"), run.at("toy"), run.terminated) == ([3, 1], [3, 2], False)
+
+
+@pytest.mark.parametrize(
+    ("ahead", "lies"), [("wall", False), ("lava", False), ("box", False), ("floor", True)]
+)
+def test_11_5_drop_lays_it_where_something_can_roll(play: Folder, ahead: str, lies: bool) -> None:
+    run = play(_with_toy(f"thing: {{type: {ahead}, at: [1, 2]}}")).step("pickup").step("right").step("drop")
+    assert (run.at("toy"), _carries(run)) == (([1, 2], None) if lies else (None, "toy"))
+
+
+@pytest.mark.parametrize("npcs", ["shown", "hidden"])
+def test_11_6_drop_gives_it_to_empty_hands(play: Folder, npcs: str) -> None:
+    for more, toy, cup in (
+        ("", "ann", None),
+        ("cup: {type: ball, carryable: true, inside: ann}", "agent", "ann"),
+    ):
+        run = play(_with_toy(more, cast="{ann: {at: [1, 2]}}", observe=f"{{npcs: {npcs}}}"))
+        run.step("pickup").step("right").step("drop")
+        assert (_carries(run, toy), run.at("toy")) == ("toy", None)
+        assert cup is None or _carries(run, cup) == "cup"
+
+
+def test_11_7_accepts_is_asked_of_the_last_step(play: Folder) -> None:
+    run = play(_with_toy(cast="{ann: {at: [1, 2], accepts: t == 3}}")).step("pickup").step("right")
+    assert [_carries(run.step("drop"), "ann") for _ in range(2)] == [None, "toy"]
+
+
+def test_11_8_npcs_by_the_same_rules(play: Folder) -> None:
+    run = play("""
+        objects: {toy: {type: ball, carryable: true, at: [4, 3]}}
+        frames: {move: {steps: [{do: pickup}, {do: left}, {do: drop}, {do: pickup}, {do: left}, {do: drop}]}}
+        cast:
+          agent: {at: [2, 3]}
+          ann: {at: [3, 3], facing: right, frame: move}
+    """)
+    seen = [(_carries(run.step(), "ann"), run.at("toy")) for _ in range(5)]
+    assert seen == [("toy", None), ("toy", None), (None, [3, 2]), ("toy", None), ("toy", None)]
+    assert _carries(run.step()) == "toy"
+
+
+def test_11_9_a_carrier_that_vanishes_keeps_it(play: Folder) -> None:
+    run = play("""
+        objects: {toy: {type: ball, carryable: true, inside: ann}}
+        cast: {ann: {at: [3, 3]}}
+        rules: [{when: t == 1, cause: [ann.vanish]}, {when: t == 3, cause: [ann.put(first(c in cells where c.x == 5))]}]
+    """)
+    seen = [(run.at("ann"), _carries(run, "ann"), run.at("toy")) for _ in range(4) if run.step()]
+    assert [carried for _, carried, _ in seen] == ["toy"] * 4
+    assert [at is None for at, _, _ in seen] == [True, True, False, False]
+    assert all(at is None for _, _, at in seen)
+
+
+def test_11_10_a_carrier_that_is_reset_keeps_it(play: Folder) -> None:
+    run = play("""
+        objects: {toy: {type: ball, carryable: true, at: [4, 3]}}
+        frames: {take: {steps: [{do: pickup}, {do: left, cause: [self.reset]}]}}
+        cast: {ann: {at: [3, 3], facing: right, frame: take}}
+    """).steps(2)
+    assert (run.facing("ann"), _carries(run, "ann")) == ("right", "toy")
+
+
+@pytest.mark.parametrize(
+    ("effect", "at"),
+    [("put(first(c in cells where c.x == 5))", [5, 1]), ("move_into(box)", None), ("vanish", None)],
+)
+def test_11_11_what_is_taken_away_is_in_nobodys_hands(
+    play: Folder, effect: str, at: list[int] | None
+) -> None:
+    text = _with_toy("box: {type: box, at: [5, 5]}", rules=f"[{{when: t == 2, cause: [toy.{effect}]}}]")
+    run = play(text).step("pickup")
+    assert _carries(run) == "toy"
+    assert (_carries(run.step()), run.at("toy")) == (None, at)
+
+
+def test_11_12_into_hands_unless_they_are_full(play: Folder) -> None:
+    run = play("""
+        objects:
+          box: {type: box, at: [5, 5]}
+          toy: {type: ball, carryable: true, inside: box}
+          cup: {type: ball, carryable: true, at: [4, 4]}
+        cast: {ann: {at: [3, 3]}}
+        rules: [{when: t == 1, cause: [toy.move_into(ann), cup.move_into(ann), box.reveal]}]
+    """).step()
+    assert (_carries(run, "ann"), run.at("toy"), run.at("cup"), run.at("box")) == (
+        "toy",
+        None,
+        [4, 4],
+        [5, 5],
+    )
+
+
+def test_11_13_reset_gives_back(play: Folder) -> None:
+    text = """
+        objects:
+          toy: {{type: ball, carryable: true, inside: ann}}
+          cup: {{type: ball, carryable: true, at: [4, 4]}}
+        cast: {{ann: {{at: [3, 3]}}}}
+        rules: [{{when: t == 1, cause: [toy.move_into(agent)]}}, {{when: t == 2, cause: [{}]}}]
+    """
+    run = play(text.format("toy.vanish, toy.reset")).steps(2)
+    assert (_carries(run, "ann"), _carries(run)) == ("toy", None)
+    run = play(text.format("toy.vanish, cup.move_into(ann), toy.reset")).steps(2)
+    assert (_carries(run, "ann"), _carries(run), run.at("toy")) == ("cup", None, None)
+    run = play(text.format("toy.vanish, cup.move_into(agent), cup.reset")).steps(2)
+    assert (_carries(run), run.at("cup")) == (None, [4, 4])
+
+
+def test_11_14_entries_end_with_the_act(play: Folder) -> None:
+    text = """
+        objects: {{toy: {{type: ball, carryable: true, at: [4, 3]}}}}
+        frames: {{fetch: {{steps: [{{do: "{}"}}, {{do: stay, for: ever, state: over}}]}}}}
+        cast:
+          agent: {{at: [3, 4]}}
+          ann: {{at: [3, 3], facing: right, frame: fetch}}
+    """
+    run = play(text.format("fetch(toy)")).step()
+    assert (_carries(run, "ann"), run.status("ann")) == ("toy", "over")
+    run = play(text.format("bring(toy, agent)"))
+    seen = [(run.step().status("ann"), _carries(run)) for _ in range(3)]
+    assert [carried for _, carried in seen] == [None, None, "toy"]
+    assert [state == "over" for state, _ in seen] == [False, False, True]
+    run = play(text.format("fetch(toy)"), {"ann": {"carries": "toy"}}).step()
+    assert (run.state["ann"].get("last"), run.status("ann")) == (None, "over")
+
+
+def test_11_15_its_own_cell_shows_what_it_carries(play: Folder) -> None:
+    run = play(_with_toy(cast="{ann: {at: [1, 2]}}"))
+    assert run.shown(0)[:4] == [EMPTY, 0, 0, 0]
+    assert run.step("pickup").shown(0)[:4] == [BALL, 0, 0, 0]
+    run.step("right").step("drop")
+    assert (run.shown(0)[:4], run.shown(1)[4]) == ([EMPTY, 0, 0, 0], BALL)

@@ -6,21 +6,37 @@ from collections.abc import Callable
 
 from socialai_dsl.compiler.assembler import NOWHERE, Label, constant, entity_register, label
 from socialai_dsl.compiler.expressions import Expressions, Lines
+from socialai_dsl.compiler.hands import is_member
 from socialai_dsl.program import MOST_CHOICES, Body, Field, Op
 from socialai_dsl.semantics.plans import Activity, CheckedScenario
 from socialai_dsl.semantics.terms import BOOL, CellOf, Const, FieldOf, Measure, ObjectType, Read, Term
 
-_BODIES = {"left": Body.LEFT, "right": Body.RIGHT, "forward": Body.FORWARD, "toggle": Body.TOGGLE}
+_BODIES = {
+    "left": Body.LEFT,
+    "right": Body.RIGHT,
+    "forward": Body.FORWARD,
+    "toggle": Body.TOGGLE,
+    "pickup": Body.PICKUP,
+    "drop": Body.DROP,
+}
 GOING = ("go_to", "go_next_to", "enter")
 """Activities that take no step when they are fulfilled before they begin."""
 
 
 NOTHING = -1
 """In the register of an aim: the activity found nothing to be about."""
-ACTS = ("use", "push")
+_ACT_OF = {
+    "use": Body.TOGGLE,
+    "push": Body.FORWARD,
+    "fetch": Body.PICKUP,
+    "give": Body.DROP,
+    "bring": Body.DROP,
+}
+ACTS = tuple(_ACT_OF)
 """Activities that end with the act itself, which may move or replace what it is done to."""
-GETTING_THERE, ACTING = 0, 1
-"""In the register of the aim of such an activity: what this turn was for."""
+OF_HANDS = ("fetch", "give", "bring")
+GETTING_THERE, ACTING, FULFILLED = 0, 1, 2
+"""In the register of the aim of such an activity: what this turn was for; nothing, as all was done before it."""
 
 
 def has_aim(activity: Activity) -> bool:
@@ -83,6 +99,9 @@ class Activities:
         if activity.name not in ACTS:
             self._aimed_at(activity)
             return
+        if activity.name in OF_HANDS:
+            self._use_hands(activity, lambda choose: None)
+            return
         self._note(GETTING_THERE)
         if activity.name == "use":
             goal = to.value(activity.args[0])
@@ -101,7 +120,7 @@ class Activities:
         match activity.name:
             case "stay":
                 block.emit(Op.BODY, constant(Body.NONE))
-            case "left" | "right" | "forward" | "toggle":
+            case "left" | "right" | "forward" | "toggle" | "pickup" | "drop":
                 block.emit(Op.BODY, constant(_BODIES[activity.name]))
             case "face":
                 self._face(to.value(activity.args[0]))
@@ -116,6 +135,8 @@ class Activities:
             case "use":
                 self._note(GETTING_THERE)
                 self._use(to.value(activity.args[0]), noting=True)
+            case "fetch" | "give" | "bring":
+                self._use_hands(activity, lambda choose: choose())
             case "enter":
                 self._enter(activity)
             case "push":
@@ -206,6 +227,71 @@ class Activities:
         block.bind(away)
         block.emit(Op.GO_NEXT_TO, own, goal, self.turn)
         block.bind(done)
+
+    def _use_hands(self, activity: Activity, act: Callable[[Callable[[], None]], None]) -> None:
+        """Fetch a thing, unless it is carried already, and take it where it is to go.
+
+        `act` gets what chooses the body action, and does it or leaves it alone.
+        """
+        to, block = self.to, self.to.block
+        own = constant(1 + self.entity)
+        what, *where = (to.value(arg) for arg in activity.args)
+        carrier = to.into_temporary(Op.FIELD, what, Field.CARRIER)
+        done = Label()
+        self._note(FULFILLED)
+        other = Label()
+        if not where:
+            block.test(Op.IF_EQ, carrier, own, other)
+        elif activity.args[1].type.kind == "entity" and is_member(self.checked, activity.args[1]):
+            block.test(Op.IF_EQ, carrier, to.into_temporary(Op.ADD, where[0], constant(1)), other)
+        else:
+            block.test(Op.IF_SAME_CELL, what, where[0], other)
+        self._stand_still(act, done)
+        block.bind(other)
+        self._note(GETTING_THERE)
+        lacking = Label()
+        if where:
+            block.test(Op.IF_EQ, carrier, own, lacking)
+            self._approach(where[0], Body.DROP, act, done)
+            block.bind(lacking)
+        if activity.name == "give":
+            self._stand_still(act, done)
+        else:
+            full = Label()
+            self._while_empty_handed(full)
+            self._approach(what, Body.PICKUP, act, done)
+            block.bind(full)
+            self._stand_still(act, done)
+        block.bind(done)
+
+    def _stand_still(self, act: Callable[[Callable[[], None]], None], done: Label) -> None:
+        act(lambda: self.to.block.emit(Op.BODY, constant(Body.NONE)))
+        self.to.block.skip(done)
+
+    def _approach(
+        self, goal: int, body: Body, act: Callable[[Callable[[], None]], None], done: Label
+    ) -> None:
+        """Go next to the goal, face it, act; then on to `done`."""
+        block, own = self.to.block, constant(self.entity)
+        away, aside = Label(), Label()
+        block.test(Op.IF_NEXT_TO, own, goal, away)
+        block.test(Op.IF_FACES, own, goal, aside)
+        self._note(ACTING)
+        act(lambda: block.emit(Op.BODY, constant(body)))
+        block.skip(done)
+        block.bind(aside)
+        act(lambda: self._face(goal))
+        block.skip(done)
+        block.bind(away)
+        act(lambda: block.emit(Op.GO_NEXT_TO, own, goal, self.turn))
+        block.skip(done)
+
+    def _while_empty_handed(self, otherwise: Label) -> None:
+        """Fall through if nothing is in its hands."""
+        for entity in self.checked.entities:
+            if entity.carryable:
+                carrier = entity_register(entity.number, Field.CARRIER)
+                self.to.block.test(Op.IF_NE, carrier, constant(1 + self.entity), otherwise)
 
     def _enter(self, activity: Activity) -> None:
         """Use it while it cannot be walked on, then go there; who is there stays there."""
@@ -332,10 +418,24 @@ class Activities:
         elif activity.name in ACTS:
             assert self.aim is not None, "internal: the end of an act asks what was noted"
             block.test(Op.IF_NE, self.aim, constant(NOTHING), nothing)
+            ended = Label()
+            if activity.name in OF_HANDS:
+                missing = Label()
+                block.test(Op.IF_EQ, self.aim, constant(FULFILLED), missing)
+                block.skip(ended)
+                block.bind(missing)
             block.test(Op.IF_EQ, self.aim, constant(ACTING), otherwise)
             # A scripted agent's frame follows what the agent has really done.
-            act = Body.TOGGLE if activity.name == "use" else Body.FORWARD
-            block.test(Op.IF_EQ, entity_register(self.entity, Field.LAST), constant(act), otherwise)
+            act = constant(_ACT_OF[activity.name])
+            block.test(Op.IF_EQ, entity_register(self.entity, Field.LAST), act, otherwise)
+            if activity.name == "fetch":
+                empty = Label()
+                self._while_empty_handed(empty)
+                block.skip(otherwise)
+                block.bind(empty)
+            elif activity.name in OF_HANDS:
+                self._while_empty_handed(otherwise)
+            block.bind(ended)
         elif activity.name == "turn_to":
             facing = entity_register(self.entity, Field.DIR)
             block.test(Op.IF_EQ, facing, self._goal(activity, nothing), otherwise)

@@ -19,6 +19,7 @@ from socialai_dsl.compiler.assembler import (
 from socialai_dsl.compiler.cells import ROW
 from socialai_dsl.compiler.expressions import Expressions, Lines
 from socialai_dsl.compiler.folding import Changes, Mobility, When, numbers_of, plans
+from socialai_dsl.compiler.hands import back_into_hands, move_into, out_of_hands
 from socialai_dsl.compiler.rows import row, row_of
 from socialai_dsl.program import CELL, TEMPORARY, Field, Op, Register
 from socialai_dsl.semantics import terms
@@ -47,10 +48,11 @@ class Home:
     gone: int | None
     facing: int | None
     inside: int | None
+    carrier: int | None = None
 
 
 class Homes:
-    """Makes room for what a `reset` may put back: `NAME.reset.home`, the cell, then `.gone`, `.facing`, `.inside`."""
+    """Makes room for what a `reset` may put back: `NAME.reset.home`, the cell, then the other fields of `Home`."""
 
     def __init__(self, checked: CheckedScenario, registers: Registers) -> None:
         self.checked = checked
@@ -71,6 +73,7 @@ class Homes:
                 (home.gone, Field.GONE),
                 (home.facing, Field.DIR),
                 (home.inside, Field.INSIDE),
+                (home.carrier, Field.CARRIER),
             ):
                 if register is not None:
                     block.emit(Op.LOAD, register, entity_register(number, field))
@@ -80,9 +83,9 @@ class Homes:
         points = thing.role == "npc" and self.pointing
         return self.of[thing.number] == Home(None, None, None, None) and not thing.contains and not points
 
-    def put_back(self, block: Block, number: int) -> None:
+    def put_back(self, to: Expressions, number: int) -> None:
         """Emit that a thing is where and as it was, and what lay in it lies in it again; its status is left alone."""
-        thing, home = self.checked.entities[number], self.of[number]
+        block, thing, home = to.block, self.checked.entities[number], self.of[number]
         own = constant(number)
         if home.cell is not None:
             block.emit(Op.PLACE, own, home.cell)
@@ -95,6 +98,8 @@ class Homes:
             block.emit(Op.SET_FIELD, own, Field.DIR, home.facing)
         if home.inside is not None:
             block.emit(Op.SET_FIELD, own, Field.INSIDE, home.inside)
+        if home.carrier is not None:
+            back_into_hands(to, number, home.carrier)
         if thing.role == "npc" and self.pointing:
             block.emit(Op.SET_FIELD, own, Field.POINTING, constant(0))
         for content in thing.contains:
@@ -137,6 +142,7 @@ def _reserve(thing: Entity, mobility: Mobility, registers: Registers, entities: 
         gone=room(".gone", BOOL, number in mobility.vanishing),
         facing=room(".facing", terms.DIRECTION, number in mobility.turning),
         inside=room(".inside", Type("entity", 0, entities - 1), number in mobility.contents),
+        carrier=room(".carrier", Type("int", 0, entities), number in mobility.carried),
     )
 
 
@@ -240,6 +246,7 @@ class Effects:
         block.span = effect.span
         if effect.name == "vanish":
             block.emit(Op.VANISH, entity)
+            out_of_hands(self.to, term, entity)
         elif effect.name == "reset":
             self._reset(term, entity)
         elif value is None:
@@ -247,9 +254,8 @@ class Effects:
         elif effect.name == "become":
             block.emit(Op.BECOME, entity, value)
         elif effect.name == "move_into":
-            block.emit(Op.PLACE, entity, value)
-            block.emit(Op.VANISH, entity)
-            block.emit(Op.SET_FIELD, entity, Field.INSIDE, value)
+            assert effect.value is not None, "internal: `move_into` says into what"
+            move_into(self.to, term, entity, effect.value, value)
         else:
             block.emit(Op.PLACE, entity, self._cell(effect, value))
 
@@ -302,7 +308,7 @@ class Effects:
 
     def _put_back(self, thing: Entity, entity: int) -> None:
         self._become_initial(thing, entity)
-        self.homes.put_back(self.to.block, thing.number)
+        self.homes.put_back(self.to, thing.number)
 
     def _become_initial(self, thing: Entity, entity: int) -> None:
         self._restart(thing)
@@ -632,6 +638,8 @@ def _release(to: Expressions, holder: Entity) -> None:
         elsewhere = Label()
         block.test(Op.IF_EQ, entity_register(content, Field.INSIDE), constant(holder.number), elsewhere)
         block.test(Op.IF_EQ, entity_register(content, Field.GONE), constant(1), elsewhere)
+        if to.checked.entities[content].carryable:
+            block.test(Op.IF_EQ, entity_register(content, Field.CARRIER), constant(0), elsewhere)
         block.emit(Op.VANISH, constant(holder.number))
         block.emit(Op.PLACE, constant(content), constant(holder.number))
         block.bind(elsewhere)

@@ -50,6 +50,7 @@ _FIELDS = {
     "poked": Field.POKED,
     "pointing": Field.POINTING,
     "inside": Field.INSIDE,
+    "carrier": Field.CARRIER,
     "toggled": Field.TOGGLED,
 }
 _WORLD = {

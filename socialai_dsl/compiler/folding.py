@@ -424,7 +424,8 @@ class Mobility:
 
     Attributes:
         turning, walking: those whose direction or place can change. vanishing: those that can leave the room or come
-        into it. contents: those that may lie in others. pointing: whether anybody points.
+        into it. contents: those that may lie in others. carried: those that can be carried. pointing:
+        whether anybody points.
     """
 
     def __init__(self, checked: CheckedScenario) -> None:
@@ -432,6 +433,7 @@ class Mobility:
         self.turning, self.walking = {0}, {0}
         self.vanishing: set[int] = set()
         self.contents: set[int] = set()
+        self.carried: set[int] = set()
         self.pointing = False
         for number, activity in activities(checked):
             self._act(number, activity)
@@ -443,10 +445,13 @@ class Mobility:
                 self.walking.add(entity.number)
             if entity.type is not None and entity.type.pushed:
                 self.turning.add(entity.number)
+            if entity.carryable:
+                self.carried.add(entity.number)
             if entity.contains:
                 self.vanishing |= {entity.number, *entity.contains}
                 self.contents |= set(entity.contains)
-        self.walking |= self.contents
+        self.walking |= self.contents | self.carried
+        self.vanishing |= self.carried
 
     def _act(self, number: int, activity: Activity) -> None:
         self.pointing |= activity.name == "point"

@@ -101,9 +101,15 @@ def _field_ranges(program: Program, entity: int, width: int, height: int) -> dic
         Field.GONE: (0, 1),
         Field.POKED: (0, 1),
         Field.LAST: (-1, LAST_BODY),
-        Field.POINTING: (0, 4),
+        Field.POINTING: pointing_range(program, entity),
         Field.INSIDE: (0, program.header(Header.ENTITIES) - 1),
     }
+
+
+def pointing_range(program: Program, entity: int) -> Interval:
+    """Of an NPC where it points, of an object who carries it."""
+    carriers = program.header(Header.NPCS) + 1
+    return (0, carriers if program.entities[entity].role == "object" else 4)
 
 
 class Known:

@@ -6,7 +6,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
-from socialai_dsl.compiler.activities import ACTING, ACTS, GOING, NOTHING, Activities, has_aim
+from socialai_dsl.compiler.activities import (
+    ACTING,
+    ACTS,
+    FULFILLED,
+    GOING,
+    NOTHING,
+    OF_HANDS,
+    Activities,
+    has_aim,
+)
 from socialai_dsl.compiler.assembler import Block, CodeTable, Label, Registers, Sites, constant, state_names
 from socialai_dsl.compiler.beliefs import perceive
 from socialai_dsl.compiler.effects import (
@@ -194,8 +203,9 @@ class _FrameCompiler:
         self.later = Deferred(frame, self.speaker, shared.registers, shared.lines)
 
     def _range_of_aim(self, activity: plans.Activity) -> Type:
-        highest = self.shared.registers.cut(activity.args[0].type).high
-        return Type("int", NOTHING, ACTING if activity.name in ACTS else highest)
+        if activity.name in ACTS:
+            return Type("int", NOTHING, FULFILLED if activity.name in OF_HANDS else ACTING)
+        return Type("int", NOTHING, self.shared.registers.cut(activity.args[0].type).high)
 
     def _names(self) -> list[str]:
         if self.frame.steps:

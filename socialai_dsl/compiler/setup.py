@@ -14,6 +14,7 @@ from socialai_dsl.compiler.cells import (
 from socialai_dsl.compiler.effects import ComputedStatuses, Homes
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.compiler.folding import fold, mentions
+from socialai_dsl.compiler.hands import into_hands
 from socialai_dsl.compiler.step_order import first_entry
 from socialai_dsl.program import Counting, Field, Op, Register, Side
 from socialai_dsl.semantics import terms
@@ -48,7 +49,8 @@ class Places:
         mark = block.taken
         if placing.inside is not None:
             to.site = placing.where_site
-            self._inside(placing.entity, placing.inside)
+            put_in = self._in_hands if placing.in_hands else self._inside
+            put_in(placing.entity, placing.inside)
             block.release(mark)
             return
         cell = block.temporary(2)
@@ -82,6 +84,15 @@ class Places:
         block.emit(Op.PUT, constant(content), cell)
         block.emit(Op.VANISH, constant(content))
         block.emit(Op.SET_FIELD, constant(content), Field.INSIDE, number)
+
+    def _in_hands(self, content: int, carrier: Term) -> None:
+        """Not in the room, and carried, unless these hands are full already."""
+        block = self.to.block
+        nowhere = block.temporary(2)
+        for target in (nowhere, nowhere + 1):
+            block.emit(Op.LOAD, target, constant(-1))
+        block.emit(Op.PUT, constant(content), nowhere)
+        into_hands(self.to, constant(content), self.to.value(carrier))
 
     def _coordinate(self, target: int, coordinate: Term, size: int) -> None:
         """A coordinate, kept on the canvas where it comes from something that may be anywhere."""

@@ -6,7 +6,7 @@ so an entity, a line, a status or a coordinate that could be out of range is fou
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise, product
 from math import prod
@@ -85,7 +85,9 @@ class Tables:
         table(Header.CODE_AT, [word for row in self.code.instructions for word in row])
         table(Header.ACTION_AT, [*(ACTIONS.index(action) for action in checked.actions), len(ACTIONS) - 1])
         table(Header.CLASS_AT, self.classes.of_pair)
-        table(Header.ENTITY_AT, [word for entity in checked.entities for word in _entity_row(entity, types)])
+        accepts = {number: self.registers.by_path[path] for number, path in checked.accepting}
+        rows = (_entity_row(entity, types, accepts) for entity in checked.entities)
+        table(Header.ENTITY_AT, [word for row in rows for word in row])
         table(Header.TYPE_AT, [word for row in types.rows for word in row])
         table(Header.ROOM_AT, room_templates(checked.room))
         table(Header.FRAME_AT, self._frame_rows(frames))
@@ -133,7 +135,7 @@ class Tables:
             Header.EACH_STEP: checked.each_step,
             Header.CLASS_SETS: len(self.classes.sets),
             Header.CLASS_SET_WORDS: self.classes.words_of_a_set,
-            Header.CHANNELS: checked.channels,
+            Header.CHANNELS: checked.channels + checked.shows_carrying,
         }
         words = np.array([*(header[word] for word in Header if word != Header.END), *body], dtype=np.int64)
         # Boards are sets of bits, so a word may use the sign bit.
@@ -168,6 +170,8 @@ class Tables:
             Flag.ROLLS: any(entity.type and entity.type.rolls for entity in checked.entities),
             Flag.HEARD_BY: self.classes.speakers_matter,
             Flag.SETTLE_ALWAYS: self.allocation.computed.settle_always,
+            Flag.SHOWS_CARRYING: checked.shows_carrying,
+            Flag.CARRYING: any(entity.carryable for entity in checked.entities),
         }
         return sum(flag for flag, on in flags.items() if on)
 
@@ -269,7 +273,8 @@ class _TypeTable:
         return self.npc if entity.role == "npc" else self.agent
 
 
-def _entity_row(entity: Entity, types: _TypeTable) -> list[int]:
+def _entity_row(entity: Entity, types: _TypeTable, accepts: Mapping[int, int]) -> list[int]:
+    """One row of the entity table; `accepts`: member of the cast -> the register that says whether it takes things."""
     row = {
         EntityColumn.TYPE: types.of(entity),
         EntityColumn.KIND: entity.kind_code,
@@ -277,8 +282,10 @@ def _entity_row(entity: Entity, types: _TypeTable) -> list[int]:
         EntityColumn.FAR: entity.far,
         EntityColumn.AUDIBLE: int(entity.audible),
         EntityColumn.VIEW: entity.view,
-        EntityColumn.PUSHED_BY: int(entity.pushed_by_rolling),
+        EntityColumn.PUSHED_BY: entity.pushed_by_rolling | entity.carryable << 1,
     }
+    if entity.number in accepts:
+        row[EntityColumn.ACCEPTS] = accepts[entity.number]
     return [row[column] for column in EntityColumn if column != EntityColumn.COLUMNS]
 
 
@@ -565,7 +572,8 @@ def _header(program: Program) -> None:
     )
     sets, words = h(Header.CLASS_SETS), h(Header.CLASS_SET_WORDS)
     _require(0 <= sets < 32768 and (not sets or 32 * words >= h(Header.CLASSES)), "a class in no set")
-    _require(h(Header.CHANNELS) in (4, 6), f"a picture of {h(Header.CHANNELS)} channels")
+    more = bool(h(Header.FLAGS) & Flag.SHOWS_CARRYING)
+    _require(h(Header.CHANNELS) - more in (4, 6), f"a picture of {h(Header.CHANNELS)} channels")
     _require(0 <= h(Header.SLOPE) <= 1000, f"SLOPE is {h(Header.SLOPE)}")
     for offset in _OFFSETS:
         _require(Header.END <= h(offset) <= len(program.words), f"{offset.name} is {h(offset)}")
@@ -608,6 +616,7 @@ def _inside(program: Program, table: Header, count: int, low: int, high: int) ->
 def _entities(program: Program) -> None:
     h = program.header
     types = program.table(Header.TYPE_AT).tolist()
+    truths = {name.register for name in program.registers if (name.low, name.high) == (0, 1)}
     _require(len(program.entities) == h(Header.ENTITIES), "entities without names")
     for number, entity in enumerate(program.entities):
         row = program.table(Header.ENTITY_AT)[number].tolist()
@@ -619,7 +628,11 @@ def _entities(program: Program) -> None:
         )
         _require(0 <= kind < 256, f"the status code of {entity} does not fit into the picture")
         _require(0 < view <= 2 * MAX_SIDE, f"{entity} sees {view} cells far")
-        _require(pushed_by in (0, 1), f"{entity} is pushed by {pushed_by}")
+        if entity.role == "object":
+            _require(pushed_by in range(4), f"{entity} is pushed by {pushed_by}")
+        else:
+            known = pushed_by == 0 or pushed_by in truths
+            _require(known, f"{entity} accepts what register {pushed_by} says")
         for status in types[first : first + statuses]:
             toggled, pushed, rolls = (
                 status[column] for column in (TypeColumn.TOGGLED, TypeColumn.PUSHED, TypeColumn.ROLLS)

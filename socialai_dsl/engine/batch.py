@@ -104,10 +104,11 @@ class Batch:
             np.array([self.offsets[i] for pool in pools for i in pool], np.int64),
             np.concatenate([np.arange(1, len(pool) + 1) for pool in pools]).astype(np.int64),
         )
-        gestures = any(int(header[Header.CHANNELS]) > _PLAIN_CHANNELS for header in headers)
-        self.state: State = empty_state(rows, registers, board, length, VIEW, gestures)
+        shown = _shown(headers)
+        self.more = 2 * bool(shown & Trait.GESTURES) + bool(shown & Trait.HANDS)
+        self.state: State = empty_state(rows, registers, board, length, VIEW, self.more)
         counters = int(sum(int(header[Header.COUNTERS]) for header in headers))
-        self.ports: Ports = empty_ports(self.state, counters, len(parts[0].slots))
+        self.ports: Ports = empty_ports(self.state, counters, len(parts[0].slots), self.more)
         self.counters = self.ports.counters
         for row, pool in enumerate(pool_of_row):
             in_sequence = int(pool in sequences)
@@ -219,7 +220,7 @@ def _link(
     parts: Sequence[Part],
 ) -> tuple[NDArray[np.int32], NDArray[np.uint16], list[int], list[int]]:
     """Lay programs and their links one behind the other: words, views, offset and first counter of each program."""
-    gestures = any(int(part.words[Header.CHANNELS]) > _PLAIN_CHANNELS for part in parts)
+    shown = _shown([part.words for part in parts])
     words: list[NDArray[np.int32]] = []
     views: dict[tuple[int, int], int] = {}
     offsets, first_counters = [], []
@@ -245,13 +246,23 @@ def _link(
         tables = np.array([*part.actions, *spoken, *part.outcomes, *part.successes], np.int32)
         own = _with_tokens(part)
         link[Link.FIRST_ROLLING], link[Link.LAST_ROLLING] = _rolling(own)
-        own[Header.FLAGS] |= _traits(own) | (Trait.GESTURES if gestures else 0)
+        own[Header.FLAGS] |= _traits(own) | shown
         words += [own, link, tables]
         offsets.append(offset)
         first_counters.append(counter)
         offset += len(part.words) + len(link) + len(tables)
         counter += int(part.words[Header.COUNTERS])
     return np.concatenate(words), np.concatenate([view_table(*c) for c in views]), offsets, first_counters
+
+
+def _shown(headers: Sequence[NDArray[np.int32]]) -> int:
+    """What the channels behind the fourth show if one of the programs has them, as bits of `Trait`."""
+    shown = 0
+    for header in headers:
+        carrying = int(header[Header.FLAGS] & Flag.SHOWS_CARRYING != 0)
+        shown |= Trait.HANDS * carrying
+        shown |= Trait.GESTURES * int(header[Header.CHANNELS] - carrying > _PLAIN_CHANNELS)
+    return shown
 
 
 def _traits(words: NDArray[np.int32]) -> int:

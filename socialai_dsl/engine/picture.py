@@ -6,9 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.engine import rng
+from socialai_dsl.engine.boards import object_look
+from socialai_dsl.engine.carrying import carried_by
 from socialai_dsl.engine.entities import field, npc_at, step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
-from socialai_dsl.engine.pointers import uint16_of
+from socialai_dsl.engine.pointers import bytes_of, uint16_of
 from socialai_dsl.engine.shadows import lit_cells
 from socialai_dsl.engine.state import AGENT, NOTHING, Book, Link, Row, Trait
 from socialai_dsl.engine.views import CELLS, OWN_LOOK, OWN_PLACE
@@ -45,7 +47,7 @@ def image_digest(image: NDArray[np.uint32], extra: NDArray[np.uint16], gestures:
 
 @inline
 def take_picture(row: Row, link: int, book: Any, number: int) -> None:
-    """Write what the agent, in row `number` of the book, sees; its own cell reads empty."""
+    """Write what the agent, in row `number` of the book, sees; its own cell shows what it carries, or reads empty."""
     flags = row.program[Header.FLAGS]
     x = field(row, AGENT, Field.X)
     y = field(row, AGENT, Field.Y)
@@ -59,7 +61,13 @@ def take_picture(row: Row, link: int, book: Any, number: int) -> None:
             lit = lit_cells(row, x, y, field(row, AGENT, Field.DIR))
         pose = (y * row.program[Header.CANVAS_WIDTH] + x) * 4 + field(row, AGENT, Field.DIR)
         _gather(row, (row.program[link + Link.VIEWS] + pose) * CELLS, lit)
-    if flags & (Flag.EGOCENTRIC | Trait.GESTURES):
+    if flags & Flag.CARRYING:
+        carried = carried_by(row, AGENT)
+        if carried != 0:
+            row.image[OWN_PLACE] = object_look(row, carried)
+    if flags & Trait.HANDS:
+        _show_hands(row, bytes_of(book, Book.EXTRA, number), bytes_of(book, Book.PICTURE, number))
+    elif flags & (Flag.EGOCENTRIC | Trait.GESTURES):
         _show_npcs(row, uint16_of(book, Book.EXTRA, number), uint16_of(book, Book.PICTURE, number))
 
 
@@ -120,6 +128,41 @@ def _show_npcs(row: Row, extra: NDArray[np.uint16], picture: NDArray[np.uint16])
             picture[3 * place] = look
             picture[3 * place + 1] = look >> 16
             picture[3 * place + 2] = gesture
+
+
+@outline
+def _show_hands(row: Row, extra: NDArray[np.uint8], picture: NDArray[np.uint8]) -> None:
+    """As `_show_npcs`, where pictures of the batch also show what NPCs carry."""
+    stay_outline()
+    flags = row.program[Header.FLAGS]
+    gestures = 2 if flags & Trait.GESTURES else 0
+    more = gestures + 1
+    for i in range(more * CELLS):
+        extra[i] = NO_GESTURE
+    own = field(row, AGENT, Field.DIR)
+    for npc in range(1, row.program[Header.NPCS] + 1):
+        place = _place_in_view(row, npc)
+        if place < 0 or npc_at(row, field(row, npc, Field.X), field(row, npc, Field.Y)) != npc:
+            continue
+        look = row.image[place]
+        if look & 0xFF != NPC:
+            continue
+        if flags & Flag.EGOCENTRIC:
+            row.image[place] = (look & 0xFFFFFF) | _relative(look >> 24, own) << 24
+        shows = np.int64(flags & Flag.SHOWS_CARRYING != 0)
+        if row.program[Header.CHANNELS] - shows == _WITH_GESTURES:
+            gesture = _gesture(row, npc, own)
+            extra[more * place] = gesture & 0xFF
+            extra[more * place + 1] = gesture >> 8
+        carried = carried_by(row, npc)
+        if shows and carried != 0:
+            look = object_look(row, carried)
+            extra[more * place + gestures] = (look & 0xFF) | (look >> 8 & 0xFF) << 5
+    for i in range(CELLS):
+        for k in range(4):
+            picture[(4 + more) * i + k] = row.image[i] >> 8 * k & 0xFF
+        for k in range(more):
+            picture[(4 + more) * i + 4 + k] = extra[more * i + k]
 
 
 @inline

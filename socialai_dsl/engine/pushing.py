@@ -37,6 +37,8 @@ def put_on(row: Row, entity: int, thing: int) -> None:
     set_field(row, entity, Field.X, x)
     set_field(row, entity, Field.Y, y)
     set_field(row, entity, Field.GONE, ZERO)
+    if entity > row.program[Header.NPCS]:
+        set_field(row, entity, Field.CARRIER, ZERO)
     row.registers[Register.CHANGED] = 1
     if drawn:
         draw_cell(row, old_x, old_y)
@@ -71,7 +73,8 @@ def push(row: Row, x: int, y: int, direction: int, rolling: int) -> None:
     if entity == 0 or field(row, entity, Field.POKED) != 0:
         return
     status = row.program[type_row(row, entity) + TypeColumn.PUSHED]
-    if status != field(row, entity, Field.STATUS) and rolling >= column(row, entity, EntityColumn.PUSHED_BY):
+    only_rolling = column(row, entity, EntityColumn.PUSHED_BY) & 1
+    if status != field(row, entity, Field.STATUS) and rolling >= only_rolling:
         set_field(row, entity, Field.DIR, direction)
         _become(row, entity, status)
 

@@ -83,8 +83,9 @@ class Trait(IntEnum):
 
     GOES_BY_ITSELF = 1 << 20  # something counts or rolls
     PUSHED = 1 << 21  # some object takes another status when it is pushed
-    GESTURES = 1 << 22  # pictures of the batch have channels 5 and 6
+    GESTURES = 1 << 22  # pictures of the batch have channels for where NPCs point and what they did last
     REWARDS = 1 << 23  # there are rewards besides that of an outcome
+    HANDS = 1 << 25  # pictures of the batch have a channel for what NPCs carry
     APART = 1 << 24  # some frame has code for what it perceives, or for the rest of a rule of `first`
 
 
@@ -151,7 +152,7 @@ class State(NamedTuple):
     ]  # (E, 49) packed cells, from the agent's left to its right, each from far to near
     extra: NDArray[
         np.uint16
-    ]  # (E, 49) fifth channel | sixth << 8 of these cells; (E, 0) if no program of the batch shows them
+    ]  # (E, (49 N + 1) // 2) the bytes of the N channels behind the fourth, cell by cell
 
 
 class Tables(NamedTuple):
@@ -180,7 +181,7 @@ class Ports(NamedTuple):
     outcome: NDArray[np.int16]  # (E,) of the episode that ended in this step, else -1
     final_image: NDArray[np.uint32]  # (E, 49) last picture of an episode that was reset in the same step
     final_tokens: NDArray[np.int16]  # (E, L)
-    final_extra: NDArray[np.uint16]  # (E, 49) or (E, 0)
+    final_extra: NDArray[np.uint16]  # as `extra`
     success: NDArray[
         np.bool_
     ]  # (E,) whether an episode ended in this step, and was a success in all its acts
@@ -193,7 +194,9 @@ class Ports(NamedTuple):
     spare_counters: NDArray[np.int64]  # (counters of all programs,)
     image_ids: NDArray[np.uint64]  # (E,) digests of the pictures
     refused: NDArray[np.bool_]  # (E,) rows that were reset and found no room that is as required
-    picture: NDArray[np.uint16]  # (E, 147) `image` and `extra` cell by cell, six bytes each; or (E, 0)
+    picture: NDArray[
+        np.uint16
+    ]  # bytes of `image` and `extra` cell by cell, (E, (49 (4 + N) + 1) // 2); or (E, 0)
     sizes: NDArray[np.int64]  # (Size.END,)
 
 
@@ -214,21 +217,22 @@ class Row(NamedTuple):
     views: NDArray[np.uint16]
 
 
-def empty_state(rows: int, registers: int, board: int, tokens: int, view: int, gestures: bool) -> State:
-    """A state of zeros; every row must be reset before it is used."""
+def empty_state(rows: int, registers: int, board: int, tokens: int, view: int, more: int) -> State:
+    """A state of zeros, with so many channels behind the fourth; every row must be reset before it is used."""
     return State(
         registers=np.zeros((rows, registers), np.int16),
         boards=np.zeros((rows, board), np.uint32),
         keys=np.zeros((rows, Key.WORDS), np.uint64),
         tokens=np.zeros((rows, tokens), np.int16),
         image=np.zeros((rows, view * view), np.uint32),
-        extra=np.zeros((rows, view * view if gestures else 0), np.uint16),
+        extra=np.zeros((rows, (view * view * more + 1) // 2), np.uint16),
     )
 
 
-def empty_ports(state: State, counters: int, slots: int) -> Ports:
-    """Ports that fit a state, with nothing pinned and no outcome."""
+def empty_ports(state: State, counters: int, slots: int, more: int) -> Ports:
+    """Ports that fit a state with so many channels behind the fourth, with nothing pinned and no outcome."""
     rows, registers = state.registers.shape
+    picture = (state.image.shape[1] * (4 + more) + 1) // 2 if more else 0
     return Ports(
         actions=np.zeros((rows, 3 + slots), np.int64),
         pins=no_pins(registers),
@@ -251,7 +255,7 @@ def empty_ports(state: State, counters: int, slots: int) -> Ports:
         spare_counters=np.zeros(counters, np.int64),
         image_ids=np.zeros(rows, np.uint64),
         refused=np.zeros(rows, np.bool_),
-        picture=np.zeros((rows, 3 * state.extra.shape[1]), np.uint16),
+        picture=np.zeros((rows, picture), np.uint16),
         sizes=np.array(
             [registers, state.boards.shape[1], state.tokens.shape[1], state.extra.shape[1]],
             np.int64,

@@ -1,6 +1,7 @@
 """Turns: the body actions of agent and NPCs, and how an NPC follows its frames."""
 
 from socialai_dsl.engine.boards import draw_cell, draw_npc, is_solid, npcs_are_hidden, type_row
+from socialai_dsl.engine.carrying import pick_up, put_down
 from socialai_dsl.engine.entities import (
     field,
     is_present,
@@ -92,6 +93,15 @@ def _toggle_ahead(row: Row) -> None:
 
 
 @inline
+def use_hands(row: Row, who: int, action: int) -> None:
+    """`pickup` and `drop`."""
+    if action == Body.PICKUP:
+        pick_up(row, who)
+    elif action == Body.DROP:
+        put_down(row, who)
+
+
+@inline
 def move_agent(row: Row, action: int) -> None:
     """The agent's body action; out of the room it has none to do."""
     direction = field(row, AGENT, Field.DIR)
@@ -112,6 +122,8 @@ def move_agent(row: Row, action: int) -> None:
         set_field(row, AGENT, Field.DIR, (direction + 2 * action - 1) & 3)
     elif action == Body.TOGGLE:
         _toggle_ahead(row)
+    elif row.program[Header.FLAGS] & Flag.CARRYING:
+        use_hands(row, AGENT, action)
 
 
 @outline
@@ -140,6 +152,8 @@ def move_npc(row: Row, npc: int, action: int) -> None:
         set_field(row, npc, Field.TOGGLED, _toggle_object(row, ahead_x, ahead_y))
     elif action == Body.STOP_POINTING:
         set_field(row, npc, Field.POINTING, ZERO)
+    elif row.program[Header.FLAGS] & Flag.CARRYING:
+        use_hands(row, npc, action)
 
 
 @inline

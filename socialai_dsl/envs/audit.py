@@ -110,7 +110,8 @@ def _entities(program: Program) -> list[Range]:
             Field.GONE: (0, 1),
             Field.POKED: (0, 1),
             Field.LAST: (0, int(Body.STOP_POINTING)),
-            Field.POINTING: (0, 4),
+            # Of an object who carries it.
+            Field.POINTING: (0, 1 + program.header(Header.NPCS) if entity.role == "object" else 4),
             Field.INSIDE: (0, program.header(Header.ENTITIES) - 1),
         }
         base = FIRST_ENTITY + ENTITY_FIELDS * number

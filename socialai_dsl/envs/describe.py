@@ -13,6 +13,7 @@ from socialai_dsl.program import (
     FIRST_ENTITY,
     Body,
     Field,
+    Flag,
     FrameColumn,
     Header,
     Program,
@@ -104,9 +105,20 @@ def _entity(program: Program, registers: Row, number: int) -> dict[str, Any]:
             described["pointing"] = DIRECTIONS[field[Field.POINTING] - 1]
         if field[Field.TOGGLED]:
             described["toggled"] = str(program.entities[field[Field.TOGGLED]])
-    elif field[Field.INSIDE]:
+    elif entity.role == "object" and field[Field.INSIDE]:
         described["inside"] = str(program.entities[field[Field.INSIDE]])
+    if entity.role != "object" and program.header(Header.FLAGS) & Flag.CARRYING:
+        described |= _carried(program, registers, number)
     return described
+
+
+def _carried(program: Program, registers: Row, who: int) -> dict[str, Any]:
+    """What a member of the cast carries, if anything."""
+    for number, entity in enumerate(program.entities):
+        carrier = registers[FIRST_ENTITY + ENTITY_FIELDS * number + Field.CARRIER]
+        if entity.role == "object" and carrier == 1 + who:
+            return {"carries": str(entity)}
+    return {}
 
 
 def _act(program: Program, registers: Row, acts: Acts, k: int) -> list[Any]:

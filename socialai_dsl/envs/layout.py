@@ -53,6 +53,16 @@ def may_lie_over(program: Program) -> frozenset[int]:
     return frozenset(number for number in objects if _is_walkable(program, number)) | _put_anywhere(program)
 
 
+def carryable(program: Program) -> dict[str, int]:
+    """Names and numbers of the objects that can be carried."""
+    pushed_by = program.table(Header.ENTITY_AT)[:, EntityColumn.PUSHED_BY]
+    return {
+        str(entity): number
+        for number, entity in enumerate(program.entities)
+        if entity.role == "object" and pushed_by[number] & 2
+    }
+
+
 def _is_walkable(program: Program, number: int) -> bool:
     """Whether an object can be walked on in one of its statuses."""
     first = int(program.table(Header.ENTITY_AT)[number, EntityColumn.TYPE])
@@ -81,10 +91,11 @@ _WORDS: dict[str, tuple[Field, Sequence[str]]] = {
     "color": (Field.COLOR, COLORS),
 }
 _KEYS = {
-    "agent": ("at", "believes", "clock", "color", "facing", "gone", "name", "state"),
+    "agent": ("at", "believes", "carries", "clock", "color", "facing", "gone", "name", "state"),
     "npc": (
         "at",
         "believes",
+        "carries",
         "clock",
         "color",
         "facing",
@@ -129,6 +140,7 @@ class _Layout:
         self.addresses = addresses_of(program)
         self.others = ("member", "spoiled", *_OTHER_KEYS) if in_suite else _OTHER_KEYS
         self.groups: dict[str, list[int]] = {}
+        self.carried: dict[int, Any] = {}
         for number, entity in enumerate(program.entities):
             self.groups.setdefault(entity.key, []).append(number)
 
@@ -142,6 +154,8 @@ class _Layout:
             self.row[Register.T] = whole_number("t", layout["t"], 0, self.program.header(Header.HORIZON) - 1)
         for key, numbers in self.groups.items():
             self._group(key, numbers, layout.get(key))
+        for number, thing in self.carried.items():
+            self._carries(number, thing)
         self._one_of(layout.get("one_of"))
         self._let(layout.get("let"))
         self._world(layout.get("state"))
@@ -203,6 +217,8 @@ class _Layout:
                 self._owned(key, name, given[name])
         self._gestures(key, number, given)
         self._believes(key, given.get("believes"))
+        if given.get("carries") is not None:
+            self.carried[number] = given["carries"]
         inside = given.get("inside")
         if inside is not None:
             entities = [str(entity) for entity in self.program.entities]
@@ -224,6 +240,21 @@ class _Layout:
             self._set(number, Field.TOGGLED, word(f"{key}.toggled", given["toggled"], objects))
         if given.get("pointing") is not None:
             self._set(number, Field.POINTING, 1 + word(f"{key}.pointing", given["pointing"], DIRECTIONS))
+
+    def _carries(self, number: int, given: Any) -> None:
+        """What a member of the cast has in its hands."""
+        key = f"{self.program.entities[number]}.carries"
+        things = carryable(self.program)
+        if not things:
+            raise ValueError(f"{key}: got {given!r}, but nothing can be carried in this scenario")
+        thing = list(things.values())[word(key, given, list(things))]
+        base = FIRST_ENTITY + ENTITY_FIELDS * thing
+        if self.row[base] not in (PIN_NONE, -1):
+            raise ValueError(f"{key}: got {given!r}, which is given a place of its own")
+        if self.row[base + Field.CARRIER] != PIN_NONE:
+            raise ValueError(f"{key}: got {given!r}, which somebody else carries")
+        for field, value in ((Field.X, -1), (Field.Y, -1), (Field.GONE, 1), (Field.CARRIER, 1 + number)):
+            self._set(thing, field, value)
 
     def _believes(self, owner: str, given: Any) -> None:
         """What a member of the cast takes for true."""

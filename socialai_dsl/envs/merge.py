@@ -10,7 +10,7 @@ from gymnasium import spaces
 
 from socialai_dsl.engine.batch import Part
 from socialai_dsl.program import NO_GESTURE, VIEW, Body, EntityColumn, Header, Program, TypeColumn, room_words
-from socialai_dsl.program_suite import Playable, ProgramSuite, mixture, prefixed
+from socialai_dsl.program_suite import Playable, ProgramSuite, channels_of, mixture, prefixed
 from socialai_dsl.vocabulary import ACTIONS, Sentences
 
 
@@ -25,7 +25,8 @@ class Merged:
         outcomes: every way an episode can end: its name and whether it is a success.
         length: tokens in a history, L.
         parts: the programs as the engine takes them.
-        highest: greatest value of each channel of the picture, which has six if one of the programs shows six.
+        channels: of the picture: those that one of the programs shows.
+        highest: greatest value of each of them.
     """
 
     playable: Playable
@@ -35,6 +36,7 @@ class Merged:
     outcomes: tuple[tuple[str, bool], ...]
     length: int
     parts: tuple[Part, ...]
+    channels: tuple[str, ...]
     highest: tuple[int, ...]
 
     @classmethod
@@ -46,8 +48,8 @@ class Merged:
         parts = _parts(suite, [name for name, _ in outcomes], playable)
         length = max(program.header(Header.TOKENS) for program in suite.programs)
         highest = np.max([_highest_codes(program) for program in suite.programs], axis=0).tolist()
-        if any(program.header(Header.CHANNELS) > len(highest) for program in suite.programs):
-            highest += [NO_GESTURE, NO_GESTURE]
+        channels = channels_of(suite.programs)
+        highest += [NO_GESTURE] * (len(channels) - len(highest))
         return cls(
             playable,
             suite.programs,
@@ -56,6 +58,7 @@ class Merged:
             outcomes,
             length,
             parts,
+            channels,
             tuple(highest),
         )
 
@@ -71,7 +74,7 @@ class Merged:
         return spaces.MultiDiscrete([len(self.playable.actions) + 1, 2, len(sentences.templates), *sizes])
 
     def observation_space(self) -> spaces.Dict:
-        """Image uint8 (7, 7, 4 or 6) and tokens int16 (L,), both with true bounds."""
+        """Image uint8 (7, 7, channels) and tokens int16 (L,), both with true bounds."""
         high = np.broadcast_to(np.array(self.highest, np.uint8), (VIEW, VIEW, len(self.highest))).copy()
         return spaces.Dict(
             {

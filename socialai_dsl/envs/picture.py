@@ -22,7 +22,7 @@ from socialai_dsl.program import (
     TypeColumn,
 )
 from socialai_dsl.render.gestures import Gesture, gestures_of
-from socialai_dsl.render.grid import draw_ansi, draw_grid, figures
+from socialai_dsl.render.grid import draw_ansi, draw_grid, figures, own_hands
 from socialai_dsl.render.panel import Face
 from socialai_dsl.render.tiles import NPC, Code, draw_tile
 
@@ -39,6 +39,7 @@ class Scene:
         seen: bool (H, W), the cells in the agent's field of view.
         below: (x, y) -> the object in whose cell an NPC stands.
         gestures: (x, y) -> where the NPC there points and what it did last.
+        held: (x, y) -> what the agent or the NPC there carries, as far as the agent sees it.
     """
 
     codes: NDArray[np.uint8]
@@ -46,6 +47,12 @@ class Scene:
     seen: NDArray[np.bool_]
     below: dict[tuple[int, int], Code]
     gestures: dict[tuple[int, int], Gesture]
+    held: dict[tuple[int, int], Code]
+
+    @property
+    def own(self) -> Code | None:
+        """What the agent carries."""
+        return self.held.get(self.agent[:2])
 
 
 def scene(table: Table, row: int) -> Scene:
@@ -58,6 +65,7 @@ def scene(table: Table, row: int) -> Scene:
         _seen(table, row, agent)[:height, :width],
         _under_npcs(table, row),
         gestures_of(table.program(row), table.state.registers[row]),
+        _held(table, row, agent),
     )
 
 
@@ -65,8 +73,10 @@ def frame(table: Table, row: int, mode: str, tile: int = 32) -> Any:
     """uint8 (H * tile, W * tile, 3) for rgb_array, a text for ansi."""
     shown = scene(table, row)
     if mode == "ansi":
-        return "\n".join([plain_text(table, row), *figures(shown.codes, shown.gestures)])
-    return draw_grid(shown.codes, shown.agent, shown.seen, tile, shown.below, shown.gestures)
+        told = figures(shown.codes, shown.gestures, held=shown.held)
+        own = [own_hands(shown.own)] if shown.own is not None else []
+        return "\n".join([plain_text(table, row), *told, *own])
+    return draw_grid(shown.codes, shown.agent, shown.seen, tile, shown.below, shown.gestures, shown.held)
 
 
 def plain_text(table: Table, row: int) -> str:
@@ -79,11 +89,13 @@ def plain_text(table: Table, row: int) -> str:
 def coloured_text(table: Table, row: int) -> str:
     """The room as text with escape codes for colours, what the agent has in view on a lighter ground.
 
-    Where the scenario shows its agent gestures, lines below the room say who points and who did what last.
+    Where the scenario shows its agent gestures, lines below the room say who points and who did what last; where it
+    shows hands, who carries what.
     """
     found = scene(table, row)
     shown = {place: gesture for place, gesture in found.gestures.items() if gesture.words}
-    told = figures(found.codes, shown, shown)
+    told = figures(found.codes, shown, {**shown, **found.held}, found.held)
+    told += [own_hands(found.own)] if found.own is not None else []
     return "\n".join([draw_ansi(found.codes, found.agent, colour=True, seen=found.seen), *told])
 
 
@@ -131,6 +143,28 @@ def _under_npcs(table: Table, row: int) -> dict[tuple[int, int], Code]:
         for number, place in present.items()
         if roles[number] == "object" and place in npcs
     }
+
+
+def _held(table: Table, row: int, agent: tuple[int, int, int]) -> dict[tuple[int, int], Code]:
+    """(x, y) -> what is in the hands of who stands there: of NPCs its type and colour, where the agent sees them."""
+    program, registers = table.program(row), table.state.registers[row]
+    flags = program.header(Header.FLAGS)
+    if not flags & Flag.CARRYING:
+        return {}
+    fields = registers[FIRST_ENTITY:][: ENTITY_FIELDS * len(program.entities)].reshape(-1, ENTITY_FIELDS)
+    shown = flags & Flag.SHOWS_CARRYING and not flags & Flag.NPCS_HIDDEN
+    found: dict[tuple[int, int], Code] = {}
+    for number, thing in enumerate(fields):
+        carrier = int(thing[Field.CARRIER]) - 1
+        if program.entities[number].role != "object" or carrier < 0:
+            continue
+        look = _look(program, number, thing)
+        who = fields[carrier]
+        if carrier == 0:
+            found[agent[:2]] = look
+        elif shown and who[Field.X] >= 0 and not who[Field.GONE]:
+            found.setdefault((int(who[Field.X]), int(who[Field.Y])), (*look[:2], 0, 0))
+    return found
 
 
 def _look(program: Program, number: int, entity: NDArray[np.int16]) -> Code:

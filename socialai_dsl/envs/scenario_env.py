@@ -125,9 +125,9 @@ _INT64 = np.dtype(np.int64)
 class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
     """One environment of a scenario or suite.
 
-    **Observation.** `image`, uint8 (7, 7, 4), or (7, 7, 6) if the scenario shows gestures: `image[i, j]` counts i from
-    the agent's left to its right and j from far to near, the agent itself is at `[3, 6]`, and the channels are type,
-    colour, status, orientation, then pointing and last act. `tokens`, int16 (L,): the words heard since the reset,
+    **Observation.** `image`, uint8 (7, 7, C): `image[i, j]` counts i from the agent's left to its right and j from far
+    to near, the agent itself is at `[3, 6]`, and `channels` names the channels: type, colour, status, orientation, and
+    where the scenario shows gestures or hands more. `tokens`, int16 (L,): the words heard since the reset,
     oldest first, as indices into `program.vocabulary`; 0 pads, 1 is an unknown word.
 
     **Action.** int64 (3 + slots,): body action (the last one is no movement), speak (1) or not (0), template, noun, or
@@ -409,6 +409,11 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
         heard = "\n".join(self._table.heard(0))
         print(f"{text}\n{heard}\n")
         return None
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels of the picture."""
+        return self._table.merged.channels
 
     def plain_text(self) -> str:
         """The room as text, two characters for each cell, without colours."""

@@ -20,27 +20,30 @@ from socialai_dsl.envs.describe import describe, history
 from socialai_dsl.envs.layout import pinned_member, pins_of
 from socialai_dsl.envs.merge import Merged
 from socialai_dsl.envs.starts import Starts
-from socialai_dsl.program import FIRST_ENTITY, VIEW, Field, Flag, Header, Program, Register
+from socialai_dsl.program import FIRST_ENTITY, LOOKS, VIEW, Field, Flag, Header, Program, Register
 from socialai_dsl.program_suite import Playable, ProgramSuite, prefixed
 
 Image = NDArray[np.uint8]
 
 
-def in_bytes(words: NDArray[Any]) -> Image:
-    """The same memory, uint8 (E, 7, 7, channels): all words of a row hold the channels of its 49 cells."""
-    return words.view(np.uint8).reshape(len(words), VIEW, VIEW, -1)
+def in_bytes(words: NDArray[Any], channels: int) -> Image:
+    """The same memory, uint8 (E, 7, 7, channels): the bytes of a row hold the channels of its 49 cells."""
+    held = words.view(np.uint8)[:, : VIEW * VIEW * channels]
+    return held.reshape(len(words), VIEW, VIEW, channels)
 
 
-def joined(image: NDArray[np.uint32], gestures: NDArray[np.uint16]) -> Image:
-    """The pictures of all rows, uint8 (E, 7, 7, 4), or (E, 7, 7, 6) where a program shows pointing and last acts.
+def joined(image: NDArray[np.uint32], extra: NDArray[np.uint16], channels: int) -> Image:
+    """The pictures of all rows, uint8 (E, 7, 7, channels).
 
     Args:
-        image: packed cells, (E, 49).
-        gestures: the fifth and sixth channel, (E, 49), or (E, 0).
+        image: packed cells, (E, 49): the first four channels.
+        extra: those behind the fourth, see `State.extra`.
+        channels: how many there are of both.
     """
-    if not gestures.size:
-        return in_bytes(image)
-    return np.concatenate([in_bytes(image), in_bytes(gestures)], axis=-1)
+    looks = in_bytes(image, len(LOOKS))
+    if channels == len(LOOKS):
+        return looks
+    return np.concatenate([looks, in_bytes(extra, channels - len(LOOKS))], axis=-1)
 
 
 # -- who plays which episode: seeds, indices and episode numbers of the rows ---------------------------------
@@ -117,7 +120,7 @@ class Table:
     """Rows of environments: row i plays `playables[i modulo their number]`, of a suite one member each episode.
 
     Attributes:
-        image: uint8 (E, 7, 7, 4 or 6), tokens: int16 (E, L): buffers that every call writes to.
+        image: uint8 (E, 7, 7, channels), tokens: int16 (E, L): buffers that every call writes to.
     """
 
     def __init__(self, playables: Sequence[Playable], rows: int, threads: int = 1) -> None:
@@ -137,8 +140,10 @@ class Table:
             [number for number, in_acts in enumerate(self._plays_acts) if in_acts],
         )
         self.state, self.rows = self.batch.state, rows
-        self._shows_gestures = bool(self.state.extra.size)
-        self.image = in_bytes(self.batch.ports.picture if self._shows_gestures else self.state.image)
+        self.channels = len(self.merged.channels)
+        self.image = in_bytes(
+            self.batch.ports.picture if self.batch.more else self.state.image, self.channels
+        )
         self.tokens = self.state.tokens
         self.fresh = True
         self._number_at = {offset: i for i, offset in enumerate(self.batch.offsets)}
@@ -418,8 +423,8 @@ class Table:
         for name, array in read.items():
             arrays[name][...] = array
         self.fresh = False
-        if self._shows_gestures:
-            self.image[...] = joined(self.state.image, self.state.extra)
+        if self.batch.more:
+            self.image[...] = joined(self.state.image, self.state.extra, self.channels)
 
     def _check(self, read: Mapping[str, NDArray[Any]]) -> None:
         """The engine trusts its state, so what comes from outside must be a state that it can be in."""

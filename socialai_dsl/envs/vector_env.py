@@ -29,10 +29,10 @@ Observation = dict[str, NDArray[Any]]
 class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]]):
     """A batch of E environments of one scenario or suite, or of several in turn.
 
-    **Observation.** `image`, uint8 (E, 7, 7, 4), or (E, 7, 7, 6) if a scenario shows gestures: `image[e, i, j]` counts
-    i from the agent's left to its right and j from far to near, the agent itself is at `[e, 3, 6]`, and the channels
-    are type, colour, status, orientation, then pointing and last act. `tokens`, int16 (E, L): the words heard since the
-    reset, oldest first, as indices into `vocabulary`; 0 pads, 1 is an unknown word.
+    **Observation.** `image`, uint8 (E, 7, 7, C): `image[e, i, j]` counts i from the agent's left to its right and j
+    from far to near, the agent itself is at `[e, 3, 6]`, and the channels are type, colour, status, orientation, and
+    where a scenario shows gestures or hands more. `tokens`, int16 (E, L): the words heard since the reset, oldest
+    first, as indices into `vocabulary`; 0 pads, 1 is an unknown word.
 
     **Action.** int64 (E, 3 + slots): body action (the last one is no movement), speak (1) or not (0), template, noun,
     or in place of the noun a word for each slot of the grammar. Template and noun count only where the agent speaks, a
@@ -190,7 +190,7 @@ class ScenarioVectorEnv(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]])
             "_outcome": ended,
         }
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
-            image = joined(ports.final_image, ports.final_extra)
+            image = joined(ports.final_image, ports.final_extra, self._table.channels)
             final: Observation = {"image": image, "tokens": ports.final_tokens}
             infos["final_info"], infos["_final_info"] = dict(infos), ended
             infos["final_obs"] = {k: v.copy() for k, v in final.items()} if self._copy else final

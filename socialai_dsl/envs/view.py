@@ -7,13 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.library import types_by_code
-from socialai_dsl.program import VIEW
+from socialai_dsl.program import NO_GESTURE, VIEW, unpack_held
 from socialai_dsl.render import tiles
 from socialai_dsl.render.gestures import Gesture, gesture_shown
-from socialai_dsl.render.grid import draw_ansi, letters
+from socialai_dsl.render.grid import draw_ansi, letters, own_hands, thing_words
+from socialai_dsl.render.tiles import Code
 from socialai_dsl.vocabulary import COLORS
 
 _UP: Final = 3
+_OWN: Final = (VIEW // 2, VIEW - 1)
+EMPTY_LOOK: Final = (tiles.EMPTY, 0, 0, 0)
 _LOOKS: Final = 4
 """Channels that say what things look like; those behind them are gestures."""
 
@@ -26,11 +29,13 @@ class View:
         image: uint8 (7, 7, C), as in the observation.
         facing: where the agent looks, 0 right, 1 down, 2 left, 3 up.
         egocentric: whether directions of NPCs are given as seen from the agent.
+        channels: names of the channels.
     """
 
     image: NDArray[np.uint8]
     facing: int
     egocentric: bool
+    channels: tuple[str, ...]
 
     @property
     def text(self) -> str:
@@ -39,15 +44,22 @@ class View:
 
     @property
     def figures(self) -> list[str]:
-        """One line for each NPC in view that points or has done something, as `Av 2 ahead, 1 left: did toggle`."""
-        lines = []
-        for (column, row), gesture in self.gestures.items():
-            if not gesture.words:
+        """One line for each NPC in view that points, has done or carries something, and one for the agent's own hands.
+
+        `Av 2 ahead, 1 left: did toggle`, `you carry a red ball, rb`.
+        """
+        gestures, held, lines = self.gestures, self.held, []
+        own = held.pop(_OWN, None)
+        for column, row in dict.fromkeys((*gestures, *held)):
+            gesture = gestures.get((column, row))
+            said = [gesture.words] if gesture is not None and gesture.words else []
+            said += [f"carries {thing_words(held[column, row])}"] if (column, row) in held else []
+            if not said:
                 continue
             aside, before = column - VIEW // 2, VIEW - 1 - row
             side = f", {abs(aside)} {'right' if aside > 0 else 'left'}" if aside else ""
-            lines.append(f"{letters(self.codes, row, column)} {before} ahead{side}: {gesture.words}")
-        return lines
+            lines.append(f"{letters(self.codes, row, column)} {before} ahead{side}: {', '.join(said)}")
+        return [*lines, own_hands(own)] if own is not None else lines
 
     @property
     def codes(self) -> NDArray[np.uint8]:
@@ -57,18 +69,33 @@ class View:
         rolling = np.isin(codes[..., 0], [code for code, type_ in types_by_code().items() if type_.rolls])
         codes[npcs, 3] = (codes[npcs, 3] + self._turn) % 4
         codes[rolling, 3] = (codes[rolling, 3] + _UP - self.facing) % 4
+        codes[_OWN[1], _OWN[0]] = EMPTY_LOOK
         return codes
 
     @property
     def gestures(self) -> dict[tuple[int, int], Gesture]:
         """(column, row) -> what the NPC there shows, with directions as they are on the screen."""
-        if self.image.shape[-1] <= _LOOKS:
+        if "pointing" not in self.channels:
             return {}
         found = {}
+        first = self.channels.index("pointing")
         for row, column in np.argwhere(self.image[..., 0].T == tiles.NPC).tolist():
-            gesture = gesture_shown(*map(int, self.image[column, row, _LOOKS:]))
+            gesture = gesture_shown(*map(int, self.image[column, row, first : first + 2]))
             pointing = None if gesture.pointing is None else (gesture.pointing + self._turn) % 4
             found[column, row] = gesture._replace(pointing=pointing)
+        return found
+
+    @property
+    def held(self) -> dict[tuple[int, int], Code]:
+        """(column, row) -> what the agent or the NPC there carries; of NPCs only type and colour are seen."""
+        found: dict[tuple[int, int], Code] = {}
+        kind, colour, status, orientation = (int(value) for value in self.image[*_OWN, :_LOOKS])
+        if kind != tiles.EMPTY:
+            found[_OWN] = (kind, colour, status, orientation)
+        if "carrying" in self.channels:
+            carrying = self.image[..., self.channels.index("carrying")]
+            for column, row in np.argwhere(carrying != NO_GESTURE).tolist():
+                found[column, row] = (*unpack_held(int(carrying[column, row])), 0, 0)
         return found
 
     @property

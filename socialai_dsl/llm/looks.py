@@ -7,13 +7,13 @@ from functools import cache
 from typing import Final
 
 from socialai_dsl.library import prelude
-from socialai_dsl.program import NO_GESTURE, EntityColumn, Header, Program
+from socialai_dsl.program import NO_GESTURE, EntityColumn, Header, Program, unpack_held
 from socialai_dsl.render.gestures import gesture_shown
 from socialai_dsl.semantics.terms import ObjectType
 from socialai_dsl.vocabulary import COLORS, NPC, UNSEEN
 
 LOOKS: Final = 4
-"""Channels that say what things look like; those behind them are gestures."""
+"""Channels that say what things look like; those behind them are gestures, and what is carried."""
 
 COMPASS: Final = ("east", "south", "west", "north")
 RELATIVE: Final = ("towards you", "to your left", "away from you", "to your right")
@@ -54,11 +54,14 @@ def is_surface(cell: Cell) -> bool:
     return cell[0] == UNSEEN or (found is not None and found.name in _SURFACES)
 
 
-def facts(cell: Cell, kinds: Mapping[int, str], directions: tuple[str, ...]) -> dict[str, str]:
-    """The facts of a cell: `what` it is and, as far as it has one, `color`, `state`, direction and gestures.
+def facts(
+    cell: Cell, channels: Sequence[str], kinds: Mapping[int, str], directions: tuple[str, ...]
+) -> dict[str, str]:
+    """The facts of a cell: `what` it is and, as far as it has one, `color`, `state`, direction, gestures and load.
 
     Args:
         cell: not an empty one.
+        channels: names of its numbers.
         kinds: see `kinds_of`.
         directions: `COMPASS` or `RELATIVE`, for those of NPCs.
     """
@@ -67,9 +70,9 @@ def facts(cell: Cell, kinds: Mapping[int, str], directions: tuple[str, ...]) -> 
         return {"what": "cells out of sight"}
     if kind == NPC:
         what = kinds.get(status, f"person of look {status}")
-        return {"what": what, "color": COLORS[colour], "looking": directions[orientation]} | _gestures(
-            cell, directions
-        )
+        look = {"what": what, "color": COLORS[colour], "looking": directions[orientation]}
+        numbers = dict(zip(channels, cell, strict=True))
+        return look | _gestures(numbers, directions) | _carried(numbers)
     found = _types().get(kind)
     if found is None:
         return {"what": f"thing {kind}.{status}.{orientation}", "color": COLORS[colour]}
@@ -87,20 +90,37 @@ def facts(cell: Cell, kinds: Mapping[int, str], directions: tuple[str, ...]) -> 
 def phrase(told: Mapping[str, str]) -> str:
     """Facts in a few words: `a closed red door`, `a blue guide, looking east, just turned left`."""
     named = " ".join(told[key] for key in ("state", "color", "what") if key in told)
-    doing = [f"{key} {told[key]}" for key in ("looking", "moving", "pointing") if key in told]
+    doing = [f"{key} {told[key]}" for key in ("looking", "moving", "pointing", "carrying") if key in told]
     doing += [told["last"]] if "last" in told else []
     if told["what"].startswith("cells"):
         return named
-    return ", ".join([f"{'an' if named[0] in 'aeiou' else 'a'} {named}", *doing])
+    return ", ".join([_with_article(named), *doing])
 
 
-def _gestures(cell: Cell, directions: tuple[str, ...]) -> dict[str, str]:
-    """Where an NPC points and what it did last, where the picture shows gestures."""
-    if len(cell) == LOOKS or cell[LOOKS:] == (NO_GESTURE, NO_GESTURE):
+def _with_article(words: str) -> str:
+    return f"{'an' if words[0] in 'aeiou' else 'a'} {words}"
+
+
+def _carried(shown: Mapping[str, int]) -> dict[str, str]:
+    """What an NPC carries, where the picture shows it."""
+    held = shown.get("carrying", NO_GESTURE)
+    if held == NO_GESTURE:
         return {}
-    gesture = gesture_shown(*cell[LOOKS:])
-    pointing = {} if gesture.pointing is None else {"pointing": directions[gesture.pointing]}
-    return pointing | {"last": _ACTS[gesture.act]}
+    kind, colour = unpack_held(held)
+    found = _types().get(kind)
+    return {
+        "carrying": _with_article(f"{COLORS[colour]} {found.name.replace('_', ' ') if found else 'thing'}")
+    }
+
+
+def _gestures(shown: Mapping[str, int], directions: tuple[str, ...]) -> dict[str, str]:
+    """Where an NPC points and what it did last, where the picture shows gestures."""
+    pointing, act = shown.get("pointing", NO_GESTURE), shown.get("last_act", NO_GESTURE)
+    if act == NO_GESTURE:
+        return {}
+    gesture = gesture_shown(pointing, act)
+    towards = {} if gesture.pointing is None else {"pointing": directions[gesture.pointing]}
+    return towards | {"last": _ACTS[gesture.act]}
 
 
 @cache

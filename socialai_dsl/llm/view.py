@@ -23,7 +23,7 @@ from socialai_dsl.llm.looks import (
     phrase,
 )
 from socialai_dsl.program import VIEW, Flag, Header, Program
-from socialai_dsl.program_suite import Playable
+from socialai_dsl.program_suite import Playable, channels_of
 from socialai_dsl.render.grid import draw_ansi, letters
 from socialai_dsl.vocabulary import EMPTY, NPC, UNSEEN
 
@@ -60,6 +60,7 @@ class TextView:
         self._style = style
         self._members = _members(program)
         self._kinds = kinds_of(list(self._members.values()))
+        self._channels = channels_of(self._members.values())
         self._language = ActionLanguage(program)
         self._described = lru_cache(_REMEMBERED)(self._describe)
 
@@ -90,7 +91,7 @@ class TextView:
             info: of the same step.
         """
         image = observation["image"]
-        seen = self._described(image.tobytes(), image.shape[-1], self._directions(info))
+        seen = self._described(image.tobytes(), self._directions(info))
         utterance = info["utterance"]
         heard = [] if utterance == "NA" else [printable(line) for line in utterance.split("\n")]
         if self._style == "json":
@@ -132,27 +133,37 @@ class TextView:
             egocentric = {_is_egocentric(self._members[info["member"]])}
         return RELATIVE if True in egocentric else COMPASS
 
-    def _describe(self, data: bytes, channels: int, directions: tuple[str, ...]) -> str:
+    def _describe(self, data: bytes, directions: tuple[str, ...]) -> str:
         """What is seen in an image, given as bytes because its text is remembered."""
-        image = np.frombuffer(data, np.uint8).reshape(VIEW, VIEW, channels)
+        image = np.frombuffer(data, np.uint8).reshape(VIEW, VIEW, len(self._channels))
         seen: dict[Place, Cell] = {}
         for across, along in np.ndindex(VIEW, VIEW):
             cell = tuple(image[across, along].tolist())
             if (across, along) != _OWN and cell[0] != EMPTY:
                 seen[VIEW - 1 - along, across - VIEW // 2] = cell
-        told = {cell: facts(cell, self._kinds, directions) for cell in seen.values()}
+        told = {cell: facts(cell, self._channels, self._kinds, directions) for cell in seen.values()}
+        own = tuple(image[_OWN].tolist())
+        carried = None if own[0] == EMPTY else facts(own, self._channels, self._kinds, directions)
         if self._style == "grid":
-            return _picture(image, seen, told, directions)
+            picture = _picture(image, seen, told, directions)
+            return picture if carried is None else f"{picture}\n{_in_hands(carried)}"
         places = sorted((p for p, cell in seen.items() if not is_surface(cell)), key=_nearness)
         surfaces = sorted({cell for cell in seen.values() if is_surface(cell)}, reverse=True)
         areas = {cell: _areas(place for place, found in seen.items() if found == cell) for cell in surfaces}
         if self._style == "json":
             things = [told[seen[place]] | {"ahead": place[0], "right": place[1]} for place in places]
             covered = [told[cell] | {"areas": areas[cell]} for cell in surfaces]
-            return json.dumps({"seen": things, "covered": covered}, ensure_ascii=False)
+            hands = {} if carried is None else {"carrying": carried}
+            return json.dumps({"seen": things, "covered": covered} | hands, ensure_ascii=False)
         lines = [f"- {_where(place)}: {phrase(told[seen[place]])}" for place in places]
         lines += [f"- {phrase(told[cell])}: {'; '.join(map(_extent, areas[cell]))}" for cell in surfaces]
-        return "\n".join(["You see:", *lines]) if lines else "You see nothing but empty cells."
+        told_of_cells = ["You see:", *lines] if lines else ["You see nothing but empty cells."]
+        own_hands = [] if carried is None else [_in_hands(carried)]
+        return "\n".join([*told_of_cells, *own_hands])
+
+
+def _in_hands(told: Mapping[str, str]) -> str:
+    return f"You carry {phrase(told)}."
 
 
 def _members(program: Playable) -> dict[str | None, Program]:

@@ -169,7 +169,8 @@ class Game:
         """The agent's view."""
         program = played(self._program, {"member": self.now.member})
         egocentric = bool(program.header(Header.FLAGS) & Flag.EGOCENTRIC)
-        return View(self.now.view, DIRECTIONS.index(self._env.describe()["agent"]["facing"]), egocentric)
+        facing = DIRECTIONS.index(self._env.describe()["agent"]["facing"])
+        return View(self.now.view, facing, egocentric, self._env.channels)
 
     def place(self) -> tuple[int, int] | None:
         """X and y of the agent; None if it has left."""

@@ -31,10 +31,13 @@ from __future__ import annotations
 from socialai_dsl.program.format import (
     BOARDS,
     CELL,
+    CHANNELS,
     CONSTANT,
     ENTITY_FIELDS,
     FIRST_ENTITY,
+    GESTURES,
     LAST_ACTS,
+    LOOKS,
     MAX_SIDE,
     MOST_CHOICES,
     NO_ACTION,
@@ -56,6 +59,8 @@ from socialai_dsl.program.format import (
     Side,
     TypeColumn,
     pack_cell,
+    pack_held,
+    unpack_held,
 )
 from socialai_dsl.program.instructions import CLASS_BITS, Op, OpClass
 from socialai_dsl.program.program import (
@@ -69,11 +74,14 @@ from socialai_dsl.program.program import (
 __all__ = [
     "BOARDS",
     "CELL",
+    "CHANNELS",
     "CLASS_BITS",
     "CONSTANT",
     "ENTITY_FIELDS",
     "FIRST_ENTITY",
+    "GESTURES",
     "LAST_ACTS",
+    "LOOKS",
     "MAX_SIDE",
     "MOST_CHOICES",
     "NO_ACTION",
@@ -101,5 +109,7 @@ __all__ = [
     "Side",
     "TypeColumn",
     "pack_cell",
+    "pack_held",
     "room_words",
+    "unpack_held",
 ]

@@ -86,7 +86,7 @@ class Header(IntEnum):
     )
     CLASS_SETS = 54
     CLASS_SET_WORDS = 55
-    CHANNELS = 56  # of the picture: 4, or 6 with pointing and last act
+    CHANNELS = 56  # of the picture: 4, 2 more with pointing and last act, 1 more with `Flag.SHOWS_CARRYING`
     END = 57
 
 
@@ -101,6 +101,8 @@ class Flag(IntEnum):
     EGOCENTRIC = 32  # the picture shows an NPC's direction as (direction - the agent's + 2) mod 4
     OCCLUSION = 64  # what is not transparent hides what lies behind it, from the agent and from `SEES`
     ROLLS = 128  # some type of object rolls
+    CARRYING = 512  # some object can be carried
+    SHOWS_CARRYING = 1024  # the picture has a channel for what NPCs carry
     HEARD_BY = (
         256  # an entry of an inbox has three registers: class, speaker, noun (-1 none); else only the class
     )
@@ -148,6 +150,7 @@ class Field(IntEnum):
     POKED = 6  # NPC: 1 once it was poked in this episode; object: 1 while it reacts to no toggle and no push
     LAST = 7  # Body of its last turn
     POINTING = 8  # NPC: 0 not pointing, else 1 + direction; it lasts until it stops
+    CARRIER = 8  # object: 0, or 1 + the member of the cast who carries it; then it is gone
     INSIDE = 9  # object that may lie in another: number of that object
     TOGGLED = 9  # NPC: number of the object that it toggled at in its last turn, 0 if none
 
@@ -176,7 +179,8 @@ class EntityColumn(IntEnum):
     FAR = 3
     AUDIBLE = 4  # 1: heard even while NPCs are hidden
     VIEW = 5  # side of its view square
-    PUSHED_BY = 6  # who can push it: 0 anybody, 1 only what rolls
+    PUSHED_BY = 6  # who can push an object: 0 anybody, 1 only what rolls; 2 is added if it can be carried
+    ACCEPTS = 6  # member of the cast: 0 takes what it is given; else a register that is 1 while it does
     COLUMNS = 7
 
 
@@ -245,7 +249,22 @@ TESTS = frozenset(op for op in Op if op >> CLASS_BITS == OpClass.TEST)
 LAST_ACTS = {"forward": 0, "left": 1, "right": 2, "toggle": 3, "point": 4, "stop": 8, "none": 10}
 """Last acts of an NPC in the sixth channel; `point` has the direction added, relative if the picture is egocentric."""
 NO_GESTURE = 255
-"""In the fifth and sixth channel: no NPC, or not pointing."""
+"""In the channels behind the fourth: no NPC, or it does not point, or carries nothing."""
+LOOKS = ("type", "color", "status", "orientation")
+"""The channels that say what a cell looks like."""
+GESTURES = ("pointing", "last_act")
+CHANNELS = (*LOOKS, *GESTURES, "carrying")
+"""All channels of the picture, in their order."""
+
+
+def pack_held(code: int, color: int) -> int:
+    """What an NPC carries, as the channel `carrying` shows it; its type code is below 32."""
+    return code | color << 5
+
+
+def unpack_held(value: int) -> tuple[int, int]:
+    """Type code and colour of what the channel `carrying` shows."""
+    return value & 31, value >> 5
 
 
 def pack_cell(code: int, color: int = 0, status: int = 0, orientation: int = 0) -> int:

@@ -12,12 +12,16 @@ import numpy.typing as npt
 
 from socialai_dsl.program.format import (
     CELL,
+    CHANNELS,
     CONSTANT,
     ENTITY_FIELDS,
     FIRST_ENTITY,
+    GESTURES,
+    LOOKS,
     TEMPORARY,
     EntityColumn,
     Field,
+    Flag,
     FrameColumn,
     Header,
     LineColumn,
@@ -169,6 +173,14 @@ class Program:
             if slot.name != NOUN:
                 digest.update("\x1f".join((slot.name, *slot.words)).encode())
         return digest.hexdigest()
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels of its picture."""
+        carrying = bool(self.header(Header.FLAGS) & Flag.SHOWS_CARRYING)
+        gestures = self.header(Header.CHANNELS) - carrying > len(LOOKS)
+        shown = {*LOOKS, *(GESTURES if gestures else ()), *(["carrying"] if carrying else [])}
+        return tuple(name for name in CHANNELS if name in shown)
 
     @property
     def code(self) -> npt.NDArray[np.int32]:

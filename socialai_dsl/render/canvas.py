@@ -1,5 +1,6 @@
 """A small square canvas with soft edges for tiles, and their colours."""
 
+from copy import copy
 from typing import Final, TypeAlias
 
 import numpy as np
@@ -19,9 +20,17 @@ class Canvas:
     """A square picture whose corners are (0, 0) and (1, 1), y down, drawn large and then scaled down."""
 
     def __init__(self, size: int) -> None:
-        self._scale = size * _SUPERSAMPLING
-        self._image = Image.new("RGB", (self._scale, self._scale))
+        self._scale: float = size * _SUPERSAMPLING
+        self._left = self._top = 0.0
+        self._image = Image.new("RGB", (size * _SUPERSAMPLING, size * _SUPERSAMPLING))
         self._draw = ImageDraw.Draw(self._image)
+
+    def part(self, x: float, y: float, size: float) -> "Canvas":
+        """A square of this canvas as a canvas of its own: its upper left corner and its side."""
+        part = copy(self)
+        part._left, part._top = self._left + x * self._scale, self._top + y * self._scale
+        part._scale = size * self._scale
+        return part
 
     def pixels(self) -> NDArray[np.uint8]:
         """The finished picture, uint8 (size, size, 3)."""
@@ -29,7 +38,7 @@ class Canvas:
 
     def fill(self, colour: Rgb) -> None:
         """Paint the whole square."""
-        self._image.paste(colour, (0, 0, self._scale, self._scale))
+        self._draw.rectangle(self._box(0, 0, 1, 1), fill=colour)
 
     def rectangle(
         self,
@@ -83,12 +92,11 @@ class Canvas:
 
     def polygon(self, points: list[tuple[float, float]], fill: Rgb) -> None:
         """Draw a filled polygon."""
-        self._draw.polygon([(x * self._scale, y * self._scale) for x, y in points], fill=fill)
+        self._draw.polygon(self._scaled(points), fill=fill)
 
     def line(self, points: list[tuple[float, float]], fill: Rgb, width: float = 0.05) -> None:
         """Draw a line through points, with round ends."""
-        scaled = [(x * self._scale, y * self._scale) for x, y in points]
-        self._draw.line(scaled, fill=fill, width=self._width(width), joint="curve")
+        self._draw.line(self._scaled(points), fill=fill, width=self._width(width), joint="curve")
         for x, y in (points[0], points[-1]):
             self.circle(x, y, width / 2, fill=fill)
 
@@ -100,8 +108,11 @@ class Canvas:
         self._draw.arc(box, start, end, fill=fill, width=self._width(width))
 
     def _box(self, x0: float, y0: float, x1: float, y1: float) -> tuple[float, float, float, float]:
-        last = self._scale - 1
-        return x0 * last, y0 * last, x1 * last, y1 * last
+        last, left, top = self._scale - 1, self._left, self._top
+        return left + x0 * last, top + y0 * last, left + x1 * last, top + y1 * last
+
+    def _scaled(self, points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+        return [(self._left + x * self._scale, self._top + y * self._scale) for x, y in points]
 
     def _width(self, width: float) -> int:
         return max(1, round(width * self._scale))

@@ -19,7 +19,6 @@ from socialai_dsl.program import (
 )
 from socialai_dsl.vocabulary import DIRECTIONS, TURN_WORDS
 
-_WITH_GESTURES: Final = 6
 _DONE: Final = {"stop pointing": "stop"}
 
 
@@ -44,7 +43,7 @@ class Gesture(NamedTuple):
 
 def gestures_of(program: Program, registers: NDArray[np.int16]) -> dict[tuple[int, int], Gesture]:
     """(x, y) -> the gesture of the NPC that is seen there; empty where the agent is not shown any."""
-    if program.header(Header.CHANNELS) != _WITH_GESTURES or program.header(Header.FLAGS) & Flag.NPCS_HIDDEN:
+    if "pointing" not in program.channels or program.header(Header.FLAGS) & Flag.NPCS_HIDDEN:
         return {}
     found: dict[tuple[int, int], Gesture] = {}
     for number, entity in enumerate(program.entities):

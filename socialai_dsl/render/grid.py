@@ -28,6 +28,7 @@ def draw_grid(
     tile: int = 32,
     below: Mapping[tuple[int, int], Code] | None = None,
     gestures: Mapping[tuple[int, int], Gesture] | None = None,
+    held: Mapping[tuple[int, int], Code] | None = None,
 ) -> NDArray[np.uint8]:
     """Draw the room from above.
 
@@ -38,6 +39,7 @@ def draw_grid(
         tile: side of a cell in pixels.
         below: (x, y) -> what lies under the one who stands there, such as a doorway.
         gestures: (x, y) -> where the NPC there points and what it did last.
+        held: (x, y) -> what the agent or the NPC there carries.
 
     Returns:
         uint8 (H * tile, W * tile, 3).
@@ -57,7 +59,8 @@ def draw_grid(
             lit = bool(seen[row, column]) if seen is not None else False
             under = below.get((column, row)) if below else None
             gesture = gestures.get((column, row)) if gestures else None
-            cells.append(draw_tile(code, here, lit, tile, under, gesture))
+            carried = held.get((column, row)) if held else None
+            cells.append(draw_tile(code, here, lit, tile, under, gesture, carried))
         rows.append(np.concatenate(cells, axis=1))
     picture = np.concatenate(rows, axis=0)
     if seen is not None:
@@ -119,6 +122,7 @@ def figures(
     codes: NDArray[np.uint8],
     gestures: Mapping[tuple[int, int], Gesture],
     places: Container[tuple[int, int]] | None = None,
+    held: Mapping[tuple[int, int], Code] | None = None,
 ) -> list[str]:
     """Further facts of NPCs, one line each in reading order: `A> 3,1 red, points down`.
 
@@ -126,15 +130,29 @@ def figures(
         codes: as for `draw_grid`.
         gestures: (x, y) -> where the NPC there points and what it did last.
         places: the cells to be told of; None for all.
+        held: (x, y) -> what the NPC there carries.
     """
+    held = held or {}
     lines = []
     for row, column in np.argwhere(codes[..., 0] == tiles.NPC).tolist():
         if places is not None and (column, row) not in places:
             continue
         code, gesture = _code(codes, row, column), gestures.get((column, row))
         said = [COLORS[code[1] % len(COLORS)], *([gesture.words] if gesture and gesture.words else [])]
+        said += [f"carries {thing_words(held[column, row])}"] if (column, row) in held else []
         lines.append(f"{_letters_of(code)} {column},{row} {', '.join(said)}")
     return lines
+
+
+def thing_words(code: Code) -> str:
+    """Colour and type of a thing."""
+    type_ = types_by_code().get(code[0])
+    return f"{COLORS[code[1] % len(COLORS)]} {'thing' if type_ is None else type_.name.replace('_', ' ')}"
+
+
+def own_hands(code: Code) -> str:
+    """What the agent carries, in words and letters: `you carry a red ball, rb`."""
+    return f"you carry a {thing_words(code)}, {_letters_of(code).strip()}"
 
 
 def letters(codes: NDArray[np.uint8], row: int, column: int) -> str:

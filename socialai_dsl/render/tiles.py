@@ -44,6 +44,7 @@ def draw_tile(
     size: int,
     below: Code | None = None,
     gesture: Gesture | None = None,
+    held: Code | None = None,
 ) -> NDArray[np.uint8]:
     """Draw one cell.
 
@@ -54,6 +55,7 @@ def draw_tile(
         size: side of the tile in pixels.
         below: what lies under it, such as the doorway in which an NPC stands; None for plain floor.
         gesture: where an NPC points and what it did last; None where that is not shown.
+        held: what who stands here carries; None for nothing.
 
     Returns:
         A read-only array, uint8 (size, size, 3).
@@ -67,6 +69,8 @@ def draw_tile(
         draw_gesture(canvas, PALETTE[code[1] % len(PALETTE)], code[3], gesture)
     if agent_direction is not None:
         draw_agent(canvas, agent_direction)
+    if held is not None:
+        _draw_held(canvas, held)
     pixels = canvas.pixels()
     pixels.setflags(write=False)
     return pixels
@@ -78,6 +82,13 @@ def _dark(colour: Rgb) -> Rgb:
 
 def _light(colour: Rgb) -> Rgb:
     return mix(colour, WHITE, 0.55)
+
+
+def _draw_held(canvas: Canvas, held: Code) -> None:
+    """A small picture of a thing in the lower left corner."""
+    kind, colour, status, orientation = held
+    canvas.circle(0.2, 0.8, 0.19, fill=WHITE, outline=INK, width=0.03)
+    _drawer(kind)(canvas.part(0.05, 0.65, 0.3), PALETTE[colour % len(PALETTE)], status, orientation)
 
 
 def _draw_nothing(canvas: Canvas, colour: Rgb, status: int, orientation: int) -> None:

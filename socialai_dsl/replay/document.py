@@ -114,10 +114,10 @@ class Moment(_Part):
         cells: pairs of a cell and the number of its look.
         agent: x, y and direction.
         below: pairs of a cell where an NPC stands and the number of the look of the object there.
-        gestures: what NPCs show.
+        gestures: what NPCs show. held: pairs of a cell and the number of the look of what is carried there.
         view: the agent's own view, 7 rows of 7 numbers of looks; the agent stands in the middle of the last row and
             looks up.
-        view_gestures: what NPCs in it show.
+        view_gestures, view_held: what NPCs in it show, and what they and the agent carry.
         state: values that differ, by address: `wizard.state`, `doors[1].color`, `let.exit`.
         action: body action, speak, template, noun or slots; None without a step. did: the body action's word.
         said: the agent's utterance, None in silence. heard: lines.
@@ -136,8 +136,10 @@ class Moment(_Part):
     agent: tuple[int, int, Direction]
     below: list[tuple[_Number, _Number]] = []
     gestures: list[Gesture] = []
+    held: list[tuple[_Number, _Number]] = []
     view: list[_Number] | None = None
     view_gestures: list[Gesture] = []
+    view_held: list[tuple[_Number, _Number]] = []
     state: dict[str, Any] = {}
     action: tuple[_Number, _Number, _Number, _Number] | None = None
     did: str | None = None

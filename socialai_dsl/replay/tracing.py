@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from socialai_dsl.envs.view import View
-from socialai_dsl.program import Flag, Header, Program
+from socialai_dsl.program import VIEW, Flag, Header, Program
 from socialai_dsl.program_suite import outcome_name
 from socialai_dsl.render.gestures import Gesture
 from socialai_dsl.replay import document
@@ -160,7 +160,10 @@ class Tracer:
     def cut_short(self, replies: Answers, ended: Outcome) -> Moment:
         """The moment in which a language model's answers without an action ended the episode."""
         last = self.moments[-1]
-        kept = {name: getattr(last, name) for name in ("agent", "below", "gestures", "view_gestures")}
+        kept = {
+            name: getattr(last, name)
+            for name in ("agent", "below", "gestures", "held", "view_gestures", "view_held")
+        }
         self.moments.append(Moment(t=len(self.moments), replies=_replies(replies), ended=ended, **kept))
         self._seen.append(self._seen[-1])
         return self.moments[-1]
@@ -217,6 +220,8 @@ class Tracer:
             below=[(y * width + x, self._look(code)) for (x, y), code in scene.below.items()],
             gestures=_gestures(scene.gestures, width),
             view_gestures=_gestures(view.gestures, view.codes.shape[1]),
+            held=[(y * width + x, self._look(code)) for (x, y), code in scene.held.items()],
+            view_held=[(y * VIEW + x, self._look(code)) for (x, y), code in view.held.items()],
             **_differences(before, seen),
             **more,
         )
@@ -226,7 +231,8 @@ class Tracer:
 
     def _view(self, image: NDArray[np.uint8], described: Mapping[str, Any], info: Mapping[str, Any]) -> View:
         egocentric = bool(self._playing(info.get("member")).header(Header.FLAGS) & Flag.EGOCENTRIC)
-        return View(image, DIRECTIONS.index(described["agent"]["facing"]), egocentric)
+        facing = DIRECTIONS.index(described["agent"]["facing"])
+        return View(image, facing, egocentric, self._env.channels)
 
     def _cast(self, described: Mapping[str, Any]) -> list[Member]:
         """The NPCs, with the names by which they are heard."""

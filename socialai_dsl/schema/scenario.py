@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StringConstraints, WithJsonSchema
 from pydantic.config import JsonDict
@@ -305,6 +305,9 @@ class Character(Model):
         default_factory=dict, alias="with", description="fills the slots"
     )
     beliefs: dict[Word, Belief] = Field(default_factory=dict, description="name: a belief")
+    accepts: Expression | None = Field(
+        None, description="whether it takes what is given to it; default always", examples=["is(waiting)"]
+    )
     audible: Literal["always"] | None = Field(None, description="heard even while NPCs are hidden")
     kind_code: int | None = Field(None, ge=0, le=255, description="status code in the image")
 
@@ -420,7 +423,10 @@ class ObjectGroup(Model):
     tagged: Expression | None = Field(None, description="computed: it is tagged while this holds")
     one_way: bool = Field(False, description="a toggle only leads away from the initial status, never back")
     dark: bool = Field(False, description="the agent sees no difference between its statuses")
-    inside: str | None = Field(None, description="the object it lies in, unseen until that is opened")
+    carryable: bool = Field(False, description="it can be picked up, carried and given")
+    inside: str | None = Field(
+        None, description="the object it lies in, unseen until that is opened, or who carries it at first"
+    )
     exclusive: bool = Field(
         False, description="of a group: once one of them is used, the others react to nothing"
     )
@@ -437,8 +443,8 @@ class ObjectGroup(Model):
     )
 
 
-Channel = Literal["type", "color", "status", "orientation", "pointing", "last_act"]
-CHANNELS: tuple[Channel, ...] = ("type", "color", "status", "orientation", "pointing", "last_act")
+Channel = Literal["type", "color", "status", "orientation", "pointing", "last_act", "carrying"]
+CHANNELS: tuple[Channel, ...] = get_args(Channel)
 
 
 class Observe(Model):
@@ -450,8 +456,11 @@ class Observe(Model):
     image: Literal["end", "before_npcs"] = Field("end", description="when in the step the picture is taken")
     names: Literal["shown", "hidden"] = Field("shown", description="speaker names in what is heard")
     own_voice: bool = Field(False, description="whether the agent hears itself")
-    channels: Annotated[tuple[Channel, ...], BeforeValidator(_as_tuple)] = Field(
-        CHANNELS[:4], description="of the image: the first four, or all six"
+    channels: Annotated[tuple[Channel, ...], BeforeValidator(_as_tuple)] | None = Field(
+        None,
+        description="of the image: the first four, and perhaps the next two, and carrying; default the first "
+        "four, and carrying where something can be carried",
+        examples=[["type", "color", "status", "orientation", "carrying"]],
     )
     directions: Literal["absolute", "egocentric"] = Field(
         "absolute",

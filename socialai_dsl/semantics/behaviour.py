@@ -10,7 +10,7 @@ from typing import Any, cast
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Effects, FirstRule, Rule, State, Step, ThenRule, WorldRule
-from socialai_dsl.semantics import groups, object_facts, rows, texts
+from socialai_dsl.semantics import groups, hands, object_facts, rows, texts
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.groups import performed
 from socialai_dsl.semantics.nesting import NestedPlanner
@@ -70,7 +70,7 @@ _STATUS_AFTER = {"reveal": "opened", "open": "open", "close": "closed", "lock": 
 
 _TYPES = {"entity": ENTITY, "direction": DIRECTION, "turn": TURN, "int": INT}
 """What is expected of an argument, by what the signature takes."""
-_TO_CELLS = frozenset({"go_to", "go_next_to", "face"})
+_TO_CELLS = frozenset({"go_to", "go_next_to", "face", "bring"})
 """Activities for which a cell will do."""
 
 _WANDERING = ("forward", "left", "right")
@@ -97,6 +97,10 @@ def activity(resolver: Resolver, path: DataPath, raw: str | None, scope: Scope) 
         return _choice(resolver, path, args[0], scope)
     if name == "perform":
         return Activity("perform", performed(resolver, args[0], scope), site, span)
+    if name in ("fetch", "give", "bring"):
+        terms = tuple(_argument(resolver, name, arg, ENTITY, scope) for arg in args)
+        hands.check_arguments(resolver, name, terms, args, scope)
+        return Activity(name, terms, site, span)
     if name in ("push", "point", "follow"):
         return _at_something(resolver, name, args, Activity("stay", (), site, span), scope)
     terms = tuple(
@@ -272,8 +276,9 @@ def _target(
     if name == "put":
         return resolver.somewhere(node, scope)
     holder = resolver.value(node, ENTITY, scope)
-    object_facts.check_holder(resolver, holder, node, scope)
-    for entity in entities:
+    things = [number for one in entities for number in range(one.type.low, one.type.high + 1)]
+    object_facts.check_holder(resolver, holder, node, scope, things)
+    for entity in () if hands.is_member(resolver, holder) else entities:
         object_facts.container(resolver, entity, subject, scope)
     return holder
 

@@ -494,6 +494,7 @@ class _Run:
         remembered, required = tuple(groups.memories(resolver)), tuple(behaviour.requirements(resolver))
         inhabitants = tuple(entities_of(resolver))
         believed = tuple(object_facts.beliefs(resolver))
+        accepting = tuple(object_facts.accepting(resolver))
         drawn = resolver.registers.drawn()
         in_order = setup.ordered(resolver, placed, colors, turned, drawn)
         room = room_plan(resolver)
@@ -530,9 +531,11 @@ class _Run:
             slope=self._slope(),
             beliefs=tuple(believed),
             channels=self._channels(),
+            shows_carrying=self._shows_carrying(),
             each_step=round(scenario.reward.each_step * 1_000_000),
             properties=claimed,
             probes=asked,
+            accepting=accepting,
             readings=resolver.readings,
         )
 
@@ -655,14 +658,23 @@ class _Run:
         return term.value, None
 
     def _channels(self) -> int:
-        """How many channels the picture has: the first four, or all."""
-        given = self._scenario.observe.channels
-        if given not in (CHANNELS[:4], CHANNELS):
+        """How many channels the picture has, without the one for what is carried: the first four, or two more."""
+        given = self._scenario.observe.channels or CHANNELS[:4]
+        known = tuple(name for name in given if name != "carrying")
+        if known not in (CHANNELS[:4], CHANNELS[:6]) or given != tuple(n for n in CHANNELS if n in given):
             message = (
-                "`channels` are " + ", ".join(CHANNELS[:4]) + ", and perhaps " + " and ".join(CHANNELS[4:])
+                f"`channels` are {', '.join(CHANNELS[:4])}, and perhaps pointing and last_act, and carrying"
             )
             self._findings.error("S106", message, self._findings.places.key_span(("observe", "channels")))
-        return 4 if given == CHANNELS[:4] else 6
+        return 4 if known == CHANNELS[:4] else 6
+
+    def _shows_carrying(self) -> bool:
+        """Whether the picture has a channel for what NPCs carry; by default where something can be carried."""
+        given = self._scenario.observe.channels
+        possible = (
+            any(group.carryable for group in self._scenario.objects.values()) and len(self._symbols.cast) > 1
+        )
+        return possible if given is None else "carrying" in given
 
     def _slope(self) -> int:
         """Thousandths of the success reward that are lost by the horizon: `linear(0.9)`."""

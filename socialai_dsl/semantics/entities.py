@@ -587,7 +587,7 @@ def _code(member: CastMember, kinds: list[str]) -> int:
 def _check_shared(resolver: Resolver, name: str) -> None:
     """What the files of a `one_of` must have in common."""
     members = resolver.symbols.alternatives[name]
-    for key in ("earshot", "view", "audible"):
+    for key in ("earshot", "view", "audible", "accepts"):
         other = next(
             (i for i, one in enumerate(members) if getattr(one, key) != getattr(members[0], key)), None
         )
@@ -623,6 +623,7 @@ def _objects(
             timer=described.timer or 0,
             exclusive=tuple(objects.numbers) if described.exclusive else (),
             pushed_by_rolling=rolled,
+            carryable=described.carryable,
             contains=holding.get(number, ()),
         )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -10,7 +10,7 @@ from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.grammar.ast import ParseProblem, parse_expression
 from socialai_dsl.schema.scenario import Effects, Frame, Register, Scenario
-from socialai_dsl.semantics import groups
+from socialai_dsl.semantics import groups, hands
 from socialai_dsl.semantics.believing import Believed
 from socialai_dsl.semantics.plans import Activity, BeliefPlan, Computed, FramePlan, StatePlan
 from socialai_dsl.semantics.resolver import ENTITY, Resolver
@@ -18,6 +18,7 @@ from socialai_dsl.semantics.scope import (
     FailedError,
     Objects,
     Scope,
+    at_every_step,
     frames_of,
     object_scope,
     of_each,
@@ -61,12 +62,23 @@ def inside_of(resolver: Resolver, objects: Objects, index: int, path: DataPath, 
     scope = object_scope(objects, index, path, "inside", at_reset=True)
     node = resolver.findings.expression(path, raw)
     holder = resolver.value(node, ENTITY, scope)
-    check_holder(resolver, holder, node, scope)
+    check_holder(resolver, holder, node, scope, (objects.numbers[index],))
     return holder
 
 
-def check_holder(resolver: Resolver, holder: Term, node: ast.Expr, scope: Scope) -> None:
-    """Report what cannot hold anything."""
+def check_holder(
+    resolver: Resolver, holder: Term, node: ast.Expr, scope: Scope, contents: Iterable[int]
+) -> None:
+    """Report what cannot hold anything, and contents that nobody can carry."""
+    if hands.is_member(resolver, holder):
+        for number in contents:
+            objects = resolver.symbols.object_of(number)
+            if number not in hands.carryable(resolver):
+                called = objects.name if objects is not None else resolver.symbols.member_of(number)
+                raise resolver.fail(
+                    "S204", f"`{called}` cannot be carried", node, scope, hint=hands.CARRYABLE
+                )
+        return
     for entity in range(holder.type.low, holder.type.high + 1):
         objects = resolver.symbols.object_of(entity)
         if objects is None or "opened" not in objects.type.states:
@@ -465,6 +477,26 @@ def beliefs(resolver: Resolver) -> Iterator[BeliefPlan]:
             with surviving():
                 if register_of(name, key) in resolver.registers:
                     yield from Believed(resolver, name, key, belief).plans()
+
+
+def accepting(resolver: Resolver) -> Iterator[tuple[int, str]]:
+    """Members who do not take everything they are given, each with the register of the step that says whether."""
+    for name, member in resolver.symbols.cast.items():
+        if member.accepts is None:
+            continue
+        path = resolver.symbols.member_path(name, "accepts")
+        with surviving():
+            scope = at_every_step(reset_scope(path, f"cast.{name}.accepts", name))
+            term = resolver.written(path, member.accepts, BOOL, scope)
+            span = resolver.findings.at(path)
+            if not hands.carryable(resolver):
+                raise resolver.findings.fail("S204", "nothing here can be given", span, hint=hands.CARRYABLE)
+            if draws(term):
+                message = "`accepts` is asked in every step, so nothing can be drawn in it"
+                hint = "draw it in `let`, and use that"
+                raise resolver.findings.fail("S204", message, span, hint=hint)
+            noted = resolver.registers.remember(Sited(term, scope.draws.site, span))
+            yield resolver.symbols.numbers[name], noted.path
 
 
 def watching(member: str, number: int, span: Span) -> FramePlan:

@@ -54,7 +54,8 @@ class Region:
 @dataclass(frozen=True, slots=True)
 class Placing:
     """Where an entity is put: exactly one of `at` (x, y), `regions` (their union, filtered by `where`), `inside` (in
-    another object: on its cell, but out of the room until that is opened), or nowhere. With `overlap` cells that are
+    another object: on its cell, but out of the room until that is opened; or, `in_hands`, carried by a member of the
+    cast), or nowhere. With `overlap` cells that are
     taken count as well.
     """
 
@@ -68,6 +69,7 @@ class Placing:
     where_site: str = ""
     nowhere: bool = False
     inside: Term | None = None
+    in_hands: bool = False
     overlap: bool = False
     when: Term | None = None
     """Done only if this holds: of several for one entity (`one_of`), one does."""
@@ -315,6 +317,7 @@ class Entity:
     exclusive: tuple[int, ...] = ()
     """Objects of its group: while one of them is not in its initial status, the others react to nothing."""
     pushed_by_rolling: bool = False
+    carryable: bool = False
     contains: tuple[int, ...] = ()
     """What may lie inside: when this one is opened while something does, it is replaced by that."""
 
@@ -443,9 +446,12 @@ class CheckedScenario:
         require: a room is drawn again while one of these is false.
         egocentric: the picture shows the directions of NPCs relative to the agent's.
         beliefs: what members take for true. slope: thousandths of the success reward that are lost by the horizon.
-        each_step: millionths added to the reward of every step. channels: of the picture, 4 or 6.
+        each_step: millionths added to the reward of every step. channels: of the picture, 4 or 6; one
+            more where it `shows_carrying`.
         properties: what the scenario claims about itself; probes: what language models are asked. No program of the
             scenario contains either.
+        accepting: members of the cast who do not take everything they are given, each with the path of the register
+            that says whether it does.
         readings: how conditions were written; None if it was not made from a file.
     """
 
@@ -473,6 +479,8 @@ class CheckedScenario:
     slope: int = 900
     each_step: int = 0
     channels: int = 4
+    shows_carrying: bool = False
     properties: tuple[PropertyPlan, ...] = ()
     probes: tuple[ProbePlan, ...] = ()
+    accepting: tuple[tuple[int, str], ...] = ()
     readings: Readings | None = field(default=None, compare=False, repr=False)

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics import groups, object_facts, resolve_names, rows, texts
+from socialai_dsl.semantics import groups, hands, object_facts, resolve_names, rows, texts
 from socialai_dsl.semantics.conditional import conditional
 from socialai_dsl.semantics.groups import check_moment, check_points, check_toggled, must_be_agent, subject_of
 from socialai_dsl.semantics.resolve_names import toggled_by, without_arguments
@@ -122,6 +122,9 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
     if node.name in ("joint_attention", "points_at", "toggled_by"):
         assert subject is not None, "internal: a cell attends to nothing"
         return _attention(resolver, node.name, subject, node, scope)
+    if node.name == "carries":
+        assert subject is not None, "internal: a cell carries nothing"
+        return hands.carries(resolver, subject, node, scope)
     if node.name in ("sees", "would_see"):
         assert subject is not None, "internal: a cell sees nothing"
         return _sees(resolver, subject, node, scope)

@@ -9,7 +9,7 @@ from itertools import chain, pairwise
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Sequence
-from socialai_dsl.semantics import object_facts, rows, slots, texts
+from socialai_dsl.semantics import hands, object_facts, rows, slots, texts
 from socialai_dsl.semantics.groups import check_moment, check_points, check_toggled, must_be_agent, subject_of
 from socialai_dsl.semantics.resolver import VOCABULARIES, Resolver
 from socialai_dsl.semantics.scope import (
@@ -184,6 +184,10 @@ def _attribute(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: 
             return Compare("!=", FieldOf(_POINTING, who, "pointing"), Const(_POINTING, 0))
         case "inside":
             return object_facts.container(resolver, who, node, scope)
+        case "carried":
+            return hands.carried(resolver, who, node, scope)
+        case "empty_handed":
+            return hands.empty_handed(resolver, who, node, scope)
         case "toggled":
             check_toggled(resolver, name, who, node, scope)
             everybody = range(len(resolver.symbols.numbers))

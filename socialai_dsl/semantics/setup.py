@@ -10,7 +10,7 @@ from typing import Literal
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import CastMember, Expression, ObjectGroup, Scenario
-from socialai_dsl.semantics import groups, object_facts
+from socialai_dsl.semantics import groups, hands, object_facts
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.plans import Coloring, Drawn, Facing, Placing, Region, RoomPlan, Setup
 from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
@@ -323,7 +323,22 @@ def placings(resolver: Resolver) -> dict[int, tuple[Placing, ...]]:
         with surviving():
             for placing in _object_placings(resolver, objects):
                 found[placing.entity] = (placing,)
+    _check_hands(resolver, found)
     return found
+
+
+def _check_hands(resolver: Resolver, placed: Mapping[int, tuple[Placing, ...]]) -> None:
+    """Report a second thing in the hands of one member of the cast."""
+    full: dict[int, int] = {}
+    for number, (placing, *_) in placed.items():
+        holder = placing.inside
+        if not isinstance(holder, Const) or not placing.in_hands:
+            continue
+        if holder.value in full:
+            who = resolver.symbols.member_of(holder.value)
+            message = f"`{who}` carries one thing at a time"
+            resolver.findings.error("S204", message, placing.span, hint="put this one somewhere else")
+        full[holder.value] = number
 
 
 def _distinct(
@@ -397,7 +412,10 @@ def _inside(resolver: Resolver, objects: Objects, group: ObjectGroup) -> Iterato
         holder = object_facts.inside_of(resolver, objects, i, path, str(group.inside))
         span = resolver.findings.at(path)
         site = f"objects.{objects.called(i)}.inside"
-        yield Placing(spot.entity, spot.site, spot.number, span, inside=holder, where_site=site)
+        in_hands = hands.is_member(resolver, holder)
+        yield Placing(
+            spot.entity, spot.site, spot.number, span, inside=holder, in_hands=in_hands, where_site=site
+        )
 
 
 def _spot(objects: Objects, index: int, path: DataPath, count: int) -> Spot:
@@ -652,7 +670,7 @@ def needs(item: Setup) -> list[str]:
                 found |= {f"cell {n}": None for n in _numbers(term)}
                 if region.name == "in_front_of":
                     found |= {f"facing {n}": None for n in _numbers(term)}
-    if isinstance(item, Placing) and item.inside is not None:
+    if isinstance(item, Placing) and item.inside is not None and not item.in_hands:
         found |= {f"cell {n}": None for n in _numbers(item.inside)}
     for term in walk(item):
         found |= dict.fromkeys(_needs(term))

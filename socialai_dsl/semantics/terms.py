@@ -132,12 +132,14 @@ class World:
 @dataclass(frozen=True, slots=True)
 class FieldOf:
     """An attribute of an entity: x, y, dir, color, status, gone, poked, last (its last body action), pointing (0, or
-    1 + direction), inside (the object it lies in).
+    1 + direction), inside (the object it lies in), carrier (0, or 1 + who carries it).
     """
 
     type: Type
     entity: Term
-    name: Literal["x", "y", "dir", "color", "status", "gone", "poked", "pointing", "inside", "toggled"]
+    name: Literal[
+        "x", "y", "dir", "color", "status", "gone", "poked", "pointing", "inside", "toggled", "carrier"
+    ]
 
 
 @dataclass(frozen=True, slots=True)

@@ -56,6 +56,10 @@ def all_tiles() -> list[Tile]:
         for pointing in (-1, 0, 1, 2, 3)
         for act in LAST_ACTS
     ]
+    found += [
+        ((tiles.NPC, 4, 1, 0), {"held": (code, colour, 0, 0)}) for code, _ in types for colour in range(6)
+    ]
+    found += [((tiles.EMPTY, 0, 0, 0), {"agent": 1, "held": (prelude().types["ball"].code, 2, 1, 1)})]
     return [*found, ((tiles.NPC, 1, 2, 3), {"below": (prelude().types["door"].code, 0, 0, 0)})]
 
 
@@ -64,7 +68,8 @@ def as_png(look: tiles.Code, more: dict[str, Any]) -> np.ndarray:
     if gesture is not None:
         pointing = gesture["pointing"]
         gesture = Gesture(None if pointing < 0 else pointing, gesture["act"])
-    return draw_tile(look, more.get("agent"), more.get("seen", False), SIZE, more.get("below"), gesture)
+    held = more.get("held")
+    return draw_tile(look, more.get("agent"), more.get("seen", False), SIZE, more.get("below"), gesture, held)
 
 
 def pixels(address: str) -> np.ndarray:

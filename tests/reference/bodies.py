@@ -26,7 +26,7 @@ SEARCH_ORDER = ("down", "up", "right", "left")
 
 
 def act(world: World, body: Entity, primitive: str) -> None:
-    """Executes a primitive; what cannot be done is not done. pickup, drop and done change nothing in the room."""
+    """Executes a primitive; what cannot be done is not done. `done` changes nothing in the room."""
     # A body action with a direction: `point up`.
     word, _, way = primitive.partition(" ")
     body.action = body.last_act = word
@@ -46,6 +46,10 @@ def act(world: World, body: Entity, primitive: str) -> None:
         body.pointing = None
     elif primitive == "toggle":
         toggle(world, body, ahead)
+    elif primitive == "pickup":
+        pick_up(world, body, ahead)
+    elif primitive == "drop":
+        put_down(world, body, ahead)
 
 
 def can_enter(world: World, body: Entity, cell: Cell) -> bool:
@@ -53,6 +57,27 @@ def can_enter(world: World, body: Entity, cell: Cell) -> bool:
     if body is world.agent and world.walkable(cell) and world.deadly(cell):
         return world.npcs_hidden or all(npc.cell != cell for npc in world.npcs)
     return geometry.free(world, cell, body)
+
+
+def pick_up(world: World, body: Entity, cell: Cell) -> None:
+    """What can be carried goes from the cell into empty hands; nothing is taken from where somebody stands."""
+    things = [thing for thing in world.objects_at(cell) if thing.carryable and not thing.blocked]
+    taken = any(member.cell == cell for member in world.cast.values())
+    if things and not taken and world.carried_by(body) is None:
+        things[-1].cell, things[-1].carrier = None, body
+
+
+def put_down(world: World, body: Entity, cell: Cell) -> None:
+    """Who stands there gets it, if he takes it and has nothing; else it lies in the cell, where things can roll."""
+    thing = world.carried_by(body)
+    if thing is None:
+        return
+    others = [member for member in (world.agent, *world.npcs) if member.cell == cell]
+    if others:
+        if others[0].accepts and world.carried_by(others[0]) is None:
+            thing.carrier = others[0]
+    elif motion.clear(world, cell):
+        thing.cell, thing.carrier = cell, None
 
 
 def toggle(world: World, user: Entity, cell: Cell) -> None:
@@ -80,20 +105,48 @@ class Activity:
     verb: str
     goal: Any = None
     way: Any = None  # of a push; how near to stay
-    acting: bool = False  # this turn is that of the toggle or the push itself
+    acting: bool = False  # this turn is that of the toggle, the push, the pickup or the drop itself
+    done_before: bool = False  # of hands: what they were for was so before this turn
 
     def primitive(self, world: World, me: Entity) -> str:
         """The body action it asks for now."""
+        if self.verb in ("fetch", "give", "bring"):
+            return self.hands(world, me)
         asked = self.asked(world, me)
         act = {"use": "toggle", "push": "forward"}.get(self.verb)
         self.acting = act == asked and geometry.faces(world, me, self.goal)
         return asked
 
+    def hands(self, world: World, me: Entity) -> str:
+        """What is to be fetched, and is it there yet? Else on with it."""
+        self.acting = self.done_before = False
+        if me.cell is None:
+            return "none"
+        thing, person = self.goal, isinstance(self.way, Entity) and self.way.sort != "object"
+        if self.verb == "fetch":
+            self.done_before = thing.carrier is me
+        elif person:
+            self.done_before = thing.carrier is self.way
+        else:
+            self.done_before = geometry.at(world, thing, self.way)
+        if self.done_before:
+            return "none"
+        if self.verb != "fetch" and thing.carrier is me:
+            goal, act = self.way, "drop"
+        elif self.verb == "give" or world.carried_by(me) is not None:
+            return "none"
+        else:
+            goal, act = thing, "pickup"
+        self.acting = geometry.faces(world, me, goal)
+        if self.acting:
+            return act
+        return face(world, me, goal) if geometry.next_to(world, me, goal) else go_next_to(world, me, goal)
+
     def asked(self, world: World, me: Entity) -> str:
         """The body action by itself."""
         if me.cell is None:
             return "none"
-        if self.verb in ("left", "right", "forward", "toggle", "stop_pointing"):
+        if self.verb in ("left", "right", "forward", "toggle", "pickup", "drop", "stop_pointing"):
             return self.verb
         if self.verb == "turn":
             return str(self.goal)
@@ -139,6 +192,10 @@ class Activity:
 
     def finished(self, world: World, me: Entity) -> bool:
         """Whether it ended with the turn that was just taken; single actions take one turn."""
+        if self.verb in ("fetch", "give", "bring"):
+            act = "pickup" if self.verb == "fetch" else "drop"
+            full = world.carried_by(me) is not None
+            return self.done_before or (self.acting and me.action == act and full == (act == "pickup"))
         if self.verb in ("use", "push"):
             return self.acting and me.action == ("toggle" if self.verb == "use" else "forward")
         if self.verb in ("go_to", "enter", "go_next_to"):

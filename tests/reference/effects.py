@@ -96,12 +96,15 @@ def affect(world: World, target: Entity, verb: str, status: Any) -> None:
     """One effect on one entity; what does not apply to its status changes nothing."""
     if verb == "vanish":
         vanish(target)
+        target.carrier = None
     elif verb == "reset":
         reset(world, target)
     elif verb == "put":
         put(world, target, where(status))
+    elif verb == "move_into" and status.sort != "object":
+        hand_over(world, target, status)
     elif verb == "move_into":
-        target.cell, target.inside = None, status
+        target.cell, target.carrier, target.inside = None, None, status
     elif verb == "reveal":
         # What lies in it takes its place as the world settles.
         target.status = "opened"
@@ -122,21 +125,30 @@ def put(world: World, target: Entity, cell: Cell | None) -> None:
     if cell is None:
         return
     if target.sort == "object" or (world.walkable(cell) and not world.deadly(cell) and not taken):
-        target.cell = cell
+        target.cell, target.carrier = cell, None
+
+
+def hand_over(world: World, target: Entity, member: Entity) -> None:
+    """Somebody has it in his hands, if these are empty."""
+    if world.carried_by(member) is None:
+        target.cell, target.carrier = None, member
 
 
 def remember(entity: Entity) -> None:
     """Keeps what `reset` will bring back."""
-    entity.at_reset = (entity.status, entity.cell, entity.facing, entity.inside)
+    entity.at_reset = (entity.status, entity.cell, entity.facing, entity.inside, entity.carrier)
 
 
 def reset(world: World, target: Entity) -> None:
     """As it was put down in this episode; an NPC turns back, and goes back if its place is free."""
-    status, cell, facing, inside = target.at_reset
+    status, cell, facing, inside, carrier = target.at_reset
     if target.sort == "object":
         target.status, target.inside, target.counted = status, inside, 0
+        target.carrier = None
+        if carrier is not None:
+            hand_over(world, target, carrier)
         for content in contents_at_reset(world, target):
-            content.cell, content.inside = None, target
+            content.cell, content.carrier, content.inside = None, None, target
     else:
         target.pointing, target.facing = None, facing
         if cell is None or not geometry.free(world, cell, target):

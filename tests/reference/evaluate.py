@@ -160,6 +160,8 @@ def _name(node: ast.Name, context: Context) -> Any:
         "action",
         "pointing",
         "turns_in_state",
+        "carried",
+        "empty_handed",
     ):
         return attribute(me, word, context)
     if me is not None and context.in_frame and word in ("facing", "cell", "x", "y"):
@@ -231,6 +233,13 @@ def attribute(subject: Any, name: str, context: Context) -> Any:
         return subject.facing
     if name == "pointing":
         return subject.pointing is not None
+    if name == "empty_handed":
+        return context.world.carried_by(subject) is None
+    if name == "carried":
+        thing = context.world.carried_by(subject)
+        if thing is None:
+            raise NothingFoundError
+        return thing
     if name == "inside":
         if context.setup:
             context.setup.compute_inside(subject)
@@ -426,6 +435,8 @@ def _verb(subject: Any, node: ast.Call, context: Context) -> Any:
         )
     something(subject)
     arguments = [something(of(argument, context)) for argument in node.args]
+    if name == "carries":
+        return any(thing.carrier is subject for thing in as_list(arguments[0]))
     if name == "toggled_by":
         return any(user in subject.toggled_by for user in as_list(arguments[0]))
     return getattr(geometry, name)(world, subject, *arguments)

@@ -93,13 +93,23 @@ class Reference:
             own_voice=scenario.observe.own_voice,
             egocentric=scenario.observe.directions == "egocentric",
             occlusion=scenario.room.occlusion,
-            gestures="pointing" in scenario.observe.channels,
+            gestures="pointing" in (scenario.observe.channels or ()),
+            hands=self.shows_hands(),
             canvas=self.canvas,
             step_names={
                 name: [entry.step.state for entry in frame.entries]
                 for name, frame in scenario.frames.items()
                 if frame.steps is not None
             },
+        )
+
+    def shows_hands(self) -> bool:
+        """Whether the picture shows what NPCs carry: if nothing else is said, where something can be carried."""
+        channels = self.scenario.observe.channels
+        if channels is not None:
+            return "carrying" in channels
+        return len(self.scenario.cast) > 1 and any(
+            group.carryable for group in self.scenario.objects.values()
         )
 
     def prepare(self, layout: dict[str, Any]) -> None:
@@ -180,6 +190,8 @@ class Reference:
         world.before = None
         if self.looks_back:
             world.before = copy.deepcopy(world)
+        for name, member in world.cast.items():
+            member.accepts = self.accepts(name)
         for name, memory in world.memories.items():
             source = self.scenario.memory[name].while_
             value = None if source is None else self.sources.expression(f"memory.{name}.while", source)
@@ -187,6 +199,17 @@ class Reference:
                 memory.open = holds(value, Context(world))
             except NothingFoundError:
                 memory.open = False
+
+    def accepts(self, name: str) -> bool:
+        """Whether a member of the cast takes in this step what it is given."""
+        source = self.scenario.versions(name)[0].accepts
+        if source is None:
+            return True
+        try:
+            value = self.sources.expression(f"cast.{name}.accepts", source)
+            return holds(value, Context(self.world, self.world.cast[name]))
+        except NothingFoundError:
+            return False
 
     def begin_step(self) -> None:
         """The clock; what is true of one step only is forgotten."""

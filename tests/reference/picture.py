@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tests.reference.sight import cell_in_view, lit
-from tests.reference.world import COLORS, DIRECTIONS, TYPES, Cell, World
+from tests.reference.world import COLORS, DIRECTIONS, TYPES, Cell, Entity, World
 
 SIZE = 7
 UNSEEN = (0, 0, 0, 0)
@@ -20,7 +20,8 @@ NOWHERE = (-1000, -1000)
 def picture(world: World, canvas: tuple[int, int]) -> np.ndarray:
     """`image[i, j]` shows the cell (6 - j) ahead and (i - 3) to the right of the agent; uint8 (7, 7, 4), with gestures
     (7, 7, 6)."""
-    image = np.full((SIZE, SIZE, 6 if world.gestures else 4), NOTHING, dtype=np.uint8)
+    more = 2 * world.gestures + world.hands
+    image = np.full((SIZE, SIZE, 4 + more), NOTHING, dtype=np.uint8)
     agent = world.agent
     eye = agent.cell or NOWHERE
     bright = lit(world, eye, agent.facing, SIZE) if world.occlusion and agent.cell else None
@@ -31,21 +32,36 @@ def picture(world: World, canvas: tuple[int, int]) -> np.ndarray:
             if bright is not None and (ahead, right) not in bright:
                 image[i, j, :4] = UNSEEN
             elif ahead == right == 0:
-                image[i, j, :4] = EMPTY
+                carried = world.carried_by(agent)
+                image[i, j, :4] = EMPTY if carried is None else thing_shown(carried)
             else:
                 image[i, j, :4] = shown(world, cell, canvas)
                 if world.gestures:
-                    image[i, j, 4:] = gestures(world, cell)
+                    image[i, j, 4:6] = gestures(world, cell)
+                if world.hands:
+                    image[i, j, -1] = hands(world, cell)
     return image
+
+
+def npc_shown(world: World, cell: Cell) -> Entity | None:
+    """The NPC that is seen in a cell."""
+    return next((npc for npc in world.npcs if npc.cell == cell and not world.npcs_hidden), None)
+
+
+def hands(world: World, cell: Cell) -> int:
+    """What an NPC in the cell carries: its type, and its colour times 32."""
+    npc = npc_shown(world, cell)
+    thing = None if npc is None else world.carried_by(npc)
+    return NOTHING if thing is None else TYPES[thing.type].code + 32 * COLORS.index(str(thing.color))
 
 
 def gestures(world: World, cell: Cell) -> tuple[int, int]:
     """Where an NPC in the cell points, and its last act."""
-    npc = next((npc for npc in world.npcs if npc.cell == cell and not world.npcs_hidden), None)
+    npc = npc_shown(world, cell)
     if npc is None:
         return NOTHING, NOTHING
     towards = NOTHING if npc.pointing is None else direction_shown(world, npc.pointing)
-    act = LAST_ACTS[npc.last_act]
+    act = LAST_ACTS.get(npc.last_act, LAST_ACTS["none"])
     # Who was reset after pointing has taken its arm down.
     points = npc.last_act == "point" and npc.pointing is not None
     return towards, act + towards if points else act
@@ -61,14 +77,19 @@ def shown(world: World, cell: Cell, canvas: tuple[int, int]) -> tuple[int, int, 
             return NPC, COLORS.index(str(npc.color)), npc.kind_code, direction_shown(world, npc.facing)
     thing = world.object_at(cell)
     if thing is not None:
-        type_ = TYPES[thing.type]
-        seen = type_.initial if thing.dark else thing.status
-        tag = 1 if seen == "tagged" else 0
-        return type_.code, COLORS.index(str(thing.color)), type_.states.index(seen), tag
+        return thing_shown(thing)
     ground = world.terrain.get(cell)
     if ground is not None:
         return TYPES[ground].code, COLORS.index(str(TYPES[ground].color)), 0, 0
     return WALL if world.on_border(cell) else EMPTY
+
+
+def thing_shown(thing: Entity) -> tuple[int, int, int, int]:
+    """What an object looks like."""
+    type_ = TYPES[thing.type]
+    seen = type_.initial if thing.dark else thing.status
+    tag = 1 if seen == "tagged" else 0
+    return type_.code, COLORS.index(str(thing.color)), type_.states.index(seen), tag
 
 
 def direction_shown(world: World, facing: str) -> int:

@@ -139,6 +139,7 @@ class Setup:
             for thing in things:
                 thing.one_way, thing.dark, thing.single = group.one_way, group.dark, size is None
                 thing.exclusive, thing.timer = group.exclusive, group.timer
+                thing.carryable = group.carryable
                 thing.only_rolled = group.pushed_by is not None
             self.world.objects[name] = things[0] if size is None else things
         kinds = self.kinds()
@@ -190,8 +191,13 @@ class Setup:
     def needs(self, name: str) -> list[str]:
         """The entities that somebody's place or position speaks of, through lets and facings too, as mentioned."""
         found: dict[str, None] = {}
-        for value in self.values_of(name, ("place", "at", "inside")):
+        for value in self.values_of(name, ("place", "at")):
             self.collect(value.tree, found, {name})
+        for value in self.values_of(name, ("inside",)):
+            holders: dict[str, None] = {}
+            self.collect(value.tree, holders, {name})
+            # What is carried does not need its carrier's place.
+            found |= {holder: None for holder in holders if holder not in self.world.cast}
         return [need for need in found if need != name]
 
     def collect(self, tree: ast.Node, found: dict[str, None], seen: set[str]) -> None:
@@ -386,12 +392,16 @@ class Setup:
     def compute_inside(self, thing: Entity) -> None:
         """What it lies in: it has no cell of its own until that is opened."""
         source = self.scenario.objects[thing.key].inside if thing.sort == "object" else None
-        if source is None or thing.inside is not None:
+        if source is None or thing.inside is not None or thing.carrier is not None:
             return
         found = evaluate(
             self.sources.expression(f"{site_of(thing)}.inside", source), self.context(thing, it=thing)
         )
-        thing.inside = found[thing.index] if isinstance(found, list) else found
+        holder = found[thing.index] if isinstance(found, list) else found
+        if holder.sort == "object":
+            thing.inside = holder
+        elif self.world.carried_by(holder) is None:
+            thing.carrier = holder
 
     def compute_beliefs(self, member: Entity) -> None:
         """Beliefs start with what is the case."""

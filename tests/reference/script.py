@@ -160,6 +160,7 @@ class Member:
     with_: dict[str, Any] = field(default_factory=dict)
     beliefs: dict[str, Belief] = field(default_factory=dict)
     audible: str | None = None
+    accepts: Any = None
     kind_code: int | None = None
 
     def over(self, base: Member) -> Member:
@@ -189,6 +190,7 @@ class Group:
     one_way: bool = False
     dark: bool = False
     inside: Any = None
+    carryable: bool = False
     exclusive: bool = False
     overlap: bool = False
     timer: int | None = None
@@ -246,7 +248,7 @@ class Observe:
     names: str = "shown"
     directions: str = "absolute"
     own_voice: bool = False
-    channels: tuple[str, ...] = ()
+    channels: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True)

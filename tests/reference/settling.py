@@ -54,7 +54,9 @@ class Settling:
     def release_contents(self) -> None:
         """All that lies in a box that is opened takes its place."""
         for box in self.world.things():
-            contents = [one for one in self.world.things() if one.gone and one.inside is box]
+            contents = [
+                one for one in self.world.things() if one.gone and one.inside is box and one.carrier is None
+            ]
             if not box.gone and box.status == "opened" and contents:
                 for content in contents:
                     content.cell = box.cell

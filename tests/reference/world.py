@@ -139,6 +139,8 @@ class Entity:
     dark: bool = False
     unlocks: list[Entity] = field(default_factory=list)
     opens: list[Entity] = field(default_factory=list)
+    carryable: bool = False
+    carrier: Entity | None = None  # who carries it; it has no cell then
     inside: Entity | None = None  # the container it lies in, or came out of
     timer: int | None = None  # steps until an active status expires
     counted: int = 0  # steps since its status became active
@@ -176,6 +178,7 @@ class Entity:
     ages: dict[str, int] = field(default_factory=dict)  # of beliefs: turns without a source
     poked: bool = False
     was_poked: bool = False
+    accepts: bool = True  # in this step
 
     @property
     def gone(self) -> bool:
@@ -244,6 +247,7 @@ class World:
     egocentric: bool = False
     occlusion: bool = False
     gestures: bool = False  # whether the picture shows them
+    hands: bool = False  # whether it shows what NPCs carry
     canvas: tuple[int, int] = (0, 0)
     bonus: int = 0  # per cent that rules pay in this step
     lines: list[tuple[Entity, str]] = field(default_factory=list)  # what the agent heard in this step
@@ -261,6 +265,10 @@ class World:
     def things(self) -> list[Entity]:
         """All objects, in file order."""
         return [thing for group in self.objects.values() for thing in as_list(group)]
+
+    def carried_by(self, member: Entity) -> Entity | None:
+        """What a member of the cast carries."""
+        return next((thing for thing in self.things() if thing.carrier is member), None)
 
     def entities(self) -> list[Entity]:
         """Everything that can be somewhere."""

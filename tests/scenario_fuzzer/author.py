@@ -32,6 +32,7 @@ SAYINGS = ("Good day", "Look at me!", "Stop it.")
 """What some NPC says in every scenario that has a frame."""
 WORDS = ("ana", "bel", "cor", "dol", "ers", "fit")
 GROUPED = ("door", "box", "switch", "ball", "marble", "generator", "apple", "lever")
+CARRIED = ("ball", "apple", "box", "marble", "generator", "floor", "switch")
 SINGLE = (*GROUPED, "remote_door", "platform", "fence", "floor", "wall", "lava")
 
 
@@ -109,7 +110,8 @@ class _Author:
 
     def actions(self) -> tuple[str, ...]:
         """The agent's body actions."""
-        return ("left", "right", "forward", "toggle", *(["done"] if self.often(0.7) else []))
+        hands = ["pickup", "drop"] if self.often(0.4) else []
+        return ("left", "right", "forward", *hands, "toggle", *(["done"] if self.often(0.7) else []))
 
     def grammar(self) -> dict[str, Any]:
         """What can be said; some of it NPCs say as well."""
@@ -204,6 +206,9 @@ class _Author:
             made["dark"] = True
         if thing.count and thing.type in ("switch", "box", "lever", "generator") and self.often(0.35):
             made["exclusive"] = True
+        if thing.type in CARRIED and "pickup" in self.acts and self.often(0.8):
+            made["carryable"] = True
+            self.declared.carried.append(thing)
         if thing.type == "lever" and self.often(0.6):
             made["timer"] = self.rng.randint(1, 5)
         return made
@@ -242,6 +247,13 @@ class _Author:
                 self.declared.contents[thing.name] = box.name
                 made[thing.name]["inside"] = f"pick({box.name})" if box.count else box.name
                 del made[thing.name]["place"]
+        in_hands = [
+            thing for thing in self.declared.carried if thing.count is None and "place" in made[thing.name]
+        ]
+        if in_hands and self.often(0.3):
+            held = made[self.rng.choice(in_hands).name]
+            held["inside"] = self.rng.choice(("agent", "ann"))
+            del held["place"]
         marbles = [thing for thing in known if thing.type == "marble"]
         for thing in known:
             if thing.type == "generator" and marbles and self.often(0.5):
@@ -463,8 +475,10 @@ class _Author:
                 member["beliefs"] = {
                     key: self.belief(sort) for key, sort in self.declared.beliefs[name].items()
                 }
+            self.refuse(member)
             made[name] = member
         made["agent"] = {"place": "anywhere"}
+        self.refuse(made["agent"])
         if "agent" in self.declared.follows:
             frame = self.declared.follows["agent"]
             made["agent"]["frame"] = frame.name
@@ -473,6 +487,11 @@ class _Author:
         if self.often(0.3):
             made["agent"]["facing"] = self.rng.choice(("up", "random", "left"))
         return made
+
+    def refuse(self, member: dict[str, Any]) -> None:
+        """Whether somebody takes what he is given."""
+        if self.declared.carried and self.often(0.3):
+            member["accepts"] = self.phrases.plain_condition(Where(still=True))
 
     def filling(self, type_: str) -> str:
         """What fills a slot."""
@@ -597,6 +616,8 @@ class _Author:
             made["directions"] = "egocentric"
         if self.often(0.25):
             made["channels"] = ["type", "color", "status", "orientation", "pointing", "last_act"]
+            if self.declared.carried and self.often(0.7):
+                made["channels"].append("carrying")
         return made
 
 

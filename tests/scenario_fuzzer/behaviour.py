@@ -201,6 +201,15 @@ class Behaviour:
         pushable = phrases.thing(where, "marble", "generator")
         if pushable is not None:
             options += [lambda: f"push({pushable[0]}, {phrases.direction(where)})"] * 3
+        if self.declared.carried:
+            held = phrases.one(rng.choice(self.declared.carried), where)
+            options += [lambda: rng.choice(("pickup", "drop", "choose(pickup | drop | forward)"))] * 2
+            options += [lambda: f"fetch({held})"] * 2
+            options += [lambda: f"give({held}, {phrases.member(where)})"]
+            options += [lambda: f"bring({held}, {phrases.member(where)})"] * 2
+            options += [lambda: f"bring({held}, {phrases.entity(where)}.cell)"]
+            floors = [thing for thing in self.declared.single if thing.type == "floor"]
+            options += [lambda: f"bring({held}, {floors[0].name})"] if floors else []
         if self.declared.sequences:
             options.append(lambda: f"perform({rng.choice(self.declared.sequences)})")
         return rng.choice(options)()
@@ -231,6 +240,8 @@ class Behaviour:
         found: list[Callable[[], str]] = [lambda: self.rng.choice(verbs)] * 2
         found += [lambda: f"become({self.rng.choice(STATUSES[thing.type])})"] * 3
         found.append(lambda: f"put({self.phrases.spot(where)})")
+        if thing in self.declared.carried:
+            found += [lambda: f"move_into({self.phrases.member(where)})"] * 2
         if thing.name in self.declared.contents:
             box = self.declared.group(self.declared.contents[thing.name])
             found += [lambda: f"move_into({self.phrases.one(box, where)})"] * 4

@@ -80,6 +80,7 @@ class Declared:
     tables: list[str] = field(default_factory=list)  # colour -> word
     ranks: list[str] = field(default_factory=list)  # colour -> number
     contents: dict[str, str] = field(default_factory=dict)  # what lies in things: the containers
+    carried: list[Thing] = field(default_factory=list)  # what can be carried
     templates: list[str] = field(default_factory=list)
     nouns: list[str | int] = field(default_factory=list)
     slots: dict[str, list[str | int]] = field(

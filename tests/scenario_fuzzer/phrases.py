@@ -460,6 +460,13 @@ class Phrases:
             npc = self.rng.choice(self.declared.members)
             options += [f"{npc}.was_poked", f"{npc}.poked", f"{npc}.gone", f"{npc}.pointing"]
         options += ["poked", "was_poked", "pointing"] if where.is_npcs else []
+        for thing in self.declared.carried:
+            options += [
+                lambda thing=thing: f"{self.member(where)}.carries({self.one(thing, where)})",
+                lambda thing=thing: f"{self.member(where)}.carries({thing.name})",
+                lambda: f"{self.member(where)}.empty_handed",
+                lambda: f"{self.member(where)}.carried.color == {self.color(where)}",
+            ]
         for memory, sequence in self.declared.memories.items():
             options.append(f"{memory} == {sequence}")
         return self.one_of(*options)

@@ -180,8 +180,16 @@ export function drawTile(context, x, y, size, look, more = {}) {
   const colour = PALETTE[look[1] % 6];
   if (more.gesture) drawGesture(pen, colour, look[3], more.gesture);
   if (more.agent !== undefined) drawAgent(pen, more.agent);
+  if (more.held) drawHeld(pen, more.held);
   if (more.letter && !UNLETTERED.includes(look[0])) drawLetter(pen, look[1]);
   context.restore();
+}
+
+/** A small picture of what is carried, in the lower left corner. @param {Pen} pen @param {Look} held */
+function drawHeld(pen, [type, colour, status, orientation]) {
+  pen.circle(0.2, 0.8, 0.19, { fill: WHITE, outline: INK, width: 0.03 });
+  const part = new Pen(pen.c, pen.x + 0.05 * pen.size, pen.y + 0.65 * pen.size, 0.3 * pen.size);
+  (DRAWERS[type] ?? drawUnknown)(part, PALETTE[colour % 6], status, orientation);
 }
 
 /** @param {Pen} pen @param {number} colour */

@@ -18,8 +18,10 @@
  * @property {[number, number, number]} agent
  * @property {[number, number][]} [below]
  * @property {[number, number, string][]} [gestures]
+ * @property {[number, number][]} [held]
  * @property {number[] | null} [view]
  * @property {[number, number, string][]} [view_gestures]
+ * @property {[number, number][]} [view_held]
  * @property {Record<string, any>} [state]
  * @property {[number, number, number, number] | null} [action]
  * @property {string | null} [did]
@@ -57,6 +59,7 @@
  * @property {[number, number, number]} agent x, y, direction
  * @property {Map<number, Look>} below
  * @property {Map<number, Gesture>} gestures
+ * @property {Map<number, Look>} held what who stands in a cell carries
  * @property {boolean} tinted whether the agent's field of view is marked
  */
 /**
@@ -121,6 +124,7 @@ export class Episode {
     for (const [cell, look] of moment.cells ?? []) cells[cell] = this.looks[look];
     const pairs = (/** @type {[number, number, string][]} */ found) =>
       new Map(found.map(([cell, pointing, act]) => [cell, { pointing, act }]));
+    const looks = (/** @type {[number, number][]} */ found) => new Map(found.map(([cell, look]) => [cell, this.looks[look]]));
     const changed = moment.state ?? {};
     return {
       moment,
@@ -131,8 +135,9 @@ export class Episode {
         height,
         cells,
         agent: moment.agent,
-        below: new Map((moment.below ?? []).map(([cell, look]) => [cell, this.looks[look]])),
+        below: looks(moment.below ?? []),
         gestures: pairs(moment.gestures ?? []),
+        held: looks(moment.held ?? []),
         tinted: true,
       },
       view: {
@@ -142,6 +147,7 @@ export class Episode {
         agent: [(VIEW - 1) / 2, VIEW - 1, UP],
         below: new Map(),
         gestures: pairs(moment.view_gestures ?? []),
+        held: looks(moment.view_held ?? []),
         tinted: false,
       },
       state: moment.room ? changed : { ...before.state, ...changed },

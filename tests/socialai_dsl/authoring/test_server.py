@@ -187,7 +187,7 @@ async def completions(editor: Editor) -> None:
     assert "scenario" not in await editor.complete(SCENARIO.replace("params:", "^\nparams:"))
     states = await editor.complete(SCENARIO.replace("goto: content}", "goto: ^}"))
     assert states == ["watching", "content"]
-    verbs = await editor.complete(SCENARIO.replace("keeper.is(content)", "keeper.e^"))
+    verbs = await editor.complete(SCENARIO.replace("keeper.is(content)", "keeper.ey^"))
     assert verbs == ["eye_contact"]
     names = await editor.complete(SCENARIO.replace("eye_contact(agent)", "eye_contact(^)"))
     assert {"keeper", "agent", "gate", "what", "asked"} <= set(names), (

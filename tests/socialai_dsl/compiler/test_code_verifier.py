@@ -379,7 +379,7 @@ TABLES: dict[str, Callable[[Program], tuple[int, int]]] = {
     ),
     "a push by what is neither body nor ball": lambda p: (
         p.header(Header.ENTITY_AT) + EntityColumn.COLUMNS * 4 + EntityColumn.PUSHED_BY,
-        2,
+        4,
     ),
     "a push to no status": lambda p: (type_row(p, 3) + TypeColumn.PUSHED, 3),
     "a stop in no status": lambda p: (type_row(p, 3) + TypeColumn.ROLLS, 4),

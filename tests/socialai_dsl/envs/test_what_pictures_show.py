@@ -37,6 +37,8 @@ OTHERS = sorted(
 )
 CUES = [f"school/boxes+{cue}" for cue in ("color", "pointing", "feedback", "emulation", "scaffolding")]
 NAMES = [name for name in (*PAPER, *OTHERS, *CUES) if not name.endswith(("_as_coded", "_oracle"))]
+HANDS = Path(__file__).parents[2] / "data" / "hands"
+NAMES += [f"{HANDS}.yaml", f"{HANDS}_and_gestures.yaml"]
 STEPS, TILE, EDGE = 60, 32, 3
 _ROOM = 348
 """So many columns of a film show the room."""
@@ -73,17 +75,17 @@ def in_the_room(look: Look, own: int, egocentric: bool) -> Look:
     """The channels of a cell with directions of NPCs as they are in the room."""
     if look[0] != tiles.NPC or not egocentric:
         return look
-    kind, colour, status, orientation, *gestures = look
+    kind, colour, status, orientation, *more = look
     turned = [(orientation - 2 + own) % 4]
-    if gestures:
-        pointing, act = gestures
+    if len(more) > 1:
+        pointing, act, *more = more
         turned.append(pointing if pointing == 255 else (pointing - 2 + own) % 4)
         turned.append(4 + (act - 4 - 2 + own) % 4 if 4 <= act < 8 else act)
-    return (kind, colour, status, *turned)
+    return (kind, colour, status, *turned, *more)
 
 
 def looks(env: ScenarioEnv, image: NDArray[np.uint8]) -> Iterator[tuple[int, int, Look]]:
-    """Column, row and channels of each cell that the agent sees, its own left out."""
+    """Column, row and channels of each cell that the agent sees; its own shows what it carries."""
     _, (x, y, own) = env._table.cells(0)
     width, height = env._table.room(0)
     egocentric = bool(env.program.header(Header.FLAGS) & Flag.EGOCENTRIC)  # type: ignore[union-attr]
@@ -92,11 +94,15 @@ def looks(env: ScenarioEnv, image: NDArray[np.uint8]) -> Iterator[tuple[int, int
         ahead, right = VIEW - 1 - along, across - VIEW // 2
         column, row = x + ahead * dx - right * dy, y + ahead * dy + right * dx
         look = tuple(image[across, along].tolist())
-        if look[0] != tiles.UNSEEN and (ahead or right) and 0 <= column < width and 0 <= row < height:
-            yield column, row, in_the_room(look, own, egocentric)
+        own_cell = not (ahead or right)
+        if own_cell and look[0] == tiles.EMPTY:
+            continue
+        if look[0] != tiles.UNSEEN and 0 <= column < width and 0 <= row < height:
+            seen = in_the_room(look, own, egocentric)
+            yield column, row, (own, *seen) if own_cell else seen
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", NAMES, ids=lambda name: Path(name).stem if name.endswith(".yaml") else name)
 @pytest.mark.thorough("draws every step of many episodes")
 def test_pictures_of_cells_that_differ_for_the_agent_differ(name: str) -> None:
     env: Any = sd.make(name, render_mode="rgb_array").unwrapped
@@ -195,3 +201,18 @@ def test_gestures_can_be_told_apart_at_a_glance() -> None:
         for i, one in enumerate(pictures):
             for other in pictures[:i]:
                 assert (np.abs(one - other).max(axis=2) > 60).sum() >= 10
+
+
+def test_what_is_carried_can_be_told_apart() -> None:
+    """In the hands of the agent, which sees statuses as well, and of NPCs."""
+    things = [
+        (type_.code, colour, status, 0)
+        for type_ in prelude().types.values()
+        for status, colour in product(range(len(type_.states)), range(6))
+        if type_.look not in ("wall", "lava")  # which look alike in some colours
+    ]
+    for code, facing in (((tiles.EMPTY, 0, 0, 0), 1), ((tiles.NPC, 4, 2, 0), None)):
+        drawn: dict[bytes, Any] = {}
+        for held in [None, *things]:
+            pixels = draw_tile(code, facing, False, TILE, None, None, held).tobytes()
+            assert drawn.setdefault(pixels, held) == held

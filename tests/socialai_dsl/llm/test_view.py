@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
@@ -33,8 +34,9 @@ PLAYED = [
     "school/generators+color",
     "novel/gaze_following",
     "novel/sally_anne",
+    *(str(Path(__file__).parents[2] / "data" / f"hands{more}.yaml") for more in ("", "_and_gestures")),
 ]
-"""Four channels and six, occlusion or none, hidden NPCs, suites, absolute directions and relative ones."""
+"""Four channels and more, occlusion or none, hidden NPCs, suites, absolute directions and relative ones."""
 
 
 def moments(name: str) -> Iterator[tuple[dict[str, Any], dict[str, Any], Any]]:
@@ -87,6 +89,8 @@ def test_every_cell_that_is_not_empty_is_told_of_where_it_is(name: str) -> None:
             (VIEW - 1 - along, across - VIEW // 2): int(image[across, along, 1])
             for across, along in np.argwhere(image[..., 0] != 1).tolist()
         }
+        assert ((0, 0) in shown) == ("carrying" in told), "its own cell shows what it carries"
+        shown.pop((0, 0), None)
         assert set(colours) == set(shown)
         assert all(c is None or c == COLORS[shown[place]] for place, c in colours.items())
 
@@ -152,3 +156,19 @@ def test_instructions_name_what_can_be_done_and_said_and_nothing_of_the_solution
 def test_an_unknown_style_is_refused() -> None:
     with pytest.raises(ValueError, match="style: got 'verse', expected one of prose, grid, json"):
         TextView(sd.compile(sd.load("help")), "verse")  # type: ignore[arg-type]
+
+
+def test_hands_are_told_of() -> None:
+    """Its own, and what an NPC carries."""
+    name = str(Path(__file__).parents[2] / "data" / "hands.yaml")
+    layout = {
+        "agent": {"at": [2, 3], "facing": "up", "carries": "balls[0]"},
+        "balls": [{"color": "red"}],
+        "ann": {"at": [2, 1], "facing": "down", "carries": "apple"},
+        "bob": {"at": [4, 4]},
+    }
+    env = sd.make(name)
+    observation, info = env.reset(seed=0, options={"layout": layout})
+    text = TextView(sd.compile(sd.load(name)), "prose").observe(observation, info)
+    assert "You carry a plain red ball." in text
+    assert "looking south, carrying a red apple" in text

@@ -1,0 +1,119 @@
+"""What can be carried, and what is asked of hands: `carries`, `carried`, `empty_handed`, and who can be given what."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from socialai_dsl.grammar import ast
+from socialai_dsl.semantics import groups
+from socialai_dsl.semantics.resolver import ENTITY, Resolver
+from socialai_dsl.semantics.scope import Scope, quoted, with_article
+from socialai_dsl.semantics.terms import (
+    Compare,
+    Const,
+    FieldOf,
+    Not,
+    Term,
+    Type,
+    Variable,
+    all_of,
+    arithmetic,
+    number,
+)
+
+CARRYABLE = "what can be carried says so: `carryable: true`"
+
+
+def carryable(resolver: Resolver) -> tuple[int, ...]:
+    """Numbers of the objects that can be carried."""
+    described = resolver.symbols.scenario.objects
+    return tuple(
+        number
+        for objects in resolver.symbols.objects.values()
+        if described[objects.name].carryable
+        for number in objects.numbers
+    )
+
+
+def is_member(resolver: Resolver, term: Term) -> bool:
+    """Whether a term stands for members of the cast only."""
+    return term.type.kind == "entity" and term.type.high < len(resolver.symbols.numbers)
+
+
+def carries(resolver: Resolver, who: Term, node: ast.Call, scope: Scope) -> Term:
+    """`ann.carries(x)`; of a group, any of it."""
+    _check_hands(resolver, who, node, scope)
+    (what,) = node.args
+    if groups.is_group(resolver, what, scope):
+        return groups.any_member(resolver, what, scope, lambda one: _in_hands(resolver, who, one))
+    thing = resolver.value(what, ENTITY, scope)
+    check_carried(resolver, thing, what, scope)
+    return _in_hands(resolver, who, thing)
+
+
+def check_carried(resolver: Resolver, thing: Term, node: ast.Expr, scope: Scope) -> None:
+    """Report what nobody can carry."""
+    known = carryable(resolver)
+    if thing.type.kind != "entity" or not any(thing.type.low <= n <= thing.type.high for n in known):
+        raise resolver.fail("S204", f"`{quoted(node)}` cannot be carried", node, scope, hint=CARRYABLE)
+
+
+def empty_handed(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
+    """Whether somebody carries nothing."""
+    _check_hands(resolver, who, node, scope)
+    things = (Const(Type("entity", n, n), n) for n in carryable(resolver))
+    return all_of([Not(_in_hands(resolver, who, thing)) for thing in things])
+
+
+def carried(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
+    """`ann.carried`: what she carries, if anything."""
+    _check_hands(resolver, who, node, scope)
+    numbers = carryable(resolver)
+    type_ = Type("entity", min(numbers), max(numbers))
+    members = groups.Group(type_, tuple(Const(type_, number) for number in numbers))
+    name = f"carried#{scope.nested}"
+    condition = _in_hands(resolver, who, Variable(type_, name))
+    return groups.made("first", members, name, condition, scope)
+
+
+def _check_hands(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> None:
+    """Report what has no hands, and a scenario in which nothing is carried."""
+    if not is_member(resolver, who):
+        raise resolver.fail("S204", "only members of the cast carry something", node, scope)
+    if not carryable(resolver):
+        raise resolver.fail("S204", "nothing here can be carried", node, scope, hint=CARRYABLE)
+
+
+def _in_hands(resolver: Resolver, who: Term, thing: Term) -> Term:
+    """Whether somebody carries a thing: its register holds 0, or 1 + who carries it."""
+    members = len(resolver.symbols.numbers)
+    by = arithmetic("+", replace(who, type=Type("int", who.type.low, who.type.high)), number(1))
+    return Compare("==", FieldOf(Type("int", 0, members), thing, "carrier"), by)
+
+
+def check_arguments(
+    resolver: Resolver, name: str, terms: Sequence[Term], nodes: Sequence[ast.Expr], scope: Scope
+) -> None:
+    """Report what cannot be fetched, given or brought, and to whom or where."""
+    check_carried(resolver, terms[0], nodes[0], scope)
+    for where, node in zip(terms[1:], nodes[1:], strict=True):
+        _check_recipient(resolver, name, where, node, scope)
+
+
+def _check_recipient(resolver: Resolver, name: str, where: Term, node: ast.Expr, scope: Scope) -> None:
+    """Report what nothing can be given to, or laid down on."""
+    if where.type.kind == "cell" or is_member(resolver, where):
+        return
+    called = quoted(node)
+    if name == "give":
+        raise resolver.fail("S204", f"`{called}` is nobody; things are given to somebody", node, scope)
+    for entity in range(where.type.low, where.type.high + 1):
+        objects = resolver.symbols.object_of(entity)
+        if objects is None:
+            message = f"`{called}` may be somebody, or a thing in the room: say which of them"
+            raise resolver.fail("S204", message, node, scope)
+        if not objects.type.walkable:
+            message = f"nothing can be laid down on {with_article(objects.type.name)}"
+            hint = f"bring it to a cell: `nearest(c in cells where c.next_to({called}) to self)` in a `let`"
+            raise resolver.fail("S204", message, node, scope, hint=hint)
