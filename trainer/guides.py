@@ -19,11 +19,9 @@ class Lead(NamedTuple):
 
     Attributes:
         actions: int64 (E, H), the guide's own choice.
-        led: bool (E,), true where the guide's action is played instead of the policy's; the policy gradient skips these
-            steps. A guide hands an environment over at most once in an episode, after which the policy decides alone;
-            otherwise generalised advantage estimation would be biased.
-        weights: float32 (E,), weight of the cross-entropy between the policy and `actions`: imitation in led steps,
-            advice in others, nothing where it is 0.
+        led: bool (E,), true where the guide's action is played instead of the policy's; these give no policy gradient.
+            After handing over in an episode the guide leads it no more: advantage estimates would be biased.
+        weights: float32 (E,), weight of the cross-entropy between policy and `actions`: imitation if led, else advice.
     """
 
     actions: Any

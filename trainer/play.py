@@ -58,15 +58,12 @@ class CheckpointPolicy:
         """Load an agent to play `envs`; a `TransferWarning` lists how they differ from the ones it was trained on.
 
         Args:
-            path: `shipped:NAME`, a run's folder, its folder of checkpoints (of both the newest is taken), or one
-                checkpoint.
-            envs: the environment, single or vector, wrapped or not; None: the agent plays the scenario on which it
-                was trained.
+            path: `shipped:NAME`, one checkpoint, or a folder of a run or of checkpoints, for its newest.
+            envs: the environment, single or vector, wrapped or not; None: the scenario of the agent's training.
             greedy: take the most probable action instead of sampling.
             seed: of the sampling.
             device: PyTorch's name of the device that the network runs on.
-            net: the name `module:Class` of a network of your own, which the call must name: no file chooses what is
-                imported.
+            net: `module:Class` of a network of your own; no file chooses what is imported.
             folder: the folder whose `module.py` is tried first.
 
         Raises:
@@ -105,11 +102,7 @@ class CheckpointPolicy:
 
     @torch.no_grad()
     def think(self, observation: Observation) -> tuple[list[list[float]], float]:
-        """The agent's view of a single observation, which enters its memory as in `act`.
-
-        Returns:
-            The probabilities of each head's choices, and the expected return.
-        """
+        """The probabilities of each head's choices, and the expected return; the observation enters the memory."""
         logits, values = self._look(observation, alone=True)
         parts = torch.split(logits[0], list(self.net.spec.action_sizes))
         return [torch.softmax(part, -1).tolist() for part in parts], float(values[0])

@@ -26,11 +26,7 @@ class Leaves:
 
     @classmethod
     def of(cls, envs: Any) -> Leaves:
-        """The members of the suite that a vector environment plays.
-
-        Raises:
-            ValueError: they play no suite.
-        """
+        """The members of the suite that a vector environment plays; ValueError if it plays none."""
         suite = envs.program
         names = tuple(getattr(suite, "members", ()))
         if not names:
@@ -41,10 +37,7 @@ class Leaves:
 
 @runtime_checkable
 class Curriculum(Protocol):
-    """The interface of a curriculum, which chooses members by success so far, and by nothing else.
-
-    `--curriculum mine:Curriculum` builds `Curriculum(leaves)`.
-    """
+    """Chooses members by success so far alone; `--curriculum mine:Curriculum` builds `Curriculum(leaves)`."""
 
     def observe(self, member: int, success: bool) -> None:
         """Take in that an episode of a member, an index into `Leaves.names`, has ended."""
