@@ -11,9 +11,8 @@ from safetensors import safe_open
 
 import socialai_dsl
 from socialai_dsl import frontend
-from socialai_dsl.cli import agents
 from socialai_dsl.cli.main import main, run_main
-from socialai_dsl.evaluation import evaluate
+from socialai_dsl.evaluation import evaluate, players
 from socialai_dsl.loader.library import shipped_folder
 from socialai_dsl.loader.shipped import IDS
 from tools.ship_agent import EPISODES, INDEX, LARGEST, ROUNDING, index
@@ -136,10 +135,10 @@ def test_a_scenario_has_the_agent_of_its_name_however_it_is_called(
     scenario: str, agent: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     known = ["help", "help_as_helper", "novel/shop", "social_env"]
-    monkeypatch.setattr(agents, "shipped_agents", lambda: known)
+    monkeypatch.setattr(players, "shipped_agents", lambda: known)
     spec = scenario.replace("SHIPPED", str(shipped_folder()))
-    assert agents.named_agent("shipped", spec) == PREFIX + agent
-    assert agents.named_agent("oracle", spec) == "oracle"
+    assert players.named_agent("shipped", spec) == PREFIX + agent
+    assert players.named_agent("oracle", spec) == "oracle"
 
 
 def test_a_run_with_a_shipped_agent_trains_nothing_and_leaves_what_a_run_leaves(

@@ -74,11 +74,11 @@ Texts = Annotated[
 ]
 """One text, or a list of them."""
 
+_ManyFillers = Annotated[tuple[TextLine | int, ...], Field(min_length=1, max_length=256)]
 Fillers = Annotated[
-    tuple[TextLine | int, ...],
+    _ManyFillers,
     BeforeValidator(_as_tuple),
-    BeforeValidator(_one_or_many, json_schema_input_type=TextLine | int | tuple[TextLine | int, ...]),
-    Field(min_length=1, max_length=256),
+    BeforeValidator(_one_or_many, json_schema_input_type=TextLine | int | _ManyFillers),
 ]
 """What can stand in a slot of a grammar, one or a list."""
 

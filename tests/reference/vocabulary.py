@@ -257,7 +257,7 @@ class Vocabulary(Words):
         return None
 
     def assigned(self, name: str, member: Who) -> list[ast.Node]:
-        """All that a register of the member's frame can be given: its start and every `set`."""
+        """All that a register of the member's frame can be given, its start and every `set`; `none` is not said."""
         frame_name, frame = self.version(member).frame, self.frame(member)
         if frame is None or name not in frame.let:
             return []
@@ -268,7 +268,9 @@ class Vocabulary(Words):
         start = start["start"] if isinstance(start, dict) else start
         sources = [start, *(entry.set[name] for entry in entries if name in entry.set)]
         return [
-            self.sources.expression(f"vocabulary.{frame_name}", source, frame_name).tree for source in sources
+            self.sources.expression(f"vocabulary.{frame_name}", source, frame_name).tree
+            for source in sources
+            if source != "none"
         ]
 
     @staticmethod

@@ -106,7 +106,7 @@ def test_files_beside(tmp_path: Path) -> None:
         ("frame: duty", "fr^ame: duty", "the frame it follows"),
         ("frame: duty", "frame: d^uty", "a frame"),
         ("outcome:", "pro^bes: {q: {ask: Which}}\noutcome:", "a question to language models"),
-        ("outcome:", "probes: {q: {an^swer: exit.color}}\noutcome:", "what is right at that moment"),
+        ("outcome:", "probes: {q: {an^swer: exit.color}}\noutcome:", "the right answer at that moment"),
         ("outcome:", "probes: {q: {answer: exit.co^lor}}\noutcome:", "its colour"),
     ],
 )

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 
-from socialai_dsl.cli import run_folder
+from socialai_dsl import run_folder
 from socialai_dsl.errors import UsageError
 from socialai_dsl.experiments.folder import Run, Status, is_locked
 from socialai_dsl.experiments.work import Outcome, _performed_alone, cancel, retry
