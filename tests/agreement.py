@@ -299,5 +299,4 @@ def questions_agree(
 
 def plain_action(action: Any) -> Action:
     """An action as plain numbers."""
-    primitive, speaks, template, noun = map(int, action)
-    return primitive, speaks, template, noun
+    return tuple(map(int, action))

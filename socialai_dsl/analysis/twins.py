@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from socialai_dsl.analysis.rooms import name_of
 from socialai_dsl.engine.calls import Task
-from socialai_dsl.envs.table import Table
+from socialai_dsl.envs.table import Table, joined
 from socialai_dsl.envs.values import shown
 from socialai_dsl.program import ENTITY_FIELDS, FIRST_ENTITY, VIEW, Field, Flag, Header, Program, Register
 from socialai_dsl.semantics.plans import CheckedScenario, Entity
@@ -44,10 +44,9 @@ class Tellers:
             line for said in heard if heard[0] != heard[1] for line in said
         }
         found = [name for line in sorted(lines) for row in rows for name in self._speakers(line, table, row)]
-        state = table.state
-        differs = state.image[rows[0]] != state.image[rows[1]]
-        if state.extra.shape[1]:
-            differs = differs | (state.extra[rows[0]] != state.extra[rows[1]])
+        state, both = table.state, list(rows)
+        pictures = joined(state.image[both], state.extra[both], table.channels)
+        differs = (pictures[0] != pictures[1]).any(-1).ravel()  # (49,)
         for row in rows:
             found += self._seen(state.registers[row], before[row], differs)
         return list(dict.fromkeys(found))

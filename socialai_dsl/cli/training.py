@@ -25,7 +25,7 @@ def train_in(
     """Train in the run's folder and return the path of the final checkpoint."""
     try:
         return str(train_agent(config, loaded, program, folder, resume, stream))
-    except UsageError:
+    except (UsageError, RunFailed):
         _discard_unstarted(folder)
         raise
 

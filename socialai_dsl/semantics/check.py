@@ -416,11 +416,17 @@ def _without_consequences(found: DiagnosticBag, scenario: Scenario) -> Iterator[
     follow: set[str] = set()
     if any(d.code == possible.GRAMMAR_CODE for d in found):
         follow |= {"S401", "S402"}
-    if entities.mean_two_things(scenario):
+    if entities.mean_two_things(scenario) or _is_slot_of_strangers(found, scenario):
         follow |= {"S204", "S211"}
     if any(d.severity is Severity.ERROR and d.code != "S318" for d in found):
         follow.add("S318")  # what is put into a register may be what is wrong
     return (d for d in found if d.code not in follow)
+
+
+def _is_slot_of_strangers(found: DiagnosticBag, scenario: Scenario) -> bool:
+    """Whether a word of a slot is an unknown name elsewhere: a member or thing of another name was meant there."""
+    words = {word for slot in scenario.grammar.slots.values() for word in slot}
+    return any(d.code == "S201" and any(f"`{word}`" in d.message for word in words) for d in found)
 
 
 def _definitions(scenario: Scenario) -> Iterator[DataPath]:

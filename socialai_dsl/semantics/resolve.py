@@ -60,10 +60,12 @@ from socialai_dsl.semantics.terms import (
     all_of,
     any_of,
     arithmetic,
+    asked_first,
     between,
     draws,
     entity,
     holds_nothing,
+    is_noted,
     is_own_noun,
     may_be_nothing,
     may_find_nothing,
@@ -518,10 +520,11 @@ class ScenarioResolver(Resolver):
         for one, other in ((left, right), (right, left)):
             if one in self.slot_words:
                 slot, word = self.slot_words[one]  # where the agent said nothing there, it is unlike anything
-                return any_of(
+                same = any_of(
                     all_of([_is(word, i), self.equal(value, other, node, scope)])
                     for i, value in enumerate(slot.values)
                 )
+                return asked_first(other, same) if is_noted(other) else same
             if isinstance(one, Select) and may_be_nothing(one):
                 values = tuple(self.equal(value, other, node, scope) for value in one.values)
                 return Select(BOOL, one.conditions, values, self.equal(one.default, other, node, scope))

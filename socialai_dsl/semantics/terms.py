@@ -508,8 +508,11 @@ def may_be_nothing(term: Term) -> bool:
 
 def where_there_is(needed: Term, result: Term) -> Term:
     """A value that follows from another, which is asked for first: of an empty register nothing is found."""
-    if not may_be_nothing(needed):
-        return result
+    return asked_first(needed, result) if may_be_nothing(needed) else result
+
+
+def asked_first(needed: Term, result: Term) -> Term:
+    """A value that is found only where another is, whether it takes that other one or not."""
     never = Compare("<", needed, Const(needed.type, needed.type.low))
     return Select(result.type, (never,), (Const(result.type, result.type.low),), result)
 
@@ -644,6 +647,11 @@ def may_find_nothing(term: Term) -> bool:
         if isinstance(part, ReadEach) and part.may_miss:
             return True
     return False
+
+
+def is_noted(term: Term) -> bool:
+    """Whether a term is `prev(...)`, which finds nothing where nothing was found then."""
+    return isinstance(term, Read) and term.path.startswith(NOTED)
 
 
 def is_own_noun(term: Term) -> bool:

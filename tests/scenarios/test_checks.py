@@ -22,6 +22,7 @@ CLAIMING = {
 NOVEL = {
     "bargaining": 3,
     "culprit": 3,
+    "fetch": 2,
     "gossip": 2,
     "haggling": 3,
     "implicature": 4,

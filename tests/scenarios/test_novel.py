@@ -14,6 +14,7 @@ NAMES = (
     "bargaining",
     "conventions",
     "culprit",
+    "fetch",
     "gaze_following",
     "gossip",
     "haggling",
@@ -331,6 +332,25 @@ class TestImplicature:
     def test_an_answer_before_the_question_is_a_failure(self) -> None:
         episode = Episode("novel/implicature", self.LAYOUT | {"let": {"lit": 3, "looked_at": 3}})
         assert episode.act(say="I say yes").ended == "failure"
+
+
+class TestFetch:
+    def test_any_ball_for_either_person(self) -> None:
+        drawn = [room["let"] for room in rooms("novel/fetch", 1000)]
+        check_shares((let["wish"] for let in drawn), evenly(f"balls[{k}]" for k in range(3)))
+        check_shares((let["receiver"] for let in drawn), evenly(("people[0]", "people[1]")))
+
+    def test_max_takes_nothing_and_the_agent_has_one_thing_at_a_time(self) -> None:
+        layout = {
+            "room": {"width": 7, "height": 7},
+            "agent": {"at": [3, 3], "facing": "up"},
+            "asker": {"at": [2, 3]},
+            "balls": [{"at": [3, 2]}, {"at": [4, 3]}, {"at": [5, 5]}],
+        }
+        episode = Episode("novel/fetch", layout)
+        episode.acts("pickup", "right", "pickup", "left", "left", "drop")
+        assert episode.now()["agent"]["carries"] == "balls[0]"
+        assert "carries" not in episode.now()["asker"]
 
 
 class TestGossip:

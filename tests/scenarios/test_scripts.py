@@ -21,6 +21,7 @@ NOVEL = tuple(
             "bargaining",
             "conventions",
             "culprit",
+            "fetch",
             "gaze_following",
             "gossip",
             "haggling",

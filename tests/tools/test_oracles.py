@@ -93,7 +93,9 @@ def test_a_search_may_give_up(halves: str) -> None:
 
 def test_without_a_script_there_is_nothing_to_play(halves: str) -> None:
     Path(halves).with_name("halves_oracle.yaml").unlink()
-    with pytest.raises(UsageError, match="the agent has no frame, and there is no variant `oracle`"):
+    with pytest.raises(
+        UsageError, match="the agent of halves has no frame, and there is no variant `oracle`"
+    ):
         play_script(halves, 4, 0, 10)
 
 

@@ -75,7 +75,7 @@ def check_clear(said: str, *parts: str) -> None:
 
 def test_a_full_disk(disk: Disk, capsys: Capture) -> None:
     run = disk.place / "run"
-    assert run_main([*RUN, "--out", str(run)]) == 2
+    assert run_main([*RUN, "--out", str(run)]) == 4
     check_clear(
         capsys.readouterr().err,
         "training stopped after 512 frames (update 2): cannot write: ",
@@ -92,7 +92,7 @@ def test_a_full_disk(disk: Disk, capsys: Capture) -> None:
 def test_a_disk_too_full_to_begin(disk: Disk, capsys: Capture) -> None:
     disk.change("size=1m")
     run = disk.place / "run"
-    assert run_main([*RUN, "--out", str(run)]) == 2
+    assert run_main([*RUN, "--out", str(run)]) == 4
     check_clear(capsys.readouterr().err, "there is no checkpoint yet", os.strerror(errno.ENOSPC))
     disk.change("size=64m")
     assert run_main([*RUN, "--out", str(run)]) == 0, "the same command can be given again"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.__main__ import main as bench
 from socialai_dsl.cli.main import main, run_main
 from socialai_dsl.play.screen import PlayApp
 
@@ -109,7 +110,7 @@ def test_bench(capsys: Capture) -> None:
         "ours",
         "--json",
     ]
-    assert main(["bench", "pair.yaml", *quick]) == 0
+    assert bench(["pair.yaml", *quick]) == 0
     rows = json.loads(capsys.readouterr().out)["rows"]
     assert [row["what"] for row in rows[:2]] == ["pair.yaml", "pair.yaml"]
 

@@ -126,12 +126,18 @@ def test_a_conditional_value_in_a_text_may_compare(slot: str) -> None:
 
 @pytest.mark.parametrize(
     ("text", "offset"),
-    [("a < b", 2), ("a > b", 2), ("<>", 0), ("Is <x > 2> red", 9), ("Is <a if x > 2> red", 14)],
+    [("a < b", 2), ("a > b", 2), ("<>", 0), ("Is <x > 2> red", 9)],
 )
 def test_stray_marks_in_texts(text: str, offset: int) -> None:
     with pytest.raises(ParseProblem) as caught:
         parse_text(text)
     assert (caught.value.code, caught.value.offset) == ("S202", offset)
+
+
+def test_a_condition_in_a_text_needs_its_else() -> None:
+    with pytest.raises(ParseProblem, match="`if` without `else`") as caught:
+        parse_text("Is <a if x > 2> red")
+    assert (caught.value.code, caught.value.offset) == ("S210", 11)
 
 
 @given(st.text(alphabet='ab1 ().,|+-*/<>=!&"$_\n\tdoornotandinwhereifelse', max_size=60))

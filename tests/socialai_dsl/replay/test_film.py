@@ -13,6 +13,9 @@ from socialai_dsl.render.panel import DialogueLine
 from socialai_dsl.replay.endings import Ending
 from socialai_dsl.replay.film import Episode, record
 from socialai_dsl.replay.steps import Step, describe_step
+from socialai_dsl.vocabulary import Sentences, Slot
+
+SENTENCES = Sentences.of(("Where is <noun>", "Hello"), (Slot("noun", ("the exit", "Ann")),))
 
 
 @dataclass
@@ -20,8 +23,7 @@ class Words:
     """The part of a program that the recording reads."""
 
     actions: tuple[str, ...] = ("left", "right", "forward")
-    templates: tuple[str, ...] = ("Where is <noun>", "Hello")
-    nouns: tuple[str, ...] = ("the exit", "Ann")
+    sentences: Sentences = SENTENCES
 
 
 PROGRAM = cast(Program, Words())
