@@ -162,9 +162,9 @@ class Pen {
  * @param {CanvasRenderingContext2D} context
  * @param {number} x left edge in pixels @param {number} y upper edge @param {number} size side
  * @param {Look} look
- * @param {{agent?: number, seen?: boolean, below?: Look, gesture?: Gesture, letter?: boolean}} more
+ * @param {{agent?: number, seen?: boolean, below?: Look, gesture?: Gesture, held?: Look, letter?: boolean}} more
  *   agent: its direction if it stands here; seen: tinted, since it is in the agent's field of view; below: what lies
- *   under an NPC; letter: the first letter of the colour in a corner (e: grey)
+ *   under an NPC; held: what it carries; letter: the first letter of the colour in a corner (e: grey)
  */
 export function drawTile(context, x, y, size, look, more = {}) {
   context.save();
