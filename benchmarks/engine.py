@@ -1,4 +1,4 @@
-"""This module takes the measurements of `make bench`, ours and those of others, in one run on one core."""
+"""Measures engines for `make bench`, ours and others, in one run on one core."""
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass

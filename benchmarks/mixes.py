@@ -1,4 +1,4 @@
-"""This module generates the agent's actions of `make bench` beforehand.
+"""Actions of the agent for `make bench`, generated beforehand.
 
 `random` is uniform over the action space. `walk` turns and walks and speaks half of the time, without what ends the
 scenario, so that episodes last; which actions those are is found by trying, because it holds for any scenario.

@@ -1,4 +1,4 @@
-"""This module measures our environments for `make bench`."""
+"""Measures our environments for `make bench`."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final

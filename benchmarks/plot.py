@@ -1,4 +1,4 @@
-"""This module draws what `make bench` measured: steps per second over the number of environments."""
+"""Draws what `make bench` measured: steps per second over the number of environments."""
 
 from pathlib import Path
 

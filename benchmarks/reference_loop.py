@@ -1,4 +1,4 @@
-"""This module is the yardstick of `make bench`: a fixed loop whose speed says how fast this machine is."""
+"""The yardstick of `make bench`: a fixed loop whose speed says how fast this machine is."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""This module is what `make bench` says: its rows, what they are compared with, as JSON and as a table."""
+"""What `make bench` prints: its rows and what they are compared with, as JSON and as a table."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field

@@ -1,4 +1,4 @@
-"""This module finds actions for `make bench` that make something happen in nearly every step.
+"""Finds actions for `make bench` that make something happen in nearly every step.
 
 Walking and talking at random rarely triggers a rule, so the speed under it says little of how fast rules are. Here, for
 every environment and step, several actions are tried from the same state, and the one is kept after which somebody was

@@ -1,4 +1,4 @@
-"""This module measures for `make bench` how long one waits: for a check, for a program, for the first step."""
+"""Measures for `make bench` the time to a check, to a program and to the first step."""
 
 import os
 import statistics

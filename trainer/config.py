@@ -154,7 +154,7 @@ class RunConfig(BaseModel):
         if self.update == "chunks" and not 0 < self.bptt < self.horizon:
             raise ValueError(
                 f"bptt: got {self.bptt}, expected less than horizon = {self.horizon} and not 0, because the update "
-                "shifts chunks of so many steps"
+                "shifts chunks of that many steps"
             )
         if self.update == "chunks" and self.guide != "none":
             raise ValueError("guide: the update `chunks` is the paper's and learns from the reward alone")

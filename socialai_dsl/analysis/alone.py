@@ -35,17 +35,17 @@ from socialai_dsl.envs.table import Table
 from socialai_dsl.program import FIRST_ENTITY, Field, Header, Program, Register
 
 LEARNT_FROM: Final = 32
-"""At most so many twins of a room choose its policy, and at most a quarter of them."""
+"""The most twins of a room that choose its policy; at most a quarter of them do."""
 
 TRIED_ON: Final = 96
-"""At most so many further twins it is tried on."""
+"""The most further twins that the policy is tried on."""
 
 _BLOCK: Final = 512
 _BLOCKS: Final = 16
-"""Twins are drawn in blocks, so many at most; those that look otherwise are left out."""
+"""The most twins of a block; those that look otherwise are left out."""
 
 _SEARCHES: Final = 8
-"""For at most so many twins of a room a success is searched."""
+"""The most twins of a room for which a success is searched."""
 
 _FEWEST: Final = 8
 """With fewer twins nothing is known about a room, which then counts as never solved."""

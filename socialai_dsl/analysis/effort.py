@@ -65,7 +65,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is tried: rooms 0, 1, ... of a seed, so many states of each, as long as the clock says."""
+    """How much is tried: the rooms 0, 1, ... of a seed, a number of states of each, and a time."""
 
     rooms: int = 100
     seed: int = 0

@@ -37,12 +37,12 @@ _WALKS: Final = 256
 """How many sequences of actions are tried at random, at most."""
 
 _NEAR: Final = 3_000
-"""So many states are searched before anything is tried at random."""
+"""The number of states searched before anything is tried at random."""
 
 _LOOKED_INTO: Final = 6
 _FEW_STATES: Final = 2_000
-"""Of so many of the sequences that tell rooms apart it is found out whether they can be solved then, and in so many
-states."""
+"""The number of sequences, among those that tell rooms apart, after which a solution is searched, and the number of
+states of each search."""
 
 
 Plan = Sequence[NDArray[np.int64]]
@@ -198,7 +198,7 @@ class Guessing:
         return None
 
     def _searched(self, layer: _Together, states: int) -> Guess:
-        """Everything that can be done, breadth first, as far as so many states."""
+        """Everything that can be done, breadth first, up to a number of states."""
         self._seen = set(self._digests(layer).tolist())
         clock = self._effort.clock
         step, late, perhaps = 0, None, None

@@ -357,7 +357,7 @@ _KNOWN: Final = {
 }
 _NO_SUCCESS: Final = "no success is possible"
 _NEAR: Final = 8_000
-"""In so many states a success without the members is looked for before anything else."""
+"""The number of states in which a success without the members is looked for first."""
 
 _ALWAYS_A_GUESS: Final = "there is nothing but a guess with them, too"
 
@@ -461,7 +461,7 @@ _ORDER: Final = (Answer.GUESSES, Answer.UNDECIDED, Answer.TELLS_APART, Answer.KN
 
 
 _TURNS: Final = 4
-"""So many values of a draw are compared with the others."""
+"""The most values of a draw that are compared with the others."""
 
 
 class _Draw:

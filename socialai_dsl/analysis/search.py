@@ -41,7 +41,7 @@ _SPEECH: Final = (0.0, 0.05, 0.3)
 """How often something is said in walks at random."""
 
 _TRIED: Final = 64
-"""Among so many draws those that fall otherwise are looked for."""
+"""The number of draws among which those that fall otherwise are looked for."""
 
 
 class Verdict(Enum):

@@ -3,6 +3,14 @@
 import argparse
 import math
 from collections.abc import Callable
+from typing import Any, Final
+
+STYLE: Final[dict[str, Any]] = {
+    "choices": ("prose", "grid", "json"),
+    "default": "prose",
+    "help": "style of the observations (default: prose)",
+}
+"""The option `--style`: how a language model reads observations."""
 
 
 def positive(text: str) -> int:

@@ -3,7 +3,7 @@
 import argparse
 from dataclasses import fields
 
-from socialai_dsl.cli.arguments import positive, seconds
+from socialai_dsl.cli.arguments import STYLE, positive, seconds
 from socialai_dsl.evaluation.players import ModelOptions
 
 
@@ -21,12 +21,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="environment variable that holds the key (default: OPENAI_API_KEY)",
     )
-    group.add_argument(
-        "--style",
-        choices=("prose", "grid", "json"),
-        default="prose",
-        help="style of the observations (default: prose)",
-    )
+    group.add_argument("--style", **STYLE)
     group.add_argument(
         "--mode",
         choices=("text", "json", "tools"),

@@ -6,7 +6,7 @@ import sys
 from importlib.util import find_spec
 from typing import Final
 
-from socialai_dsl.cli.arguments import natural, positive
+from socialai_dsl.cli.arguments import STYLE, natural, positive
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.errors import UsageError
 
@@ -30,12 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--port", type=natural, default=8000, metavar="N", help="port (default: 8000); 0 takes any free one"
     )
-    parser.add_argument(
-        "--style",
-        choices=("prose", "grid", "json"),
-        default="prose",
-        help="style of the observations (default: prose)",
-    )
+    parser.add_argument("--style", **STYLE)
     parser.add_argument(
         "--sessions",
         type=positive,

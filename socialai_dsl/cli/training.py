@@ -161,7 +161,7 @@ def write_card(
 
 
 _REPLAYED: Final = 5
-"""So many failures, and so many successes."""
+"""The number of failures, and of successes, that a run films."""
 
 
 def record_run(evaluation: "Evaluation", folder: Path, label: str) -> None:

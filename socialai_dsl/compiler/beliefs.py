@@ -45,7 +45,7 @@ def _perceive_one(to: Expressions, sources: Iterator[BeliefPlan]) -> None:
 
 
 def _forget(to: Expressions, belief: BeliefPlan, age: int | None, done: Label) -> None:
-    """Without any source: nothing is believed any more after so many turns, or on a condition."""
+    """Without any source: a belief ends after a number of turns, or on a condition."""
     block = to.block
     mark = block.taken
     if age is not None:

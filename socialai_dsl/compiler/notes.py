@@ -23,9 +23,9 @@ from socialai_dsl.semantics.terms import BOOL, Const, Reading, Readings, Term, T
 
 _LEAST, _GREATEST = -32768, 32767
 _MOST_VALUES = 6
-"""So many values of a part are noted."""
+"""The most values of a part that are noted."""
 _MOST_HEARD = 3
-"""So many entries of an inbox are noted."""
+"""The most entries of an inbox that are noted."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -218,7 +218,7 @@ class Row(NamedTuple):
 
 
 def empty_state(rows: int, registers: int, board: int, tokens: int, view: int, more: int) -> State:
-    """A state of zeros, with so many channels behind the fourth; every row must be reset before it is used."""
+    """A state of zeros, with `more` channels behind the fourth; every row must be reset before it is used."""
     return State(
         registers=np.zeros((rows, registers), np.int16),
         boards=np.zeros((rows, board), np.uint32),
@@ -230,7 +230,7 @@ def empty_state(rows: int, registers: int, board: int, tokens: int, view: int, m
 
 
 def empty_ports(state: State, counters: int, slots: int, more: int) -> Ports:
-    """Ports that fit a state with so many channels behind the fourth, with nothing pinned and no outcome."""
+    """Ports that fit a state with `more` channels behind the fourth, with nothing pinned and no outcome."""
     rows, registers = state.registers.shape
     picture = (state.image.shape[1] * (4 + more) + 1) // 2 if more else 0
     return Ports(

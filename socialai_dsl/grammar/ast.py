@@ -352,7 +352,7 @@ def parse_text(text: str) -> Text:
 
 
 _MOST_ENDS = 8
-"""So many comparisons and ends of slots after a `<` are tried as the end of its slot."""
+"""The most comparisons and ends of slots after a `<` that are tried as the end of its slot."""
 
 
 def _slots(text: str) -> Iterator[tuple[int, int]]:

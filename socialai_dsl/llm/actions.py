@@ -16,10 +16,10 @@ Mode = Literal["text", "json", "tools"]
 """How a model gives its action: in a line of its reply, as a JSON object, or by calling tools."""
 
 _READ: Final = 20_000
-"""So many characters of a reply are read, the last ones."""
+"""The most characters of a reply that are read, the last ones."""
 _QUOTED: Final = 80
 _MOST_SENTENCES: Final = 500
-"""A JSON Schema lists the sentences up to so many; servers refuse longer lists."""
+"""The most sentences that a JSON Schema lists; servers refuse longer lists."""
 
 _MEANINGS: Final = {
     "left": "turn left where you stand",

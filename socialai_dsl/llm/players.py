@@ -27,7 +27,7 @@ FORMAT: Final = "socialai-transcript/1"
 Probing = Literal["apart", "kept", "off"]
 _SETTINGS: Final = "settings.json"
 _KEPT: Final = 4000
-"""So many characters of a reply are kept and shown to the model again."""
+"""The most characters of a reply that are kept and shown to the model again."""
 
 
 @dataclass(frozen=True)

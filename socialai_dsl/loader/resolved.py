@@ -632,7 +632,7 @@ def _named_file(part: Part, folder: Path, source: Source, texts: Mapping[Path, S
     found = DiagnosticBag()
     if looks_like_path(text):
         head = text[: text.rfind("/") + 1]
-        # Only so many names are compared, so the likeliest come first.
+        # `did_you_mean` compares the first names only, so the likeliest come first.
         names = sorted(yaml_files(folder / head), key=lambda name: abs(len(head + name) - len(text)))
         near = did_you_mean(text, [head + name for name in names])
         found.error("S007", "there is no such file", Span(text, 1, 1), suggestion=near)

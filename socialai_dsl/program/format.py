@@ -215,7 +215,7 @@ class FrameColumn(IntEnum):
 
 
 MOST_CHOICES = 7
-"""So many actions fit into the operand of `Op.CHOOSE`, which is a positive int32."""
+"""The most actions that fit into the operand of `Op.CHOOSE`, which is a positive int32."""
 
 
 class LineColumn(IntEnum):

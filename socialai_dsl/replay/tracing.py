@@ -27,7 +27,7 @@ Answers = Sequence[tuple[str, str]]
 Think = Callable[[Mapping[str, NDArray[Any]]], Thought | None]
 """What an agent makes of an observation; asked in each moment before a step, in order."""
 _SHOWN: Final = 400
-"""So many characters of an answer are shown; a model's last words hold its action."""
+"""The most characters of an answer that are shown; a model's last words hold its action."""
 
 
 def trace_of(

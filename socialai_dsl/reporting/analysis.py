@@ -35,7 +35,7 @@ TABLES: Final = ("table2", None)
 """Groups that are tables; any other is a case study, whose rows are compared as well as its columns."""
 
 TOGETHER: Final = 4
-"""So many conditions of a case study are drawn in one panel; more get a panel for each column."""
+"""The most conditions of a case study in one panel; more get a panel for each column."""
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,7 @@ def align(runs: Sequence[Sequence[UpdateRecord]], bins: int = 40) -> Seeds:
 
     Args:
         runs: of each the updates, at least one.
-        bins: at most so many, and no more than the longest run has updates.
+        bins: the most bins; there are no more than the longest run has updates.
     """
     end = max(updates[-1].frames for updates in runs)
     edges = np.linspace(0, end, min(bins, max(len(updates) for updates in runs)) + 1)

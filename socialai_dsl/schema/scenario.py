@@ -346,7 +346,7 @@ class CastMember(Character):
 
 
 class CastGroup(CastMember):
-    """A group in the cast as authors write it: so many alike members, of which a list gives one value each.
+    """A group in the cast as authors write it: several alike members; a list gives one value to each.
 
     The loader makes members `name[0]`, `name[1]`, ... of it, so that no scenario holds one.
     """

@@ -13,7 +13,7 @@ from socialai_dsl.semantics.terms import BOOL, Compare, Const, Select, Term, Typ
 
 _SAYABLE: Final = ("text", "noun", "color", "int", "status", "direction", "action")
 _MOST_WORDS: Final = 256
-"""As so many texts one value may be read, where another is a text."""
+"""The most texts that one value may be read as, where another is a text."""
 
 
 @dataclass(frozen=True)

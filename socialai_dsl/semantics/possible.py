@@ -39,7 +39,7 @@ GRAMMAR_CODE = "S104"
 
 
 MOST_PAIRS: Final = 64 * 256
-"""So many numbers a grammar can have for what is said: templates times fillings."""
+"""The most numbers a grammar can have for what is said: templates times fillings."""
 
 
 def check_grammar(scenario: Scenario, findings: Findings) -> bool:

@@ -17,9 +17,9 @@ from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import TRUTHS, normal
 
 _MOST: Final = 64
-"""So many possible answers need not be written out."""
+"""The most possible answers that need not be written out."""
 _MOST_VALUES: Final = 1_000
-"""So many values the texts of all probes may have."""
+"""The most values of the texts of all probes."""
 _LARGEST: Final = 32767
 _KNOWN_BEFOREHAND: Final = "what is known beforehand tells nothing of who is asked"
 

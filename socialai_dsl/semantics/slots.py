@@ -15,7 +15,7 @@ from socialai_dsl.vocabulary import COLORS, is_plain, normal
 
 _RANGE: Final = re.compile(r"(-?\d+)\.\.(-?\d+)")
 _MOST: Final = 256
-"""So many values a slot can have."""
+"""The most values of a slot."""
 
 Entry = tuple[str, Const | None]
 """A word, and the thing, member of the cast or colour that it stands for."""

@@ -428,7 +428,7 @@ Alternative = list[tuple[Pattern, Term | None]]
 """What one text of `hears:` stands for: patterns, each with a condition on values, of which at most one holds."""
 
 _MOST_LISTED = 4
-"""So many texts are listed in a message."""
+"""The most texts that a message lists."""
 
 
 def speaker(resolver: Resolver, node: ast.Name, scope: Scope) -> Term:

@@ -100,7 +100,7 @@ class Engine:
         """The answer to a question.
 
         Raises:
-            EngineLostError: there was none within so many seconds, or the process has ended.
+            EngineLostError: none came within `seconds`, or the process has ended.
         """
         async with self._turn:
             if self._worker is None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import product
 from math import sqrt
+from pathlib import Path
 from typing import Any
 
 import socialai_dsl as sd
@@ -15,6 +16,15 @@ from socialai_dsl.envs import ScenarioEnv
 
 Cell = tuple[int, int]
 Code = tuple[int, ...]
+
+NOVEL = tuple(
+    sorted(
+        path.stem
+        for path in (Path(__file__).parents[2] / "scenarios/novel").glob("*.yaml")
+        if not path.stem.endswith("_oracle")
+    )
+)
+"""The scenarios beyond the paper and the School."""
 
 FORWARD: dict[str, Cell] = {"right": (1, 0), "down": (0, 1), "left": (-1, 0), "up": (0, -1)}
 OPPOSITE = {"right": "left", "left": "right", "up": "down", "down": "up"}

@@ -8,24 +8,18 @@ from typing import Any, ClassVar
 import pytest
 
 import socialai_dsl as sd
-from tests.scenarios.playing import FORWARD, Episode, beside, check_shares, distance, evenly, made, rooms
-
-NAMES = (
-    "bargaining",
-    "conventions",
-    "culprit",
-    "fetch",
-    "gaze_following",
-    "gossip",
-    "haggling",
-    "implicature",
-    "interpreter",
-    "sally_anne",
-    "second_order",
-    "shop",
-    "turn_taking",
-    "whisper",
+from tests.scenarios.playing import (
+    FORWARD,
+    NOVEL,
+    Episode,
+    beside,
+    check_shares,
+    distance,
+    evenly,
+    made,
+    rooms,
 )
+
 # A shop whose keeper's mood is known, the agent beside the keeper.
 SHOP: dict[str, Any] = {
     "room": {"width": 5, "height": 5},
@@ -44,14 +38,14 @@ def played(name: str, seed: int) -> tuple[dict[str, Any], dict[str, Any], float]
             return env.describe(), info, float(reward)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", NOVEL)
 def test_the_rooms_can_be_solved(name: str) -> None:
     """The way to the apple of `culprit` can be barred for the whole time, in one room of a thousand."""
     solved = sum(bool(played(f"novel/{name}+oracle", seed)[1]["success"]) for seed in range(300))
     assert solved >= (298 if name == "culprit" else 300)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", NOVEL)
 def test_nothing_looks_odd(name: str) -> None:
     assert sd.load(f"novel/{name}+oracle").warnings == ()
 

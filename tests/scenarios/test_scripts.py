@@ -8,32 +8,12 @@ import socialai_dsl as sd
 from socialai_dsl.analysis.perceiving import perceived
 from socialai_dsl.analysis.properties import Effort, solved_by_script
 from tests.quick import one_in
+from tests.scenarios.playing import NOVEL
 
 ROOMS = 40
 PAPER = (
     *("talkitout", "talkitout_no_liar", "dance", "cointhief", "cointhief_tags", "diverse_exit", "showme"),
     *("showme_no_social", "help", "help_as_helper"),
-)
-NOVEL = tuple(
-    f"novel/{name}"
-    for name in (
-        *(
-            "bargaining",
-            "conventions",
-            "culprit",
-            "fetch",
-            "gaze_following",
-            "gossip",
-            "haggling",
-            "implicature",
-            "interpreter",
-            "sally_anne",
-            "second_order",
-            "shop",
-            "turn_taking",
-        ),
-        "whisper",
-    )
 )
 SCHOOL = tuple(
     f"school/{name}"
@@ -44,7 +24,10 @@ SCHOOL = tuple(
 )
 
 
-@pytest.mark.parametrize("name", one_in(4, [*PAPER, *NOVEL, *SCHOOL], "plays many rooms of every scenario"))
+ALL = [*PAPER, *(f"novel/{name}" for name in NOVEL), *SCHOOL]
+
+
+@pytest.mark.parametrize("name", one_in(4, ALL, "plays many rooms of every scenario"))
 def test_a_script_acts_on_what_it_has_perceived(name: str) -> None:
     scripted = sd.load(f"{name}+oracle")
     assert isinstance(scripted, sd.LoadedScenario)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -36,7 +37,7 @@ class NetSpec:
     vocabulary: tuple[str, ...]
     slots_used: tuple[tuple[bool, ...], ...] = ()
 
-    @property
+    @cached_property
     def used(self) -> Tensor | None:
         """`slots_used` as 0 and 1, float (templates, slots); None if all templates have all slots."""
         return None if all(map(all, self.slots_used)) else torch.tensor(self.slots_used, dtype=torch.float32)
