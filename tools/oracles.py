@@ -62,6 +62,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
         progress.clear()
         if not arguments.json:
             print("\n".join(reports[-1].lines()), flush=True)
+        if clock.interrupted:
+            raise KeyboardInterrupt
     if arguments.json:
         print(json.dumps([report.as_object() for report in reports], indent=2))
     if arguments.out is not None:

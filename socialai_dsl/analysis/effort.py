@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
@@ -45,15 +46,23 @@ class Clock:
         """Seconds; None: for ever."""
         return None if self._until is None else max(0.0, self._until - time.monotonic())
 
-    def part(self, parts: int) -> Clock:
-        """A clock for one of `tasks` that share the time left."""
-        own = Clock(None if self.left is None else self.left / parts, self._tell)
+    def part(self, tasks: float) -> Clock:
+        """A clock for the next of several tasks that share the time left; of 2.5, for two of five."""
+        own = Clock(None if self.left is None else self.left / tasks, self._tell)
         own._whole = self._whole
         return own
 
     def interrupt(self) -> None:
         """Stop as soon as possible, and tell what is known."""
         self._whole._interrupted = True
+
+    @contextmanager
+    def until_interrupted(self) -> Iterator[None]:
+        """Ctrl-C ends the block, and requests an interruption."""
+        try:
+            yield
+        except KeyboardInterrupt:
+            self.interrupt()
 
     def progress(self, what: str) -> None:
         """Tell how far it is, if it is time for that."""

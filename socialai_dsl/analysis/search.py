@@ -71,8 +71,13 @@ class Finding:
     steps: int | None = None
 
 
-def search_rooms(envs: ScenarioVectorEnv, rows: list[int], states: int = STATES) -> Iterator[Finding]:
-    """Search the rooms that these environments are in, one after the other; the environments stay as they are."""
+def search_rooms(
+    envs: ScenarioVectorEnv, rows: list[int], states: int = STATES, clock: Clock | None = None
+) -> Iterator[Finding]:
+    """Search the rooms that these environments are in, one after the other; the environments stay as they are.
+
+    Rooms for which the clock leaves too little time are left out.
+    """
     searches: dict[str, Search] = {}
     table = envs._table
     for row in rows:
@@ -80,7 +85,11 @@ def search_rooms(envs: ScenarioVectorEnv, rows: list[int], states: int = STATES)
         if program.sha256 not in searches:
             searches[program.sha256] = Search(program)
         state = table.state
-        yield searches[program.sha256].solve(state.registers[row], state.boards[row], state.keys[row], states)
+        start = state.registers[row], state.boards[row], state.keys[row]
+        finding = searches[program.sha256].solve(*start, states, clock)
+        if clock is not None and clock.is_over and finding.verdict is Verdict.UNDECIDED:
+            return
+        yield finding
 
 
 @dataclass

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from socialai_dsl.analysis.effort import Clock
 from socialai_dsl.engine.state import Key
 from socialai_dsl.envs.vector_env import Observation, ScenarioVectorEnv
 from socialai_dsl.program import FrameColumn, Header, Program
@@ -38,7 +39,7 @@ class Tally:
     Attributes:
         times: how often each rule fired, each state and step was entered, and each outcome ended an episode.
         endings: the same for every way to end, by name, deadly cells and time included.
-        episodes: how many were played.
+        episodes: how many were played to their end.
     """
 
     times: Counter[Part]
@@ -53,8 +54,9 @@ def tally(
     begin: Callable[[NDArray[np.bool_], NDArray[np.int64]], None],
     episodes: int,
     seed: int,
+    clock: Clock,
 ) -> Tally:
-    """Play a number of episodes, each to its end, and count.
+    """Play a number of episodes, each to its end, and count. What happens in episodes that the clock breaks off counts.
 
     Args:
         envs: environments that do not reset themselves (autoreset_mode "Disabled"), which nobody has played yet.
@@ -64,21 +66,28 @@ def tally(
             `choose` is asked.
         episodes: how many; they are numbers 0, 1, ... of the seed (`index`).
         seed: of the environments.
+        clock: when to stop early, and who is told how far it is.
     """
-    watch = _Watch(envs, scenarios)
-    for first in range(0, episodes, envs.num_envs):
-        playing = np.arange(envs.num_envs) < episodes - first
-        numbers = np.arange(first, first + envs.num_envs)
-        options = {"index": numbers, "reset_mask": playing}
-        observation, _ = envs.reset(seed=seed, options=options)
-        begin(playing, numbers)
-        watch.began(playing)
-        while playing.any():
-            watch.before()
-            observation, _, terminated, truncated, _ = envs.step(choose(observation))
-            watch.after(playing)
-            playing &= ~(terminated | truncated)
-    return watch.tally(episodes)
+    watch, ended = _Watch(envs, scenarios), 0
+    with clock.until_interrupted():
+        for first in range(0, episodes, envs.num_envs):
+            playing = np.arange(envs.num_envs) < episodes - first
+            numbers = np.arange(first, first + envs.num_envs)
+            options = {"index": numbers, "reset_mask": playing}
+            observation, _ = envs.reset(seed=seed, options=options)
+            begin(playing, numbers)
+            watch.began(playing)
+            while playing.any() and not clock.is_over:
+                watch.before()
+                observation, _, terminated, truncated, _ = envs.step(choose(observation))
+                watch.after(playing)
+                over = playing & (terminated | truncated)
+                playing &= ~over
+                ended += int(np.count_nonzero(over))
+            if clock.is_over:
+                break
+            clock.progress(f"{ended} of {episodes} episodes played")
+    return watch.tally(ended)
 
 
 def parts_of(checked: CheckedScenario) -> Iterator[Part]:

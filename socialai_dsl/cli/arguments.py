@@ -1,4 +1,4 @@
-"""Reads numbers from the command line."""
+"""Options that several commands have, and numbers on the command line."""
 
 import argparse
 import math
@@ -11,6 +11,26 @@ STYLE: Final[dict[str, Any]] = {
     "help": "style of the observations (default: prose)",
 }
 """The option `--style`: how a language model reads observations."""
+ROOMS: Final = 100
+SECONDS: Final = 20.0
+
+
+def add_effort(parser: argparse.ArgumentParser) -> None:
+    """Declare how much is tried, and for how long."""
+    parser.add_argument(
+        "--rooms",
+        type=positive,
+        default=ROOMS,
+        metavar="N",
+        help=f"number of rooms (default: {ROOMS})",
+    )
+    parser.add_argument(
+        "--seconds",
+        type=at_least(0.0),
+        default=SECONDS,
+        metavar="S",
+        help=f"time limit: N scenarios have N times as much in all; 0 for none (default: {SECONDS:g})",
+    )
 
 
 def positive(text: str) -> int:

@@ -5,18 +5,17 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any, Final
 
-from socialai_dsl.cli.arguments import at_least, natural, percent, positive
+from socialai_dsl.cli.arguments import add_effort, natural, percent, positive
 from socialai_dsl.cli.errors import Exit
 from socialai_dsl.cli.terminal import ProgressLine
 
 if TYPE_CHECKING:
-    from socialai_dsl.analysis.scenario_report import ScenarioReport
+    from socialai_dsl.analysis.effort import Clock
+    from socialai_dsl.checking.loaded import LoadedScenario
 
 SUMMARY: Final = "test by playing what scenarios claim, and whether everything in them can happen"
 
-ROOMS: Final = 100
 STATES: Final = 50_000
-SECONDS: Final = 20.0
 PARTS: Final = ("claims", "coverage", "script")
 
 
@@ -81,86 +80,84 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_effort(parser: argparse.ArgumentParser) -> None:
-    """Declare how much is tried, and for how long."""
-    parser.add_argument(
-        "--rooms",
-        type=positive,
-        default=ROOMS,
-        metavar="N",
-        help=f"number of rooms (default: {ROOMS})",
-    )
-    parser.add_argument(
-        "--seconds",
-        type=at_least(0.0),
-        default=SECONDS,
-        metavar="S",
-        help=f"time limit for each scenario, 0 for none (default: {SECONDS:g})",
-    )
-
-
 def execute(arguments: argparse.Namespace) -> Exit:
     """Check every scenario that was named; what fails is a finding. Ctrl-C ends with what is known."""
-    parts = arguments.parts or ["claims"]
-    documents: list[dict[str, Any]] = []
-    ends = []
-    if "claims" in parts:
-        reports = _claims(arguments)
-        documents += [report.as_object() for report in reports]
-        if any(report.interrupted for report in reports):
-            ends.append(Exit.INTERRUPTED)
-        elif any(report.fails(arguments.strict) for report in reports):
-            ends.append(Exit.FINDINGS)
-    if "coverage" in parts and Exit.INTERRUPTED not in ends:
-        ends.append(_coverage(arguments, documents))
-    if "script" in parts and Exit.INTERRUPTED not in ends:
-        ends.append(_scripts(arguments, documents))
-    if arguments.json:
-        print(json.dumps(documents[0] if arguments.alone else documents, indent=2, ensure_ascii=False))
-    return max(ends, default=Exit.GOOD)
-
-
-def _claims(arguments: argparse.Namespace) -> "list[ScenarioReport]":
-    from socialai_dsl.analysis.check import check_scenario, scenarios_of
-    from socialai_dsl.analysis.effort import Clock, Effort
+    from socialai_dsl.analysis.check import scenarios_of
+    from socialai_dsl.analysis.effort import Clock
 
     progress = ProgressLine(sys.stderr)
-    say = None if arguments.json else progress.above(sys.stdout)
-    reports: list[ScenarioReport] = []
-    for scenario, called in (pair for name in arguments.scenarios for pair in scenarios_of(name)):
-        clock = Clock(arguments.seconds or None, progress.show)
-        effort = Effort(arguments.rooms, arguments.seed, arguments.states, clock)
-        reports.append(check_scenario(scenario, called, effort, arguments.deep, say))
+    parts = [part for part in PARTS if part in (arguments.parts or ["claims"])]
+    scenarios = [pair for name in arguments.scenarios for pair in scenarios_of(name)]
+    clock = Clock(arguments.seconds * len(scenarios) or None, progress.show)
+    documents: list[dict[str, Any]] = []
+    ends = [Exit.GOOD]
+    for left, part in zip(range(len(parts), 0, -1), parts, strict=True):
+        own = clock.part(left)
+        if part == "claims":
+            ends.append(_claims(arguments, scenarios, own, progress, documents))
+        else:
+            ends.append((_coverage if part == "coverage" else _scripts)(arguments, own, progress, documents))
         if clock.interrupted:
+            ends.append(Exit.INTERRUPTED)
             break
     progress.clear()
-    return reports
+    if arguments.json:
+        print(json.dumps(documents[0] if arguments.alone else documents, indent=2, ensure_ascii=False))
+    return max(ends)
 
 
-def _coverage(arguments: argparse.Namespace, documents: list[dict[str, Any]]) -> Exit:
+def _claims(
+    arguments: argparse.Namespace,
+    scenarios: "list[tuple[LoadedScenario, str]]",
+    clock: "Clock",
+    progress: ProgressLine,
+    documents: list[dict[str, Any]],
+) -> Exit:
+    from socialai_dsl.analysis.check import check_scenario
+    from socialai_dsl.analysis.effort import Effort
+
+    say = None if arguments.json else progress.above(sys.stdout)
+    end = Exit.GOOD
+    for number, (scenario, called) in enumerate(scenarios):
+        own = clock.part(len(scenarios) - number)
+        effort = Effort(arguments.rooms, arguments.seed, arguments.states, own)
+        report = check_scenario(scenario, called, effort, arguments.deep, say)
+        documents.append(report.as_object())
+        if report.fails(arguments.strict):
+            end = Exit.FINDINGS
+        if clock.interrupted:
+            break
+    return end
+
+
+def _coverage(
+    arguments: argparse.Namespace, clock: "Clock", progress: ProgressLine, documents: list[dict[str, Any]]
+) -> Exit:
     from socialai_dsl.evaluation import coverage
 
-    found = coverage(arguments.scenarios, arguments.agent or (), arguments.episodes, arguments.seed)
+    found = coverage(arguments.scenarios, arguments.agent or (), arguments.episodes, arguments.seed, clock)
     documents.append(found.as_object())
     if not arguments.json:
-        print("\n".join(found.lines()))
+        progress.above(sys.stdout)("\n".join(found.lines()))
     least = arguments.fail_under
     return Exit.FINDINGS if least is not None and found.percent < least else Exit.GOOD
 
 
-def _scripts(arguments: argparse.Namespace, documents: list[dict[str, Any]]) -> Exit:
+def _scripts(
+    arguments: argparse.Namespace, clock: "Clock", progress: ProgressLine, documents: list[dict[str, Any]]
+) -> Exit:
     """A room that can be solved and was not is a finding."""
-    from socialai_dsl.analysis.effort import Clock
     from socialai_dsl.evaluation import play_script
 
-    progress, end = ProgressLine(sys.stderr), Exit.GOOD
-    for name in arguments.scenarios:
-        clock = Clock(None, progress.show)
-        found = play_script(name, arguments.rooms, arguments.seed, arguments.states, clock)
-        progress.clear()
+    end = Exit.GOOD
+    for number, name in enumerate(arguments.scenarios):
+        own = clock.part(len(arguments.scenarios) - number)
+        found = play_script(name, arguments.rooms, arguments.seed, arguments.states, own)
         documents.append(found.as_object())
         if not arguments.json:
-            print("\n".join(found.lines()), flush=True)
+            progress.above(sys.stdout)("\n".join(found.lines()))
         if found.found("solvable"):
             end = Exit.FINDINGS
+        if clock.interrupted:
+            break
     return end

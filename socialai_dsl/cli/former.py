@@ -25,9 +25,8 @@ def current(words: Sequence[str]) -> tuple[list[str], str | None]:
             return [
                 "check",
                 *rest,
-                "--part",
-                "coverage",
-                "--alone",
+                *_unlimited(rest),
+                *["--part", "coverage", "--alone"],
             ], "`check --part coverage` instead of `coverage`"
         case "oracles":
             return ["check", *_oracles(rest)], "`check --part script` instead of `oracles`"
@@ -62,7 +61,12 @@ def _oracles(rest: list[str]) -> list[str]:
         rest = [*(name for name in shipped_scenarios() if "oracle" in variants_of(name)), *rest]
     rest += [] if "--rooms" in named else ["--rooms", "5000"]
     rest += [] if "--states" in named else ["--states", "300000"]
-    return [*rest, "--part", "script"]
+    return [*rest, *_unlimited(rest), "--part", "script"]
+
+
+def _unlimited(rest: Sequence[str]) -> list[str]:
+    """Commands of earlier versions that had no time limit keep none."""
+    return [] if any(word.partition("=")[0] == "--seconds" for word in rest) else ["--seconds", "0"]
 
 
 def _renamed(words: Sequence[str], names: Mapping[str, str]) -> list[str]:

@@ -7,8 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from socialai_dsl.cli.arguments import positive
-from socialai_dsl.cli.check import add_effort
+from socialai_dsl.cli.arguments import add_effort, positive
 from socialai_dsl.cli.errors import Exit, is_usage
 from socialai_dsl.cli.files import STDIN, standard_input, yaml_files
 from socialai_dsl.cli.reporters import REPORTERS, Checked, limited

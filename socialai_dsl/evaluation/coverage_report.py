@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from socialai_dsl.analysis.effort import Clock
     from socialai_dsl.analysis.tally import Part, Tally
 
 _TOGETHER: Final = 250
@@ -24,7 +25,11 @@ _KINDS: Final = ("rule", "state", "step", "outcome")
 
 
 def coverage(
-    scenarios: Sequence[str], agents: Sequence[str] = (), episodes: int = 200, seed: int = 0
+    scenarios: Sequence[str],
+    agents: Sequence[str] = (),
+    episodes: int = 200,
+    seed: int = 0,
+    clock: Clock | None = None,
 ) -> Coverage:
     """Let agents play scenarios, and count how often each rule, state, step and outcome came about.
 
@@ -34,24 +39,41 @@ def coverage(
             scenario has a script).
         episodes: of each agent in each scenario: rooms 0 to episodes - 1 of the seed.
         seed: of the rooms, and of what agents draw.
+        clock: when to stop early; agents and scenarios share its time. With a clock, Ctrl-C ends with what is known.
 
     Raises:
         ScenarioError: a scenario has mistakes.
         UsageError: an agent cannot play a scenario.
     """
-    found = Coverage()
-    for scenario in scenarios:
-        found.parts.update(dict.fromkeys(_parts(scenario)))
-        found.scenarios.append(scenario)
-        for agent in agents or ("random", "oracle"):
-            played = scenario
-            if agent == "oracle":
-                scripted = with_script(scenario) if agents else scripted_name(scenario)
-                if scripted is None:
-                    continue
-                played = scripted
-            found.add(agent, _played(played, agent, episodes, seed))
+    from socialai_dsl.analysis.effort import Clock
+
+    whole, found = Clock() if clock is None else clock, Coverage()
+    with whole.until_interrupted():
+        plays = []
+        for scenario in scenarios:
+            found.parts.update(dict.fromkeys(_parts(scenario)))
+            found.scenarios.append(scenario)
+            plays += list(_plays(scenario, agents))
+        found.planned = len(plays) * episodes
+        for number, (agent, played) in enumerate(plays):
+            found.add(agent, _played(played, agent, episodes, seed, whole.part(len(plays) - number)))
+            if whole.is_over:
+                break
+    found.interrupted = whole.interrupted
+    if clock is None and whole.interrupted:
+        raise KeyboardInterrupt
     return found
+
+
+def _plays(scenario: str, agents: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Which agents play, and under which name each finds the scenario."""
+    for agent in agents or ("random", "oracle"):
+        if agent != "oracle":
+            yield agent, scenario
+        elif agents:
+            yield agent, with_script(scenario)
+        elif (scripted := scripted_name(scenario)) is not None:
+            yield agent, scripted
 
 
 def _parts(scenario: str) -> list[Part]:
@@ -65,7 +87,7 @@ def _parts(scenario: str) -> list[Part]:
     return [part for member in members for part in parts_of(member.checked)]
 
 
-def _played(scenario: str, agent: str, episodes: int, seed: int) -> Tally:
+def _played(scenario: str, agent: str, episodes: int, seed: int, clock: Clock) -> Tally:
     import numpy as np
 
     import socialai_dsl
@@ -79,7 +101,9 @@ def _played(scenario: str, agent: str, episodes: int, seed: int) -> Tally:
     )
     try:
         if agent == "oracle":
-            return tally(envs, played, lambda seen: envs.scripted_actions(), _forget_nothing, episodes, seed)
+            return tally(
+                envs, played, lambda seen: envs.scripted_actions(), _forget_nothing, episodes, seed, clock
+            )
         if agent == "random":
             generator, sizes = np.random.default_rng(seed), envs.single_action_space.nvec
             shape = (envs.num_envs, len(sizes))
@@ -90,12 +114,13 @@ def _played(scenario: str, agent: str, episodes: int, seed: int) -> Tally:
                 _forget_nothing,
                 episodes,
                 seed,
+                clock,
             )
         require_trainer()
         policy, told = make_policy(Player(named_agent(agent, scenario), seed=seed), envs)
         for warning in told:
             warnings.warn(warning, stacklevel=2)
-        return tally(envs, played, policy.act, policy.reset, episodes, seed)
+        return tally(envs, played, policy.act, policy.reset, episodes, seed, clock)
     except ValueError as error:
         raise UsageError(str(error)) from error
     finally:
@@ -125,12 +150,14 @@ class Coverage:
     Attributes:
         scenarios: what was played. parts: what could come about.
         tallies: agent -> what did, and how many episodes it played.
+        planned: how many episodes there should be. interrupted: whether Ctrl-C ended the play.
     """
 
     def __init__(self) -> None:
         self.scenarios: list[str] = []
         self.parts: dict[Part, None] = {}
         self.tallies: dict[str, Tally] = {}
+        self.planned, self.interrupted = 0, False
 
     def add(self, agent: str, played: Tally) -> None:
         """Add what came about with an agent."""
@@ -184,7 +211,13 @@ class Coverage:
             f"{came} of {total} {kind}{'s' if total != 1 else ''}"
             for kind, (came, total) in self.summary().items()
         )
-        return [*lines, "", f"{counted}: {self.percent:.1f} %"]
+        return [*lines, "", f"{counted}: {self.percent:.1f} %", *self._shortage()]
+
+    def _shortage(self) -> Iterator[str]:
+        played = sum(tally.episodes for tally in self.tallies.values())
+        if played < self.planned:
+            why = "it was interrupted" if self.interrupted else "`--seconds` gives more time"
+            yield f"of {self.planned:,} episodes there was time for {played:,}; {why}"
 
     def as_object(self) -> dict[str, Any]:
         """The report for JSON."""
@@ -194,6 +227,8 @@ class Coverage:
         return {
             "scenarios": self.scenarios,
             "episodes": {agent: played.episodes for agent, played in self.tallies.items()},
+            "planned": self.planned,
+            "interrupted": self.interrupted,
             "parts": [
                 {
                     "file": row.part.span.file,

@@ -1,7 +1,7 @@
 """Scripts: which one a scenario has for its agent, how many rooms it solves, and whether the others can be solved."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from socialai_dsl.analysis.effort import Clock
     from socialai_dsl.analysis.search import Finding
 
-_TOGETHER: Final = 1000
+_TOGETHER: Final = 250
 _ROOMS_SHOWN: Final = 12
 UNPROVEN: Final = ", as far as chance was tried"
 VERDICTS: Final = {
     "unsolvable": "cannot be solved",
     "solvable": "can be solved: a fault of the script, or only luck would find it",
-    "undecided": "are undecided: too many states",
+    "undecided": "are undecided: too many states, or too little time",
 }
 """What may be found of a room that the script does not solve -> the same in words."""
 
@@ -95,32 +95,37 @@ class ScriptReport:
 
     Attributes:
         scenario: what was played, without the script.
-        seed: of the environments. rooms: how many were played, numbers 0 to rooms - 1 of the seed.
+        seed: of the environments. planned: how many rooms there should be.
+        rooms: how many were played, numbers 0 to rooms - 1 of the seed.
         solved: how many of them the script solved, in `mean_length` steps on average (0 if none).
-        unsolved: the others.
+        unsolved: the others. searched: how many of these were searched.
+        interrupted: whether Ctrl-C ended it.
     """
 
     scenario: str
     seed: int
+    planned: int
     rooms: int
     solved: int
     mean_length: float
     unsolved: tuple[Room, ...]
+    searched: int
+    interrupted: bool
 
     @property
     def success_rate(self) -> float:
-        """Share of rooms that the script solved."""
-        return self.solved / self.rooms
+        """Share of rooms that the script solved; 0 of none."""
+        return self.solved / self.rooms if self.rooms else 0.0
 
     @property
     def success_se(self) -> float:
         """Binomial standard error of the share."""
-        return math.sqrt(self.success_rate * (1 - self.success_rate) / self.rooms)
+        return math.sqrt(self.success_rate * (1 - self.success_rate) / self.rooms) if self.rooms else 0.0
 
     @property
     def ceiling(self) -> float:
         """Share of rooms that were not found to be unsolvable: no policy succeeds more often."""
-        return 1 - len(self.found("unsolvable")) / self.rooms
+        return 1 - len(self.found("unsolvable")) / self.rooms if self.rooms else 1.0
 
     def found(self, verdict: str) -> tuple[Room, ...]:
         """The unsolved rooms with this verdict."""
@@ -128,6 +133,8 @@ class ScriptReport:
 
     def lines(self) -> list[str]:
         """The report in a few lines."""
+        if not self.rooms:
+            return [f"{self.scenario}: no room was played", *self._shortage()]
         rate, error = self.success_rate, self.success_se
         lines = [
             f"{self.scenario}: {self.solved:,} of {self.rooms:,} rooms solved, {rate:.2%} ± {error:.2%}, "
@@ -137,7 +144,14 @@ class ScriptReport:
             if rooms := self.found(verdict):
                 proven = "" if all(room.exact for room in rooms) or verdict != "unsolvable" else UNPROVEN
                 lines.append(f"  {len(rooms)} {meaning}{proven} (seed {self.seed}, index {_indices(rooms)})")
-        return lines
+        return [*lines, *self._shortage()]
+
+    def _shortage(self) -> Iterator[str]:
+        why = "it was interrupted" if self.interrupted else "`--seconds` gives more time"
+        if self.rooms < self.planned:
+            yield f"  of {self.planned:,} rooms there was time to play {self.rooms:,}; {why}"
+        if self.searched < len(self.unsolved):
+            yield f"  of {len(self.unsolved):,} unsolved rooms there was time to search {self.searched:,}; {why}"
 
     def as_object(self) -> dict[str, Any]:
         """The report for JSON."""
@@ -166,77 +180,105 @@ def play_script(
         rooms: how many.
         seed: of the environments; environment i plays its first episode.
         states: how many states a search may look at.
-        clock: is told how far it is.
+        clock: when to stop early; searches have what is left after half of its time. With a clock, Ctrl-C ends with
+            what is known.
 
     Raises:
         UsageError: there is no script.
     """
     import numpy as np
 
-    scripted = with_script(scenario)
-    success, lengths = np.zeros(rooms, np.bool_), np.zeros(rooms, np.int64)
-    outcomes = [""] * rooms
-    for first in range(0, rooms, _TOGETHER):
-        if clock is not None:
-            clock.progress(f"{scenario}: {first} of {rooms} rooms played")
-        indices = np.arange(first, min(first + _TOGETHER, rooms))
-        _play(scripted, indices, seed, success, lengths, outcomes)
-    failed = np.flatnonzero(~success).tolist()
-    findings = _search(scenario, failed, seed, states, clock)
-    unsolved = tuple(
-        Room(index, outcomes[index], f.verdict.value, f.exact, len(f.plan) if f.plan else None, f.states)
-        for index, f in zip(failed, findings, strict=True)
+    from socialai_dsl.analysis.effort import Clock
+
+    scripted, whole = with_script(scenario), Clock() if clock is None else clock
+    played = _Played(np.zeros(rooms, np.bool_), np.zeros(rooms, np.int64), [""] * rooms)
+    findings: list[Finding] = []
+    with whole.until_interrupted():
+        _play(scripted, played, seed, whole.part(2))
+        for finding in _search(scenario, played.failed, seed, states, whole):
+            findings.append(finding)
+    if clock is None and whole.interrupted:
+        raise KeyboardInterrupt
+    success = played.success[: played.rooms]
+    found = [
+        Room(
+            index, played.outcomes[index], f.verdict.value, f.exact, len(f.plan) if f.plan else None, f.states
+        )
+        for index, f in zip(played.failed, findings, strict=False)
+    ]
+    unsearched = played.failed[len(findings) :]
+    found += [Room(index, played.outcomes[index], "undecided", False, None, 0) for index in unsearched]
+    return ScriptReport(
+        scenario=scenario,
+        seed=seed,
+        planned=rooms,
+        rooms=played.rooms,
+        solved=int(success.sum()),
+        mean_length=float(played.lengths[: played.rooms][success].mean()) if success.any() else 0.0,
+        unsolved=tuple(found),
+        searched=len(findings),
+        interrupted=whole.interrupted,
     )
-    mean = float(lengths[success].mean()) if success.any() else 0.0
-    return ScriptReport(scenario, seed, rooms, int(success.sum()), mean, unsolved)
 
 
-def _play(
-    scripted: str,
-    indices: "NDArray[np.int64]",
-    seed: int,
-    success: "NDArray[np.bool_]",
-    lengths: "NDArray[np.int64]",
-    outcomes: list[str],
-) -> None:
-    """Play one episode in each of these rooms and note how it ended."""
+@dataclass
+class _Played:
+    """How the script's episodes ended, of rooms 0 to `rooms` - 1: (planned,) each."""
+
+    success: "NDArray[np.bool_]"
+    lengths: "NDArray[np.int64]"
+    outcomes: list[str]
+    rooms: int = 0
+
+    @property
+    def failed(self) -> list[int]:
+        """The rooms that it did not solve."""
+        return [room for room in range(self.rooms) if not self.success[room]]
+
+
+def _play(scripted: str, played: _Played, seed: int, clock: "Clock") -> None:
+    """Play one episode in each room. Rooms are played together and count together, so that no length is favoured."""
     import numpy as np
 
     import socialai_dsl
 
-    envs: Any = socialai_dsl.make_vec(scripted, num_envs=len(indices), copy=False, autoreset_mode="Disabled")
+    rooms = len(played.outcomes)
+    count = min(rooms, _TOGETHER)
+    envs: Any = socialai_dsl.make_vec(scripted, num_envs=count, copy=False, autoreset_mode="Disabled")
     try:
-        envs.reset(seed=seed, options={"index": indices})
-        running = np.ones(len(indices), np.bool_)
-        while running.any():
-            _, _, terminated, truncated, infos = envs.step(envs.scripted_actions())
-            lengths[indices[running]] += 1
-            now = running & (terminated | truncated)
-            if now.any():
-                success[indices[now]] = infos["success"][now]
-                for row in np.flatnonzero(now).tolist():
-                    outcomes[indices[row]] = envs.outcomes[infos["outcome"][row]]
-                running &= ~now
+        for first in range(0, rooms, count):
+            clock.progress(f"{scripted}: {first} of {rooms} rooms played")
+            indices = np.arange(first, first + count)
+            running = indices < rooms
+            envs.reset(seed=seed, options={"index": indices, "reset_mask": running.copy()})
+            while running.any():
+                if clock.is_over:
+                    return
+                _, _, terminated, truncated, infos = envs.step(envs.scripted_actions())
+                played.lengths[indices[running]] += 1
+                now = running & (terminated | truncated)
+                if now.any():
+                    played.success[indices[now]] = infos["success"][now]
+                    for row in np.flatnonzero(now).tolist():
+                        played.outcomes[indices[row]] = envs.outcomes[infos["outcome"][row]]
+                    running &= ~now
+            played.rooms = min(first + count, rooms)
     finally:
         envs.close()
 
 
-def _search(
-    scenario: str, indices: list[int], seed: int, states: int, clock: "Clock | None"
-) -> "list[Finding]":
+def _search(scenario: str, indices: list[int], seed: int, states: int, clock: "Clock") -> "Iterator[Finding]":
+    """What is found of these rooms, one after the other, until the clock is over."""
     import socialai_dsl
     from socialai_dsl.analysis.search import search_rooms
 
-    if not indices:
-        return []
+    if not indices or clock.is_over:
+        return
     envs = socialai_dsl.make_vec(scenario, num_envs=len(indices))
     try:
         envs.reset(seed=seed, options={"index": indices})
-        findings: list[Finding] = []
-        for finding in search_rooms(envs, list(range(len(indices))), states):
-            findings.append(finding)
-            if clock is not None:
-                clock.progress(f"{scenario}: {len(findings)} of {len(indices)} unsolved rooms searched")
-        return findings
+        for number, finding in enumerate(search_rooms(envs, list(range(len(indices))), states, clock), 1):
+            yield finding
+            clock.progress(f"{scenario}: {number} of {len(indices)} unsolved rooms searched")
     finally:
         envs.close()

@@ -11,7 +11,7 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.analysis.coverage import coverage
-from socialai_dsl.analysis.properties import Effort
+from socialai_dsl.analysis.effort import Clock, Effort
 from socialai_dsl.analysis.tally import Tally, parts_of, tally
 from socialai_dsl.compilation import scenarios_of
 from socialai_dsl.envs import ScenarioVectorEnv
@@ -41,7 +41,7 @@ def played(name: str, together: int, scripted: bool) -> Tally:
             return envs.scripted_actions()
         return np.stack([choose(first[0] + row, step[0], sizes) for row in range(together)])
 
-    return tally(envs, scenarios_of(sd.load(name)), act, begin, EPISODES, seed=3)
+    return tally(envs, scenarios_of(sd.load(name)), act, begin, EPISODES, seed=3, clock=Clock())
 
 
 def explained(name: str, scripted: bool) -> tuple[Counter[tuple[str, str]], Counter[str]]:
@@ -123,6 +123,7 @@ def test_states_and_steps_are_counted_when_they_are_entered(tmp_path: Path) -> N
         lambda rows, numbers: None,
         episodes=4,
         seed=0,
+        clock=Clock(),
     )
     times = {part.name: number for part, number in counted.times.items()}
     # Two members in four episodes: at the start, and back from c twice.

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from socialai_dsl.analysis.search import Search
+from socialai_dsl.analysis.tally import _Watch
 from socialai_dsl.cli.main import main
 
 Capture = pytest.CaptureFixture[str]
@@ -233,3 +234,63 @@ def test_deep_fails_where_nothing_can_succeed(gate: Path, capsys: Capture) -> No
     gate.write_text(GATE.replace("success: agent.at(gate)", "success: agent.at(gate) and guard.is(asleep)"))
     assert main(["check", str(gate), "--rooms", "2", "--deep"]) == 1
     assert "no way was found in rooms 0, 1" in capsys.readouterr().out
+
+
+def two_parts(*options: str) -> list[str]:
+    return ["check", "cointhief", "--part", "script", "--part", "coverage", "--agent", "random", *options]
+
+
+def test_all_parts_share_the_time(capsys: Capture) -> None:
+    assert main(two_parts("--seconds", "1e-9", "--rooms", "40", "--episodes", "30", "--json")) == 0
+    played, solved = json.loads(capsys.readouterr().out)
+    assert (played["planned"], played["episodes"], played["interrupted"]) == (30, {"random": 0}, False)
+    assert (solved["planned"], solved["rooms"], solved["unsolved"], solved["interrupted"]) == (
+        40,
+        0,
+        [],
+        False,
+    )
+    assert main(two_parts("--seconds", "1e-9", "--rooms", "40", "--episodes", "30")) == 0
+    out = capsys.readouterr().out
+    assert "of 30 episodes there was time for 0; `--seconds` gives more time" in out
+    assert "cointhief: no room was played\n  of 40 rooms there was time to play 0" in out
+
+
+def test_an_interrupted_part_tells_what_is_known(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C in the second of the rooms that the script does not solve."""
+    searched = Search.solve
+    calls = []
+
+    def interrupting(self: Search, *arguments: Any) -> Any:
+        calls.append(self)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return searched(self, *arguments)
+
+    command = ["check", "talkitout", "--part", "script", "--rooms", "100", "--seconds", "0"]
+    assert main([*command, "--json"]) == 1, "only luck solves one of the rooms"
+    (whole,) = json.loads(capsys.readouterr().out)
+    monkeypatch.setattr(Search, "solve", interrupting)
+    assert main([*command, "--json"]) == 130
+    (part,) = json.loads(capsys.readouterr().out)
+    assert len(whole["unsolved"]) > 2
+    assert (part["rooms"], part["solved"]) == (100, whole["solved"])
+    assert (part["interrupted"], part["searched"]) == (True, 1)
+    assert part["unsolved"][0] == whole["unsolved"][0]
+    assert {room["verdict"] for room in part["unsolved"][1:]} == {"undecided"}
+
+
+def test_an_interrupted_game_counts_what_was_played(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    watched, calls = _Watch.after, []
+
+    def interrupting(self: _Watch, *arguments: Any) -> None:
+        calls.append(self)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        watched(self, *arguments)
+
+    monkeypatch.setattr(_Watch, "after", interrupting)
+    assert main(two_parts("--episodes", "20", "--json")) == 130
+    (found,) = json.loads(capsys.readouterr().out)
+    assert found["interrupted"]
+    assert found["episodes"]["random"] < 20 == found["planned"]

@@ -14,14 +14,14 @@ Capture = pytest.CaptureFixture[str]
     ("typed", "now"),
     [
         ("codes S101", "explain S101"),
-        ("coverage a.yaml --json", "check a.yaml --json --part coverage --alone"),
+        ("coverage a.yaml --json", "check a.yaml --json --seconds 0 --part coverage --alone"),
         (
             "oracles a.yaml --episodes 40 --seed 5",
-            "check a.yaml --rooms 40 --seed 5 --states 300000 --part script",
+            "check a.yaml --rooms 40 --seed 5 --states 300000 --seconds 0 --part script",
         ),
         (
             "oracles a.yaml --states=9",
-            "check a.yaml --states=9 --rooms 5000 --part script",
+            "check a.yaml --states=9 --rooms 5000 --seconds 0 --part script",
         ),
         ("curves r0 r1", "report r0 r1 --curves curves.png"),
         ("curves r0 --out=c.png", "report r0 --curves=c.png"),
