@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
 from pathlib import Path
 from typing import Any, Final
 
@@ -44,12 +45,21 @@ class Episode:
     reward: float = 0.0
 
     def transcript(self) -> str:
-        """The episode as text: one line for each step, what was heard under it, and how it ended."""
+        """The episode as text: a line for each step, what was heard under it, and how it ended.
+
+        Four and more equal steps without a word are one line: `(until step 100)`.
+        """
         lines = [self.title, "", "step  did       said and heard"]
-        for step in self.steps:
-            said = f'   You: "{step.said}"' if step.said is not None else ""
-            lines.append(f"{step.t:>4}  {step.action:<8}{said}".rstrip())
-            lines += [f"{'':17}{printable(line)}" for line in step.heard]
+        for _, equal in groupby(self.steps, lambda step: (step.action, step.said, step.heard)):
+            steps = list(equal)
+            silent = steps[0].said is None and not steps[0].heard
+            if silent and len(steps) >= 4:
+                lines.append(f"{steps[0].t:>4}  {steps[0].action:<8}   (until step {steps[-1].t})")
+                continue
+            for step in steps:
+                said = f'   You: "{step.said}"' if step.said is not None else ""
+                lines.append(f"{step.t:>4}  {step.action:<8}{said}".rstrip())
+                lines += [f"{'':17}{printable(line)}" for line in step.heard]
         verdict = "success" if self.success else "no success"
         lines += ["", f"{verdict} ({self.outcome}) after {len(self.steps)} steps, reward {self.reward:.3f}"]
         if self.ending is not None:

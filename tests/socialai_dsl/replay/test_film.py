@@ -97,6 +97,18 @@ def test_transcript() -> None:
     ]
 
 
+def test_a_transcript_says_once_what_goes_on_in_silence() -> None:
+    waits = [Step(t, "none", None, ()) for t in (2, 3, 4, 5)]
+    steps = [Step(1, "none", "Hello", ()), *waits, *(Step(t, "left", None, ()) for t in (6, 7, 8))]
+    assert Episode("an episode", steps).transcript().splitlines()[3:8] == [
+        '   1  none       You: "Hello"',
+        "   2  none       (until step 5)",
+        "   6  left",
+        "   7  left",
+        "   8  left",
+    ]
+
+
 def test_a_transcript_ends_with_the_line_that_decided() -> None:
     ending = Ending("success@7", True, "success: agent.at(door)", "my.yaml", 7)
     episode = record(Stand(HEARD), PROGRAM, ACTIONS, "an episode", {}, endings={"success@7": ending})
