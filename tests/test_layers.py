@@ -34,6 +34,7 @@ SHIPPED = "trainer.shipped"
 # layer -> (layers of socialai_dsl it may import, third-party packages it may import)
 MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "atomic": (set(), set()),
+    "baselines": (set(), set()),
     "errors": (set(), set()),
     "run_folder": ({"atomic", "errors", "experiments"}, {"filelock", "pydantic", CONFIG}),
     "source": (set(), set()),
@@ -78,7 +79,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     ),
     "evaluation": (
         TEXT_SIDE
-        | {"", "errors", "atomic", "program", "program_suite", "compilation", "envs", "analysis"}
+        | {"", "errors", "atomic", "baselines", "program", "program_suite", "compilation", "envs", "analysis"}
         | {"replay", "llm", "play", "experiments", "run_folder"},
         {"numpy", "gymnasium", "pydantic", "yaml", "torch", "trainer"},
     ),
@@ -91,7 +92,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"filelock", "ray", "submitit", "yaml", CONFIG, SHIPPED},
     ),
     "reporting": (
-        {"experiments"},
+        {"experiments", "baselines"},
         {"numpy", "pandas", "scipy", "matplotlib", "pydantic", "jinja2", "markupsafe", CONFIG},
     ),
     "sb3": (set(), {"numpy", "gymnasium", "stable_baselines3"}),

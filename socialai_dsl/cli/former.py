@@ -35,6 +35,9 @@ def current(words: Sequence[str]) -> tuple[list[str], str | None]:
             if not any(word.partition("=")[0] == "--curves" for word in rest):
                 rest += ["--curves", "curves.png"]
             return ["report", *rest], "`report --curves FILE` instead of `curves`"
+        case "report" if "--no-ceilings" in rest:
+            rest = _renamed(rest, {"--no-ceilings": "--no-baselines"})
+            return ["report", *rest], "`--no-baselines` instead of `--no-ceilings`"
         case "check" | "validate" if (found := _format(rest)) is not None:
             index, length, named = found
             if named == "json":

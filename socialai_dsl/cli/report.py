@@ -2,7 +2,6 @@
 
 import argparse
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -12,12 +11,14 @@ from socialai_dsl.errors import UsageError
 from socialai_dsl.run_folder import write_text
 
 if TYPE_CHECKING:
-    from socialai_dsl.reporting.analysis import Analysis, Ceilings
+    from socialai_dsl.baselines import Baselines
+    from socialai_dsl.reporting.analysis import Analysis
     from socialai_dsl.reporting.collect import Experiment
 
 SUMMARY: Final = "write a page with figures and tables about runs, finished or not"
 FIGURES: Final = "figures"
 FOLDER: Final = "report"
+BASELINES: Final = "baselines.json"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="draw only the learning curves, seeds of one condition together, and print them as a table",
     )
     parser.add_argument(
-        "--no-ceilings",
+        "--no-baselines",
         action="store_true",
         help="do not measure script, chance and success without NPCs; show only what is known",
     )
@@ -54,8 +55,8 @@ def execute(arguments: argparse.Namespace) -> Exit:
     experiment, place = _experiment(arguments.folders)
     out = arguments.out or place / FOLDER
     out.mkdir(parents=True, exist_ok=True)
-    ceilings, notes = ceilings_of(experiment, out, arguments.no_ceilings)
-    analysis = analyse(experiment, ceilings, notes)
+    measured, notes = _baselines(experiment, out / BASELINES, arguments.no_baselines)
+    analysis = analyse(experiment, measured, notes)
     _write(analysis, out)
     print(f"written to {out / 'index.html'}")
     return Exit.GOOD
@@ -89,49 +90,17 @@ def _experiment(folders: list[Path]) -> "tuple[Experiment, Path]":
         raise UsageError(str(error)) from error
 
 
-def ceilings_of(
-    experiment: "Experiment", out: Path, only_known: bool
-) -> "tuple[dict[str, Ceilings], list[str]]":
-    """Baselines by scenario: from conditions, from an earlier report, or measured now and kept."""
-    from socialai_dsl.cli.ceilings import (
-        FILE,
-        is_current,
-        known_ceilings,
-        measured_ceilings,
-        read_ceilings,
-        scenarios_of,
-        write_ceilings,
-    )
-    from socialai_dsl.diagnostics import ScenarioError
+def _baselines(
+    experiment: "Experiment", file: Path, only_known: bool
+) -> "tuple[dict[str, Baselines], list[str]]":
+    """Baselines by scenario, from an earlier report or measured now, and remarks."""
+    from socialai_dsl.evaluation.levels import read_baselines, update_baselines
     from socialai_dsl.evaluation.players import require_trainer
-    from socialai_dsl.reporting.analysis import Ceilings
 
-    if not only_known:
-        require_trainer()
-    kept, notes = read_ceilings(out / FILE), []
-    for scenario in scenarios_of(experiment):
-        if only_known:
-            continue
-        try:
-            if scenario not in kept or not is_current(scenario, kept[scenario]):
-                print(
-                    f"{scenario}: playing the script, at random, and without NPCs",
-                    file=sys.stderr,
-                    flush=True,
-                )
-                kept[scenario] = measured_ceilings(scenario)
-                write_ceilings(out / FILE, kept)
-        except ScenarioError as error:
-            kept.pop(scenario, None)
-            notes.append(f"{scenario}: nothing to set beside it: {error.diagnostics[0].message}")
-    told = known_ceilings(experiment)
-    merged = {}
-    for scenario in scenarios_of(experiment):
-        measured, own = kept.get(scenario, Ceilings()), told.get(scenario, Ceilings())
-        merged[scenario] = replace(
-            measured, oracle=own.oracle or measured.oracle, random=own.random or measured.random
-        )
-    return merged, notes
+    if only_known:
+        return read_baselines(file), []
+    require_trainer()
+    return update_baselines(experiment.scenarios, file, lambda line: print(line, file=sys.stderr, flush=True))
 
 
 def _write(analysis: "Analysis", out: Path) -> None:

@@ -10,6 +10,7 @@ The page `docs/evaluation.md` shows each of these at work:
 * `baselines(scenario)`: what success is set beside; `play_script` and `play_at_random` measure more closely.
 """
 
+from socialai_dsl.baselines import Baselines, Level
 from socialai_dsl.evaluation.chance import Sample, play_at_random
 from socialai_dsl.evaluation.coverage_report import Coverage, coverage
 from socialai_dsl.evaluation.episode_trace import Trace, TraceStep, trace
@@ -23,7 +24,7 @@ from socialai_dsl.evaluation.episodes import (
     evaluate,
     wilson_interval,
 )
-from socialai_dsl.evaluation.levels import Baselines, Level, baselines
+from socialai_dsl.evaluation.levels import baselines
 from socialai_dsl.evaluation.players import ModelOptions, Player
 from socialai_dsl.evaluation.recordings import record
 from socialai_dsl.evaluation.scripts import ScriptReport, play_script

@@ -2,43 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import asdict
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
 
 import socialai_dsl
+from socialai_dsl.atomic import write_json
+from socialai_dsl.baselines import Baselines, Level
+from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.errors import UsageError
 from socialai_dsl.evaluation.players import Player
 from socialai_dsl.evaluation.testing import evaluate_agent
-
-
-@dataclass(frozen=True)
-class Level:
-    """A share of successes.
-
-    Attributes:
-        value: the share. error: its standard error. sample: of what, in words.
-    """
-
-    value: float
-    error: float
-    sample: str
-
-
-@dataclass(frozen=True)
-class Baselines:
-    """What a scenario's success is set beside.
-
-    Attributes:
-        script: the scenario's own script; None where it has none.
-        chance: uniformly random actions.
-        without_npcs: the least that an agent can get which neither sees nor hears an NPC; None of suites, and where
-            there is no NPC.
-        program_sha256: digest of the program that was played.
-    """
-
-    script: Level | None
-    chance: Level
-    without_npcs: Level | None
-    program_sha256: str
 
 
 def baselines(scenario: str, episodes: int = 500, rooms: int = 32) -> Baselines:
@@ -63,6 +39,44 @@ def baselines(scenario: str, episodes: int = 500, rooms: int = 32) -> Baselines:
         without_npcs=_alone(loaded, rooms),
         program_sha256=socialai_dsl.compile(loaded).sha256,
     )
+
+
+def read_baselines(file: Path) -> dict[str, Baselines]:
+    """By scenario what `update_baselines` measured; nothing if the file is missing or damaged."""
+    try:
+        return TypeAdapter(dict[str, Baselines]).validate_json(file.read_bytes())
+    except (OSError, ValidationError):
+        return {}
+
+
+def update_baselines(
+    scenarios: Iterable[str], file: Path, tell: Callable[[str], None]
+) -> tuple[dict[str, Baselines], list[str]]:
+    """Measure the scenarios that the file does not have, or that have changed since, and keep them there.
+
+    Args:
+        scenarios: paths or names.
+        file: is written after each scenario.
+        tell: takes a line before each that is measured.
+
+    Returns:
+        By scenario its baselines, and a remark for each scenario that cannot be played.
+    """
+    known, remarks = read_baselines(file), []
+    for scenario in scenarios:
+        try:
+            if scenario not in known or known[scenario].program_sha256 != _digest(scenario):
+                tell(f"{scenario}: playing the script, at random, and without NPCs")
+                known[scenario] = baselines(scenario)
+                write_json(file, {name: asdict(one) for name, one in known.items()})
+        except ScenarioError as error:
+            known.pop(scenario, None)
+            remarks.append(f"{scenario}: nothing to set beside it: {error.diagnostics[0].message}")
+    return known, remarks
+
+
+def _digest(scenario: str) -> str:
+    return socialai_dsl.compile(socialai_dsl.load(scenario)).sha256
 
 
 def _played(scenario: str, agent: str, episodes: int) -> Level:

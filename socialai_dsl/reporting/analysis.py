@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, Final
 
 import numpy as np
 import pandas as pd
 
+from socialai_dsl.baselines import Baselines, Level
 from socialai_dsl.reporting.collect import Condition, Experiment, Run
 from socialai_dsl.reporting.records import Ending
 from socialai_dsl.reporting.seeds import Seeds, align, mean_over_seeds
@@ -36,34 +37,6 @@ TABLES: Final = ("table2", None)
 
 TOGETHER: Final = 4
 """The most conditions of a case study in one panel; more get a panel for each column."""
-
-
-@dataclass(frozen=True)
-class Level:
-    """The success rate of a policy that does not learn.
-
-    Attributes:
-        value: 0 to 1. error: its standard error. source: how it is known, in a phrase.
-    """
-
-    value: float
-    error: float
-    source: str
-
-
-@dataclass(frozen=True)
-class Ceilings:
-    """What a scenario's success can be set beside; None what is not known.
-
-    Attributes:
-        oracle: the scenario's own script. random: uniform choice. alone: at least possible without the NPCs.
-        program_sha256: of the program on which it was measured; empty if runs of the experiment told.
-    """
-
-    oracle: Level | None = None
-    random: Level | None = None
-    alone: Level | None = None
-    program_sha256: str = ""
 
 
 class Summary:
@@ -175,12 +148,12 @@ class Analysis:
 
     Attributes:
         experiment: as it was read. sections: tables first.
-        ceilings: by scenario. notes: what is to be known about how it was made.
+        baselines: by scenario. notes: what is to be known about how it was made.
     """
 
     experiment: Experiment
     sections: Sequence[Section]
-    ceilings: Mapping[str, Ceilings]
+    baselines: Mapping[str, Baselines]
     notes: Sequence[str] = ()
 
     @property
@@ -189,13 +162,42 @@ class Analysis:
         return [summary for section in self.sections for summary in section.summaries]
 
 
-def analyse(experiment: Experiment, ceilings: Mapping[str, Ceilings], notes: Sequence[str] = ()) -> Analysis:
-    """Compute all figures of a report. The learning curves are read here, one condition after the other."""
+def analyse(experiment: Experiment, measured: Mapping[str, Baselines], notes: Sequence[str] = ()) -> Analysis:
+    """Compute all figures of a report. The learning curves are read here, one condition after the other.
+
+    Args:
+        experiment: what was read.
+        measured: baselines by scenario; script and chance count only where no condition of the experiment plays them.
+        notes: for `Analysis`.
+    """
     grouped: dict[str | None, list[Summary]] = {}
     for condition in experiment.conditions:
         grouped.setdefault(condition.entry.group, []).append(Summary(condition))
     groups = sorted(grouped, key=lambda group: group not in TABLES)
-    return Analysis(experiment, [_section(group, grouped[group]) for group in groups], ceilings, notes)
+    sections = [_section(group, grouped[group]) for group in groups]
+    return Analysis(experiment, sections, _baselines(experiment, measured), notes)
+
+
+def _baselines(experiment: Experiment, measured: Mapping[str, Baselines]) -> dict[str, Baselines]:
+    """By scenario what conditions tell that play the script or chance, and else what was measured."""
+    found = {}
+    for scenario in experiment.scenarios:
+        conditions = [one for one in experiment.conditions if one.entry.scenario == scenario]
+        script, chance = (_told(conditions, agent) for agent in ("oracle", "random"))
+        known = measured.get(scenario, Baselines())
+        found[scenario] = replace(known, script=script or known.script, chance=chance or known.chance)
+    return found
+
+
+def _told(conditions: Sequence[Condition], agent: str) -> Level | None:
+    """The last of these conditions that this agent played."""
+    for condition in reversed(conditions):
+        rates = [run.figures for run in condition.done if run.figures is not None]
+        if condition.entry.agent == agent and rates:
+            value, episodes = np.mean([one.success_rate for one in rates]), sum(one.episodes for one in rates)
+            error = np.sqrt(value * (1 - value) / episodes)
+            return Level(float(value), float(error), f"{condition.entry.name}, {episodes:,} episodes")
+    return None
 
 
 def _too_short(condition: Condition, success: pd.Series, seeds: Seeds | None) -> list[str]:

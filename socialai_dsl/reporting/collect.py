@@ -131,6 +131,11 @@ class Experiment:
     conditions: tuple[Condition, ...]
 
     @property
+    def scenarios(self) -> list[str]:
+        """The scenarios of its conditions, each once."""
+        return list(dict.fromkeys(condition.entry.scenario for condition in self.conditions))
+
+    @property
     def runs(self) -> list[Run]:
         """All runs, each once, also where several conditions have it."""
         return list({run.id: run for condition in self.conditions for run in condition.runs}.values())

@@ -19,14 +19,13 @@ import jinja2
 import pandas as pd
 from markupsafe import Markup
 
+from socialai_dsl.baselines import Baselines, Level
 from socialai_dsl.experiments.folder import REPLAY
 from socialai_dsl.reporting.analysis import (
     RISING,
     SOLVED,
     THRESHOLDS,
     Analysis,
-    Ceilings,
-    Level,
     Section,
     Summary,
 )
@@ -71,11 +70,11 @@ def render_page(analysis: Analysis, drawings: Mapping[str, bytes], version: str,
         remarks=list(_remarks(analysis)),
         sections=sections,
         endings=[one for section in sections for one in section["endings"]],
-        baselines=_baselines(analysis.ceilings),
+        baselines=_baselines(analysis.baselines),
         runs=_runs(analysis, place),
         facts=_facts(analysis, version),
         identities=[
-            _identity(summary, analysis.ceilings.get(summary.condition.entry.scenario))
+            _identity(summary, analysis.baselines.get(summary.condition.entry.scenario))
             for summary in analysis.summaries
         ],
         interval=_interval_example(analysis),
@@ -370,21 +369,21 @@ def _ending(summary: Summary, name: str) -> str:
 # -- where figures come from -------------------------------------------------------------------------------------------
 
 
-def _baselines(ceilings: Mapping[str, Ceilings]) -> Rows:
+def _baselines(baselines: Mapping[str, Baselines]) -> Rows:
     rows = [
         {
             "scenario": name,
-            "own script": _level(one.oracle),
-            "random": _level(one.random),
-            "without NPCs, at least": _level(one.alone),
+            "own script": _level(one.script),
+            "random": _level(one.chance),
+            "without NPCs, at least": _level(one.without_npcs),
         }
-        for name, one in ceilings.items()
+        for name, one in baselines.items()
     ]
     return [row for row in rows if set(row.values()) != {row["scenario"], _NONE}]
 
 
 def _level(level: Level | None) -> str:
-    return _NONE if level is None else f"{level.value:.3f} ± {level.error:.3f}\n{level.source}"
+    return _NONE if level is None else f"{level.value:.3f} ± {level.error:.3f}\n{level.sample}"
 
 
 def _runs(analysis: Analysis, place: Path) -> Rows:
@@ -440,10 +439,10 @@ def _machine(run: Run) -> str:
     return f"{start.device}, {start.cpu} instructions, {threads}{processes}"
 
 
-def _identity(summary: Summary, ceilings: Ceilings | None) -> dict[str, str]:
+def _identity(summary: Summary, baselines: Baselines | None) -> dict[str, str]:
     programs = _programs(summary)
     configurations = dict.fromkeys(run.digest for run in summary.condition.runs if run.digest)
-    measured = ceilings.program_sha256 if ceilings is not None else ""
+    measured = baselines.program_sha256 if baselines is not None else ""
     changed = "\nthe scenario has changed since" if measured and programs and measured not in programs else ""
     return {
         "condition": summary.name,

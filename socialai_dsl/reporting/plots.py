@@ -14,7 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from socialai_dsl.reporting.analysis import Analysis, Ceilings, Section, Summary
+from socialai_dsl.baselines import Baselines
+from socialai_dsl.reporting.analysis import Analysis, Section, Summary
 from socialai_dsl.reporting.curve import draw_outcomes
 from socialai_dsl.reporting.seeds import Seeds
 from socialai_dsl.reporting.style import (
@@ -30,7 +31,11 @@ from socialai_dsl.reporting.style import (
     styled,
 )
 
-_LEVELS: Final = (("oracle", "own script", "-"), ("random", "random", ":"), ("alone", "without NPCs", "--"))
+_LEVELS: Final = (
+    ("script", "own script", "-"),
+    ("chance", "random", ":"),
+    ("without_npcs", "without NPCs", "--"),
+)
 _LEGEND: Final[dict[str, Any]] = {"loc": "outside upper left", "ncols": 2}
 _RULES_SHOWN: Final = 6
 _BETWEEN: Final = 0.08  # of an axis, so that two names do not overlap
@@ -42,23 +47,23 @@ def figures(analysis: Analysis) -> dict[str, Figure]:
         return {
             f"part{number}-{name}": figure
             for number, section in enumerate(analysis.sections, start=1)
-            for name, figure in _figures(section, analysis.ceilings)
+            for name, figure in _figures(section, analysis.baselines)
         }
 
 
-def _figures(section: Section, ceilings: Mapping[str, Ceilings]) -> Iterator[tuple[str, Figure]]:
-    yield "success", success_figure(section, ceilings)
+def _figures(section: Section, baselines: Mapping[str, Baselines]) -> Iterator[tuple[str, Figure]]:
+    yield "success", success_figure(section, baselines)
     if any(column["rows"] > 1 for column in section.columns):
         yield "iqm", iqm_figure(section)
     for place, (row, members) in enumerate(section.panels.items(), start=1):
         if learning := [summary for summary in members if summary.seeds is not None]:
-            yield f"curves{place}", curves_figure(section, row, learning, ceilings)
+            yield f"curves{place}", curves_figure(section, row, learning, baselines)
         for number, summary in enumerate(members, start=1):
             if summary.seeds is not None:
                 yield f"endings{place}-{number}", endings_figure(summary, section.label(summary))
 
 
-def success_figure(section: Section, ceilings: Mapping[str, Ceilings]) -> Figure:
+def success_figure(section: Section, baselines: Mapping[str, Baselines]) -> Figure:
     """Test success of every condition: a dot for each seed, mean and standard deviation, published figures beside."""
     rows, columns = section.by("row"), list(section.by("column"))
     figure, axes = new_axes(1.1 + 0.27 * (len(section.summaries) + 0.9 * len(rows)))
@@ -71,7 +76,7 @@ def success_figure(section: Section, ceilings: Mapping[str, Ceilings]) -> Figure
             _dots(axes, summary, place, columns.index(summary.column))
             place += 1
         ticks.append((top + place - 1) / 2)
-        for name, level, style in _levels(members, ceilings):
+        for name, level, style in _levels(members, baselines):
             axes.plot([level] * 2, [top - 0.45, place - 0.55], style, color=MUTED, linewidth=1.1, label=name)
         place += 0.9
     _lanes(axes, ticks, list(rows), place - 1.1, "success on the test episodes")
@@ -109,9 +114,11 @@ def _dots(axes: Axes, summary: Summary, place: float, index: int) -> None:
         )  # fmt: skip
 
 
-def _levels(members: Sequence[Summary], ceilings: Mapping[str, Ceilings]) -> Iterator[tuple[str, float, str]]:
+def _levels(
+    members: Sequence[Summary], baselines: Mapping[str, Baselines]
+) -> Iterator[tuple[str, float, str]]:
     """Name, success and line style of what does not learn, in the scenario of these conditions."""
-    known = ceilings.get(members[0].condition.entry.scenario)
+    known = baselines.get(members[0].condition.entry.scenario)
     for name, label, style in _LEVELS:
         level = getattr(known, name, None)
         if level is not None:
@@ -127,7 +134,7 @@ def _legend(figure: Figure, axes: Axes) -> None:
 
 
 def curves_figure(
-    section: Section, title: str, members: Sequence[Summary], ceilings: Mapping[str, Ceilings]
+    section: Section, title: str, members: Sequence[Summary], baselines: Mapping[str, Baselines]
 ) -> Figure:
     """Learning curves of conditions that belong together: seeds thin, the mean thick, its spread shaded."""
     figure, axes = new_axes(3.4)
@@ -141,7 +148,7 @@ def curves_figure(
             if len(spread):
                 axes.axhline(spread.mean(), color=colour(index), linestyle="-.", linewidth=1.3, zorder=2)
                 _name_line(axes, name, spread.mean(), end, colour(index))
-    for name, level, style in _levels(members, ceilings):
+    for name, level, style in _levels(members, baselines):
         axes.axhline(level, color=MUTED, linestyle=style, linewidth=1, zorder=1, label=name)
     rates(axes)
     frames(axes, end * 1.03)

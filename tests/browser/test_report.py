@@ -20,7 +20,7 @@ def test_the_page_is_as_wide_as_the_screen(tmp_path: Path, page: Page, width: in
     names = [f"{row} / {column}" for row in ("Help", "Dance") for column in ("PPO", "PPO+Explo", "Unsocial")]
     reference = {"mean": 0.45, "std": 0.05, "source": "paper, Table 2"}
     write_experiment(tmp_path, [condition(name, [0.4, 0.5, 0.6], reference=reference) for name in names])
-    assert main(["report", str(tmp_path), "--no-ceilings"]) == 0
+    assert main(["report", str(tmp_path), "--no-baselines"]) == 0
     page.set_viewport_size({"width": width, "height": 800})
     page.goto((tmp_path / "report" / "index.html").as_uri())
     page.evaluate("document.querySelectorAll('details').forEach(part => part.open = true)")

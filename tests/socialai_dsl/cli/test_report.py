@@ -5,9 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from socialai_dsl.cli import ceilings, report
+from socialai_dsl.baselines import Baselines
+from socialai_dsl.cli import report
 from socialai_dsl.cli.main import main
-from socialai_dsl.cli.report import ceilings_of
+from socialai_dsl.evaluation import levels
+from socialai_dsl.evaluation.levels import baselines as levels_of
+from socialai_dsl.reporting.analysis import analyse
 from socialai_dsl.reporting.collect import read_experiment
 from tests.socialai_dsl.reporting.synthetic import condition, write_experiment, write_run
 
@@ -22,7 +25,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_everything_is_written(folder: Path, capsys: Capture) -> None:
-    assert main(["report", str(folder), "--no-ceilings"]) == 0
+    assert main(["report", str(folder), "--no-baselines"]) == 0
     out = folder / "report"
     assert f"written to {out / 'index.html'}" in capsys.readouterr().out
     names = {path.name for path in out.iterdir()} - {path.name for path in out.glob("*.parquet")}
@@ -37,45 +40,43 @@ def test_everything_is_written(folder: Path, capsys: Capture) -> None:
     assert "Help / oracle, 500 episodes" in page, "a condition tells what the script gets"
 
 
-def test_who_does_not_learn_is_measured_once(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
-) -> None:
-    monkeypatch.setattr(ceilings, "_EPISODES", 10)
-    monkeypatch.setattr(ceilings, "_ROOMS", 2)
-    experiment, out = read_experiment(folder), folder
-    found, notes = ceilings_of(experiment, out, only_known=False)
+def test_baselines_are_measured_once(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    monkeypatch.setattr(levels, "baselines", lambda scenario: levels_of(scenario, episodes=10, rooms=2))
+    assert main(["report", str(folder)]) == 0
     assert "help: playing the script, at random, and without NPCs" in capsys.readouterr().err
-    measured = json.loads((out / ceilings.FILE).read_text())["help"]
-    assert measured["oracle"]["value"] == 1.0
-    assert measured["random"]["source"] == "10 test episodes"
-    assert found["help"].alone is not None
-    assert 0.3 < found["help"].alone.value <= 1.0
-    assert found["help"].alone.source == "2 rooms"
-    assert found["help"].oracle is not None
-    assert found["help"].oracle.value == 0.9, "what a condition tells counts before what is measured"
-    assert notes == []
+    file = folder / "report" / report.BASELINES
+    measured = json.loads(file.read_text())["help"]
+    assert measured["script"]["value"] == 1.0
+    assert measured["chance"]["sample"] == "10 test episodes"
+    assert 0.3 < measured["without_npcs"]["value"] <= 1.0
+    assert measured["without_npcs"]["sample"] == "2 rooms"
+    found = analyse(read_experiment(folder), levels.read_baselines(file)).baselines["help"]
+    assert found.chance is not None
+    assert found.chance.value == measured["chance"]["value"]
+    assert found.script is not None
+    assert found.script.value == 0.9, "what a condition tells counts before what is measured"
 
-    assert ceilings_of(experiment, out, only_known=False) == (found, [])
-    assert capsys.readouterr().err == ""
-    changed = {"help": measured | {"program_sha256": "0" * 64}}
-    (out / ceilings.FILE).write_text(json.dumps(changed))
-    ceilings_of(experiment, out, only_known=False)
-    assert "help: playing the script" in capsys.readouterr().err, (
-        "a scenario that has changed is measured again"
-    )
+    told: list[str] = []
+    levels.update_baselines(["help"], file, told.append)
+    assert told == []
+    file.write_text(json.dumps({"help": measured | {"program_sha256": "0" * 64}}))
+    monkeypatch.setattr(levels, "baselines", lambda scenario: Baselines(program_sha256="1" * 64))
+    again, _ = levels.update_baselines(["help"], file, told.append)
+    assert (len(told), again["help"].program_sha256) == (1, "1" * 64), "a changed scenario is measured again"
+    assert levels.read_baselines(file) == again
 
 
 def test_a_scenario_that_is_gone_is_a_remark(tmp_path: Path) -> None:
-    write_experiment(tmp_path, [condition("A / x", [0.5], scenario="gone.yaml")])
-    _, notes = ceilings_of(read_experiment(tmp_path), tmp_path, only_known=False)
-    (note,) = notes
-    assert note.startswith("gone.yaml: nothing to set beside it")
+    found, remarks = levels.update_baselines(["gone.yaml"], tmp_path / "baselines.json", print)
+    assert found == {}
+    (remark,) = remarks
+    assert remark.startswith("gone.yaml: nothing to set beside it")
 
 
 def test_runs_without_an_experiment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     runs = [write_run(tmp_path / name, "help", seed, 0.5) for seed, name in enumerate("ab")]
     monkeypatch.chdir(tmp_path)
-    assert main(["report", *map(str, runs), "--no-ceilings", "--out", "there"]) == 0
+    assert main(["report", *map(str, runs), "--no-baselines", "--out", "there"]) == 0
     assert "2 of 2 seeds" in (tmp_path / "there" / "index.html").read_text(encoding="utf-8")
 
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from socialai_dsl.reporting.analysis import Analysis, Ceilings, Level, analyse, tables
+from socialai_dsl.baselines import Baselines, Level
+from socialai_dsl.reporting.analysis import Analysis, analyse, tables
 from socialai_dsl.reporting.collect import read_experiment
 from socialai_dsl.reporting.page import render_page
 from socialai_dsl.reporting.plots import figures
@@ -41,7 +42,7 @@ def small(folder: Path) -> Analysis:
     for seed, rate in enumerate((0.1, 0.2, 0.3)):
         write_tests(folder / "runs" / f"c0-s{seed}", {"help_as_helper": rate})
     level = Level(0.25, 0.01, "64 rooms")
-    return analyse(read_experiment(folder), {"help": Ceilings(Level(1.0, 0.0, "500 episodes"), None, level)})
+    return analyse(read_experiment(folder), {"help": Baselines(Level(1.0, 0.0, "500 episodes"), None, level)})
 
 
 @pytest.fixture(scope="module")
@@ -126,7 +127,7 @@ def test_hostile_names_stay_text(tmp_path: Path) -> None:
     result["versions"] = {HOSTILE: HOSTILE}
     path.write_text(json.dumps(result))
     analysis = analyse(
-        read_experiment(tmp_path), {HOSTILE: Ceilings(random=Level(0.1, 0.0, HOSTILE))}, [HOSTILE]
+        read_experiment(tmp_path), {HOSTILE: Baselines(chance=Level(0.1, 0.0, HOSTILE))}, [HOSTILE]
     )
     drawings = drawn(analysis)
     text = render_page(analysis, drawings, "1", tmp_path)
