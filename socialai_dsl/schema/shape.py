@@ -405,6 +405,10 @@ def model_of(
     except ValidationError as error:
         _Report(model, repaired, found, bag, partial, parameters).add_all(error)
         made = _tried(model, repaired.data)
+        if made is None and model is Scenario and not partial and isinstance(repaired.data, dict):
+            missing = [key for key in _STAND_INS if key not in repaired.data]
+            repaired.lost += [(key,) for key in missing]
+            made = _tried(model, repaired.data | {key: _STAND_INS[key] for key in missing})
     lost = any(_matters(path) for path in repaired.lost)
     kept = found if repaired.moved else places
     return ShapedFile(made, repaired.data, kept, lost)
@@ -422,9 +426,18 @@ def _tried(model: type[M], data: object) -> M | None:
     return None
 
 
+_STAND_INS: Final[Mapping[str, object]] = {
+    "scenario": "unnamed",
+    "grammar": {"templates": ["Hello"]},
+    "room": {"size": 30},
+    "cast": {"agent": {}},
+    "outcome": [{"success": "t == 1"}],
+}
+"""What stands for the parts that every scenario needs where a file lacks them, so that its other mistakes are found."""
+
 _INDIFFERENT: Final = frozenset(
-    "about notes skills horizon earshot view kind kind_code audible color facing reward id after chance once npcs "
-    "image names own_voice canvas actions do".split()
+    "scenario outcome room about notes skills horizon earshot view kind kind_code audible color facing reward id after "
+    "chance once npcs image names own_voice canvas actions do".split()
 )
 """Keys whose loss makes nothing else in the file wrong."""
 
@@ -578,6 +591,8 @@ class _Report:
         if parent:
             called = f"`{parent[-1]}`" if isinstance(parent[-1], str) else called
         self._bag.error("S105", f"{called} needs a key `{key}`", self._places.key_span(parent))
+        if parent:
+            self._repaired.leave_out(parent)
 
     def _bad_name(self, finding: _Finding) -> None:
         key = str(finding.path[-1])
