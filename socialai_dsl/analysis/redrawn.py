@@ -11,7 +11,7 @@ from socialai_dsl.draws import GOLDEN, mix
 from socialai_dsl.draws import site as number_of
 from socialai_dsl.program import Header, Program
 from socialai_dsl.semantics.plans import CheckedScenario, Coloring, Drawn, Facing, Placing
-from socialai_dsl.semantics.terms import Chance, Quantified, Sited, walk
+from socialai_dsl.semantics.terms import Quantified, Sited, walk
 
 _SITE_MASK: Final = (1 << 31) - 1
 
@@ -59,7 +59,7 @@ def _paths(checked: CheckedScenario) -> Iterator[str]:
                 yield item.site
                 if item.value is not None:
                     yield item.value.site
-        yield from (part.site for part in walk(item) if isinstance(part, Quantified | Chance) and part.site)
+        yield from (part.site for part in walk(item) if isinstance(part, Quantified) and part.site)
 
 
 def _said(path: str) -> str:

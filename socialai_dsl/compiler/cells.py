@@ -641,7 +641,7 @@ def _switch(term: Select) -> _Switch | None:
     if first is None:
         return None
     read = first[0]
-    left = set(range(read.type.low, read.type.high + 1))
+    left = set(read.type.values)
     cases: dict[Term, set[int]] = {}
     for ask, value in zip(asked, term.values, strict=True):
         if ask is None or ask[0] != read:

@@ -136,7 +136,7 @@ class Expressions(Emitter):
             case terms.Sees():
                 self._sees(term, otherwise)
             case terms.Chance():
-                site = self.sites.row(term.site or self.site, term.ordinal)
+                site = self.sites.row(self.site, term.ordinal)
                 block.test(Op.IF_CHANCE, chance_word(term.probability), site, otherwise)
             case terms.Select():
                 selected_condition(self, term, otherwise)
@@ -618,5 +618,5 @@ def _choices(part: str | Term) -> tuple[str, ...]:
     """The words a part of a line can be."""
     if isinstance(part, str):
         return (part,)
-    words = part.type.words or tuple(str(value) for value in range(part.type.low, part.type.high + 1))
+    words = part.type.words or tuple(str(value) for value in part.type.values)
     return (words[part.value - part.type.low],) if isinstance(part, Const) else words

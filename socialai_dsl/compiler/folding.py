@@ -481,7 +481,7 @@ def leaving(checked: CheckedScenario) -> frozenset[int]:
 
 def numbers_of(term: Term) -> list[int]:
     """The entities that a term may name."""
-    return [term.value] if isinstance(term, Const) else list(range(term.type.low, term.type.high + 1))
+    return [term.value] if isinstance(term, Const) else list(term.type.values)
 
 
 def plans(checked: CheckedScenario) -> Iterable[RulePlan | StepPlan]:

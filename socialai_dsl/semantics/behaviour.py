@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any, cast
 
 from socialai_dsl.diagnostics import did_you_mean
@@ -31,6 +30,7 @@ from socialai_dsl.semantics.scope import (
     Draws,
     FailedError,
     PlayedFrame,
+    Scalar,
     Scope,
     at_every_step,
     described,
@@ -50,7 +50,6 @@ from socialai_dsl.semantics.terms import (
     Compare,
     Const,
     FieldOf,
-    Heard,
     Line,
     Measure,
     Read,
@@ -59,10 +58,9 @@ from socialai_dsl.semantics.terms import (
     Term,
     Type,
     all_of,
-    any_of,
-    draws,
+    entity,
 )
-from socialai_dsl.semantics.texts import Alternative, asked_of_heard, binding, bound, with_slots
+from socialai_dsl.semantics.texts import Alternative, asked_of_heard, binding, bound, on_hearing, with_slots
 from socialai_dsl.source import DataPath
 
 _STATUS_AFTER = {"reveal": "opened", "open": "open", "close": "closed", "lock": "locked", "unlock": "locked"}
@@ -125,13 +123,11 @@ def _at_something(
         return replace(written, name="go_next_to", args=(_argument(resolver, name, args[0], ENTITY, scope),))
     if name == "point":
         assert scope.member is not None, "internal: an activity is somebody's"
-        own = resolver.symbols.numbers[scope.member]
-        way = Measure(
-            DIRECTION, "dir_to", (Const(Type("entity", own, own), own), resolver.somewhere(args[0], scope))
-        )
+        own = entity(resolver.symbols.numbers[scope.member])
+        way = Measure(DIRECTION, "dir_to", (own, resolver.somewhere(args[0], scope)))
         return replace(written, name="point", args=(way,))
     what = _argument(resolver, name, args[0], ENTITY, scope)
-    for number in range(what.type.low, what.type.high + 1):
+    for number in what.type.values:
         objects = resolver.symbols.object_of(number)
         if objects is None or not objects.type.pushed:
             message = f"`{quoted(args[0])}` cannot be pushed"
@@ -256,7 +252,7 @@ def _entities(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[Term, .
     """What an effect is about: one thing, a group, or all `objects`."""
     if isinstance(node, ast.Name) and node.id == "objects":
         first, last = len(resolver.symbols.numbers), resolver.symbols.entities
-        return tuple(Const(Type("entity", number, number), number) for number in range(first, last))
+        return tuple(map(entity, range(first, last)))
     if not groups.is_group(resolver, node, scope):
         return (resolver.value(node, ENTITY, scope),)
     members = groups.group(resolver, node, None, scope)
@@ -276,10 +272,10 @@ def _target(
     if name == "put":
         return resolver.somewhere(node, scope)
     holder = resolver.value(node, ENTITY, scope)
-    things = [number for one in entities for number in range(one.type.low, one.type.high + 1)]
+    things = [number for one in entities for number in one.type.values]
     object_facts.check_holder(resolver, holder, node, scope, things)
-    for entity in () if hands.is_member(resolver, holder) else entities:
-        object_facts.container(resolver, entity, subject, scope)
+    for thing in () if hands.is_member(resolver, holder) else entities:
+        object_facts.container(resolver, thing, subject, scope)
     return holder
 
 
@@ -319,10 +315,6 @@ def _new_status(
 
 
 # -- frames --------------------------------------------------------------------------------------------------
-
-
-ANYTHING = "any"
-"""`hears: any` is whatever anybody says."""
 
 
 @dataclass(frozen=True)
@@ -378,30 +370,56 @@ def plan(resolver: Resolver, played: PlayedFrame, spoken: Spoken) -> FramePlan:
     return FramePlan(played.member, played.name, played.number, span, start, states, steps, nesting=nested)
 
 
-def assigned(
-    resolver: Resolver, key: str, raw: object, path: DataPath, scope: Scope, register_of: Callable[[str], str]
-) -> Iterator[Assignment]:
-    """What a register is set to, for which it makes room.
+@dataclass(frozen=True)
+class _Deeds:
+    """What a rule or step sets and causes.
 
-    It is written as a name, or with whose register is meant, `trust(speaker)`, or those of a group, `trust(peers)`;
-    `register_of` gives the path of a name.
+    Attributes:
+        scope: the scope of the value at a path, by its address below that of the rule.
+        register: the path of the register that a name stands for, by where the name is written.
     """
-    register = register_of(key.partition("(")[0].strip())
-    value = Sited(
-        texts.value_for(resolver, register, raw, path, scope), scope.draws.site, resolver.findings.at(path)
-    )
-    own = scope.at((*path, KEY), f"{scope.draws.site}.key")
-    node = resolver.findings.expression(own.path, key)
-    targets: list[Term] = []
-    if isinstance(node, ast.Call):
-        targets += rows.of_keys(resolver, register, node, own)
-    else:
-        targets.append(single(resolver, register, None, node, own))
-    for target in targets:
-        if isinstance(target, ReadEach):
-            yield Assignment(register, value, target, own.draws.site)
-        elif isinstance(target, Read):
-            yield Assignment(target.path, value)
+
+    resolver: Resolver
+    scope: Callable[[DataPath, str], Scope]
+    register: Callable[[DataPath, str], str]
+
+    def sets(self, entry: Effects | WorldRule, path: DataPath) -> tuple[Assignment, ...]:
+        """What registers are set to."""
+        made: list[Assignment] = []
+        for key, raw in entry.set.items():
+            with surviving():
+                made += self._assigned(key, raw, self.scope((*path, "set", key), f"set.{key}"))
+        return tuple(made)
+
+    def _assigned(self, key: str, raw: Scalar, scope: Scope) -> Iterator[Assignment]:
+        """What a register is set to, for which it makes room.
+
+        It is written as a name, or with whose register is meant, `trust(speaker)`, or those of a group, `trust(peers)`.
+        """
+        resolver, register = self.resolver, self.register(scope.path, key.partition("(")[0].strip())
+        if register not in resolver.registers:
+            raise FailedError  # its group means nothing, which has been reported
+        value = texts.value_for(resolver, register, raw, scope)
+        own = scope.at((*scope.path, KEY), f"{scope.draws.site}.key")
+        node = resolver.findings.expression(own.path, key)
+        targets: list[Term] = []
+        if isinstance(node, ast.Call):
+            targets += rows.of_keys(resolver, register, node, own)
+        else:
+            targets.append(single(resolver, register, None, node, own))
+        for target in targets:
+            if isinstance(target, ReadEach):
+                yield Assignment(register, value, target, own.draws.site)
+            elif isinstance(target, Read):
+                yield Assignment(target.path, value)
+
+    def causes(self, entry: Effects | WorldRule, path: DataPath) -> tuple[Effect, ...]:
+        """The effects, in order."""
+        made: list[Effect] = []
+        for i, (place, raw) in enumerate(self.resolver.findings.each((*path, "cause"), entry.cause)):
+            with surviving():
+                made.append(effect(self.resolver, place, raw, self.scope(place, f"cause[{i}]")))
+        return tuple(made)
 
 
 @dataclass(frozen=True)
@@ -439,21 +457,16 @@ class _Planner:
         when = self.condition((*path, "when"), rule.when, address)
         do = rule.do if isinstance(rule, FirstRule) else None
         doing = self._activity((*path, "do"), do, address) if do is not None else None
-        sets, causes = self._sets(rule, path, address), self._causes(rule, path, address)
+        deeds = self._deeds(address)
+        sets, causes = deeds.sets(rule, path), deeds.causes(rule, path)
         say = self.spoken.lines.get(path)
         if asked := asked_of_heard((when, doing, sets, causes, say)):
             heard = with_slots(self.resolver, heard, asked, self.resolver.findings.at((*path, "hears")))
         patterns = tuple(pattern for alternative in heard for pattern, _ in alternative)
         compared = any(condition is not None for alternative in heard for _, condition in alternative)
         if compared:
-            term = any_of(
-                all_of([Heard((pattern,)), *([condition] if condition is not None else [])])
-                for alternative in heard
-                for pattern, condition in alternative
-            )
             span = self.resolver.findings.at((*path, "hears"))
-            both = term if when is None else all_of([term, when.term])
-            when = Sited(both, f"{self.played.member}/{address}.when", when.span if when else span)
+            when = on_hearing(heard, when, f"{self.played.member}/{address}.when", span)
         after, when = self._after(rule, path, when, address)
         plan = RulePlan(
             name=rule.id or f"{self.played.member}.{self.played.name}.{place}",
@@ -479,17 +492,10 @@ class _Planner:
     def _hears(self, rule: Rule, path: DataPath, address: str) -> list[Alternative]:
         """What `hears:` waits for: the patterns of each of its texts."""
         found: list[Alternative] = []
-        resolver = self.resolver
-        single = not self.resolver.findings.is_list((*path, "hears"))
-        for i, raw in enumerate(rule.hears):
-            place: DataPath = (*path, "hears") if single else (*path, "hears", i)
-            if raw == ANYTHING:
-                found.append([(resolver.utterances.anything(), None)])
-                continue
+        for place, raw in self.resolver.findings.each((*path, "hears"), rule.hears):
             with surviving():
-                text = resolver.findings.text(place, raw)
                 scope = _scope(self.played, place, f"{address}.hears")
-                found.append(texts.patterns(resolver, text, scope, resolver.findings.at(place), True))
+                found.append(texts.heard_at(self.resolver, raw, scope))
         return found
 
     def _after(
@@ -502,7 +508,7 @@ class _Planner:
         resolver = self.resolver
         term: Term = Const(INT, 0)
         with surviving():
-            term = resolver.written(place, rule.after, INT, self._scope(place, f"{address}.after"))
+            term = resolver.written(rule.after, INT, self._scope(place, f"{address}.after"))
         if isinstance(term, Const):
             if term.value < 0:
                 resolver.findings.error(
@@ -519,10 +525,8 @@ class _Planner:
         """The condition at a path, of an entry with this address; None if none is written."""
         if raw is None:
             return None
-        scope = self._scope(path, f"{address}.{path[-1]}")
         with surviving():
-            term = self.resolver.written(path, raw, BOOL, scope)  # type: ignore[arg-type]
-            return Sited(term, scope.draws.site, self.resolver.findings.at(path))
+            return self.resolver.sited(raw, BOOL, self._scope(path, f"{address}.{path[-1]}"))  # type: ignore[arg-type]
         return None
 
     def _activity(self, path: DataPath, raw: str | None, address: str) -> Activity | None:
@@ -534,14 +538,10 @@ class _Planner:
     def _staying(self, path: DataPath) -> Activity:
         return Activity("stay", (), "", self.resolver.findings.at(path))
 
-    def _sets(self, entry: Effects, path: DataPath, address: str) -> tuple[Assignment, ...]:
-        made: list[Assignment] = []
-        for key, raw in entry.set.items():
-            place = (*path, "set", key)
-            with surviving():
-                scope = self._scope(place, f"{address}.set.{key}")
-                made += assigned(self.resolver, key, raw, place, scope, partial(self._register, place))
-        return tuple(made)
+    def _deeds(self, address: str) -> _Deeds:
+        return _Deeds(
+            self.resolver, lambda path, part: self._scope(path, f"{address}.{part}"), self._register
+        )
 
     def _register(self, path: DataPath, name: str) -> str:
         """The register of the frame, or of the world, that an effect sets."""
@@ -549,29 +549,17 @@ class _Planner:
             return self.played.register(name)
         if name in self.resolver.symbols.scenario.state:
             return f"state.{name}"
-        raise self._no_register(name, path)
-
-    def _no_register(self, name: str, path: DataPath) -> FailedError:
         findings, symbols = self.resolver.findings, self.resolver.symbols
         span = findings.places.key_span(path)
         if name in symbols.scenario.let or name in self.played.model.slots:
             what = "is a slot" if name in self.played.model.slots else "is drawn once per episode"
             cure = "only what the frame declares in its own `let`, or the scenario in `state`, can be set"
-            return findings.fail("S305", f"`{name}` {what} and cannot be set", span, hint=cure)
+            raise findings.fail("S305", f"`{name}` {what} and cannot be set", span, hint=cure)
         near = did_you_mean(name, [*self.played.model.let, *symbols.scenario.state])
         hint = None if near else f"declare it: `let: {{{name}: 0}}` in the frame"
-        return findings.fail(
+        raise findings.fail(
             "S305", f"`{name}` is not declared in this frame's `let`", span, suggestion=near, hint=hint
         )
-
-    def _causes(self, entry: Effects, path: DataPath, address: str) -> tuple[Effect, ...]:
-        made = []
-        single = not self.resolver.findings.is_list((*path, "cause"))
-        for i, raw in enumerate(entry.cause):
-            place: DataPath = (*path, "cause") if single else (*path, "cause", i)
-            with surviving():
-                made.append(effect(self.resolver, place, raw, self._scope(place, f"{address}.cause[{i}]")))
-        return tuple(made)
 
     def _target(self, target: str | None, path: DataPath) -> str | None:
         states = self.played.model.states or {}
@@ -608,8 +596,8 @@ class _Planner:
             until=self.condition((*path, "until"), step.until, address),
             duration=duration,
             lasted=lasted,
-            sets=self._sets(step, path, address),
-            causes=self._causes(step, path, address),
+            sets=self._deeds(address).sets(step, path),
+            causes=self._deeds(address).causes(step, path),
             say=self.spoken.lines.get(path),
         )
 
@@ -621,7 +609,7 @@ class _Planner:
             return FOR_EVER, None
         findings, horizon = self.resolver.findings, self.resolver.symbols.scenario.horizon
         try:
-            term = self.resolver.written(path, raw, INT, self._scope(path, site))  # type: ignore[arg-type]
+            term = self.resolver.written(raw, INT, self._scope(path, site))  # type: ignore[arg-type]
         except FailedError:
             return None, None
         if isinstance(term, Const):
@@ -666,10 +654,13 @@ def _rule(resolver: Resolver, rule: WorldRule, path: DataPath) -> RulePlan:
     when: Sited | None = None
     with surviving():
         if rule.when is not None:
-            scope = _world_scope((*path, "when"), f"{name}.when")
-            term = resolver.written((*path, "when"), rule.when, BOOL, scope)
-            when = Sited(term, scope.draws.site, resolver.findings.at((*path, "when")))
+            when = resolver.sited(rule.when, BOOL, _world_scope((*path, "when"), f"{name}.when"))
     resolver.readings.entries[name] = rule
+    deeds = _Deeds(
+        resolver,
+        lambda path, part: _world_scope(path, f"{name}.{part}"),
+        lambda path, word: _register_of_the_world(resolver, path, word),
+    )
     return RulePlan(
         name=rule.id or name,
         site=name,
@@ -677,65 +668,38 @@ def _rule(resolver: Resolver, rule: WorldRule, path: DataPath) -> RulePlan:
         when=when,
         chance=rule.chance,
         once=rule.once,
-        sets=tuple(_sets(resolver, rule, (*path, "set"), name)),
+        sets=deeds.sets(rule, path),
         reward=rule.reward,
-        causes=tuple(_effects(resolver, rule, (*path, "cause"), name)),
+        causes=deeds.causes(rule, path),
     )
 
 
-def _sets(resolver: Resolver, rule: WorldRule, path: DataPath, name: str) -> Iterator[Assignment]:
-    """The registers of the world that a rule sets."""
-    for key, raw in rule.set.items():
-        place = (*path, key)
-        with surviving():
-            scope = _world_scope(place, f"{name}.set.{key}")
-            yield from assigned(resolver, key, raw, place, scope, partial(_of_the_world, resolver, place))
-
-
-def _of_the_world(resolver: Resolver, path: DataPath, word: str) -> str:
+def _register_of_the_world(resolver: Resolver, path: DataPath, word: str) -> str:
+    """The register of `state` that a rule of the world sets; it sets no other."""
     if word in resolver.symbols.scenario.state:
         return f"state.{word}"
-    raise _not_of_the_world(resolver, word, path)
-
-
-def _not_of_the_world(resolver: Resolver, word: str, path: DataPath) -> FailedError:
-    """Rules of the world set registers of `state`, and nothing else."""
     scenario, span = resolver.symbols.scenario, resolver.findings.places.key_span(path)
     frame = next((name for name, frame in scenario.frames.items() if word in frame.let), None)
     cure = "a rule of the world sets what is declared in `state`"
     if word in scenario.let:
         message = f"`{word}` is drawn once per episode and cannot be set"
-        return resolver.findings.fail("S305", message, span, hint=cure)
+        raise resolver.findings.fail("S305", message, span, hint=cure)
     if frame is not None:
         message = f"`{word}` is a register of the frame `{frame}`, which only the frame itself sets"
-        return resolver.findings.fail("S305", message, span, hint=cure)
+        raise resolver.findings.fail("S305", message, span, hint=cure)
     near = did_you_mean(word, scenario.state)
     hint = None if near or word in resolver.symbols.declared else f"declare it: `state: {{{word}: 0}}`"
     message = f"`{word}` is not declared in `state`"
-    return resolver.findings.fail("S305", message, span, suggestion=near, hint=hint)
+    raise resolver.findings.fail("S305", message, span, suggestion=near, hint=hint)
 
 
 def _world_scope(path: DataPath, site: str) -> Scope:
     return at_every_step(reset_scope(path, site))
 
 
-def _effects(resolver: Resolver, rule: WorldRule, path: DataPath, name: str) -> Iterator[Effect]:
-    single = not resolver.findings.is_list(path)
-    for i, raw in enumerate(rule.cause):
-        place = path if single else (*path, i)
-        with surviving():
-            yield effect(resolver, place, raw, _world_scope(place, f"{name}.cause[{i}]"))
-
-
 def requirements(resolver: Resolver) -> Iterator[Sited]:
     """The conditions on a drawn room."""
     for i, raw in enumerate(resolver.symbols.scenario.require):
-        path: DataPath = ("require", i)
         with surviving():
-            scope = reset_scope(path)
-            term = resolver.written(path, raw, BOOL, scope)
-            if draws(term):
-                message = "a condition on the room draws nothing itself"
-                hint = "draw it in `let`, and use that"
-                raise resolver.findings.fail("S204", message, resolver.findings.at(path), hint=hint)
-            yield Sited(term, scope.draws.site, resolver.findings.at(path))
+            condition = resolver.sited(raw, BOOL, reset_scope(("require", i)))
+            yield resolver.undrawn(condition, "a condition on the room draws nothing itself")

@@ -10,8 +10,8 @@ from socialai_dsl.semantics import texts
 from socialai_dsl.semantics.plans import BeliefPlan
 from socialai_dsl.semantics.resolver import Declaration, Resolver
 from socialai_dsl.semantics.scope import Draws, Scope, is_nothing, reset_scope, surviving
-from socialai_dsl.semantics.terms import BOOL, Const, Heard, Sited, Term, all_of, any_of, changed
-from socialai_dsl.semantics.texts import Alternative, asked_of_heard, binding, with_slots
+from socialai_dsl.semantics.terms import BOOL, Const, Sited, changed
+from socialai_dsl.semantics.texts import Alternative, asked_of_heard, binding, on_hearing, with_slots
 from socialai_dsl.source import DataPath
 
 
@@ -81,37 +81,23 @@ class Believed:
     def _source(self, source: Source, path: DataPath, site: str, scope: Scope) -> tuple[Sited | None, Sited]:
         resolver, findings = self._resolver, self._resolver.findings
         of = scope.at((*path, "of"), site)
-        value = texts.value_for(resolver, self.register, source.of, of.path, of)
-        condition: Term | None = None
+        value = texts.value_for(resolver, self.register, source.of, of)
         asked = scope.at((*path, "when"), f"{site}.when")
-        if source.when is not None:
-            condition = resolver.written(asked.path, source.when, BOOL, asked)
+        when = None if source.when is None else resolver.sited(source.when, BOOL, asked)
         heard = self._hears(source, (*path, "hears"), scope.at((*path, "hears"), f"{site}.hears"))
         if heard:
-            if wanted := asked_of_heard((value, condition)):
-                heard = with_slots(resolver, heard, wanted, findings.at((*path, "hears")))
-            spoken = any_of(
-                all_of([Heard((pattern,)), *([given] if given is not None else [])])
-                for alternative in heard
-                for pattern, given in alternative
-            )
-            condition = spoken if condition is None else all_of([spoken, condition])
-            value, condition = changed((value, condition), binding(heard))
-        place = findings.at(asked.path if source.when is not None else (*path, "hears"))
-        when = None if condition is None else Sited(condition, asked.draws.site, place)
-        return when, Sited(value, site, findings.at(of.path))
+            span = findings.at((*path, "hears"))
+            if wanted := asked_of_heard((value, when)):
+                heard = with_slots(resolver, heard, wanted, span)
+            when = on_hearing(heard, when, asked.draws.site, span)
+            value, when = changed((value, when), binding(heard))
+        return when, value
 
     def _hears(self, source: Source, path: DataPath, scope: Scope) -> Sequence[Alternative]:
         """The patterns of each of the texts that a source waits for."""
         resolver, found = self._resolver, list[Alternative]()
-        for i, raw in enumerate(source.hears):
-            place = (*path, i) if resolver.findings.is_list(path) else path
-            if raw == "any":
-                found.append([(resolver.utterances.anything(), None)])
-                continue
-            text = resolver.findings.text(place, raw)
-            own = scope.at(place, scope.draws.site)
-            found.append(texts.patterns(resolver, text, own, resolver.findings.at(place), True))
+        for place, raw in resolver.findings.each(path, source.hears):
+            found.append(texts.heard_at(resolver, raw, scope.at(place, scope.draws.site)))
         return found
 
     def _forgetting(self) -> tuple[Sited | None, int]:
@@ -120,9 +106,10 @@ class Believed:
             return None, 0
         path, findings = (*self._path, "forget"), self._resolver.findings
         scope = self._scope(path, f"{self._site}.forget")
-        term = self._resolver.written(path, self._belief.forget, None, scope)
+        forget = self._resolver.sited(self._belief.forget, None, scope)
+        term = forget.term
         if term.type.kind == "bool":
-            return Sited(term, scope.draws.site, findings.at(path)), 0
+            return forget, 0
         horizon = self._resolver.symbols.scenario.horizon
         if isinstance(term, Const) and term.type.kind == "int" and 1 <= term.value <= horizon:
             return None, term.value

@@ -39,7 +39,6 @@ from socialai_dsl.semantics.scope import (
 from socialai_dsl.semantics.setup import room_plan, room_sizes
 from socialai_dsl.semantics.terms import (
     BOOL,
-    Chance,
     Compare,
     Const,
     Line,
@@ -50,7 +49,6 @@ from socialai_dsl.semantics.terms import (
     Term,
     Type,
     Variable,
-    draws,
     walk,
 )
 from socialai_dsl.semantics.texts import words_in_order
@@ -153,31 +151,24 @@ class _Entry:
         """A condition, and what it alone asks about the step before."""
         remembered = self._resolver.registers.remembered
         asked = len(remembered)
-        scope = at_every_step(reset_scope(path))
         try:
-            term = self._resolver.written(path, raw, BOOL, scope)
-            used = {part.path for part in walk(term) if hasattr(part, "path")}
+            condition = self._resolver.sited(raw, BOOL, at_every_step(reset_scope(path)))
+            used = {part.path for part in walk(condition) if hasattr(part, "path")}
             own = tuple(drawn for drawn in remembered if drawn.path in used)
         finally:
             del remembered[asked:]
-        if draws(term) or any(isinstance(part, Chance) for part in walk(term)):
-            message = "a property draws nothing itself"
-            hint = "draw it in `let`, and use that"
-            raise self._findings.fail("S204", message, self._findings.at(path), hint=hint)
-        return Sited(term, scope.draws.site, self._findings.at(path)), own
+        return self._resolver.undrawn(condition, "a property draws nothing itself"), own
 
     def _members(self, path: DataPath, names: tuple[str, ...]) -> tuple[str, ...]:
         symbols = self._resolver.symbols
         npcs = [name for name in symbols.cast if name != "agent"]
         members: list[str] = []
-        for i, name in enumerate(names):
+        for place, name in self._findings.each(path, names):
             if name not in npcs and name not in symbols.groups:
-                place = (*path, i) if self._findings.is_list(path) else path
                 near = did_you_mean(name, [*npcs, *symbols.groups])
                 message = f"`{name}` is no NPC of the cast"
-                raise self._findings.fail(
-                    "S201", message, self._findings.at(place, width=len(name)), suggestion=near
-                )
+                span = self._findings.at(place, width=len(name))
+                raise self._findings.no_such(name, message, span, suggestion=near)
             members += symbols.groups.get(name, (name,))
         return tuple(dict.fromkeys(members))
 
@@ -187,9 +178,8 @@ class _Entry:
                 raise FailedError  # its value means nothing, which has been reported
             near = did_you_mean(word, [known.removeprefix("let.") for known in lets])
             message = f"`{word}` is not drawn in `let`"
-            raise self._findings.fail(
-                "S201", message, self._findings.at(path, width=len(word)), suggestion=near
-            )
+            span = self._findings.at(path, width=len(word))
+            raise self._findings.no_such(word, message, span, suggestion=near)
         self._resolver.used.add(("let", word))
         return f"let.{word}"
 
@@ -396,7 +386,7 @@ def check_meaning(
             if checked is not None and not found.has_errors:
                 check_possible(checked, findings)  # else what is missing would seem never to happen
             break
-    bag.extend(_without_consequences(found, scenario))
+    bag.extend(_without_consequences(findings, scenario))
     return None if found.has_errors else checked
 
 
@@ -409,24 +399,20 @@ def _no_agent(scenario: Scenario, findings: Findings, places: Positions) -> None
         findings.error("S105", message, places.key_span(("cast",)), hint="add `agent: {}`")
 
 
-def _without_consequences(found: DiagnosticBag, scenario: Scenario) -> Iterator[Diagnostic]:
+def _without_consequences(findings: Findings, scenario: Scenario) -> Iterator[Diagnostic]:
     """What is wrong with the grammar makes many a text impossible to say, and a name that means two things makes many
     an expression senseless; that need not be said as well.
     """
-    follow: set[str] = set()
+    found, follow = findings.bag, set[str]()
     if any(d.code == possible.GRAMMAR_CODE for d in found):
         follow |= {"S401", "S402"}
-    if entities.mean_two_things(scenario) or _is_slot_of_strangers(found, scenario):
+    words = {word for slot in scenario.grammar.slots.values() for word in slot}
+    # An unknown name that is a word of a slot: there, too, a member or thing of another name was meant.
+    if entities.mean_two_things(scenario) or words & findings.unknown:
         follow |= {"S204", "S211"}
     if any(d.severity is Severity.ERROR and d.code != "S318" for d in found):
         follow.add("S318")  # what is put into a register may be what is wrong
     return (d for d in found if d.code not in follow)
-
-
-def _is_slot_of_strangers(found: DiagnosticBag, scenario: Scenario) -> bool:
-    """Whether a word of a slot is an unknown name elsewhere: a member or thing of another name was meant there."""
-    words = {word for slot in scenario.grammar.slots.values() for word in slot}
-    return any(d.code == "S201" and any(f"`{word}`" in d.message for word in words) for d in found)
 
 
 def _definitions(scenario: Scenario) -> Iterator[DataPath]:
@@ -636,13 +622,10 @@ class _Run:
                 findings.error(code, message, findings.places.value_span(path))
                 continue
             kind = given[0]
-            span = findings.at((*path, kind))
-            scope = reset_scope((*path, kind))
             with surviving():
-                raw = getattr(outcome, kind)
-                term = self.resolver.written((*path, kind), raw, BOOL, at_every_step(scope))
+                scope = at_every_step(reset_scope((*path, kind)))
+                condition = self.resolver.sited(getattr(outcome, kind), BOOL, scope)
                 line = findings.places.key_span((*path, kind)).line
-                condition = Sited(term, scope.draws.site, span)
                 self.resolver.readings.entries[condition.site] = outcome
                 percent, graded = self._reward(outcome.reward, (*path, "reward"))
                 if kind == "failure" and "reward" in outcome.model_fields_set:
@@ -653,15 +636,13 @@ class _Run:
 
     def _reward(self, raw: Expression, path: DataPath) -> tuple[int, Sited | None]:
         """Per cent of the success reward, or what computes it."""
-        scope = at_every_step(reset_scope(path))
-        term = self.resolver.written(path, raw, INT, scope)
-        span = self._findings.at(path)
-        if not isinstance(term, Const):
-            return 100, Sited(term, scope.draws.site, span)
-        if not 0 <= term.value <= 100:
-            message = f"`{term.value}` is not a per cent of the success reward"
-            raise self._findings.fail("S106", message, span, hint="from 0 to 100")
-        return term.value, None
+        reward = self.resolver.sited(raw, INT, at_every_step(reset_scope(path)))
+        if not isinstance(reward.term, Const):
+            return 100, reward
+        if not 0 <= reward.term.value <= 100:
+            message = f"`{reward.term.value}` is not a per cent of the success reward"
+            raise self._findings.fail("S106", message, reward.span, hint="from 0 to 100")
+        return reward.term.value, None
 
     def _channels(self) -> int:
         """How many channels the picture has, without the one for what is carried: the first four, or two more."""

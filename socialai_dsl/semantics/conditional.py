@@ -8,8 +8,19 @@ from typing import Final
 
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics.resolver import INT, Resolver, same_kind
-from socialai_dsl.semantics.scope import Draws, FailedError, Scope, described, quoted, spoken
-from socialai_dsl.semantics.terms import BOOL, Compare, Const, Select, Term, Type, is_own_noun, may_be_nothing
+from socialai_dsl.semantics.scope import Draws, FailedError, Scope, common_type, described, quoted, spoken
+from socialai_dsl.semantics.terms import (
+    BOOL,
+    Compare,
+    Const,
+    Select,
+    Term,
+    Type,
+    constants,
+    is_own_noun,
+    may_be_nothing,
+    numbers_of,
+)
 
 _SAYABLE: Final = ("text", "noun", "color", "int", "status", "direction", "action")
 _MOST_WORDS: Final = 256
@@ -96,9 +107,8 @@ def _taken(branches: Sequence[_Branch]) -> Term:
     if not kept:
         return last.value
     values = [branch.value for branch in (*kept, last)]
-    low, high = min(v.type.low for v in values), max(v.type.high for v in values)
     conditions = tuple(branch.condition for branch in kept if branch.condition is not None)
-    return Select(replace(last.value.type, low=low, high=high), conditions, tuple(values[:-1]), values[-1])
+    return Select(common_type(values), conditions, tuple(values[:-1]), values[-1])
 
 
 # -- texts, which have words of their own ----------------------------------------------------------------------
@@ -117,7 +127,7 @@ def _as_texts(resolver: Resolver, node: ast.Expr, branches: list[_Branch], scope
 
 
 def _words(term: Term) -> list[str]:
-    values = [term.value] if isinstance(term, Const) else range(term.type.low, term.type.high + 1)
+    values = numbers_of(term)
     return [spoken(term.type, value) for value in values]
 
 
@@ -128,7 +138,7 @@ def _as_text(term: Term, type_: Type) -> Term:
     if isinstance(term, Select):
         values = tuple(_as_text(value, type_) for value in term.values)
         return Select(type_, term.conditions, values, _as_text(term.default, type_))
-    known = [Const(term.type, value) for value in range(term.type.low, term.type.high + 1)]
+    known = constants(term.type)
     # As a text a noun is needed: where there is none, nothing is found.
     asked = replace(term, type=replace(term.type, kind="text")) if is_own_noun(term) else term
     *texts, last = (_as_text(value, type_) for value in known)

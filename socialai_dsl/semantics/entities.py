@@ -143,7 +143,7 @@ def _roles(scenario: Scenario, findings: Findings) -> dict[str, str]:
         if role not in scenario.roles:
             near = did_you_mean(role, scenario.roles)
             hint = None if near else "roles are declared under `roles:`"
-            findings.error("S201", f"unknown role `{role}`", span, suggestion=near, hint=hint)
+            findings.no_such(role, f"unknown role `{role}`", span, suggestion=near, hint=hint)
         elif name != name.partition("[")[0]:
             message = f"a role is played by one member of the cast; `{name.partition('[')[0]}` is a group"
             if name.endswith("[0]"):
@@ -310,7 +310,7 @@ def _played(symbols: Symbols, findings: Findings, name: str, which: int) -> Play
         files = symbols.scenario.cast[name].one_of
         near = did_you_mean(member.frame, [*symbols.scenario.frames, *(files[which].frames if files else ())])
         span = findings.at(path, 0, len(member.frame))
-        findings.error("S201", f"unknown frame `{member.frame}`", span, suggestion=near)
+        findings.no_such(member.frame, f"unknown frame `{member.frame}`", span, suggestion=near)
         return None
     frame, path = followed
     _check_slots(name, which, frame, symbols, findings)
@@ -679,7 +679,7 @@ def _voice(resolver: Resolver, name: str, member: CastMember) -> tuple[int, int]
     if raw == "room":
         return 0, symbols.width[1] + symbols.height[1]
     with surviving():
-        term: Term = resolver.written(path, raw, INT, reset_scope(path))
+        term: Term = resolver.written(raw, INT, reset_scope(path))
         if isinstance(term, Const) and term.value >= 0:
             return 0, term.value
         findings = resolver.findings

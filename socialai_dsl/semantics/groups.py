@@ -44,8 +44,11 @@ from socialai_dsl.semantics.terms import (
     Variable,
     all_of,
     between,
+    chosen,
+    constants,
     entity,
     number,
+    numbers_of,
     where_there_is,
 )
 from socialai_dsl.source import DataPath
@@ -97,7 +100,7 @@ def group(resolver: Resolver, node: ast.Expr, expected: Type | None, scope: Scop
             return _alternatives(resolver, node, options, expected, scope)
         case ast.Attribute(subject=ast.Name(id=slot)) if is_group(resolver, node, scope):
             type_ = resolver.symbols.slots[slot].words
-            return Group(type_, _values(type_))
+            return Group(type_, constants(type_))
         case ast.Name(id=word):
             bound = scope.variables.get(word)
             if isinstance(bound, Macro) and is_group(resolver, bound.node, bound.scope):
@@ -108,17 +111,17 @@ def group(resolver: Resolver, node: ast.Expr, expected: Type | None, scope: Scop
                 type_ = COLOR if word == "colors" else resolver.symbols.nouns
                 if type_.size == 0:
                     raise resolver.fail("S201", "this grammar has slots, and no `nouns`", node, scope)
-                return Group(type_, _values(type_))
+                return Group(type_, constants(type_))
             if bound is None and is_everybody(resolver, word):
                 return _everybody(resolver, word)
             objects = resolver.symbols.objects.get(word)
             if bound is None and word in resolver.symbols.groups:
                 numbers = [resolver.symbols.numbers[name] for name in resolver.symbols.groups[word]]
                 type_ = Type("entity", numbers[0], numbers[-1])
-                return Group(type_, _values(type_))
+                return Group(type_, constants(type_))
             if bound is None and objects is not None:
                 type_ = Type("entity", objects.numbers[0], objects.numbers[-1])
-                return Group(type_, _values(type_))
+                return Group(type_, constants(type_))
     single = resolver.value(node, expected, scope)
     if isinstance(single, Const):
         return Group(single.type, (single,))
@@ -138,7 +141,7 @@ def is_everybody(resolver: Resolver, word: str) -> bool:
 def _everybody(resolver: Resolver, word: str) -> Group:
     members, entities = len(resolver.symbols.numbers), resolver.symbols.entities
     type_ = Type("entity", 0, members - 1) if word == "cast" else Type("entity", members, entities - 1)
-    return Group(type_, _values(type_))
+    return Group(type_, constants(type_))
 
 
 def _cells(resolver: Resolver, node: ast.Name, scope: Scope) -> Group:
@@ -150,10 +153,6 @@ def _cells(resolver: Resolver, node: ast.Name, scope: Scope) -> Group:
             "S211", message, node, scope, hint="draw or compute one of the two in `let` first"
         )
     return Group(CELL, ())
-
-
-def _values(type_: Type) -> tuple[Const, ...]:
-    return tuple(Const(type_, value) for value in range(type_.low, type_.high + 1))
 
 
 def _interval(resolver: Resolver, node: ast.Interval, scope: Scope) -> Group:
@@ -168,7 +167,7 @@ def _interval(resolver: Resolver, node: ast.Interval, scope: Scope) -> Group:
         raise resolver.fail(
             "S106", f"a range has at most {MAX_GROUP} values, this one {type_.size}", node, scope
         )
-    return Group(type_, _values(type_), None if known else (low, high))
+    return Group(type_, constants(type_), None if known else (low, high))
 
 
 def _alternatives(
@@ -402,7 +401,7 @@ def values_of(resolver: Resolver, term: Term) -> frozenset[int]:
             return frozenset().union(*(values_of(resolver, value) for value in (*values, default)))
         case FieldOf(entity=who, name="color"):
             return frozenset().union(*(_colors(resolver, number) for number in values_of(resolver, who)))
-    return frozenset(range(term.type.low, term.type.high + 1))
+    return frozenset(term.type.values)
 
 
 def _colors(resolver: Resolver, number: int) -> frozenset[int]:
@@ -471,9 +470,9 @@ def looked_up(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
     if len(node.args) != 1:
         raise resolver.fail("S211", f"`{name}` is a table: it takes one key", node, scope)
     key = _key(resolver, name, node.args[0], scope)
-    known = [key.value] if isinstance(key, Const) else range(key.type.low, key.type.high + 1)
+    known = numbers_of(key)
     possible = values_of(resolver, key)
-    cases: list[tuple[Term, Term]] = []
+    cases: dict[int, Term] = {}
     for value in known:
         word = spoken(key.type, value)
         if word not in keys and value not in possible:
@@ -482,10 +481,8 @@ def looked_up(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
             raise _no_key(resolver, name, keys, word, key, node.args[0], scope)
         if isinstance(key, Const):
             return values[keys.index(word)]
-        cases.append((Compare("==", key, Const(key.type, value)), values[keys.index(word)]))
-    *others, (_, default) = cases
-    found = Select(default.type, tuple(c for c, _ in others), tuple(v for _, v in others), default)
-    return where_there_is(key, found)
+        cases[value] = values[keys.index(word)]
+    return where_there_is(key, chosen(key, [*cases], [*cases.values()], values[0].type))
 
 
 def _key(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> Term:
@@ -514,10 +511,10 @@ def _no_key(
         hint = None if near else "it has " + ", ".join(keys)
         message = f"the table `{name}` has no `{word}`"
         return resolver.fail("S402", message, node, scope, suggestion=near, hint=hint)
-    lacks = f" can be {word}, which the table `{name}` does not have"
-    if any(finding.message.endswith(lacks) for finding in resolver.findings.bag):
+    if (name, word) in resolver.missing_keys:
         return FailedError()  # wherever else it is looked up, that is no other mistake
-    message = f"`{quoted(node)}`{lacks}"
+    resolver.missing_keys.add((name, word))
+    message = f"`{quoted(node)}` can be {word}, which the table `{name}` does not have"
     hint = f"it has `{near}`; is that meant?" if near else "it has " + ", ".join(keys)
     return resolver.fail("S402", message, node, scope, hint=hint)
 
@@ -540,7 +537,7 @@ def _word(resolver: Resolver, path: DataPath, raw: object) -> str:
         text = raw.strip()
         if is_plain(text, "'-") or not text.strip(" '-"):
             return text
-    term = resolver.written(path, raw, ANY_TEXT if isinstance(raw, str) else None, reset_scope(path))  # type: ignore[arg-type]
+    term = resolver.written(raw, ANY_TEXT if isinstance(raw, str) else None, reset_scope(path))  # type: ignore[arg-type]
     if not isinstance(term, Const):
         raise resolver.findings.fail(
             "S204", "a value of a table is known beforehand", resolver.findings.at(path)
@@ -575,20 +572,11 @@ def _permuted(
         near = did_you_mean(other, [key for key, value in known.items() if not isinstance(value, str)])
         message = f"`{other}` is not a table that is written out"
         span = resolver.findings.node(path, node.args[0])
-        raise resolver.findings.fail("S201", message, span, suggestion=near)
+        raise resolver.findings.no_such(other, message, span, suggestion=near)
     resolver.used.add(("tables", other))
     keys, values = resolver.table(other)
     order = permutation(resolver, f"tables.{name}", len(keys), path)
-    type_ = values[0].type
-    return keys, tuple(
-        Select(
-            type_,
-            tuple(Compare("==", place, Const(place.type, i)) for i in range(len(values) - 1)),
-            values[:-1],
-            values[-1],
-        )
-        for place in order
-    )
+    return keys, tuple(chosen(place, range(len(values)), values, values[0].type) for place in order)
 
 
 def permutation(resolver: Resolver, register: str, count: int, path: DataPath) -> tuple[Read, ...]:
@@ -671,9 +659,7 @@ def memories(resolver: Resolver) -> Iterator[MemoryPlan]:
         open_: Sited | None = None
         with surviving():
             if model.while_ is not None:
-                scope = at_every_step(reset_scope(path))
-                term = resolver.written(path, model.while_, BOOL, scope)
-                open_ = Sited(term, scope.draws.site, resolver.findings.at(path))
+                open_ = resolver.sited(model.while_, BOOL, at_every_step(reset_scope(path)))
             yield MemoryPlan(f"memory.{name}", model.last, utterance_type(resolver), open_)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from socialai_dsl.grammar import ast
 from socialai_dsl.semantics import groups
@@ -19,6 +18,8 @@ from socialai_dsl.semantics.terms import (
     Variable,
     all_of,
     arithmetic,
+    as_number,
+    entity,
     number,
 )
 
@@ -62,7 +63,7 @@ def check_carried(resolver: Resolver, thing: Term, node: ast.Expr, scope: Scope)
 def empty_handed(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
     """Whether somebody carries nothing."""
     _check_hands(resolver, who, node, scope)
-    things = (Const(Type("entity", n, n), n) for n in carryable(resolver))
+    things = map(entity, carryable(resolver))
     return all_of([Not(_in_hands(resolver, who, thing)) for thing in things])
 
 
@@ -88,7 +89,7 @@ def _check_hands(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) ->
 def _in_hands(resolver: Resolver, who: Term, thing: Term) -> Term:
     """Whether somebody carries a thing: its register holds 0, or 1 + who carries it."""
     members = len(resolver.symbols.numbers)
-    by = arithmetic("+", replace(who, type=Type("int", who.type.low, who.type.high)), number(1))
+    by = arithmetic("+", as_number(who), number(1))
     return Compare("==", FieldOf(Type("int", 0, members), thing, "carrier"), by)
 
 
@@ -108,8 +109,8 @@ def _check_recipient(resolver: Resolver, name: str, where: Term, node: ast.Expr,
     called = quoted(node)
     if name == "give":
         raise resolver.fail("S204", f"`{called}` is nobody; things are given to somebody", node, scope)
-    for entity in range(where.type.low, where.type.high + 1):
-        objects = resolver.symbols.object_of(entity)
+    for one in where.type.values:
+        objects = resolver.symbols.object_of(one)
         if objects is None:
             message = f"`{called}` may be somebody, or a thing in the room: say which of them"
             raise resolver.fail("S204", message, node, scope)

@@ -61,7 +61,7 @@ class NestedPlanner:
         draws = Draws(f"{self.played.member}/{site}")
         scope = Scope(path, draws, member=self.played.member, frame=self.played)
         try:
-            term = self.resolver.written(path, raw, INT, scope)  # type: ignore[arg-type]
+            term = self.resolver.written(raw, INT, scope)  # type: ignore[arg-type]
         except FailedError:
             return 1
         if isinstance(term, Const) and 0 <= term.value <= horizon:

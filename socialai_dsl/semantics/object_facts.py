@@ -29,7 +29,6 @@ from socialai_dsl.semantics.scope import (
 )
 from socialai_dsl.semantics.terms import (
     BOOL,
-    Compare,
     Const,
     FieldOf,
     Read,
@@ -38,8 +37,10 @@ from socialai_dsl.semantics.terms import (
     Term,
     Type,
     arithmetic,
-    draws,
+    as_number,
+    chosen,
     number,
+    numbers_of,
     walk,
     where_there_is,
 )
@@ -79,7 +80,7 @@ def check_holder(
                     "S204", f"`{called}` cannot be carried", node, scope, hint=hands.CARRYABLE
                 )
         return
-    for entity in range(holder.type.low, holder.type.high + 1):
+    for entity in holder.type.values:
         objects = resolver.symbols.object_of(entity)
         if objects is None or "opened" not in objects.type.states:
             able = [name for name, type_ in resolver.symbols.types.items() if "opened" in type_.states]
@@ -92,7 +93,7 @@ def check_holder(
 def container(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
     """`x.inside`: what something lies in."""
     known = holders(resolver)
-    for entity in range(who.type.low, who.type.high + 1):
+    for entity in who.type.values:
         objects = resolver.symbols.object_of(entity)
         if objects is None or known is None or not can_lie_inside(resolver, objects):
             message = f"`{quoted(node)}`: it never lies inside anything"
@@ -263,15 +264,15 @@ def unlocker(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Ter
     for key, locks in resolver.unlocks.items():
         for lock in locks:
             if lock in found and who.type.low <= lock <= who.type.high:
-                message = f"several things unlock `{_called(resolver, lock)}`"
+                message = f"several things unlock `{resolver.symbols.called(lock)}`"
                 raise resolver.fail("S204", message, node, scope, hint="name the one that is meant")
             found[lock] = key
-    numbers = [who.value] if isinstance(who, Const) else range(who.type.low, who.type.high + 1)
+    numbers = numbers_of(who)
     for lock in numbers:
         if lock not in found and _some_failed(resolver):
             raise FailedError  # perhaps it is what that one was to unlock
         if lock not in found:
-            message = f"nothing unlocks `{_called(resolver, lock)}`"
+            message = f"nothing unlocks `{resolver.symbols.called(lock)}`"
             hint = "an object unlocks another with `unlocks:`"
             raise resolver.fail("S204", message, node, scope, hint=hint)
     keys = [found[lock] for lock in numbers]
@@ -280,15 +281,9 @@ def unlocker(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Ter
         return Const(type_, keys[0])
     shifts = {key - lock for lock, key in zip(numbers, keys, strict=True)}
     if len(shifts) == 1:
-        return _shifted(who, shifts.pop(), type_)
-    *others, last = zip(numbers, keys, strict=True)
-    chosen = Select(
-        type_,
-        tuple(Compare("==", who, Const(who.type, lock)) for lock, _ in others),
-        tuple(Const(type_, key) for _, key in others),
-        Const(type_, last[1]),
-    )
-    return where_there_is(who, chosen)
+        # Objects that stand in the same order in two groups are found by adding to their number.
+        return replace(arithmetic("+", as_number(who), number(shifts.pop())), type=type_)
+    return where_there_is(who, chosen(who, numbers, [Const(type_, key) for key in keys], type_))
 
 
 def _some_failed(resolver: Resolver) -> bool:
@@ -296,19 +291,6 @@ def _some_failed(resolver: Resolver) -> bool:
     symbols = resolver.symbols
     linked = [name for name, group in symbols.scenario.objects.items() if group.unlocks is not None]
     return any(symbols.objects[name].numbers[0] not in resolver.unlocks for name in linked)
-
-
-def _shifted(who: Term, shift: int, type_: Type) -> Term:
-    """Objects that stand in the same order in two groups are found by adding to their number."""
-    as_number = replace(who, type=Type("int", who.type.low, who.type.high))
-    return replace(arithmetic("+", as_number, number(shift)), type=type_)
-
-
-def _called(resolver: Resolver, entity: int) -> str:
-    objects = resolver.symbols.object_of(entity)
-    if objects is None:
-        return resolver.symbols.member_of(entity) or "agent"
-    return objects.called(entity - objects.numbers[0])
 
 
 # -- statuses: the one an object begins with, and those that follow from a condition -------------------------
@@ -349,7 +331,7 @@ def _initial(resolver: Resolver, objects: Objects) -> dict[int, int | Read]:
     found: dict[int, int | Read] = {}
     for index, entity in enumerate(objects.numbers):
         scope = object_scope(objects, index, (*base, key), key, at_reset=True)
-        condition = resolver.written((*base, key), getattr(group, key), BOOL, scope)
+        condition = resolver.written(getattr(group, key), BOOL, scope)
         if isinstance(condition, Const):
             found[entity] = status if condition.value else objects.type.initial
             continue
@@ -398,12 +380,8 @@ def _computed(resolver: Resolver, objects: Objects, key: str, left_for: str | No
     off = states.index(left_for) if left_for in states else objects.type.initial
     for index, entity in enumerate(objects.numbers):
         scope = object_scope(objects, index, path, key, at_reset=False)
-        condition = resolver.written(path, raw, BOOL, scope)
-        if draws(condition):
-            message = f"`{key}` follows from how things are, so nothing can be drawn in it"
-            hint = "draw it in `let`, and use that"
-            raise resolver.findings.fail("S204", message, resolver.findings.at(path), hint=hint)
-        yield Computed(entity, on, off, Sited(condition, scope.draws.site, resolver.findings.at(path)))
+        message = f"`{key}` follows from how things are, so nothing can be drawn in it"
+        yield Computed(entity, on, off, resolver.undrawn(resolver.sited(raw, BOOL, scope), message))
 
 
 def _add(resolver: Resolver, found: dict[int, Computed], one: Computed, objects: Objects, key: str) -> None:
@@ -424,7 +402,7 @@ def _in_order(resolver: Resolver, found: dict[int, Computed]) -> Iterator[Comput
         if entity in done or entity not in found:
             return
         if entity in path:
-            names = [_object_called(resolver, one) for one in [*path[path.index(entity) :], entity]]
+            names = [resolver.symbols.called(one) for one in [*path[path.index(entity) :], entity]]
             message = " and ".join(f"`{a}` needs `{b}`" for a, b in pairwise(names))
             span = found[entity].condition.span
             resolver.findings.error("S208", f"computed statuses in a circle: {message}", span)
@@ -445,13 +423,7 @@ def _in_order(resolver: Resolver, found: dict[int, Computed]) -> Iterator[Comput
 def _statuses_read(term: Term) -> Iterator[int]:
     for part in walk(term):
         if isinstance(part, FieldOf) and part.name == "status":
-            yield from range(part.entity.type.low, part.entity.type.high + 1)
-
-
-def _object_called(resolver: Resolver, entity: int) -> str:
-    objects = resolver.symbols.object_of(entity)
-    assert objects is not None, "internal: only objects have statuses"
-    return objects.called(entity - objects.numbers[0])
+            yield from part.entity.type.values
 
 
 # -- beliefs: what a member of the cast takes for true, because it saw it last -------------------------------
@@ -487,15 +459,12 @@ def accepting(resolver: Resolver) -> Iterator[tuple[int, str]]:
         path = resolver.symbols.member_path(name, "accepts")
         with surviving():
             scope = at_every_step(reset_scope(path, f"cast.{name}.accepts", name))
-            term = resolver.written(path, member.accepts, BOOL, scope)
-            span = resolver.findings.at(path)
+            asked = resolver.sited(member.accepts, BOOL, scope)
             if not hands.carryable(resolver):
-                raise resolver.findings.fail("S204", "nothing here can be given", span, hint=hands.CARRYABLE)
-            if draws(term):
-                message = "`accepts` is asked in every step, so nothing can be drawn in it"
-                hint = "draw it in `let`, and use that"
-                raise resolver.findings.fail("S204", message, span, hint=hint)
-            noted = resolver.registers.remember(Sited(term, scope.draws.site, span))
+                message = "nothing here can be given"
+                raise resolver.findings.fail("S204", message, asked.span, hint=hands.CARRYABLE)
+            message = "`accepts` is asked in every step, so nothing can be drawn in it"
+            noted = resolver.registers.remember(resolver.undrawn(asked, message))
             yield resolver.symbols.numbers[name], noted.path
 
 
@@ -508,7 +477,7 @@ def watching(member: str, number: int, span: Span) -> FramePlan:
 def believed(resolver: Resolver, owner: ast.Attribute, node: ast.Attribute, scope: Scope) -> Term:
     """`sally.believes.toy_in`; of several members, what the one believes who is meant."""
     who = resolver.value(owner.subject, ENTITY, scope)
-    members = [resolver.symbols.member_of(number) for number in range(who.type.low, who.type.high + 1)]
+    members = resolver.symbols.members_of(who.type.values)
     if None in members:
         raise resolver.fail("S211", "only a member of the cast believes something", owner, scope)
     for member in map(str, members):
@@ -518,7 +487,7 @@ def believed(resolver: Resolver, owner: ast.Attribute, node: ast.Attribute, scop
             hint = None if near else f"declare it: `beliefs: {{{node.name}: {{of: ..., when: sees(...)}}}}`"
             called = (resolver.symbols.group_of(member) or (member, 0))[0]
             message = f"`{called}` has no belief `{node.name}`"
-            raise resolver.fail("S201", message, node, scope, suggestion=near, hint=hint)
+            raise resolver.no_such(node.name, message, node, scope, suggestion=near, hint=hint)
     if any(register_of(str(member), node.name) not in resolver.registers for member in members):
         raise FailedError  # what it starts with is missing, which has been reported
     return of_each(who, [resolver.registers.read(register_of(str(m), node.name)) for m in members])

@@ -16,7 +16,6 @@ from socialai_dsl.semantics import plans, terms
 from socialai_dsl.semantics.plans import CheckedScenario, Effect, FramePlan, NestedSteps, RulePlan
 from socialai_dsl.semantics.scope import Findings, frames_of
 from socialai_dsl.semantics.terms import (
-    Chance,
     Const,
     Logic,
     ObjectType,
@@ -336,7 +335,7 @@ def _hears_all(above: RulePlan, below: RulePlan) -> bool:
 def _asks_less(above: RulePlan, below: RulePlan) -> bool:
     if above.when is None:
         return True
-    if below.when is None or _draws(above.when.term):
+    if below.when is None or draws(above.when.term):
         return False
     if isinstance(above.when.term, Const) and not above.when.term.value:
         return False  # a parameter has switched it off
@@ -345,10 +344,6 @@ def _asks_less(above: RulePlan, below: RulePlan) -> bool:
 
 def _conjuncts(term: Term) -> tuple[Term, ...]:
     return term.args if isinstance(term, Logic) and term.op == "and" else (term,)
-
-
-def _draws(term: Term) -> bool:
-    return draws(term) or any(isinstance(part, Chance) for part in walk(term))
 
 
 # -- conditions that no value makes true ---------------------------------------------------------------------
@@ -465,8 +460,6 @@ class Possible:
                     return (op == "all") is wanted
                 if (op == "any") is wanted and condition is not None:
                     return self._may(condition, wanted)
-            case terms.Chance(probability=probability):
-                return probability > 0 if wanted else probability < 1
         return True
 
     def _may_compare(self, term: terms.Compare, wanted: bool) -> bool:
@@ -504,7 +497,7 @@ class Possible:
                 found = {
                     s for number in range(low, high + 1) for s in self._statuses.of(number, term.type.size)
                 }
-                return sorted(found) or range(term.type.low, term.type.high + 1)
+                return sorted(found) or term.type.values
             case Select(values=values, default=default):
                 parts = [self._values(part) for part in (*values, default)]
                 if not all(parts):
@@ -512,7 +505,7 @@ class Possible:
                 if any(part[-1] - part[0] > 256 for part in parts):
                     return range(min(part[0] for part in parts), max(part[-1] for part in parts) + 1)
                 return sorted({value for part in parts for value in part})
-        return range(term.type.low, term.type.high + 1)
+        return term.type.values
 
     # -- words --
 
@@ -600,7 +593,7 @@ class _Statuses:
         self._effects: dict[int, list[Effect]] = {}
         for effect in _effects(checked):
             for entity in effect.entities:
-                for number in range(entity.type.low, entity.type.high + 1):
+                for number in entity.type.values:
                     self._effects.setdefault(number, []).append(effect)
         self._known: dict[int, frozenset[int]] = {}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Final
 
 from socialai_dsl.grammar.ast import every
@@ -11,7 +11,7 @@ from socialai_dsl.semantics.groups import values_of
 from socialai_dsl.semantics.plans import Drawn, ProbePlan
 from socialai_dsl.semantics.resolver import Resolver
 from socialai_dsl.semantics.scope import FailedError, Scope, at_every_step, reset_scope, spoken, surviving
-from socialai_dsl.semantics.terms import BOOL, Chance, Sited, Term, draws, walk
+from socialai_dsl.semantics.terms import BOOL, Sited, Term, walk
 from socialai_dsl.semantics.texts import parts, sayable
 from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import TRUTHS, normal
@@ -89,17 +89,15 @@ class _Entry:
         return when, ask, answer, answers
 
     def _condition(self, raw: Expression) -> Sited:
-        return self._sited(
-            (*self._path, "when"), lambda scope: self._resolver.written(scope.path, raw, BOOL, scope)
-        )
+        return self._undrawn(self._resolver.sited(raw, BOOL, self._scope((*self._path, "when"))))
 
     def _answer(self) -> Drawn:
         """What is right."""
         path = (*self._path, "answer")
         node = self._findings.expression(path, self._entry.answer)
-        return self._value(
-            "answer", self._sited(path, lambda s: sayable(self._resolver, node, s, or_condition=True))
-        )
+        scope = self._scope(path)
+        term = sayable(self._resolver, node, scope, or_condition=True)
+        return self._value("answer", self._undrawn(Sited(term, scope.draws.site, self._findings.at(path))))
 
     def _text(self, part: str, path: DataPath, raw: str) -> Text:
         """The pieces of a text and the values in it."""
@@ -108,7 +106,7 @@ class _Entry:
         pieces: list[str | Drawn] = []
         for piece in parts(self._resolver, text, scope):
             if isinstance(piece, Term):
-                sited = self._undrawn(Sited(piece, scope.draws.site, self._findings.at(path)), path)
+                sited = self._undrawn(Sited(piece, scope.draws.site, self._findings.at(path)))
                 pieces.append(self._value(f"{part}[{len(pieces)}]", sited))
             else:
                 pieces.append(piece)
@@ -125,11 +123,8 @@ class _Entry:
             self._check_number(len(possible))
             yield from ((word,) for word in possible)
             return
-        written = [
-            self._text(f"answers[{i}]", path, text)
-            for i, text in enumerate(self._entry.answers)
-            for path in [self._place(i)]
-        ]
+        places = self._findings.each((*self._path, "answers"), self._entry.answers)
+        written = [self._text(f"answers[{i}]", path, text) for i, (path, text) in enumerate(places)]
         self._check_written(written, possible)
         yield from written
 
@@ -183,17 +178,9 @@ class _Entry:
         self._values.append(Drawn(f"probes.{self._name}.{part}", type_, sited))
         return self._values[-1]
 
-    def _sited(self, path: DataPath, resolve: Callable[[Scope], Term]) -> Sited:
-        scope = self._scope(path)
-        return self._undrawn(Sited(resolve(scope), scope.draws.site, self._findings.at(path)), path)
-
     def _scope(self, path: DataPath) -> Scope:
         return at_every_step(reset_scope(path))
 
-    def _undrawn(self, sited: Sited, path: DataPath) -> Sited:
+    def _undrawn(self, sited: Sited) -> Sited:
         """The same, in which nothing is drawn: who asks changes nothing."""
-        if draws(sited.term) or any(isinstance(part, Chance) for part in walk(sited.term)):
-            message = "a probe draws nothing itself"
-            hint = "draw it in `let`, and use that"
-            raise self._findings.fail("S204", message, self._findings.at(path), hint=hint)
-        return sited
+        return self._resolver.undrawn(sited, "a probe draws nothing itself")

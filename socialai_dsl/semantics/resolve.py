@@ -62,8 +62,10 @@ from socialai_dsl.semantics.terms import (
     arithmetic,
     asked_first,
     between,
+    constants,
     draws,
     entity,
+    equals,
     holds_nothing,
     is_noted,
     is_own_noun,
@@ -280,7 +282,7 @@ def _toggled_by(resolver: Resolver, what: Term, node: ast.Expr, scope: Scope) ->
     if isinstance(who, Const):
         return toggled_by(who, what)
     cases = []
-    for one in (Const(who.type, value) for value in range(who.type.low, who.type.high + 1)):
+    for one in constants(who.type):
         cases.append(all_of([Compare("==", who, one), toggled_by(one, what)]))
     return where_there_is(who, any_of(cases))
 
@@ -356,7 +358,7 @@ def _is_in_state(resolver: Resolver, node: ast.Call, scope: Scope) -> Term:
 
 def _is_each_in_state(resolver: Resolver, who: Term, node: ast.Call, scope: Scope) -> Term:
     """`any(p in peers where p.is(ready))`, `leader.is(ready)`: of whoever is meant."""
-    members = [resolver.symbols.member_of(number) for number in range(who.type.low, who.type.high + 1)]
+    members = resolver.symbols.members_of(who.type.values)
     named = [member for member in members if member is not None]
     if len(named) < len(members):
         raise resolver.fail("S211", "a member of the cast is needed before the dot", node, scope)
@@ -364,7 +366,7 @@ def _is_each_in_state(resolver: Resolver, who: Term, node: ast.Call, scope: Scop
     for i, member in enumerate(named):
         asked = replace(node, subject=ast.Name(member, at=node.at))
         its = _is_in_state(resolver, asked, replace(scope, variables={}))
-        cases.append(all_of([Compare("==", who, Const(who.type, who.type.low + i)), its]))
+        cases.append(all_of([equals(who, who.type.low + i), its]))
     return where_there_is(who, any_of(cases))
 
 
@@ -536,8 +538,8 @@ class ScenarioResolver(Resolver):
         if left.type.kind in worded and right.type.kind in worded and (left.type.words or right.type.words):
             alike = any_of(
                 all_of([_is(left, i), _is(right, j)])
-                for i in range(left.type.low, left.type.high + 1)
-                for j in range(right.type.low, right.type.high + 1)
+                for i in left.type.values
+                for j in right.type.values
                 if spoken(left.type, i) == spoken(right.type, j)
             )
             # Both are asked for, even if none of their values are called the same.
@@ -631,7 +633,7 @@ def _is_unlike(term: Term) -> bool:
 def _is(term: Term, value: int) -> Term:
     if isinstance(term, Const):
         return Const(BOOL, int(term.value == value))
-    return Compare("==", term, Const(term.type, value))
+    return equals(term, value)
 
 
 def _negated(term: Term) -> Term:

@@ -61,8 +61,11 @@ from socialai_dsl.semantics.terms import (
     all_of,
     any_of,
     arithmetic,
+    as_number,
     entity,
+    equals,
     number,
+    numbers_of,
 )
 from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import normal
@@ -201,8 +204,7 @@ def _attribute(resolver: Resolver, name: str, who: Term, node: ast.Expr, scope: 
 
 
 def _name(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
-    numbers = [who.value] if isinstance(who, Const) else range(who.type.low, who.type.high + 1)
-    members = [resolver.symbols.member_of(number) for number in numbers]
+    members = resolver.symbols.members_of(numbers_of(who))
     names = [resolver.registers.read(f"{member}.name") for member in members if member is not None]
     if len(names) < len(members):
         raise resolver.fail("S204", "only a member of the cast has a name", node, scope)
@@ -211,8 +213,7 @@ def _name(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
 
 def _turns_in_state(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
     """The clock of a member's frame, which `after` compares as well."""
-    numbers = [who.value] if isinstance(who, Const) else range(who.type.low, who.type.high + 1)
-    members = [resolver.symbols.member_of(number) for number in numbers]
+    members = resolver.symbols.members_of(numbers_of(who))
     if not all(member in resolver.frames for member in members):
         hint = "members of the cast follow one with `frame:`"
         raise resolver.fail("S204", "only who follows a frame is in a state", node, scope, hint=hint)
@@ -221,7 +222,7 @@ def _turns_in_state(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope)
 
 
 def _kind(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
-    kinds = {_kind_of(resolver, n) for n in range(who.type.low, who.type.high + 1)}
+    kinds = {_kind_of(resolver, n) for n in who.type.values}
     if len(kinds) > 1:
         raise resolver.fail("S204", "`kind` is known of one thing, or of things of one kind", node, scope)
     return Const(Type("text", 0, 0, (kinds.pop(),)), 0)
@@ -237,14 +238,14 @@ def _kind_of(resolver: Resolver, entity: int) -> str:
 
 
 def _index(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
-    members = [resolver.symbols.member_of(number) for number in (who.type.low, who.type.high)]
+    members = resolver.symbols.members_of((who.type.low, who.type.high))
     groups = [resolver.symbols.group_of(member) for member in members if member is not None]
     if len(groups) == 2 and groups[0] is not None and groups[1] is not None and groups[0][0] == groups[1][0]:
         first = who.type.low - groups[0][1]
         return (
             number(who.value - first)
             if isinstance(who, Const)
-            else arithmetic("-", _as_number(who), number(first))
+            else arithmetic("-", as_number(who), number(first))
         )
     objects = resolver.symbols.object_of(who.type.low)
     if objects is None or who.type.high not in objects.numbers:
@@ -252,12 +253,7 @@ def _index(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> Term:
     first = objects.numbers[0]
     if isinstance(who, Const):
         return number(who.value - first)
-    return arithmetic("-", _as_number(who), number(first))
-
-
-def _as_number(term: Term) -> Term:
-    """An entity's number as a number."""
-    return replace(term, type=Type("int", term.type.low, term.type.high))
+    return arithmetic("-", as_number(who), number(first))
 
 
 def _status(resolver: Resolver, status: str, who: Term, node: ast.Expr, scope: Scope) -> Term:
@@ -267,12 +263,12 @@ def _status(resolver: Resolver, status: str, who: Term, node: ast.Expr, scope: S
         assert what is not None, "internal: a status belongs to an object"
         message = f"{with_article(what.type.name)} is never `{status}`; it is {' or '.join(field.type.words)}"
         raise resolver.fail("S204", message, node, scope, suggestion=did_you_mean(status, field.type.words))
-    return Compare("==", field, Const(field.type, field.type.words.index(status)))
+    return equals(field, field.type.words.index(status))
 
 
 def status_of(resolver: Resolver, who: Term, node: ast.Expr, scope: Scope) -> FieldOf:
     """The status of one object, or of one of several objects of the same type."""
-    found = [resolver.symbols.object_of(n) for n in range(who.type.low, who.type.high + 1)]
+    found = [resolver.symbols.object_of(n) for n in who.type.values]
     types = {objects.type.name: objects.type for objects in found if objects is not None}
     if None in found or len(types) != 1:
         several = [*types, *(["member of the cast"] if None in found else [])]
@@ -392,7 +388,7 @@ def slot_truth(resolver: Resolver, slot: str, raw: object, scope: Scope) -> Term
         truth = "true" if raw.casefold() in ("yes", "on", "y", "always") else "false"
         span = resolver.findings.at(scope.path, 0, len(raw))
         raise resolver.findings.fail("S204", f"slot `{slot}` is a bool: write `{truth}`", span)
-    return resolver.written(scope.path, raw, BOOL, scope)  # type: ignore[arg-type]
+    return resolver.written(raw, BOOL, scope)  # type: ignore[arg-type]
 
 
 def with_scope(path: DataPath, member: str, slot: str, user: Scope) -> Scope:
@@ -442,7 +438,7 @@ def _player(resolver: Resolver, role: str) -> str:
     # Said once, where the role is declared: it may be spoken of in many places.
     span = resolver.findings.places.key_span(("roles", role))
     hint = f"add `role: {role}` to a member of the cast"
-    raise resolver.findings.fail("S201", f"nobody plays the role `{role}`", span, hint=hint)
+    raise resolver.findings.no_such(role, f"nobody plays the role `{role}`", span, hint=hint)
 
 
 def _not_a_value(resolver: Resolver, kind: str, node: ast.Name, scope: Scope) -> FailedError:
@@ -519,7 +515,7 @@ def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: S
             "S201", "`here` is the candidate cell; it means something only in a place", node, scope
         )
     if word in _NOBODY_HERE:
-        raise resolver.fail("S201", f"`{word}` is {_NOBODY_HERE[word]}", node, scope)
+        raise resolver.no_such(word, f"`{word}` is {_NOBODY_HERE[word]}", node, scope)
     if word in ACTIVITIES or word in EFFECTS or word in PLACES:
         kind = "an activity" if word in ACTIVITIES else "an effect" if word in EFFECTS else "a place"
         return resolver.fail("S204", f"`{word}` is {kind}; here a value is expected", node, scope)
@@ -537,7 +533,7 @@ def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: S
             f"`{word}` is what somebody is called",
             "in expressions a member of the cast goes by its key",
         )
-        return resolver.fail("S201", message, node, scope, suggestion=called, hint=cure)
+        return resolver.no_such(word, message, node, scope, suggestion=called, hint=cure)
     near, place = suggestion(resolver, word, expected, scope)
     message = f"unknown name `{word}`"
     hint: str | None = None
@@ -555,7 +551,7 @@ def _unknown(resolver: Resolver, node: ast.Name, expected: Type | None, scope: S
         message = f"unknown name `{word}`, where a number is expected"
     elif near is None and expected is None:
         hint = f"if a text is meant, quote it: {as_text(word, whole)}"
-    return resolver.fail("S201", message, node, scope, suggestion=near, suggestion_place=place, hint=hint)
+    return resolver.no_such(word, message, node, scope, suggestion=near, suggestion_place=place, hint=hint)
 
 
 def suggestion(
@@ -628,7 +624,7 @@ def _of_each(resolver: Resolver, who: Term, name: str) -> Term | None:
     """A register that each of several members has in its frame: that of the one who is meant. None if some lack it."""
     if who.type.kind != "entity" or who.type.high >= len(resolver.symbols.numbers):
         return None
-    members = [resolver.symbols.member_of(number) for number in range(who.type.low, who.type.high + 1)]
+    members = resolver.symbols.members_of(who.type.values)
     if not all(f"{member}.{name}" in resolver.registers for member in members):
         return None
     if any(resolver.registers.keys(f"{member}.{name}") for member in members):
@@ -666,4 +662,4 @@ def expanded(
         variables={parameter: Macro(argument, scope) for parameter, argument in arguments.items()},
         within=(*scope.within, define.name),
     )
-    return resolver.written(define.path, define.raw, expected, inner)
+    return resolver.written(define.raw, expected, inner)

@@ -20,6 +20,7 @@ from socialai_dsl.semantics.scope import (
     Scalar,
     Scope,
     Symbols,
+    beside_word,
     described,
     quoted,
     select,
@@ -35,7 +36,6 @@ from socialai_dsl.semantics.terms import (
     NOTED,
     SIDE,
     TURN,
-    Compare,
     Const,
     Line,
     Pattern,
@@ -47,6 +47,8 @@ from socialai_dsl.semantics.terms import (
     Term,
     Type,
     arithmetic,
+    draws,
+    integer,
     nothing_of,
     number,
     where_there_is,
@@ -166,7 +168,7 @@ def number_of_texts(line: Line) -> int:
 
 def words_of_values(type_: Type) -> list[str]:
     """The word of each value of a type."""
-    return [spoken(type_, value) for value in range(type_.low, type_.high + 1)]
+    return [spoken(type_, value) for value in type_.values]
 
 
 # -- registers: what is drawn or computed once at reset ------------------------------------------------------
@@ -302,7 +304,7 @@ class Registers:
 
     def _called(self, path: str, key: Const) -> str:
         """The path of the register of a key: `ann.trust(bob)`."""
-        return f"{path}({self._resolver.symbols.called(key)})"
+        return f"{path}({self._resolver.symbols.word(key)})"
 
     def is_wordy(self, path: str) -> bool:
         """Whether a register's value consists of bare words, so that its type depends on its uses."""
@@ -456,7 +458,7 @@ class Registers:
         scope = declaration.scope
         written = [(declaration.source, declaration.raw), *declaration.others]
         terms = [
-            self._resolver.written(source, raw, expected, scope.at(source, scope.draws.site))
+            self._resolver.written(raw, expected, scope.at(source, scope.draws.site))
             for source, raw in written
         ]
         if len(terms) == 1:
@@ -512,6 +514,7 @@ class Resolver(ABC):
         frames: member -> the frame it plays.
         readings: how everything was written that has been given a meaning.
         used: where the definitions and draws stand that something uses.
+        missing_keys: table and word of what may be looked up and is not there, once it has been reported.
         slot_words: value of a slot of what the agent said -> the slot, and the word that stands for the value.
     """
 
@@ -530,6 +533,7 @@ class Resolver(ABC):
         self.utterances = Utterances(symbols.sentences)
         self.readings = Readings()
         self.used: set[DataPath] = set()
+        self.missing_keys: set[tuple[str, str]] = set()
         self.slot_words: dict[Term, tuple[FilledSlot, Term]] = {}
         self._within: list[tuple[ast.Expr, Scope]] = []
         self._parts = self._all_parts = 0
@@ -558,15 +562,25 @@ class Resolver(ABC):
     def meaning(self, node: ast.Expr, expected: Type | None, scope: Scope) -> Term:
         """The term for a tree by what kind of node it is; `value` keeps how it was written as well."""
 
-    def written(self, path: DataPath, raw: Scalar, expected: Type | None, scope: Scope) -> Term:
-        """The value of the expression that is written at `path`; raises FailedError once it has been reported."""
+    def written(self, raw: Scalar, expected: Type | None, scope: Scope) -> Term:
+        """The value of the expression that is written at the scope's path; raises FailedError once it is reported."""
         if isinstance(raw, str) and expected is not None and expected.kind in ("text", "noun"):
-            literal = self._literal(path, raw, expected, scope)
+            literal = self._literal(raw, expected)
             if literal is not None:
                 return literal
-        return self.value(self.findings.expression(path, raw), expected, scope)
+        return self.value(self.findings.expression(scope.path, raw), expected, scope)
 
-    def _literal(self, path: DataPath, raw: str, expected: Type, scope: Scope) -> Term | None:
+    def sited(self, raw: Scalar, expected: Type | None, scope: Scope) -> Sited:
+        """The same with its place and the site of its draws."""
+        return Sited(self.written(raw, expected, scope), scope.draws.site, self.findings.at(scope.path))
+
+    def undrawn(self, sited: Sited, message: str) -> Sited:
+        """A value in which nothing may be drawn; the message says why."""
+        if draws(sited.term):
+            raise self.findings.fail("S204", message, sited.span, hint="draw it in `let`, and use that")
+        return sited
+
+    def _literal(self, raw: str, expected: Type) -> Term | None:
         """A text of several words needs no quotes where a text is expected."""
         text = raw.strip()
         if expected.kind == "noun" and text in expected.words:
@@ -607,6 +621,12 @@ class Resolver(ABC):
     def fail(self, code: str, message: str, node: ast.Expr, scope: Scope, **more: str | None) -> FailedError:
         """Report what is wrong with a part of an expression; raising the result gives the expression up."""
         return self.findings.fail(code, message, self.findings.node(scope.path, node), **more)
+
+    def no_such(
+        self, word: str, message: str, node: ast.Expr, scope: Scope, **more: str | None
+    ) -> FailedError:
+        """Report a name in an expression that means nothing there."""
+        return self.findings.no_such(word, message, self.findings.node(scope.path, node), **more)
 
     def fit(self, term: Term, expected: Type | None, node: ast.Expr, scope: Scope) -> Term:
         """The term itself if it is of the expected type, or the word of that type it stands for."""
@@ -730,18 +750,10 @@ def _number_of(noun: Term) -> Term | None:
     if not all(map(is_number, words)):
         return None
     values = [int(word) for word in words]
-    type_ = Type("int", min(values), max(values))
     if isinstance(noun, Const):
         return number(values[noun.value])
-    # As a number it is needed: where there is no noun, nothing is found.
-    place = replace(noun, type=Type("int", 0, len(words) - 1))
-    if values == list(range(values[0], values[0] + len(values))):
-        return arithmetic("+", place, number(values[0])) if values[0] else place
-    cases = [Compare("==", place, number(i)) for i in range(len(values) - 1)]
-    return where_there_is(
-        noun,
-        Select(type_, tuple(cases), tuple(Const(type_, v) for v in values[:-1]), Const(type_, values[-1])),
-    )
+    found = beside_word(noun, values, integer(min(values), max(values)))
+    return where_there_is(noun, found) if isinstance(found, Select) else found
 
 
 def same_kind(actual: Type, expected: Type) -> bool:

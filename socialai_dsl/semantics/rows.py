@@ -7,7 +7,7 @@ from socialai_dsl.schema.scenario import Expression
 from socialai_dsl.semantics import groups
 from socialai_dsl.semantics.resolver import ENTITY, Resolver
 from socialai_dsl.semantics.scope import FailedError, Scope, of_each, quoted, reset_scope
-from socialai_dsl.semantics.terms import Const, Read, ReadEach, Term
+from socialai_dsl.semantics.terms import Const, Read, ReadEach, Term, numbers_of
 from socialai_dsl.source import DataPath
 
 _KEYS = ("entity", "color", "noun", "int")
@@ -29,7 +29,7 @@ def keys(resolver: Resolver, path: DataPath, raw: Expression) -> tuple[Const, ..
 def example(resolver: Resolver, path: str) -> str:
     """A key, as it could be written."""
     key = resolver.registers.keys(path)[0]
-    return "noun" if key.type.kind == "noun" else resolver.symbols.called(key)
+    return "noun" if key.type.kind == "noun" else resolver.symbols.word(key)
 
 
 def kept_for(resolver: Resolver, node: ast.Call, scope: Scope) -> Term | None:
@@ -44,8 +44,7 @@ def kept_for(resolver: Resolver, node: ast.Call, scope: Scope) -> Term | None:
     if not any(node.name in played.model.let for played in resolver.frames.values()):
         return None
     who = resolver.value(node.subject, ENTITY, scope)
-    numbers = [who.value] if isinstance(who, Const) else range(who.type.low, who.type.high + 1)
-    members = [symbols.member_of(number) for number in numbers]
+    members = symbols.members_of(numbers_of(who))
     if not all(f"{member}.{node.name}" in resolver.registers for member in members):
         message = f"`{quoted(node.subject)}` has no register `{node.name}`"
         raise resolver.fail("S205", message, node, scope)
@@ -77,9 +76,9 @@ def of_key(resolver: Resolver, path: str, node: ast.Call, scope: Scope) -> Read 
         message = f"`{node.name}` takes one key: `{node.name}({example(resolver, path)})`"
         raise resolver.fail("S211", message, node, scope)
     key = resolver.value(node.args[0], groups.opened(known[0].type), scope)
-    possible = {key.value} if isinstance(key, Const) else set(range(key.type.low, key.type.high + 1))
+    possible = {key.value} if isinstance(key, Const) else set(key.type.values)
     if not possible & {each.value for each in known}:
-        first, last = symbols.called(known[0]), symbols.called(known[-1])
+        first, last = symbols.word(known[0]), symbols.word(known[-1])
         listed = first if first == last else f"{first} to {last}"
         message = f"there is no `{node.name}` for `{quoted(node.args[0])}`"
         raise resolver.fail("S204", message, node.args[0], scope, hint=f"there is one for each of {listed}")

@@ -25,7 +25,13 @@ from socialai_dsl.semantics.terms import (
     Term,
     Type,
     all_of,
+    arithmetic,
+    chosen,
+    entity,
+    equals,
+    integer,
     may_be_nothing,
+    numbers_of,
     one_of,
     where_there_is,
 )
@@ -34,6 +40,7 @@ from socialai_dsl.vocabulary import NOUN, Sentences, Slot
 
 Scalar = int | bool | float | str
 
+V = TypeVar("V")
 
 KEY: Final = "(key)"
 """The last step of the path of an expression that is the key itself: `trust(speaker)` in `set`."""
@@ -56,6 +63,7 @@ class Findings:
         params: the file's parameters with their values, for `$name`.
         substituted: paths whose whole value was a parameter; places inside them mean nothing.
         data: the document, to tell one value from a list of one.
+        unknown: the names that were found to mean nothing where they stand.
     """
 
     bag: DiagnosticBag
@@ -63,6 +71,7 @@ class Findings:
     params: Mapping[str, Scalar] = field(default_factory=dict)
     substituted: frozenset[DataPath] = frozenset()
     data: object = None
+    unknown: set[str] = field(default_factory=set)
 
     def part(self, path: DataPath) -> object:
         """The text at `path`; None without one."""
@@ -77,6 +86,12 @@ class Findings:
     def is_list(self, path: DataPath) -> bool:
         """Whether a list is written at `path`."""
         return isinstance(self.part(path), list)
+
+    def each(self, path: DataPath, values: Iterable[V]) -> Iterator[tuple[DataPath, V]]:
+        """The values at `path` with their paths; one may stand there without being a list."""
+        is_list = self.is_list(path)
+        for i, value in enumerate(values):
+            yield (*path, i) if is_list else path, value
 
     def at(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
         """The place of a character of the text at `path`."""
@@ -97,6 +112,11 @@ class Findings:
     def warning(self, code: str, message: str, span: Span, **more: str | None) -> None:
         """Report a warning."""
         self.bag.warning(code, message, span, **more)
+
+    def no_such(self, word: str, message: str, span: Span, **more: str | None) -> FailedError:
+        """Report a name that means nothing there."""
+        self.unknown.add(word)
+        return self.fail("S201", message, span, **more)
 
     def fail(self, code: str, message: str, span: Span, **more: str | None) -> FailedError:
         """Report an error; raising the result gives up the value it is in."""
@@ -414,14 +434,18 @@ class Symbols:
             return self.scenario.frames[called], ("frames", called)
         return None
 
-    def called(self, value: Const) -> str:
+    def members_of(self, numbers: Iterable[int]) -> list[str | None]:
+        """The same of several numbers."""
+        return [self.member_of(number) for number in numbers]
+
+    def called(self, number: int) -> str:
+        """An entity in the scenario's own words: `boxes[1]`, `bob`."""
+        objects = self.object_of(number)
+        return objects.called(number - objects.numbers[0]) if objects else str(self.member_of(number))
+
+    def word(self, value: Const) -> str:
         """A known value in the scenario's own words: `boxes[1]`, `bob`, `red`, `3`."""
-        if value.type.kind != "entity":
-            return spoken(value.type, value.value)
-        objects = self.object_of(value.value)
-        return (
-            objects.called(value.value - objects.numbers[0]) if objects else str(self.member_of(value.value))
-        )
+        return self.called(value.value) if value.type.kind == "entity" else spoken(value.type, value.value)
 
     @cached_property
     def declared(self) -> dict[str, str]:
@@ -555,9 +579,8 @@ def reset_scope(path: DataPath, site: str | None = None, member: str | None = No
 
 def object_scope(objects: Objects, index: int, path: DataPath, key: str, *, at_reset: bool) -> Scope:
     """The scope of a value of one member of a group of objects, which is `it`."""
-    number = objects.numbers[index]
-    it = Const(Type("entity", number, number), number)
-    return Scope(path, Draws(f"objects.{objects.called(index)}.{key}"), at_reset=at_reset, it=it)
+    draws = Draws(f"objects.{objects.called(index)}.{key}")
+    return Scope(path, draws, at_reset=at_reset, it=entity(objects.numbers[index]))
 
 
 def at_every_step(scope: Scope) -> Scope:
@@ -586,9 +609,6 @@ def frames_of(scenario: Scenario) -> Iterator[tuple[DataPath, Frame]]:
 # -- what differs between the files of a `one_of`, as values that depend on which was drawn ------------------
 
 
-V = TypeVar("V")
-
-
 def drawn(which: Term | None, among: Iterable[int]) -> Term | None:
     """Whether the file that was drawn, whose number `which` is, is one of these; None if that is certain."""
     numbers = sorted(set(among))
@@ -613,66 +633,59 @@ def select(which: Term | None, terms: Sequence[Term]) -> Term:
         return terms[0]
     assert which is not None, "internal: nothing is drawn, and the values differ"
     if kinds == {"text"}:
-        return _text(which, terms)
-    type_ = terms[0].type
-    for term in terms[1:]:
-        type_ = replace(type_, low=min(type_.low, term.type.low), high=max(type_.high, term.type.high))
-    return _cases(which, [_of_type(term, type_) for term in terms], type_)
+        return text_of([(equals(which, number), term) for number, term in enumerate(terms)])
+    type_ = common_type(terms)
+    typed = [replace(term, type=type_) if isinstance(term, Const) else term for term in terms]
+    return _with_default(type_, [(equals(which, number), term) for number, term in enumerate(typed)])
 
 
-def _of_type(term: Term, type_: Type) -> Term:
-    return replace(term, type=type_) if isinstance(term, Const) else term
-
-
-def _cases(which: Term, terms: Sequence[Term], type_: Type) -> Term:
-    default = Counter(terms).most_common(1)[0][0]
-    cases = [
-        (Compare("==", which, Const(which.type, number)), term)
-        for number, term in enumerate(terms)
-        if term != default
-    ]
-    return Select(type_, tuple(case for case, _ in cases), tuple(term for _, term in cases), default)
-
-
-def _text(which: Term, terms: Sequence[Term]) -> Term:
-    """Texts have words of their own, so the result has the words of all."""
-    return text_of(
-        [(Compare("==", which, Const(which.type, number)), term) for number, term in enumerate(terms)]
-    )
+def _with_default(type_: Type, cases: Sequence[tuple[Term, Term]]) -> Select:
+    """The value beside the condition that holds (one does); the most frequent one needs none."""
+    default = Counter(value for _, value in cases).most_common(1)[0][0]
+    kept = [(condition, value) for condition, value in cases if value != default]
+    return Select(type_, tuple(c for c, _ in kept), tuple(v for _, v in kept), default)
 
 
 def of_each(who: Term, values: Sequence[Term]) -> Term:
     """The value that belongs to whichever entity is meant; `values` in the order of those it can be."""
-    numbers = [who.value] if isinstance(who, Const) else range(who.type.low, who.type.high + 1)
-    cases = [
-        (Compare("==", who, Const(who.type, number)), value)
-        for number, value in zip(numbers, values, strict=True)
-    ]
+    numbers = numbers_of(who)
     if len(set(values)) == 1:
         return where_there_is(who, values[0])
     if values[0].type.kind == "text":
-        return where_there_is(who, text_of(cases))
+        cases = zip(numbers, values, strict=True)
+        return where_there_is(who, text_of([(equals(who, number), value) for number, value in cases]))
+    return where_there_is(who, chosen(who, numbers, values, common_type(values)))
+
+
+def beside_word(word: Term, values: Sequence[int], type_: Type) -> Term:
+    """The value beside a word of a type; it needs the word: where there is none, nothing is found."""
+    place = replace(word, type=integer(0, len(values) - 1))
+    first = values[0]
+    if list(values) == list(range(first, first + len(values))):
+        return replace(arithmetic("+", place, Const(integer(first), first)) if first else place, type=type_)
+    return chosen(place, range(len(values)), [Const(type_, value) for value in values], type_)
+
+
+def common_type(values: Sequence[Term]) -> Type:
+    """The type of the last of some values of one kind, with room for all of them."""
     low, high = min(v.type.low for v in values), max(v.type.high for v in values)
-    *others, (_, last) = cases
-    conditions, chosen = tuple(c for c, _ in others), tuple(v for _, v in others)
-    return where_there_is(who, Select(replace(last.type, low=low, high=high), conditions, chosen, last))
+    return replace(values[-1].type, low=low, high=high)
 
 
 def text_of(cases: Sequence[tuple[Term, Term]]) -> Term:
     """The text beside the condition that holds (one does), of one type that has the words of all."""
     words: dict[str, None] = {}
     for _, term in cases:
-        values = [term.value] if isinstance(term, Const) else range(term.type.low, term.type.high + 1)
+        values = numbers_of(term)
         words |= {spoken(term.type, value): None for value in values}
     type_ = Type("text", 0, len(words) - 1, tuple(words))
     if len(words) == 1:
         return Const(type_, 0)
     if len(cases) == 1:
         return cases[0][1]
-    choices = [case for condition, term in cases for case in _words_of(condition, term, type_)]
-    default = Counter(value for _, value in choices).most_common(1)[0][0]
-    kept = [(condition, value) for condition, value in choices if value != default]
-    return Select(type_, tuple(c for c, _ in kept), tuple(v for _, v in kept), default)
+    return _with_default(
+        type_, [case for condition, term in cases for case in _words_of(condition, term, type_)]
+    )
 
 
 def _words_of(condition: Term, term: Term, type_: Type) -> Iterator[tuple[Term, Const]]:
@@ -680,7 +693,7 @@ def _words_of(condition: Term, term: Term, type_: Type) -> Iterator[tuple[Term, 
     if isinstance(term, Const):
         yield condition, Const(type_, type_.words.index(spoken(term.type, term.value)))
         return
-    for value in range(term.type.low, term.type.high + 1):
-        equal = Compare("==", term, Const(term.type, value))
+    for value in term.type.values:
+        equal = equals(term, value)
         needed = [Compare("<=", Const(term.type, term.type.low), term)] if may_be_nothing(term) else []
         yield all_of([condition, *needed, equal]), Const(type_, type_.words.index(spoken(term.type, value)))

@@ -34,19 +34,18 @@ from socialai_dsl.semantics.terms import (
     SIDE,
     CellBeside,
     CellOf,
-    Compare,
     Const,
     FieldOf,
     Measure,
     ObjectType,
     Read,
     Sees,
-    Select,
     Sited,
     Term,
     Test,
     Type,
     World,
+    chosen,
     walk,
 )
 from socialai_dsl.source import DataPath, Span
@@ -76,16 +75,9 @@ def at(resolver: Resolver, spot: Spot, pair: Sequence[Expression], scope: Scope)
         raise findings.fail(
             "S104", f"`at` is a cell [x, y]; {len(pair)} numbers given", findings.at(spot.path)
         )
-    x, y = (
-        resolver.written((*spot.path, i), raw, INT, _coordinate(scope, spot.path, i))
-        for i, raw in enumerate(pair)
-    )
+    x, y = (resolver.written(raw, INT, replace(scope, path=(*spot.path, i))) for i, raw in enumerate(pair))
     span = findings.at(spot.path)
     return Placing(spot.entity, spot.site, spot.number, span, at=(x, y), where_site=scope.draws.site)
-
-
-def _coordinate(scope: Scope, path: DataPath, index: int) -> Scope:
-    return replace(scope, path=(*path, index))
 
 
 def place(resolver: Resolver, spot: Spot, raw: str, scope: Scope) -> Placing:
@@ -442,7 +434,7 @@ def colorings(resolver: Resolver) -> Iterator[Coloring]:
                 if color == "distinct":
                     yield _distinct_color(resolver, name, path)
                     continue
-                value = None if color is None else _color(resolver, path, color, scope)
+                value = None if color is None else _color(resolver, color, scope)
                 number = resolver.symbols.numbers[name]
                 yield Coloring(number, f"cast.{name}.color", 0, resolver.findings.at(path), value, when=when)
     for objects in resolver.symbols.objects.values():
@@ -465,12 +457,9 @@ def _distinct_color(resolver: Resolver, name: str, path: DataPath) -> Coloring:
     return Coloring(number, f"cast.{group[0]}.color", group[1], resolver.findings.at(path), None, before)
 
 
-def _color(resolver: Resolver, path: DataPath, raw: object, scope: Scope) -> Sited | None:
+def _color(resolver: Resolver, raw: object, scope: Scope) -> Sited | None:
     """A colour; None for a random one."""
-    if raw == "random":
-        return None
-    term = resolver.written(path, raw, COLOR, scope)  # type: ignore[arg-type]
-    return Sited(term, scope.draws.site, resolver.findings.at(path))
+    return None if raw == "random" else resolver.sited(raw, COLOR, scope)  # type: ignore[arg-type]
 
 
 def _object_colors(resolver: Resolver, objects: Objects, group: ObjectGroup) -> Iterator[Coloring]:
@@ -493,7 +482,7 @@ def _object_colors(resolver: Resolver, objects: Objects, group: ObjectGroup) -> 
             yield Coloring(number, site, i, span, None, tuple(objects.numbers[:i]))
             continue
         scope = object_scope(objects, i, path, "color", at_reset=True)
-        value = _of_group(resolver, path, raw, i, count, scope) or _color(resolver, path, raw, scope)
+        value = _of_group(resolver, path, raw, i, count, scope) or _color(resolver, raw, scope)
         yield Coloring(number, site, i, span, value)
 
 
@@ -529,8 +518,7 @@ def _permuted(
         raise resolver.fail("S106", message, node, scope)
     place = groups.permutation(resolver, f"{path[0]}.{path[1]}.order", count, path)[index]
     colors = tuple(FieldOf(COLOR, other, "color") for other in others.items)
-    cases = tuple(Compare("==", place, Const(place.type, i)) for i in range(count - 1))
-    value = Select(COLOR, cases, colors[:-1], colors[-1])
+    value = chosen(place, range(count), colors, COLOR)
     return Sited(value, scope.draws.site, resolver.findings.at(path))
 
 
@@ -597,7 +585,7 @@ def _placement_order(resolver: Resolver) -> list[int]:
         span = resolver.findings.at(("order", i), 0, len(name))
         if name not in numbers:
             near = did_you_mean(name, numbers)
-            resolver.findings.error("S201", f"unknown name `{name}`", span, suggestion=near)
+            resolver.findings.no_such(name, f"unknown name `{name}`", span, suggestion=near)
         elif name in first:
             resolver.findings.error("S106", f"`{name}` is in the order twice", span)
         else:
@@ -701,4 +689,4 @@ def _needs(term: Term) -> Iterator[str]:
 
 def _numbers(term: Term) -> range:
     """The entities that a term can stand for."""
-    return range(term.type.low, term.type.high + 1) if term.type.kind == "entity" else range(0)
+    return term.type.values if term.type.kind == "entity" else range(0)

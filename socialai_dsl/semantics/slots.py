@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from typing import Final
 
 from socialai_dsl.schema.scenario import CastMember
-from socialai_dsl.semantics.scope import FilledSlot, Findings, Symbols, surviving
-from socialai_dsl.semantics.terms import COLOR, Compare, Const, Select, Term, Type, arithmetic, entity, number
+from socialai_dsl.semantics.scope import FilledSlot, Findings, Symbols, beside_word, surviving
+from socialai_dsl.semantics.terms import COLOR, Const, Term, Type, entity
 from socialai_dsl.source import DataPath
 from socialai_dsl.vocabulary import COLORS, is_plain, normal
 
@@ -35,8 +34,7 @@ def _filled(
     symbols: Symbols, name: str, entries: tuple[str | int, ...], path: DataPath, findings: Findings
 ) -> FilledSlot:
     found: list[Entry] = []
-    for i, raw in enumerate(entries):
-        place = (*path, i) if findings.is_list(path) else path
+    for place, raw in findings.each(path, entries):
         for word, value in _entries(symbols, raw, place, findings):
             if normal(word) in {normal(other) for other, _ in found}:
                 raise findings.fail("S213", f"`{word}` is in the slot `{name}` already", findings.at(place))
@@ -110,12 +108,4 @@ def meaning(slot: FilledSlot, word: Term) -> Term:
     numbers = [value.value for value in slot.values]
     kind = slot.values[0].type.kind
     type_ = COLOR if kind == "color" else Type(kind, min(numbers), max(numbers))
-    # As a number it is needed: where there is no word, nothing is found.
-    place = replace(word, type=Type("int", 0, len(numbers) - 1))
-    if numbers == list(range(numbers[0], numbers[0] + len(numbers))):
-        shifted = arithmetic("+", place, number(numbers[0])) if numbers[0] else place
-        return replace(shifted, type=type_)
-    cases = [Compare("==", place, number(i)) for i in range(len(numbers) - 1)]
-    return Select(
-        type_, tuple(cases), tuple(Const(type_, v) for v in numbers[:-1]), Const(type_, numbers[-1])
-    )
+    return beside_word(word, numbers, type_)

@@ -20,7 +20,7 @@ cell       CELL + 32 * y + x (program); where an entity is asked for its place, 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from socialai_dsl.grammar import ast
@@ -47,6 +47,11 @@ class Type(Leaf):
     def size(self) -> int:
         """How many values there are."""
         return self.high - self.low + 1
+
+    @property
+    def values(self) -> range:
+        """All of them."""
+        return range(self.low, self.high + 1)
 
 
 BOOL = Type("bool", 0, 1, ("false", "true"))
@@ -101,7 +106,7 @@ class ReadEach:
     def may_miss(self) -> bool:
         """Whether the key may be something that is not in the group."""
         type_ = self.key.type
-        return not set(self.keys) >= set(range(type_.low, type_.high + 1))
+        return not set(self.keys) >= set(type_.values)
 
     def known(self) -> Read | None:
         """The register itself, if it is known which."""
@@ -239,11 +244,10 @@ class Sees:
 
 @dataclass(frozen=True, slots=True)
 class Chance:
-    """True with a probability, drawn anew at every use; `ordinal` and `site` as those of a pick."""
+    """True with a probability, drawn when a sequence is; `ordinal` as that of a pick."""
 
     probability: float
     ordinal: int = 0
-    site: str = ""
     type: Type = BOOL
 
 
@@ -492,6 +496,32 @@ def entity(number: int) -> Const:
 def number(value: int) -> Const:
     """A known number."""
     return Const(integer(value), value)
+
+
+def numbers_of(term: Term) -> Sequence[int]:
+    """The values that a term may have: that of a known one, else all of its type."""
+    return (term.value,) if isinstance(term, Const) else term.type.values
+
+
+def constants(type_: Type) -> tuple[Const, ...]:
+    """Every value of a type."""
+    return tuple(Const(type_, value) for value in type_.values)
+
+
+def as_number(term: Term) -> Term:
+    """An entity's number as a number."""
+    return replace(term, type=integer(term.type.low, term.type.high))
+
+
+def equals(term: Term, value: int) -> Compare:
+    """Whether a term is a value of its type."""
+    return Compare("==", term, Const(term.type, value))
+
+
+def chosen(key: Term, numbers: Sequence[int], values: Sequence[Term], type_: Type) -> Select:
+    """The value beside the number that a term is; the last one serves the rest."""
+    cases = tuple(equals(key, number) for number in numbers[:-1])
+    return Select(type_, cases, tuple(values[:-1]), values[-1])
 
 
 def nothing_of(type_: Type) -> int:

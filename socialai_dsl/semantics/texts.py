@@ -40,6 +40,7 @@ from socialai_dsl.semantics.terms import (
     Said,
     SaidBy,
     Select,
+    Sited,
     Speaker,
     Spoke,
     Term,
@@ -48,6 +49,9 @@ from socialai_dsl.semantics.terms import (
     all_of,
     any_of,
     changed,
+    entity,
+    equals,
+    numbers_of,
     walk,
 )
 from socialai_dsl.source import DataPath, Span
@@ -55,6 +59,9 @@ from socialai_dsl.vocabulary import NOUN, Sentences, is_number, normal, words
 
 _JOINED = re.compile(r"\s*\|\s*|\s+or\s+")
 """What an author may put between alternatives."""
+
+ANYTHING = "any"
+"""`hears: any` is whatever anybody says."""
 
 _SAYABLE = ("text", "noun", "color", "int", "status", "direction", "action")
 
@@ -232,8 +239,7 @@ def _choices(part: str | Term) -> list[tuple[str, Term | None]]:
         return [(part, None)]
     if isinstance(part, Const):
         return [(spoken(part.type, part.value), None)]
-    values = range(part.type.low, part.type.high + 1)
-    return [(spoken(part.type, v), Compare("==", part, Const(part.type, v))) for v in values]
+    return [(spoken(part.type, value), equals(part, value)) for value in part.type.values]
 
 
 def _report_unsayable(
@@ -431,6 +437,25 @@ _MOST_LISTED = 4
 """The most texts that a message lists."""
 
 
+def heard_at(resolver: Resolver, raw: str, scope: Scope) -> Alternative:
+    """What a text of `hears:` stands for, which is written at the scope's path."""
+    if raw == ANYTHING:
+        return [(resolver.utterances.anything(), None)]
+    text = resolver.findings.text(scope.path, raw)
+    return patterns(resolver, text, scope, resolver.findings.at(scope.path), True)
+
+
+def on_hearing(heard: Sequence[Alternative], when: Sited | None, site: str, span: Span) -> Sited:
+    """The condition that one of these was heard, and then what else is asked."""
+    term = any_of(
+        all_of([Heard((pattern,)), *_given(condition)])
+        for alternative in heard
+        for pattern, condition in alternative
+    )
+    both = term if when is None else all_of([term, when.term])
+    return Sited(both, site, when.span if when is not None else span)
+
+
 def speaker(resolver: Resolver, node: ast.Name, scope: Scope) -> Term:
     """`speaker` in a rule; which patterns it is about is filled in once they are known (`bound`)."""
     if not scope.hearing:
@@ -557,16 +582,13 @@ def speakers(
     name = "" if isinstance(node, ast.Name) else node.name
     who = subject_of(resolver, subject, VALUES[name], node, scope)
     assert who is not None, "internal: a cell says nothing"
-    numbers = [who.value] if isinstance(who, Const) else range(who.type.low, who.type.high + 1)
-    members = [resolver.symbols.member_of(number) for number in numbers]
+    numbers = numbers_of(who)
+    members = resolver.symbols.members_of(numbers)
     if None in members:
         raise resolver.fail("S211", "only a member of the cast says something", node, scope)
     if len(members) == 1:
         return [(str(members[0]), [])]
-    return [
-        (str(member), [Compare("==", who, Const(who.type, number))])
-        for number, member in zip(numbers, members, strict=True)
-    ]
+    return [(str(member), [equals(who, number)]) for number, member in zip(numbers, members, strict=True)]
 
 
 def asked_of_heard(parts: object) -> set[Digit | None]:
@@ -631,7 +653,7 @@ def binding(heard: Sequence[Alternative]) -> Callable[[Term], Term | None]:
 
     def change(term: Term) -> Term | None:
         if isinstance(term, Speaker):
-            return Const(Type("entity", 0, 0), 0) if only_agent else _of_what_is_meant(term, heard, ())
+            return entity(0) if only_agent else _of_what_is_meant(term, heard, ())
         if isinstance(term, HeardNoun):
             said = World(term.type, "noun", term.digit)
             return said if only_agent else _of_what_is_meant(term, heard, ())
@@ -661,23 +683,24 @@ def _of_what_is_meant(asked: Speaker | HeardNoun, heard: Sequence[Alternative], 
 # -- what a register is set to, where only that says what it holds -----------------------------------------
 
 
-def value_for(resolver: Resolver, register: str, raw: object, path: DataPath, scope: Scope) -> Term:
+def value_for(resolver: Resolver, register: str, raw: object, scope: Scope) -> Sited:
     """The value that a register is set to; one that may hold nothing can be set to `none`."""
     registers = resolver.registers
     known = registers.holds(register)
     if registers.starts_with_nothing(register) and is_nothing(raw):
         base = registers.read(register)
         assert isinstance(base, Read), "internal: a register that is set is no constant"
-        return Const(base.type, base.nothing if base.nothing is not None else 0)
+        nothing = Const(base.type, base.nothing if base.nothing is not None else 0)
+        return Sited(nothing, scope.draws.site, resolver.findings.at(scope.path))
     if is_nothing(raw) and known is not None and known.kind != "action" and known.words != TURN.words:
         message = "only a register that starts with `none` can hold nothing"
-        raise resolver.findings.fail("S204", message, resolver.findings.at(path))
+        raise resolver.findings.fail("S204", message, resolver.findings.at(scope.path))
     expected = INT if known is not None and known.kind == "int" and not known.words else known
     if known is None and isinstance(raw, str) and _is_noun(resolver, raw.strip(), scope):
         expected = resolver.symbols.nouns
-    term = resolver.written(path, raw, expected, scope)  # type: ignore[arg-type]
-    registers.widen(register, term.type)
-    return term
+    value = resolver.sited(raw, expected, scope)  # type: ignore[arg-type]
+    registers.widen(register, value.term.type)
+    return value
 
 
 def _is_noun(resolver: Resolver, raw: str, scope: Scope) -> bool:

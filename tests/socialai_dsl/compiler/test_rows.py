@@ -122,3 +122,42 @@ def test_a_program_without_them_has_none_of_their_instructions() -> None:
     program = sd.compile(sd.load("talkitout"))
     assert isinstance(program, Program)
     assert not {int(Op.READ_AT), int(Op.STORE_AT)} & set(program.code[:, 0].tolist())
+
+
+EMPTY = """
+    grammar: {templates: [It is <noun>, Hello], nouns: ["3", "5", "9"]}
+    tables: {paid: {"3": 4, "5": 7, "9": 2}}
+    objects:
+      keys: {type: switch, count: 3, at: [[1, 3], [1, 4], [1, 5]], unlocks: back | front | side}
+      front: {type: door, at: [6, 2], state: locked}
+      back: {type: door, at: [6, 4], state: locked}
+      side: {type: door, at: [6, 5], state: locked}
+    state:
+      who: {start: none}
+      gate: {start: none}
+      word: {start: none}
+      held: 0
+    rules:
+      - {when: t == 1 and CONDITION, set: {held: held + 1}}
+      - {when: t == 1 and not (CONDITION), set: {held: held + 1}}
+      - {when: t == 3 and CONDITION, set: {held: held + 10}}
+      - {when: t == 3 and not (CONDITION), set: {held: held + 10}}
+      - {when: t == 2, set: {who: pick(people), gate: pick(front | back | side), word: pick(nouns)}}
+    frames: {wait: {states: {waiting: {do: stay}}}}
+    cast:
+      people: {count: 2, at: [[4, 4], [4, 2]], name: [Ann, Bob], frame: wait}
+"""
+
+
+@pytest.mark.parametrize(
+    "condition",
+    [
+        *("who.is(waiting)", 'who.name == "Ann"', "who.turns_in_state > 99", "back.toggled_by(who)"),
+        *("paid(word) == 4", "gate.unlocked_by.pressed", "word + 1 > 5", "who.x == 4"),
+    ],
+)
+def test_what_follows_from_an_empty_register_is_not_found(tmp_path: Path, condition: str) -> None:
+    """Neither it nor its opposite holds, until the register holds something."""
+    run = Folder(tmp_path)(EMPTY.replace("CONDITION", condition))
+    assert run.steps(1).state["state"]["held"] == 0
+    assert run.steps(2).state["state"]["held"] == 10
