@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "source",
         metavar="RUN|SCENARIO|TRACES",
         help="the folder of a run, shipped:NAME, the path or name of a scenario, or traces written by `--out "
-        "episodes.json`",
+        "episodes.json` or `socialai trace --json`",
     )
     parser.add_argument(
         "-o",
@@ -55,7 +55,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help=f"keep up to N failures and N successes (default: {_RECORDED})",
     )
-    parser.add_argument("--test-episode", type=natural, metavar="N", help="keep only test episode N")
+    parser.add_argument(
+        "--test-episode",
+        type=natural,
+        action="append",
+        metavar="N",
+        help="keep only test episode N (repeatable)",
+    )
     parser.add_argument(
         "--greedy",
         action="store_true",
@@ -90,7 +96,8 @@ def _read(path: Path) -> "list[Trace]":
     from socialai_dsl.replay import Trace
 
     try:
-        traces = TypeAdapter(list[Trace]).validate_python(json.loads(path.read_text(encoding="utf-8")))
+        found = json.loads(path.read_text(encoding="utf-8"))
+        traces = TypeAdapter(list[Trace]).validate_python([found] if isinstance(found, dict) else found)
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
@@ -103,20 +110,23 @@ def _read(path: Path) -> "list[Trace]":
 
 
 def _played(arguments: argparse.Namespace) -> "list[Trace]":
-    """Test episodes of a run or a scenario: one that was asked for, or failures and successes.
+    """Test episodes of a run or a scenario: those that were asked for, or failures and successes.
 
     Raises:
-        UsageError: a language model has not played the one that was asked for.
+        UsageError: a language model has not played one that was asked for.
     """
-    number = arguments.test_episode
-    evaluation = _evaluation(arguments, arguments.episodes if number is None else number + 1)
+    numbers = arguments.test_episode
+    evaluation = _evaluation(arguments, arguments.episodes if numbers is None else max(numbers) + 1)
     for warning in evaluation.warnings:
         print(f"warning: {warning}", file=sys.stderr)
-    if number is not None and number not in evaluation.actions:
-        raise UsageError(
-            f"--test-episode: got {number}, expected less than {len(evaluation.actions)}, as many as were played"
-        )
-    return evaluation.traces(arguments.record) if number is None else [evaluation.trace(number)]
+    if numbers is None:
+        return evaluation.traces(arguments.record)
+    for number in numbers:
+        if number not in evaluation.actions:
+            raise UsageError(
+                f"--test-episode: got {number}, expected less than {len(evaluation.actions)}, as many as were played"
+            )
+    return [evaluation.trace(number) for number in dict.fromkeys(numbers)]
 
 
 def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":

@@ -1,8 +1,8 @@
 """`socialai trace`: one episode step by step, with the rules that fired and why others did not."""
 
 import argparse
-import json
 import sys
+from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -65,7 +65,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="show only the rules of this member of the cast, of `world` or of `outcome`, with every reason",
     )
-    parser.add_argument("--json", action="store_true", help="print the trace as one JSON object")
+    parser.add_argument(
+        "--json",
+        action="store_true",
+        help="print the trace as JSON, in the format that `socialai replay` reads and writes, with every rule and "
+        "reason",
+    )
 
 
 def execute(arguments: argparse.Namespace) -> Exit:
@@ -73,14 +78,16 @@ def execute(arguments: argparse.Namespace) -> Exit:
     from socialai_dsl.evaluation.episode_trace import Traced, reset_of
 
     reset = reset_of(arguments.seed, arguments.index, arguments.test_episode, arguments.layout)
+    if arguments.json and (arguments.why or arguments.first > 1):
+        raise UsageError("--json: got --why or --from with it, but the document has every step and rule")
     traced = Traced(arguments.scenario, arguments.agent, arguments.do, arguments.seed)
     try:
         trace = traced.begin(reset)
         _check_names(arguments.why, trace)
         steps = _window(traced.steps(trace), arguments.first, arguments.steps)
         if arguments.json:
-            shown = [step.as_object(arguments.why) for step in steps]
-            print(json.dumps(trace.as_object(shown), indent=2, ensure_ascii=False))
+            deque(steps, maxlen=0)
+            print(traced.document().as_json())
             return Exit.GOOD
         text = Text(arguments.why, shows_color(sys.stdout))
         print("\n".join(text.head(trace)), flush=True)

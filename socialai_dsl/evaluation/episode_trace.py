@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from socialai_dsl import replay
+
 
 @dataclass
 class TraceStep:
@@ -37,24 +39,6 @@ class TraceStep:
     fired: list[dict[str, Any]]
     others: list[dict[str, Any]]
     reward: float
-
-    def as_object(self, names: Sequence[str]) -> dict[str, Any]:
-        """The step for JSON, with the rules of these members only, if any are named."""
-        chosen = [
-            [rule for rule in rules if not names or is_among(rule["who"], names)]
-            for rules in (self.fired, self.others)
-        ]
-        return {
-            "t": self.t,
-            "action": self.action,
-            "said": self.said,
-            "heard": list(self.heard),
-            "picture": self.picture.split("\n"),
-            "changed": {key: list(values) for key, values in self.changed.items()},
-            "fired": chosen[0],
-            "others": chosen[1],
-            "reward": self.reward,
-        }
 
 
 @dataclass
@@ -82,22 +66,6 @@ class Trace:
     outcome: str | None = None
     success: bool = False
     steps: list[TraceStep] = field(default_factory=list)
-
-    def as_object(self, steps: list[dict[str, Any]]) -> dict[str, Any]:
-        """The trace for JSON, with these steps."""
-        return {
-            "scenario": self.scenario,
-            "agent": self.agent,
-            "episode": self.origin,
-            "member": self.member,
-            "start": self.state,
-            "picture": self.picture.split("\n"),
-            "steps": steps,
-            "length": self.length,
-            "reward": self.reward,
-            "outcome": self.outcome,
-            "success": self.success,
-        }
 
 
 def trace(
@@ -183,7 +151,7 @@ class Traced:
         from socialai_dsl.evaluation.scripts import with_script
 
         self.agent = "typed" if agent is None else named_agent(agent, scenario)
-        self._lines, self._seed = lines, seed
+        self._asked, self._lines, self._seed = scenario, lines, seed
         if lines is None and agent in (None, "oracle"):
             try:
                 scenario = with_script(scenario)
@@ -193,6 +161,8 @@ class Traced:
                     raise
                 self.agent = "random"
         self.scenario = scenario
+        self._reset: dict[str, Any] = {}
+        self._actions: list[NDArray[np.int64]] = []
         self._env: Any = socialai_dsl.make(scenario, render_mode="ansi")
         self._act = self._actor()
 
@@ -203,6 +173,7 @@ class Traced:
             UsageError: there is no such episode, or the layout does not fit.
         """
         env = self._env.unwrapped
+        self._reset, self._actions = reset, []
         try:
             self._observation, info = env.reset(**reset)
         except ValueError as error:
@@ -226,6 +197,7 @@ class Traced:
             action = self._act(self._observation)
             if action is None:
                 return
+            self._actions.append(action)
             self._observation, reward, terminated, truncated, info = env.step(action)
             after, explained = env.describe(), env.explain()
             trace.length += 1
@@ -247,6 +219,29 @@ class Traced:
                 float(reward),
             )
             before = after
+
+    def document(self) -> "replay.Trace":
+        """What was played so far, in the format of replays: played again, without the script."""
+        import socialai_dsl
+        from socialai_dsl.checking.loaded import about_of
+        from socialai_dsl.replay import trace_of
+        from socialai_dsl.replay.endings import endings_of
+
+        loaded = socialai_dsl.load(self._asked)
+        env: Any = socialai_dsl.make(self._asked)
+        try:
+            return trace_of(
+                env,
+                self._actions,
+                self._reset,
+                scenario=self._asked,
+                agent=self.agent,
+                episode=_origin(self._reset.get("seed"), self._reset["options"] or {}),
+                endings={one.name: one.text for one in endings_of(loaded, env.unwrapped.program)},
+                about=about_of(loaded),
+            )
+        finally:
+            env.close()
 
     def close(self) -> None:
         """Let the environment go."""

@@ -70,6 +70,20 @@ def test_one_test_episode_and_traces_as_a_file() -> None:
     assert trace["about"].startswith("Leave by the right one")
     assert main(["replay", "seven.json", "-o", "seven.html"]) == 0
     assert episodes_in(Path("seven.html")) == [trace]
+    assert main(["replay", "talkitout", *(f"--test-episode={n}" for n in (7, 2, 7)), "-o", "two.json"]) == 0
+    first, second = json.loads(Path("two.json").read_text(encoding="utf-8"))
+    assert (first, second["episode"]) == (trace, "test episode 2")
+
+
+def test_what_trace_prints_can_be_replayed(capsys: Capture) -> None:
+    assert main(["trace", "talkitout", "--test-episode", "7", "--json"]) == 0
+    printed = capsys.readouterr().out
+    Path("seven.json").write_text(printed)
+    assert main(["replay", "talkitout", "--test-episode", "7", "-o", "replayed.json"]) == 0
+    (replayed,) = json.loads(Path("replayed.json").read_text(encoding="utf-8"))
+    assert json.loads(printed)["moments"] == replayed["moments"]
+    assert main(["replay", "seven.json", "-o", "seven.html"]) == 0
+    assert [trace["episode"] for trace in episodes_in(Path("seven.html"))] == ["test episode 7"]
 
 
 def test_a_run_writes_what_its_agent_expected() -> None:

@@ -9,6 +9,7 @@ import pytest
 
 import socialai_dsl as sd
 from socialai_dsl.cli.main import main
+from socialai_dsl.replay.document import Trace
 from tests.tiny import Folder
 
 Capture = pytest.CaptureFixture[str]
@@ -57,26 +58,30 @@ def test_it_fits_a_terminal_and_has_no_colour_elsewhere(capsys: Capture) -> None
     assert printed.splitlines()[-1].startswith("success (success@51) after 21 steps, reward 0.")
 
 
-def test_json_is_one_object(shy: str, capsys: Capture) -> None:
+def reasons(trace: Trace, moment: int) -> dict[str, str]:
+    """Member -> why its rules did not fire."""
+    return {trace.rules[rule].who: trace.texts[why] for rule, why in trace.moments[moment].others}
+
+
+def test_json_is_a_document_of_replays(shy: str, capsys: Capture) -> None:
     assert main(["trace", shy, "--json", "--do", "Say hello", "--do", "Say bye"]) == 0
-    trace = json.loads(capsys.readouterr().out)
-    assert (trace["scenario"], trace["agent"], trace["outcome"], trace["success"]) == (
-        shy,
-        "typed",
-        "success@11",
-        True,
-    )
-    first, second = trace["steps"]
-    assert (first["t"], first["said"], first["heard"], first["fired"]) == (1, "Say hello", [], [])
-    assert first["others"][0]["values"] == {"distance(agent)": 4}
-    assert [entry["who"] for entry in second["fired"]] == ["outcome"]
-    assert trace["start"]["agent"]["at"] == [1, 1]
+    trace = Trace.model_validate_json(capsys.readouterr().out)
+    assert (trace.scenario, trace.agent, trace.succeeded) == (shy, "typed", True)
+    start, first, second = trace.moments
+    assert start.agent == (1, 1, 0)
+    assert (first.t, first.said, first.heard, first.fired) == (1, "Say hello", [], [])
+    assert "distance(agent) is 4" in reasons(trace, 1)["guide"]
+    assert [trace.rules[rule].who for rule in second.fired] == ["outcome"]
+    assert second.ended is not None
+    assert (second.ended.name, second.ended.success) == ("success@11", True)
+    assert 'success: agent.said("Say bye")' in second.ended.text
 
 
-def test_a_group_is_named_as_a_whole(shy: str, capsys: Capture) -> None:
-    assert main(["trace", shy, "--json", "--why", "peers[1]", "--do", "Say hello"]) == 0
-    (step,) = json.loads(capsys.readouterr().out)["steps"]
-    assert [entry["who"] for entry in step["others"]] == ["peers[1]"]
+def test_one_of_a_group_is_named(shy: str, capsys: Capture) -> None:
+    assert main(["trace", shy, "--why", "peers[1]", "--do", "Say hello"]) == 0
+    printed = capsys.readouterr().out
+    assert "peers[1] in on" in printed
+    assert "peers[0] in on" not in printed
 
 
 def test_a_whole_group_and_who_has_no_rules(shy: str, capsys: Capture) -> None:
@@ -96,11 +101,12 @@ def test_acts_have_casts_of_their_own(capsys: Capture) -> None:
 
 
 def test_a_window_of_the_episode(capsys: Capture) -> None:
-    command = ["trace", "dance", "--agent", "random", "--seed", "1", "--json", "--from", "3", "--steps", "2"]
-    assert main(command) == 0
-    trace = json.loads(capsys.readouterr().out)
-    assert [step["t"] for step in trace["steps"]] == [3, 4]
-    assert trace["outcome"] is None
+    command = ["trace", "dance", "--agent", "random", "--seed", "1", "--steps", "2"]
+    assert main([*command, "--from", "3"]) == 0
+    printed = capsys.readouterr().out
+    assert [f"-- step {t} " in printed for t in range(1, 6)] == [False, False, True, True, False]
+    assert main([*command, "--json"]) == 0
+    assert len(Trace.model_validate_json(capsys.readouterr().out).moments) == 3
 
 
 def test_a_layout_and_a_test_episode(shy: str, capsys: Capture) -> None:
@@ -113,9 +119,9 @@ def test_a_layout_and_a_test_episode(shy: str, capsys: Capture) -> None:
 
 def test_a_suite_says_what_it_plays(capsys: Capture) -> None:
     assert main(["trace", "social_env", "--json", "--steps", "1", "--agent", "random"]) == 0
-    trace = json.loads(capsys.readouterr().out)
-    assert trace["member"]
-    assert len(trace["steps"]) == 1
+    trace = Trace.model_validate_json(capsys.readouterr().out)
+    assert trace.moments[0].member
+    assert len(trace.moments) == 2
 
 
 def test_without_a_script_chance_plays(shy: str, capsys: Capture) -> None:
@@ -137,6 +143,8 @@ def test_without_a_script_chance_plays(shy: str, capsys: Capture) -> None:
         (["--layout", "shy.yaml"], "is no JSON"),
         (["--layout", "wrong.json"], "guide.at"),
         (["--agent", "oracle"], "has no frame"),
+        (["--json", "--from", "2"], "--json: got --why or --from with it"),
+        (["--json", "--why", "guide"], "--json: got --why or --from with it"),
     ],
 )
 def test_wrong_usage_is_said_in_one_line(shy: str, options: list[str], said: str, capsys: Capture) -> None:
@@ -164,9 +172,9 @@ def test_a_trained_agent_can_be_watched(shy: str, capsys: Capture) -> None:
     assert main(["run", shy, *quick]) == 0
     capsys.readouterr()
     assert main(["trace", shy, "--agent", "trained", "--steps", "3", "--json"]) == 0
-    trace = json.loads(capsys.readouterr().out)
-    assert trace["agent"] == "trained"
-    assert len(trace["steps"]) == 3 or trace["outcome"]
+    trace = Trace.model_validate_json(capsys.readouterr().out)
+    assert trace.agent == "trained"
+    assert len(trace.moments) == 4 or trace.moments[-1].ended
     assert main(["coverage", shy, "--agent", "trained", "--episodes", "5", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["episodes"] == {"trained": 5}
     assert main(["trace", "dance", "--agent", str(Path("trained").resolve())]) == 2
@@ -175,8 +183,8 @@ def test_a_trained_agent_can_be_watched(shy: str, capsys: Capture) -> None:
 
 def test_lines_are_typed_as_in_play(shy: str, capsys: Capture) -> None:
     assert main(["trace", shy, "--json", "--do", ".", "--do", "none Say hello", "--do", "f"]) == 0
-    steps = json.loads(capsys.readouterr().out)["steps"]
-    assert [(step["action"], step["said"]) for step in steps] == [
+    moments = Trace.model_validate_json(capsys.readouterr().out).moments
+    assert [(moment.did, moment.said) for moment in moments[1:]] == [
         ("none", None),
         ("none", "Say hello"),
         ("forward", None),
@@ -190,9 +198,11 @@ def test_any_room_of_a_seed_can_be_opened(capsys: Capture) -> None:
     envs = sd.make_vec("talkitout", num_envs=18)
     envs.reset(seed=4)
     assert main(["trace", "talkitout", "--seed", "4", "--index", "17", "--json", "--do", "."]) == 0
-    trace = json.loads(capsys.readouterr().out)
-    assert trace["episode"] == "seed 4, room 17"
-    assert {**trace["start"], "heard": []} == {**envs.unwrapped.describe(17), "heard": []}
+    trace = Trace.model_validate_json(capsys.readouterr().out)
+    assert trace.episode == "seed 4, room 17"
+    there = envs.unwrapped.describe(17)
+    assert trace.moments[0].agent[:2] == tuple(there["agent"]["at"])
+    assert trace.moments[0].state["let.exit"] == there["let"]["exit"]
     envs.close()
 
 
