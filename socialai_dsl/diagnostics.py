@@ -66,6 +66,7 @@ CODES: Final[dict[str, str]] = {
     "S316": "no success or no room is possible",
     "W317": "a definition that nothing uses",
     "S318": "a register that nothing is ever put into",
+    "W319": "a condition that always holds",
     # S4xx: what can be said
     "S401": "an utterance that nobody can say",
     "S402": "a value that cannot be said",

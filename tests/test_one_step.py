@@ -1677,6 +1677,50 @@ def test_5_69_without_a_source_a_belief_is_forgotten(play: Folder) -> None:
     assert [run.step().state["bob"]["believes"]["hue"] for _ in range(2)] == ["blue", "none"]
 
 
+THOSE = """
+    objects:
+      doors: {{type: door, count: 2, at: [[0, 2], [0, 4]]}}
+      balls: {{type: ball, count: 3, color: [red, blue, red]}}
+    state: {{seen: {{for: balls, start: 0, range: 0..9}}, last: 9}}
+    cast: {{ann: {{at: [5, 5]}}}}
+    rules: [{{when: t == 1, {does}}}]
+"""
+
+
+def test_5_70_those_are_the_ones_for_which_the_condition_held_before_any_effect(play: Folder) -> None:
+    run = play(
+        THOSE.format(
+            does="set: {last: 0}, cause: [doors.open, those(d in doors where d.closed).lock, "
+            "those(b in balls where b.color == red and last == 9).vanish]"
+        )
+    ).step()
+    assert [door["state"] for door in run.state["doors"]] == ["locked", "locked"]
+    assert [ball.get("gone", False) for ball in run.state["balls"]] == [True, False, True]
+
+
+def test_5_71_of_whom_nothing_is_found_is_not_one_of_those(play: Folder) -> None:
+    found = "nearest(d in doors where d.index == b.index to b).closed"
+    run = play(
+        THOSE.format(does=f"set: {{last: 5}}, cause: ['those(b in balls where {found}).vanish']")
+    ).step()
+    assert [ball.get("gone", False) for ball in run.state["balls"]] == [True, True, False]
+    run = play(
+        THOSE.format(does="set: {last: 5}, cause: ['those(b in balls where b.x > t + 9).vanish']")
+    ).step()
+    assert run.state["state"]["last"] == 5
+
+
+def test_5_72_a_value_about_each_of_those_is_computed_for_each_of_them_alone(play: Folder) -> None:
+    run = play(
+        THOSE.format(
+            does="cause: ['those(b in balls where b.index < 2).put(first(d in doors where d.index == b.index))'], "
+            "set: {'seen(those(b in balls where b.color == red))': seen(b) + b.index + 1}"
+        )
+    ).step()
+    assert [ball["at"] for ball in run.state["balls"]][:2] == [[0, 2], [0, 4]]
+    assert run.state["state"]["seen"] == {"balls[0]": 1, "balls[1]": 0, "balls[2]": 3}
+
+
 # -- 6. memories -----------------------------------------------------------------------------------
 
 

@@ -131,7 +131,7 @@ SPOKEN_OF = (
         "start: none",
         "toggled_by(",
     ),
-    *("from:", "forget:", "start: none", "for: cast"),
+    *("from:", "forget:", "start: none", "for: cast", ": [those(", "(those("),
     *("timer:", "exclusive: true", "unlocks:", "opens:", "inside:", "pushed_by:", "locked:", "tagged:"),
     *(
         "carryable: true",

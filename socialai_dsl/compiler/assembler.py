@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from socialai_dsl.draws import site as site_number
@@ -264,6 +265,29 @@ class Registers:
         first = self.next_free
         self.next_free += count
         return first
+
+
+def store(
+    registers: Registers,
+    emit: Callable[..., None],
+    path: str,
+    value: int,
+    is_nothing: bool = False,
+    key: tuple[int, int] | None = None,
+) -> None:
+    """Put a temporary into a register; those that hold plain integers saturate, unless it is nothing that is put there.
+
+    Of a row of registers `path` is that of the first, and `key` the operands of `Op.STORE_AT` that say which is meant.
+    """
+    name = next(name for name in registers.names if name.path == path)
+    assert value >= TEMPORARY, "internal: what is stored is cut to its range in place"
+    if not name.values and not is_nothing:
+        emit(Op.MAX, value, value, constant(name.least))
+        emit(Op.MIN, value, value, constant(name.high))
+    if key is None:
+        emit(Op.LOAD, name.register, value)
+    else:
+        emit(Op.STORE_AT, value, *key)
 
 
 def label(entity: Entity) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 
 from socialai_dsl.compiler.assembler import (
@@ -15,13 +16,15 @@ from socialai_dsl.compiler.assembler import (
     found_path,
     label,
     said_path,
+    store,
 )
 from socialai_dsl.compiler.cells import ROW
 from socialai_dsl.compiler.expressions import Expressions, Lines
 from socialai_dsl.compiler.folding import Changes, Mobility, When, numbers_of, plans
 from socialai_dsl.compiler.hands import back_into_hands, move_into, out_of_hands
 from socialai_dsl.compiler.rows import row, row_of
-from socialai_dsl.program import CELL, TEMPORARY, Field, Op, Register
+from socialai_dsl.compiler.those import Choice, Chosen, sizes
+from socialai_dsl.program import CELL, Field, Op, Register
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import (
     Assignment,
@@ -170,7 +173,8 @@ class Operands:
     Attributes:
         sets: of each register that is set. keys: of each of these the first register of its row and the operand of its
         place, where it is one of a key. targets: for each effect, of what it is about. values: for each effect, of
-        its value, if it has one. line: of what is said, if anything is.
+        its value, if it has one. line: of what is said, if anything is. chosen: sets of bits, one for each condition in
+        `those(...)`, see `compiler/those.py`.
     """
 
     sets: tuple[int, ...]
@@ -178,6 +182,12 @@ class Operands:
     targets: tuple[tuple[int, ...], ...]
     values: tuple[int | None, ...]
     line: int | None
+    chosen: tuple[int, ...] = ()
+
+
+def _chooses(what: RulePlan | StepPlan) -> bool:
+    """Whether a rule affects or sets only those for which a condition holds."""
+    return any(item.only is not None for item in what.sets) or any(effect.only for effect in what.causes)
 
 
 class Effects:
@@ -198,22 +208,28 @@ class Effects:
     def compute(self, what: RulePlan | StepPlan, failed: Label, speaker: Entity | None) -> Operands:
         """Compute all values; a pick that finds nothing skips to `failed`."""
         to = self.to
+        chosen = Chosen(to, what) if _chooses(what) else None
         to.failed = failed
-        sets = tuple(to.sited_copy(item.value) for item in what.sets)
+        sets = tuple(
+            to.sited_copy(item.value) if chosen is None else chosen.set_to(item) for item in what.sets
+        )
         keys = tuple(self._key(item, what) for item in what.sets)
         targets: list[tuple[int, ...]] = []
         values: list[int | None] = []
         for effect in what.causes:
             to.site = effect.site
             targets.append(tuple(self._steady(to.value(entity), what) for entity in effect.entities))
-            values.append(None if effect.value is None else self._steady(to.value(effect.value), what))
+            if effect.each and chosen is not None:
+                values.append(chosen.value_of(effect))
+            else:
+                values.append(None if effect.value is None else self._steady(to.value(effect.value), what))
         line = None
         if what.say is not None:
             assert speaker is not None, "internal: nobody is there to say it"
             line = self._steady(self.lines.say(to, speaker, what.say), what)
         to.failed = None
         to.block.span = what.span
-        return Operands(sets, keys, tuple(targets), tuple(values), line)
+        return Operands(sets, keys, tuple(targets), tuple(values), line, chosen.bits if chosen else ())
 
     def _key(self, item: Assignment, what: RulePlan | StepPlan) -> tuple[int, int] | None:
         """The first register of a row, and the place of the one that is set."""
@@ -226,13 +242,16 @@ class Effects:
     def carry_out(self, what: RulePlan | StepPlan, operands: Operands, speaker: Entity | None) -> None:
         """Set, reward, cause, say."""
         block = self.to.block
+        only = Choice(block, operands.chosen).of if operands.chosen else nullcontext
         for item, operand, key in zip(what.sets, operands.sets, operands.keys, strict=True):
-            store(self.registers, block.emit, item.paths[0], operand, _empties(item), key)
+            with only(item.only):
+                store(self.registers, block.emit, item.paths[0], operand, _empties(item), key)
         if isinstance(what, RulePlan) and what.reward:
             block.emit(Op.REWARD, constant(what.reward))
         for effect, targets, value in zip(what.causes, operands.targets, operands.values, strict=True):
-            for term, entity in zip(effect.entities, targets, strict=True):
-                self._cause(effect, term, entity, value)
+            for i, (term, entity) in enumerate(zip(effect.entities, targets, strict=True)):
+                with only(effect.only[i] if effect.only else None):
+                    self._cause(effect, term, entity, value)
         if operands.line is not None and speaker is not None:
             self.lines.speak(self.to, speaker, operands.line)
 
@@ -315,29 +334,6 @@ class Effects:
         if thing.role == "object":
             status = constant(thing.status) if thing.initial is None else self.to.value(thing.initial)
             self.to.block.emit(Op.BECOME, entity, status)
-
-
-def store(
-    registers: Registers,
-    emit: Callable[..., None],
-    path: str,
-    value: int,
-    is_nothing: bool = False,
-    key: tuple[int, int] | None = None,
-) -> None:
-    """Put a temporary into a register; those that hold plain integers saturate, unless it is nothing that is put there.
-
-    Of a row of registers `path` is that of the first, and `key` the operands of `Op.STORE_AT` that say which is meant.
-    """
-    name = next(name for name in registers.names if name.path == path)
-    assert value >= TEMPORARY, "internal: what is stored is cut to its range in place"
-    if not name.values and not is_nothing:
-        emit(Op.MAX, value, value, constant(name.least))
-        emit(Op.MIN, value, value, constant(name.high))
-    if key is None:
-        emit(Op.LOAD, name.register, value)
-    else:
-        emit(Op.STORE_AT, value, *key)
 
 
 def _empties(item: Assignment) -> bool:
@@ -443,11 +439,12 @@ class _KeptRule:
     targets: tuple[tuple[_Kept, ...], ...]
     values: tuple[_Kept | None, ...]
     line: _Kept | None
+    chosen: tuple[_Kept, ...]
 
     def registers(self) -> Iterator[int]:
         """Those that are in use."""
         targets = (kept for targets in self.targets for kept in targets)
-        every = [*self.sets, *self.keys, *targets, *self.values, self.line]
+        every = [*self.sets, *self.keys, *targets, *self.values, self.line, *self.chosen]
         return (kept.register for kept in every if kept is not None and kept.register is not None)
 
 
@@ -494,6 +491,7 @@ class Deferred:
             tuple(map(fetched, kept.targets)),
             tuple(None if part is None else _fetch(to, part) for part in kept.values),
             None if kept.line is None else _fetch(to, kept.line),
+            fetched(kept.chosen),
         )
         for register in (*kept.registers(), self._pending):
             to.block.emit(Op.LOAD, register, constant(0))
@@ -511,6 +509,7 @@ class Deferred:
             tuple(tuple(self._kept_term(entity) for entity in effect.entities) for effect in rule.causes),
             tuple(None if e.value is None else self._kept_term(e.value) for e in rule.causes),
             line,
+            tuple(self._kept_range(0, (1 << bits) - 1) for bits in (sizes(rule) if _chooses(rule) else ())),
         )
 
     def _kept_key(self, item: Assignment) -> _Kept | None:
@@ -553,6 +552,7 @@ def _pairs(kept: _KeptRule, operands: Operands) -> Iterator[tuple[_Kept, int]]:
             yield part, value
     if kept.line is not None and operands.line is not None:
         yield kept.line, operands.line
+    yield from zip(kept.chosen, operands.chosen, strict=True)
 
 
 def _keep(to: Expressions, kept: _Kept, operand: int) -> None:

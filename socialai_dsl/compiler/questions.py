@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from socialai_dsl.compiler.assembler import Label, Registers, constant
-from socialai_dsl.compiler.effects import store
+from socialai_dsl.compiler.assembler import Label, Registers, constant, store
 from socialai_dsl.compiler.expressions import Expressions
 from socialai_dsl.program import Op, Program, RegisterName
 from socialai_dsl.semantics.plans import Drawn, ProbePlan

@@ -9,7 +9,7 @@ from typing import Any, cast
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import Effects, FirstRule, Rule, State, Step, ThenRule, WorldRule
-from socialai_dsl.semantics import groups, hands, object_facts, rows, texts
+from socialai_dsl.semantics import groups, hands, object_facts, rows, texts, those
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.groups import performed
 from socialai_dsl.semantics.nesting import NestedPlanner
@@ -45,6 +45,7 @@ from socialai_dsl.semantics.signatures import ACTIVITIES, EFFECTS, SYNONYMS
 from socialai_dsl.semantics.terms import (
     ACTION,
     BOOL,
+    CELL,
     DIRECTION,
     TURN,
     Compare,
@@ -212,8 +213,8 @@ def _with_stay(node: ast.Expr) -> ast.Expr:
     return replace(node, id="none") if isinstance(node, ast.Name) and node.id == "stay" else node
 
 
-def effect(resolver: Resolver, path: DataPath, raw: object, scope: Scope) -> Effect:
-    """One entry of `cause:`."""
+def effects(resolver: Resolver, path: DataPath, raw: object, scope: Scope) -> Iterator[Effect]:
+    """One entry of `cause:`; of `those(...)` perhaps an effect for each."""
     node = resolver.findings.expression(path, cast(Any, raw))
     match node:
         case ast.Attribute(subject=subject, name=name):
@@ -235,7 +236,26 @@ def effect(resolver: Resolver, path: DataPath, raw: object, scope: Scope) -> Eff
         raise resolver.fail("S205", f"unknown effect `{name}`", node, scope, suggestion=near, hint=hint)
     if len(args) != len(signature.takes):
         raise resolver.fail("S211", wrong_count(signature, len(args)), node, scope)
-    entities = _entities(resolver, subject, scope)
+    if (which := those.found(subject)) is None:
+        yield _effect(resolver, path, node, _entities(resolver, subject, scope), args, scope)
+        return
+    for chosen, inner, each in those.affected(resolver, which, args, scope):
+        entities = _things([one.item for one in chosen], which.group, resolver, scope)
+        only = tuple(one.condition for one in chosen)
+        yield replace(_effect(resolver, path, node, entities, args, inner), only=only, each=each)
+
+
+def _effect(
+    resolver: Resolver,
+    path: DataPath,
+    node: ast.Attribute | ast.Call,
+    entities: tuple[Term, ...],
+    args: tuple[ast.Expr, ...],
+    scope: Scope,
+) -> Effect:
+    """The effect that a node names, on these entities."""
+    name, subject, signature = node.name, node.subject, EFFECTS[node.name]
+    assert subject is not None, "internal: an effect on nothing"
     if name == "vanish" and any(entity.type.low == 0 for entity in entities):
         raise resolver.fail("S204", _not_the_agent(subject, entities, "vanish"), node, scope)
     value = None
@@ -256,10 +276,18 @@ def _entities(resolver: Resolver, node: ast.Expr, scope: Scope) -> tuple[Term, .
     if not groups.is_group(resolver, node, scope):
         return (resolver.value(node, ENTITY, scope),)
     members = groups.group(resolver, node, None, scope)
-    if members.type.kind != "entity":
-        message = f"`{quoted(node)}` is {described(members.type)}, but {described(ENTITY)} is expected here"
+    return _things(members.items, node, resolver, scope, members.type)
+
+
+def _things(
+    items: Sequence[Const], node: ast.Expr, resolver: Resolver, scope: Scope, type_: Type | None = None
+) -> tuple[Term, ...]:
+    """The members of a group at `node`, which are things."""
+    type_ = type_ or (items[0].type if items else CELL)
+    if type_.kind != "entity":
+        message = f"`{quoted(node)}` is {described(type_)}, but {described(ENTITY)} is expected here"
         raise resolver.fail("S204", message, node, scope)
-    return tuple(members.items)
+    return tuple(items)
 
 
 def _target(
@@ -399,9 +427,12 @@ class _Deeds:
         resolver, register = self.resolver, self.register(scope.path, key.partition("(")[0].strip())
         if register not in resolver.registers:
             raise FailedError  # its group means nothing, which has been reported
-        value = texts.value_for(resolver, register, raw, scope)
         own = scope.at((*scope.path, KEY), f"{scope.draws.site}.key")
         node = resolver.findings.expression(own.path, key)
+        if isinstance(node, ast.Call) and len(node.args) == 1 and those.found(node.args[0]):
+            yield from those.assigned(resolver, register, node, raw, scope, own)
+            return
+        value = texts.value_for(resolver, register, raw, scope)
         targets: list[Term] = []
         if isinstance(node, ast.Call):
             targets += rows.of_keys(resolver, register, node, own)
@@ -418,7 +449,7 @@ class _Deeds:
         made: list[Effect] = []
         for i, (place, raw) in enumerate(self.resolver.findings.each((*path, "cause"), entry.cause)):
             with surviving():
-                made.append(effect(self.resolver, place, raw, self.scope(place, f"cause[{i}]")))
+                made += effects(self.resolver, place, raw, self.scope(place, f"cause[{i}]"))
         return tuple(made)
 
 
@@ -629,7 +660,7 @@ class _Planner:
         return None, Sited(lasted, f"{self.played.member}/{site}", findings.at(path))
 
 
-# -- what belongs to nobody's frame: rules of the world, and what a drawn room has to be like ----------------
+# -- what belongs to nobody's frame: rules of the world ------------------------------------------------------
 
 
 _DOES = ("cause", "set", "reward")

@@ -10,7 +10,7 @@ from typing import Final, Literal, get_args
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, Severity, did_you_mean
 from socialai_dsl.schema.scenario import CHANNELS, Expression, Property, Scenario, Sequence
-from socialai_dsl.semantics import behaviour, entities, groups, object_facts, possible, setup
+from socialai_dsl.semantics import behaviour, entities, groups, object_facts, possible, setup, tables
 from socialai_dsl.semantics.entities import AGENT, Prelude, entities_of
 from socialai_dsl.semantics.free_cells import check_absences, check_placements
 from socialai_dsl.semantics.groups import performs
@@ -479,7 +479,8 @@ class _Run:
         outcomes = tuple(self._outcomes())
         plans = tuple(self._plans(spoken))
         self._look_at_unused()
-        groups.look_at_all(resolver)
+        if scenario.tables:
+            tables.look_at_all(resolver)
         placed = setup.placings(resolver)
         colors, turned = list(setup.colorings(resolver)), list(setup.facings(resolver))
         computed, rules = object_facts.computed(resolver), tuple(behaviour.rules(resolver))

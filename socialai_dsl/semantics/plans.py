@@ -99,6 +99,9 @@ class Effect:
     """An effect on an object or NPC: open, close, lock, unlock, reset (status, presence, place and content as at the
     start of the episode), vanish, become (status in `value`), put (on the cell of `value`), move_into (the object
     `value`), reveal (becomes opened).
+
+    `only`: of each of the entities the condition on which it is affected, or empty: all are. `each`: `value` is that of
+    the one entity that it has, and computed only if that is affected.
     """
 
     name: Literal[
@@ -108,16 +111,23 @@ class Effect:
     span: Span
     value: Term | None = None
     site: str = ""
+    only: tuple[Term, ...] = ()
+    each: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Assignment:
-    """What a register is set to; it is known which, by its path, or it is the one of a key (`target`)."""
+    """What a register is set to; it is known which, by its path, or it is the one of a key (`target`).
+
+    `only`: the condition on which it is set. `each`: the value is computed only if it is.
+    """
 
     path: str
     value: Sited
     target: ReadEach | None = None
     key_site: str = ""
+    only: Sited | None = None
+    each: bool = False
 
     @property
     def paths(self) -> tuple[str, ...]:

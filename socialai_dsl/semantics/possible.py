@@ -25,6 +25,7 @@ from socialai_dsl.semantics.terms import (
     draws,
     is_own_noun,
     may_be_nothing,
+    may_find_nothing,
     walk,
 )
 from socialai_dsl.source import DataPath, Span
@@ -367,6 +368,12 @@ def check_possible(checked: CheckedScenario, findings: Findings) -> None:
     for span, conditions in _by_place(_untils(checked)):
         if (why := possible.never(conditions)) is not None:
             findings.warning("W314", "this step can never end: `until` can never hold", span, hint=why)
+    for span, conditions in _by_place(_those(checked)):
+        if (why := possible.never(conditions)) is not None:
+            findings.warning("W314", "there are never any of those: this can never hold", span, hint=why)
+        elif possible.always(conditions):
+            hint = "the name of the group alone means all of them"
+            findings.warning("W319", "those are all of them: this always holds", span, hint=hint)
     for probe in checked.probes:
         if probe.when is not None and (why := possible.never([probe.when])) is not None:
             findings.warning(
@@ -424,6 +431,15 @@ def _untils(checked: CheckedScenario) -> Iterator[tuple[Span, Sited]]:
                 yield step.until.span, step.until
 
 
+def _those(checked: CheckedScenario) -> Iterator[tuple[Span, Sited]]:
+    """The conditions in `those(...)`, of each of the group."""
+    for item in every(plans.Assignment, checked):
+        if item.only is not None:
+            yield item.only.span, item.only
+    for effect in every(Effect, checked):
+        yield from ((effect.span, Sited(only, effect.site, effect.span)) for only in effect.only)
+
+
 class Possible:
     """The possible values of the parts of a scenario, each by itself."""
 
@@ -442,6 +458,13 @@ class Possible:
                 return None
             why = why or self._why(condition.term)
         return why
+
+    def always(self, conditions: Sequence[Sited]) -> bool:
+        """Whether none of these conditions can be false, and that not as they are written."""
+        asked = [condition.term for condition in conditions]
+        return not all(isinstance(term, Const) for term in asked) and not any(
+            self._may(term, wanted=False) or may_find_nothing(term) for term in asked
+        )
 
     def _may(self, term: Term, wanted: bool = True) -> bool:
         """Whether a condition may be true, or false."""

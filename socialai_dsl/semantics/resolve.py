@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.semantics import groups, hands, object_facts, resolve_names, rows, texts
+from socialai_dsl.semantics import groups, hands, object_facts, resolve_names, rows, tables, texts
 from socialai_dsl.semantics.conditional import conditional
 from socialai_dsl.semantics.groups import check_moment, check_points, check_toggled, must_be_agent, subject_of
 from socialai_dsl.semantics.resolve_names import toggled_by, without_arguments
@@ -93,7 +93,7 @@ def call(resolver: Resolver, node: ast.Call, expected: Type | None, scope: Scope
         define, arguments = defined
         return resolve_names.expanded(resolver, define, arguments, node, expected, scope)
     if node.subject is None and node.name in resolver.symbols.scenario.tables:
-        return groups.looked_up(resolver, node, scope)
+        return tables.looked_up(resolver, node, scope)
     if node.name not in VALUES and (kept := rows.kept_for(resolver, node, scope)) is not None:
         return kept
     signature = VALUES.get(node.name)
@@ -388,7 +388,7 @@ class ScenarioResolver(Resolver):
         if name not in self._tables:
             self._tables[name] = None
             with surviving():
-                self._tables[name] = groups.resolved(self, name)
+                self._tables[name] = tables.resolved(self, name)
         found = self._tables[name]
         if found is None:
             raise FailedError

@@ -10,7 +10,7 @@ from typing import Literal
 from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
 from socialai_dsl.schema.scenario import CastMember, Expression, ObjectGroup, Scenario
-from socialai_dsl.semantics import groups, hands, object_facts
+from socialai_dsl.semantics import groups, hands, object_facts, tables
 from socialai_dsl.semantics.entities import AGENT
 from socialai_dsl.semantics.plans import Coloring, Drawn, Facing, Placing, Region, RoomPlan, Setup
 from socialai_dsl.semantics.resolver import ENTITY, INT, Resolver
@@ -516,7 +516,7 @@ def _permuted(
     if len(others.items) != count:
         message = f"`{quoted(node)}` gives {len(others.items)} values for {count}"
         raise resolver.fail("S106", message, node, scope)
-    place = groups.permutation(resolver, f"{path[0]}.{path[1]}.order", count, path)[index]
+    place = tables.permutation(resolver, f"{path[0]}.{path[1]}.order", count, path)[index]
     colors = tuple(FieldOf(COLOR, other, "color") for other in others.items)
     value = chosen(place, range(count), colors, COLOR)
     return Sited(value, scope.draws.site, resolver.findings.at(path))

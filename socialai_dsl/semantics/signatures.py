@@ -148,6 +148,7 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     _value("first", "none", ("group",), "one of them", "first(d in group where ...): the first that does"),
     _value("pick", "none", ("group",), "one of them", "pick(group), pick(d in group where ...): drawn at random"),
     _value("nearest", "none", ("group",), "one of them", "nearest(d in group to y): the nearest to y"),
+    _value("those", "none", ("group",), "of them", "those(d in group where ...): in `cause` and `set`, all that do"),
     # places
     Signature("anywhere", "none", (), "place", "place", "all free cells of the room"),
     Signature("nowhere", "none", (), "place", "place", "not in the room"),
@@ -204,7 +205,7 @@ VALUES: Final = {s.name: s for s in SIGNATURES if s.use == "value"}
 PLACES: Final = {s.name: s for s in SIGNATURES if s.use == "place"}
 ACTIVITIES: Final = {s.name: s for s in SIGNATURES if s.use == "activity"}
 EFFECTS: Final = {s.name: s for s in SIGNATURES if s.use == "effect"}
-QUANTIFIERS: Final = frozenset({"any", "all", "count", "first", "pick", "nearest"})
+QUANTIFIERS: Final = frozenset({"any", "all", "count", "first", "pick", "nearest", "those"})
 
 SYNONYMS: Final = {
     "press": "use", "push_button": "use", "open": "use", "pick": "use", "activate": "use", "interact": "use",

@@ -19,8 +19,30 @@ def causes(sources: Sources, rule: Any, path: str, context: Context, frame: str 
     found = []
     for number, source in enumerate(rule.cause):
         value = sources.expression(f"{path}.cause[{number}]", source, frame)
-        found.append(cause(value.tree, replace(context, value=value)))
+        own = replace(context, value=value)
+        each = those_named(getattr(value.tree, "subject", None), getattr(value.tree, "args", ()))
+        if each is None:
+            found.append(cause(value.tree, own))
+            continue
+        # What the effect takes is about each of those: computed for each.
+        for member in of(each, own):
+            target = own.knowing(**{each.var: member})
+            found.append(cause(replace(value.tree, subject=ast.Name(each.var)), target))
     return found
+
+
+def those_named(node: Any, values: Any) -> ast.Quantifier | None:
+    """`those(...)` if that stands there and its variable in one of some values; else None."""
+    if isinstance(node, ast.Quantifier) and any(mentions(node.var, value) for value in values):
+        return node
+    return None
+
+
+def mentions(word: str, node: Any) -> bool:
+    """Whether a name stands in an expression."""
+    return (isinstance(node, ast.Name) and node.id == word) or any(
+        mentions(word, part) for part in node.children()
+    )
 
 
 def cause(node: Any, context: Context) -> Cause:
@@ -44,6 +66,14 @@ def assignments(
     for written, source in rule.set.items():
         name = written.partition("(")[0].strip()
         value: Any = NOTHING
+        variable = _variable(sources, written, source, path, frame)
+        if variable is not None:
+            for key, member in _members(sources, written, path, context, frame):
+                own = context.knowing(**{variable: member})
+                found.append(
+                    (name, key, there(_assigned(sources, f"{path}.set.{written}", source, own, frame)))
+                )
+            continue
         if (
             str(source).strip() != "none"
             or name not in holder_of(context.world, context.me, name).may_be_nothing
@@ -58,6 +88,27 @@ def _assigned(sources: Sources, site: str, source: Any, context: Context, frame:
     if " " in str(source) and source in context.world.nouns:
         return source
     return evaluate(sources.expression(site, source, frame), context)
+
+
+def _variable(sources: Sources, written: str, source: Any, path: str, frame: str | None) -> str | None:
+    """The variable of `those(...)` in the key if the value speaks of it: then there is a value for each."""
+    key = sources.expression(f"{path}.set.{written}.key", written, frame).tree if "(" in written else None
+    if not isinstance(key, ast.Call) or source is None:
+        return None
+    value, those = sources.expression(f"{path}.set.{written}", source, frame), key.args[0]
+    variable = those.var.partition("~")[0] if isinstance(those, ast.Quantifier) else ""
+    return variable if variable and mentions(variable, value.tree) else None
+
+
+def _members(
+    sources: Sources, written: str, path: str, context: Context, frame: str | None
+) -> list[tuple[Any, Any]]:
+    """Each of those whose registers are set, with its key."""
+    value = sources.expression(f"{path}.set.{written}.key", written, frame)
+    assert isinstance(value.tree, ast.Call)
+    return [
+        (key_of(there(one)), one) for one in as_list(of(value.tree.args[0], replace(context, value=value)))
+    ]
 
 
 def _keys(sources: Sources, written: str, path: str, context: Context, frame: str | None) -> list[Any]:

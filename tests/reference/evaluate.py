@@ -82,7 +82,7 @@ def spelled_part(part: Any, context: Context) -> str:
     """A value inside a text; of what stood in a slot the word, whatever it stands for."""
     value, slots = of(part, context), context.world.fillers
     slot = part.id if isinstance(part, ast.Name) else part.name if isinstance(part, ast.Attribute) else ""
-    of_agent = isinstance(part, ast.Attribute) and part.subject == ast.Name("agent")
+    of_agent = isinstance(part, ast.Attribute) and getattr(part.subject, "id", "") == "agent"
     if slot in slots and slot != "noun" and (of_agent or isinstance(part, ast.Name)):
         return speech.spelled_in(context.world, slot, there(value))
     return spelled(value)
@@ -376,13 +376,15 @@ def _arithmetic(node: ast.Arithmetic, context: Context) -> Any:
 
 
 def _quantifier(node: ast.Quantifier, context: Context) -> Any:
-    """any, all, count, first, pick, nearest over a group; ties go to the lowest index."""
+    """any, all, count, first, pick, nearest, those over a group; ties go to the lowest index."""
     group = as_list(of(node.group, context))
     condition, variable = node.where, node.var
 
     def true_of(item: Any) -> bool:
         return condition is None or bool(there(of(condition, context.knowing(**{variable: item}))))
 
+    if node.name == "those":
+        return [item for item in group if _is_one_of_those(condition, variable, item, context)]
     if node.name == "any":
         return any(true_of(item) for item in group)
     if node.name == "all":
@@ -399,6 +401,14 @@ def _quantifier(node: ast.Quantifier, context: Context) -> Any:
     if not found:
         raise NothingFoundError
     return found[drawn(context, node, len(found))] if node.name == "pick" else found[0]
+
+
+def _is_one_of_those(condition: Any, variable: str, item: Any, context: Context) -> bool:
+    """A member about whom something is not found is not one of those."""
+    try:
+        return bool(there(of(condition, context.knowing(**{variable: item}))))
+    except NothingFoundError:
+        return False
 
 
 # -- calls -------------------------------------------------------------------------------------------------

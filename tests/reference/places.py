@@ -33,7 +33,7 @@ def cells_of(node: Any, context: Context) -> list[Cell]:
         return [cell for side in as_list(arguments[0]) for cell in wall(world, side, 1)]
     if name == "each_wall":
         assert context.me is not None, "internal: each_wall places a group"
-        return wall(world, SIDES[context.me.index % 4], arguments[0])
+        return wall(world, SIDES[context.me.index % 4], *(arguments or [1]))
     tests = {
         "anywhere": lambda cell: True,
         "nowhere": lambda cell: False,

@@ -289,16 +289,15 @@ class Setup:
             return
         if holder.at is not None:
             cells = [self.exact_cell(path, holder.at, entity)]
-            cells = [cell for cell in cells if self.world.inside(cell) and not self.shared(cell, holder)]
+            cells = [cell for cell in cells if self.world.inside(cell)]  # "`at` always may" share it
         else:
             written = leaves(f"{path}.place", holder.place) or [(f"{path}.place", "anywhere")]
             _, source = written[entity.index % len(written)]
             value = self.sources.expression(f"{site_of(entity)}.place", source)
             found = region(value, self.context(entity, it=entity))
             overlaps = isinstance(holder, Group) and holder.overlap
-            cells = [
-                c for c in found if overlaps or (c not in self.world.terrain and not self.shared(c, holder))
-            ]
+            taken = {entity.cell for entity in self.world.entities()}
+            cells = [c for c in found if overlaps or (c not in self.world.terrain and c not in taken)]
         if cells:
             entity.cell = cells[self.draw(f"{path}.cell", number_of(entity), len(cells))]
 
@@ -315,12 +314,6 @@ class Setup:
         context.value = Value(f"{site_of(entity)}.at", ast.Alternatives(tuple(trees)))
         x, y = (of(tree, context) for tree in trees)
         return x, y
-
-    def shared(self, cell: Cell, holder: Group | Member) -> bool:
-        """Whether it would share a cell that is not to be shared."""
-        if isinstance(holder, Group) and holder.overlap:
-            return False
-        return any(entity.cell == cell for entity in self.world.entities())
 
     # -- what is drawn or computed once --------------------------------------------------------------------
 

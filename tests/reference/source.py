@@ -129,6 +129,12 @@ class Sources:
                 where=node.where and self._expand(node.where, inner, frame),
                 to=node.to and self._expand(node.to, bound, frame),
             )
+        if isinstance(node, ast.Call) and isinstance(node.subject, ast.Quantifier):
+            # In what is done to `those(...)` the variable is each of them.
+            those = self._expand(node.subject, bound, frame)
+            inner = {**bound, node.subject.var: ast.Name(those.var)}
+            arguments = [self._expand(argument, inner, frame) for argument in node.args]
+            return replace(node, subject=those, args=tuple(arguments))
         changes: dict[str, Any] = {}
         for field in fields(node):
             value = getattr(node, field.name)

@@ -151,6 +151,9 @@ class Behaviour:
             name: lambda: self.phrases.number(where) for name in self.declared.registers
         }
         for row in [*self.declared.rows, *(where.frame.rows if where.frame else [])]:
+            if row.keys is not None and self.often(0.25):
+                found |= self.of_those(row, where)
+                continue
             found[self.target(row, where)] = lambda row=row: (  # type: ignore[misc]
                 "none" if row.empty and self.often(0.2) else self.phrases.value_of(row, where)
             )
@@ -170,6 +173,24 @@ class Behaviour:
         if row.keys is not None and self.often(0.15):
             return f"{row.name}({row.keys})"
         return self.phrases.of_row(row, where)
+
+    def of_those(self, row: Row, where: Where) -> dict[str, Callable[[], str]]:
+        """Some of a row, with a value that may be about each."""
+        keys, number = str(row.keys), self.rng.randint(1, 3)
+        conditions = {
+            "colors": "g != red",
+            "nouns": "g != first(nouns)",
+            "1..4": f"g % 2 == t % 2 or g < {number}",
+        }
+        thing = next((thing for thing in self.declared.things if thing.name == keys), None)
+        inner = where if thing is None else self.phrases.bound("g", thing, where)
+        condition = conditions.get(keys, f"g.distance({self.phrases.anchor(where)}) > {number}")
+        if thing is not None:
+            condition = self.phrases.plain_condition(inner)
+        own = [f"{row.name}(g) + {number}"] if row.holds == "number" else [f"{row.name}(g)"]
+        own += ["g"] if (keys, row.holds) in (("colors", "color"), ("nouns", "noun")) else []
+        value = self.rng.choice(own) if self.often(0.5) else self.phrases.value_of(row, where)
+        return {f"{row.name}(those(g in {keys} where {condition}))": lambda: value}
 
     # -- activities --------------------------------------------------------------------------------------------
 
@@ -225,8 +246,17 @@ class Behaviour:
             return self.effect_on_somebody(where)
         if self.often(0.05):
             return "objects.reset"
+        if thing.count is not None and self.often(0.35):
+            return self.effect_on_those(thing, where)
         what = thing.name if self.often(0.25) else self.phrases.one(thing, where)
         return f"{what}.{self.rng.choice(self.verbs(thing, where))()}"
+
+    def effect_on_those(self, thing: Thing, where: Where) -> str:
+        """An effect on some of a group; what it takes may be about each of them."""
+        inner = self.phrases.bound("g", thing, where)
+        condition = self.phrases.plain_condition(inner)
+        verb = self.rng.choice(self.verbs(thing, inner if self.often(0.5) else where))()
+        return f"those(g in {thing.name} where {condition}).{verb}"
 
     def verbs(self, thing: Thing, where: Where) -> list[Callable[[], str]]:
         """What can be done to a thing."""
