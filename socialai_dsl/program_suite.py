@@ -10,7 +10,7 @@ from hashlib import sha256
 from itertools import chain
 from typing import Any
 
-from socialai_dsl.program import CHANNELS, Flag, Header, Outcome, Program
+from socialai_dsl.program import CHANNELS, Outcome, Program
 from socialai_dsl.vocabulary import NOUN, Sentences, Slot
 
 Positions = tuple[int, ...]
@@ -119,15 +119,6 @@ def channels_of(programs: Iterable[Program]) -> tuple[str, ...]:
     """The channels of pictures in which several programs are shown: those that one of them has."""
     shown = {name for program in programs for name in program.channels}
     return tuple(name for name in CHANNELS if name in shown)
-
-
-def unscripted(playable: Playable) -> tuple[str, ...]:
-    """The members of a suite, or the scenario, in which the agent follows no frame."""
-    if isinstance(playable, ProgramSuite):
-        programs = list(zip(playable.members, playable.programs, strict=True))
-    else:
-        programs = [(playable.name, playable)]
-    return tuple(name for name, program in programs if not program.header(Header.FLAGS) & Flag.AGENT_FRAME)
 
 
 def prefixed(member: str, name: str) -> str:

@@ -9,7 +9,7 @@ from socialai_dsl.analysis.depth import depth
 from socialai_dsl.analysis.effort import Effort
 from socialai_dsl.analysis.properties import Trial, by_default
 from socialai_dsl.analysis.scenario_report import ScenarioReport
-from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite
+from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite, unscripted
 from socialai_dsl.diagnostics import ScenarioError
 from socialai_dsl.frontend import load
 
@@ -78,7 +78,7 @@ def scenarios_of(name: str) -> list[tuple[LoadedScenario, str]]:
 
 def _scripted(loaded: LoadedScenario, called: str) -> LoadedScenario | None:
     """The scenario with a frame for the agent: itself, or its variant `oracle`; None without either."""
-    if any(frame.entity == 0 for frame in loaded.checked.frames):
+    if not unscripted(loaded):
         return loaded
     base, mark, parameters = called.partition("?")
     try:

@@ -90,3 +90,12 @@ def about_of(loaded: Loaded) -> str:
     """What a file says of itself."""
     data = loaded.resolved.data
     return str(data.get("about", "")) if isinstance(data, dict) else ""
+
+
+def unscripted(loaded: Loaded) -> tuple[str, ...]:
+    """The members of a suite, or the scenario, in which the agent follows no frame."""
+    if isinstance(loaded, LoadedSuite):
+        members = list(zip(loaded.member_names, loaded.members, strict=True))
+    else:
+        members = [(loaded.checked.name, loaded)]
+    return tuple(name for name, one in members if not any(frame.entity == 0 for frame in one.checked.frames))

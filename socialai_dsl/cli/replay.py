@@ -120,13 +120,13 @@ def _played(arguments: argparse.Namespace) -> "list[Trace]":
     for warning in evaluation.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     if numbers is None:
-        return evaluation.traces(arguments.record)
+        return evaluation.traces(evaluation.to_replay(arguments.record))
     for number in numbers:
         if number not in evaluation.actions:
             raise UsageError(
                 f"--test-episode: got {number}, expected less than {len(evaluation.actions)}, as many as were played"
             )
-    return [evaluation.trace(number) for number in dict.fromkeys(numbers)]
+    return evaluation.traces(dict.fromkeys(numbers))
 
 
 def _evaluation(arguments: argparse.Namespace, episodes: int) -> "Evaluation":

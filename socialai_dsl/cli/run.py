@@ -44,12 +44,13 @@ def execute(arguments: argparse.Namespace) -> Exit:
     """Do the whole run."""
     import socialai_dsl
     from socialai_dsl.cli.run_options import resumed, started
+    from socialai_dsl.envs.factory import compiled
     from socialai_dsl.evaluation.players import require_trainer
 
     require_trainer()
     config = resumed(arguments) if arguments.resume else started(arguments)
     loaded = socialai_dsl.load(config.scenario)
-    program = socialai_dsl.compile(loaded)
+    program = compiled(loaded)
     folder = arguments.resume or create_run_folder(arguments.out, config.scenario, config.seed)
     with only_writer(folder):
         return _run(config, loaded, program, folder, arguments)

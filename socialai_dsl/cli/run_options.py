@@ -230,9 +230,8 @@ GUIDED_FRAMES_OF_A_SUITE: Final = 6_000_000
 def frames_for(recipe: str, scenario: str) -> int:
     """Frames where nobody says how many: measured to be enough for every scenario of the paper (docs/mastery.md)."""
     import socialai_dsl
-    from socialai_dsl.program_suite import ProgramSuite
 
     if recipe != "guided":
         return PLAIN_FRAMES
-    is_suite = isinstance(socialai_dsl.compile(socialai_dsl.load(scenario)), ProgramSuite)
+    is_suite = isinstance(socialai_dsl.load(scenario), socialai_dsl.LoadedSuite)
     return GUIDED_FRAMES_OF_A_SUITE if is_suite else GUIDED_FRAMES

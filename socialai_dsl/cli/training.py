@@ -83,7 +83,8 @@ def train_agent(
     from trainer.ppo import train
 
     played = _played(config)
-    envs = socialai_dsl.make_vec(played, num_envs=config.envs, copy=False, autoreset_mode="SameStep")
+    scenario = program if played == config.scenario else played
+    envs = socialai_dsl.make_vec(scenario, num_envs=config.envs, copy=False, autoreset_mode="SameStep")
     total = config.updates * config.frames_per_update
     learnt = Learnt(loaded, endings_of(loaded, program))
     try:
@@ -171,7 +172,7 @@ def record_run(evaluation: "Evaluation", folder: Path, label: str) -> None:
     """
     from socialai_dsl.replay.page import replay_page
 
-    write_text(folder / REPLAY, replay_page(evaluation.traces(_REPLAYED)))
+    write_text(folder / REPLAY, replay_page(evaluation.traces(evaluation.to_replay(_REPLAYED))))
     success = evaluation.result.success
     shown = {"episode": int(success.argmax())}
     if success.any() and not success.all():

@@ -21,10 +21,15 @@ Scenario = str | Path | Playable
 
 def playable_of(scenario: Scenario) -> Playable:
     """The program of a scenario, or the programs of a suite, given by name or path, or itself."""
-    return scenario if isinstance(scenario, Playable) else _compiled(load(scenario))
+    return scenario if isinstance(scenario, Playable) else compiled(load(scenario))
 
 
-def _compiled(loaded: Loaded) -> Playable:
+def compiled(loaded: Loaded) -> Playable:
+    """The program of a scenario, or the programs of a suite, whose layouts fit.
+
+    Raises:
+        ScenarioError: a layout of the suite does not.
+    """
     playable = compile_loaded(loaded)
     if isinstance(loaded, LoadedSuite) and isinstance(playable, ProgramSuite):
         check_starts(loaded, playable)
@@ -46,7 +51,7 @@ def make(scenario: Scenario, render_mode: str | None = None) -> ScenarioEnv:
     if isinstance(scenario, Playable):
         return ScenarioEnv(scenario, render_mode)
     loaded = load(scenario)
-    return ScenarioEnv(_compiled(loaded), render_mode, scenarios_of(loaded))
+    return ScenarioEnv(compiled(loaded), render_mode, scenarios_of(loaded))
 
 
 def make_vec(

@@ -32,7 +32,7 @@ def record(evaluation: Evaluation, folder: Path, count: int = 3, label: str = ""
             name = f"{'success' if success else 'failure'}-{number:03d}"
             write_text(place / f"{name}.txt", episode.transcript())
             episode.save_film(place / f"{name}.gif")
-    if traces := evaluation.traces(count):
+    if traces := evaluation.traces(evaluation.to_replay(count)):
         write_text(place / REPLAY, replay_page(traces))
     write_text(place / EPISODES, _episodes(evaluation))
     return place

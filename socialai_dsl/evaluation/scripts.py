@@ -52,9 +52,9 @@ def with_script(scenario: str) -> str:
 def _closest_script(scenario: str) -> tuple[str, Sequence[str]]:
     """The scenario itself or its variant `oracle`, and which of its members have no script even there."""
     import socialai_dsl
-    from socialai_dsl.program_suite import unscripted
+    from socialai_dsl.checking.loaded import unscripted
 
-    lacking = unscripted(socialai_dsl.compile(socialai_dsl.load(scenario)))
+    lacking = unscripted(socialai_dsl.load(scenario))
     if not lacking:
         return scenario, ()
     name, mark, parameters = scenario.partition("?")
@@ -65,7 +65,7 @@ def _closest_script(scenario: str) -> tuple[str, Sequence[str]]:
         if all(diagnostic.code == "S503" for diagnostic in error.diagnostics):
             return scenario, lacking
         raise
-    return scripted, unscripted(socialai_dsl.compile(loaded))
+    return scripted, unscripted(loaded)
 
 
 @dataclass(frozen=True)

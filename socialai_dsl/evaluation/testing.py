@@ -1,6 +1,6 @@
 """Plays the test set with an agent and keeps what is needed to count, describe and record its episodes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -101,7 +101,7 @@ class Evaluation:
         import socialai_dsl
         from socialai_dsl.replay.film import record
 
-        env = socialai_dsl.make(self.scenario, render_mode="rgb_array")
+        env = socialai_dsl.make(self.program, render_mode="rgb_array")
         title = f"{self.scenario}, test episode {number}, {label}"
         endings = {ending.name: ending for ending in self.endings}
         try:
@@ -117,54 +117,57 @@ class Evaluation:
         finally:
             env.close()
 
-    def traces(self, count: int) -> "list[Trace]":
-        """Up to `count` failures and as many successes, for a replay."""
-        return [self.trace(number) for success in (False, True) for number in self.pick(success, count)]
+    def to_replay(self, count: int) -> list[int]:
+        """Numbers of up to `count` failures and as many successes."""
+        return [number for success in (False, True) for number in self.pick(success, count)]
 
-    def trace(self, number: int) -> "Trace":
-        """Play test episode `number` once more, and trace it with what the agent made of it, or answered."""
+    def traces(self, numbers: Iterable[int]) -> "list[Trace]":
+        """Play these test episodes once more, and trace each with what the agent made of it, or answered."""
         import socialai_dsl
+
+        env = socialai_dsl.make(self.scenario)
+        try:
+            policy = make_policy(self.player, env)[0] if self.player.is_trained else None
+            return [self._trace(env, policy, number) for number in numbers]
+        finally:
+            env.close()
+
+    def _trace(self, env: Any, policy: Any, number: int) -> "Trace":
         from socialai_dsl.replay import trace_of
         from socialai_dsl.replay.document import Outcome
 
         endings = {one.name: one.text for one in self.endings}
         ending = self.result.names[self.result.outcome[number]]
         cut_short = Outcome(name=ending, success=False, text=endings[ending])
-        env = socialai_dsl.make(self.scenario)
-        try:
-            return trace_of(
-                env,
-                self.actions[number],
-                {"options": {"test_episode": number}},
-                scenario=self.scenario,
-                agent=self.player.agent,
-                episode=f"test episode {number}",
-                endings=endings,
-                about=self.about,
-                think=self._think(env, number),
-                replies=self.replies.get(number, ()),
-                cut_short=cut_short if self.is_cut_short(number) else None,
-            )
-        finally:
-            env.close()
+        return trace_of(
+            env,
+            self.actions[number],
+            {"options": {"test_episode": number}},
+            scenario=self.scenario,
+            agent=self.player.agent,
+            episode=f"test episode {number}",
+            endings=endings,
+            about=self.about,
+            think=None if policy is None else _thinking(policy, number),
+            replies=self.replies.get(number, ()),
+            cut_short=cut_short if self.is_cut_short(number) else None,
+        )
 
-    def _think(self, env: Any, number: int) -> "Think | None":
-        """Asks a trained agent what it makes of each observation of an episode; None for any other."""
-        import numpy as np
 
-        from socialai_dsl.replay import Thought
+def _thinking(policy: Any, number: int) -> "Think":
+    """Asks a trained agent what it makes of each observation of an episode."""
+    import numpy as np
 
-        if not self.player.is_trained:
-            return None
-        policy: Any = make_policy(self.player, env)[0]
-        policy.reset(np.ones(1, np.bool_), np.array([number]))
+    from socialai_dsl.replay import Thought
 
-        def think(observation: Any) -> Thought:
-            probabilities, value = policy.think(observation)
-            rounded = [[round(share, 4) for share in head] for head in probabilities]
-            return Thought(probabilities=rounded, value=round(value, 4))
+    policy.reset(np.ones(1, np.bool_), np.array([number]))
 
-        return think
+    def think(observation: Any) -> Thought:
+        probabilities, value = policy.think(observation)
+        rounded = [[round(share, 4) for share in head] for head in probabilities]
+        return Thought(probabilities=rounded, value=round(value, 4))
+
+    return think
 
 
 def evaluate_agent(agent: str | Player, scenario: str, episodes: int = 500) -> Evaluation:
@@ -183,9 +186,10 @@ def evaluate_agent(agent: str | Player, scenario: str, episodes: int = 500) -> E
     """
     player = agent if isinstance(agent, Player) else Player(named_agent(agent, scenario))
     import socialai_dsl
+    from socialai_dsl.envs.factory import compiled
 
     loaded = socialai_dsl.load(scenario)
-    program = socialai_dsl.compile(loaded)
+    program = compiled(loaded)
     endings = endings_of(loaded, program)
     if player.agent == "human":
         result, actions = _let_a_person_play(scenario, program, episodes)
@@ -204,7 +208,7 @@ def evaluate_agent(agent: str | Player, scenario: str, episodes: int = 500) -> E
     if player.is_trained:
         require_trainer()
     envs = socialai_dsl.make_vec(
-        with_script(scenario) if player.agent == "oracle" else scenario,
+        with_script(scenario) if player.agent == "oracle" else program,
         num_envs=min(_TOGETHER, episodes),
         copy=False,
         autoreset_mode="Disabled",

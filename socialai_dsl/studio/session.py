@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite, about_of
+from socialai_dsl.checking.loaded import LoadedScenario, LoadedSuite, about_of, unscripted
 from socialai_dsl.compilation import compile_loaded, scenarios_of
 from socialai_dsl.diagnostics import Diagnostic, ScenarioError, Severity
 from socialai_dsl.engine.calls import RoomError
@@ -20,7 +20,6 @@ from socialai_dsl.envs.typed import Phrases, split_line
 from socialai_dsl.frontend import Loaded, check, load
 from socialai_dsl.library import prelude
 from socialai_dsl.loader.reader import display_name
-from socialai_dsl.program_suite import unscripted
 from socialai_dsl.replay import Thought, Tracer
 from socialai_dsl.replay.endings import endings_of
 from socialai_dsl.replay.page import replay_page
@@ -237,14 +236,14 @@ class Session:
         """Let somebody else play."""
         path = str(self._path)
         loaded = load(path, self._texts)
-        if player == "script" and unscripted(compile_loaded(loaded)):
+        if player == "script" and unscripted(loaded):
             try:
                 loaded = load(f"{path}+oracle", self._texts)
             except ScenarioError as error:
                 known = all(one.code == "S503" for one in error.diagnostics)
                 said = "" if known else f": {error.diagnostics[0].text}"
                 raise RefusalError(f"the agent has no script: there is no variant `oracle`{said}") from None
-            if unscripted(compile_loaded(loaded)):
+            if unscripted(loaded):
                 raise RefusalError("the variant `oracle` gives the agent no frame")
         self._use(loaded)
         if player not in ("me", "script", "random"):

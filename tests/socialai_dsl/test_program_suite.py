@@ -6,8 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import socialai_dsl as sd
+from socialai_dsl.checking.loaded import unscripted
 from socialai_dsl.program import Program
-from socialai_dsl.program_suite import ProgramSuite, mixture, unscripted
+from socialai_dsl.program_suite import ProgramSuite, mixture
 
 FOLDER = Path(__file__).parents[1] / "data" / "suites"
 
@@ -52,9 +53,9 @@ def test_what_means_something_while_a_member_plays() -> None:
 
 
 def test_scripted_only_if_all_are() -> None:
-    assert unscripted(program("talkitout+oracle")) == ()
-    assert unscripted(program("talkitout")) == ("talkitout",)
-    assert unscripted(suite("pair.yaml"))
+    assert unscripted(sd.load("talkitout+oracle")) == ()
+    assert unscripted(sd.load("talkitout")) == ("talkitout",)
+    assert unscripted(sd.load(f"{FOLDER}/pair.yaml"))
 
 
 def test_a_mixture_shares_texts_but_keeps_each_members_own_pairs() -> None:
