@@ -13,7 +13,7 @@ from filelock import FileLock, Timeout
 
 from socialai_dsl.atomic import write_json as write_json
 from socialai_dsl.atomic import write_text as write_text
-from socialai_dsl.errors import UsageError
+from socialai_dsl.errors import UsageError, first_mistake
 from socialai_dsl.experiments.folder import EPISODES as EPISODES
 from socialai_dsl.experiments.folder import REPLAY as REPLAY
 
@@ -123,6 +123,5 @@ def read_config(folder: Path) -> "RunConfig":
         # As JSON, because strict validation takes no lists for tuples from Python.
         return RunConfig.model_validate_json(json.dumps(read_json(folder / SETTINGS)))
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise UsageError(f"{folder / SETTINGS}: {place}: {first['msg']}") from None
+        place, said = first_mistake(error.errors())
+        raise UsageError(f"{folder / SETTINGS}: {place}: {said}") from None

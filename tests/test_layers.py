@@ -42,7 +42,10 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
     "draws": (set(), {"numpy", "numba"}),
     "vocabulary": (set(), set()),
     "grammar": ({"source", "diagnostics", "vocabulary"}, {"lark"}),
-    "schema": ({"source", "diagnostics", "vocabulary", "grammar"}, {"pydantic", "pydantic_core", CONFIG}),
+    "schema": (
+        {"source", "diagnostics", "errors", "vocabulary", "grammar"},
+        {"pydantic", "pydantic_core", CONFIG},
+    ),
     "semantics": ({"source", "diagnostics", "draws", "vocabulary", "grammar", "schema"}, set()),
     "loader": (
         TEXT_SIDE - {"frontend", "checking", "library"},
@@ -92,7 +95,7 @@ MAY_IMPORT: dict[str, tuple[set[str], set[str]]] = {
         {"filelock", "ray", "submitit", "yaml", CONFIG, SHIPPED},
     ),
     "reporting": (
-        {"experiments", "baselines"},
+        {"errors", "experiments", "baselines"},
         {"numpy", "pandas", "scipy", "matplotlib", "pydantic", "jinja2", "markupsafe", CONFIG},
     ),
     "sb3": (set(), {"numpy", "gymnasium", "stable_baselines3"}),

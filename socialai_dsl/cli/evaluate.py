@@ -82,7 +82,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     """Evaluate on each scenario."""
     from socialai_dsl.evaluation.players import named_agent
     from socialai_dsl.evaluation.recordings import record
-    from socialai_dsl.evaluation.testing import evaluate_agent
+    from socialai_dsl.evaluation.testing import evaluate_agent, own_scenario
 
     if arguments.record is not None and arguments.out is None:
         raise UsageError("--record: expected --out DIR as well, where the recordings go")
@@ -91,7 +91,7 @@ def execute(arguments: argparse.Namespace) -> Exit:
     player = _player(arguments)
     out = player.out if player.options is not None else arguments.out
     results = []
-    for scenario in arguments.on or [_own_scenario(arguments.run)]:
+    for scenario in arguments.on or [own_scenario(arguments.run)]:
         playing = replace(player, agent=named_agent(player.agent, scenario))
         evaluation = evaluate_agent(playing, scenario, arguments.episodes)
         for warning in evaluation.warnings:
@@ -125,6 +125,7 @@ def _player(arguments: argparse.Namespace) -> "Player":
         require_trainer,
         resolve_device,
     )
+    from socialai_dsl.evaluation.testing import own_scenario
 
     agent = arguments.run
     if agent.startswith(MODEL_PREFIX):
@@ -139,17 +140,8 @@ def _player(arguments: argparse.Namespace) -> "Player":
         arguments.greedy,
         arguments.seed,
         arguments.net,
-        code_folder(_own_scenario(agent) if has_own else arguments.on[0]),
+        code_folder(own_scenario(agent) if has_own else arguments.on[0]),
     )
-
-
-def _own_scenario(agent: str) -> str:
-    from socialai_dsl.evaluation.testing import own_scenario
-
-    try:
-        return own_scenario(agent)
-    except UsageError as error:
-        raise UsageError(f"--on: {error}") from None
 
 
 def _text(results: list[dict[str, Any]]) -> str:

@@ -3,6 +3,7 @@
 import argparse
 import gc
 import os
+import re
 import sys
 import traceback
 import warnings
@@ -14,7 +15,7 @@ from typing import Any, Final, NoReturn
 from socialai_dsl.cli import former
 from socialai_dsl.cli.errors import Exit, is_usage
 from socialai_dsl.cli.terminal import shows_color
-from socialai_dsl.diagnostics import ScenarioError, printable, render_text
+from socialai_dsl.diagnostics import ScenarioError, did_you_mean, printable, render_text
 from socialai_dsl.engine.calls import RoomError
 from socialai_dsl.errors import RunFailed, UsageError
 
@@ -174,6 +175,15 @@ def _explain(program: str, error: Exception) -> Exit:
 
 class _Parser(argparse.ArgumentParser):
     """Says what is wrong with the command in text that no terminal acts on, whatever was typed."""
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As argparse does; an option that does not exist is answered with the nearest one that does."""
+        known, unknown = super().parse_known_args(args, namespace)
+        for word in [word for word in unknown if word.startswith("--")]:
+            near = did_you_mean(word.partition("=")[0], re.findall(r"--[a-z-]+", self.format_help()))
+            cure = f"did you mean {near}?" if near else f"`{self.prog} --help` lists the options"
+            self.exit(Exit.USAGE, f"{self.prog}: there is no option {printable(word)}; {cure}\n")
+        return known, unknown
 
     def error(self, message: str) -> NoReturn:
         super().error(printable(message))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from socialai_dsl.cli.arguments import natural, positive
 from socialai_dsl.cli.errors import Exit
-from socialai_dsl.errors import UsageError
+from socialai_dsl.errors import UsageError, first_mistake
 from socialai_dsl.run_folder import REPLAY, SETTINGS, read_json, write_text
 
 if TYPE_CHECKING:
@@ -99,9 +99,8 @@ def _read(path: Path) -> "list[Trace]":
         found = json.loads(path.read_text(encoding="utf-8"))
         traces = TypeAdapter(list[Trace]).validate_python([found] if isinstance(found, dict) else found)
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise UsageError(f"{path}: {place or 'the file'}: {first['msg']}") from None
+        place, said = first_mistake(error.errors())
+        raise UsageError(f"{path}: {place or 'the file'}: {said}") from None
     except (ValueError, RecursionError) as error:
         raise UsageError(f"{path}: expected a JSON list of traces, {error}") from None
     if not all(trace.moments for trace in traces) or not traces:

@@ -10,7 +10,7 @@ from typing import Any, Final, get_args
 from pydantic import ValidationError
 
 from socialai_dsl.diagnostics import did_you_mean
-from socialai_dsl.errors import UsageError
+from socialai_dsl.errors import UsageError, first_mistake
 from socialai_dsl.evaluation.players import folder_of, named_agent, resolve_device
 from socialai_dsl.evaluation.scripts import scripted_name
 from socialai_dsl.experiments.settings import resolved_config
@@ -157,11 +157,9 @@ def checked_config(given: dict[str, Any]) -> RunConfig:
     try:
         return resolved_config(given)
     except ValidationError as error:
-        first = error.errors()[0]
-        said = first["msg"].removeprefix("Value error, ")
-        if first["loc"]:
-            name, said = str(first["loc"][0]), f"{said}, got {first['input']!r}"
-        else:  # of options that contradict each other, the message begins with one
+        place, said = first_mistake(error.errors())
+        name = place.partition(".")[0]
+        if not name:  # of options that contradict each other, the message begins with one
             name, _, said = said.partition(": ")
         typed = f"--{name.replace('_', '-')}" if name in FLAGS else f"--hyper {name}"
         raise UsageError(f"{typed}: {said}") from None

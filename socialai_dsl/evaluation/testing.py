@@ -333,7 +333,7 @@ def own_scenario(agent: str) -> str:
     """
     run = folder_of(agent)
     if not (run / SETTINGS).is_file():
-        raise UsageError(f"{run} does not say which scenario it was trained on; name one")
+        raise UsageError(f"{run} does not say which scenario it was trained on; name one by --on")
     scenario = read_json(run / SETTINGS).get("scenario")
     if not isinstance(scenario, str):
         raise UsageError(f"{run / SETTINGS}: scenario: expected a text, got {scenario!r}")

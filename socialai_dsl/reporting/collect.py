@@ -37,7 +37,7 @@ from socialai_dsl.reporting.records import (
     StartRecord,
     StatusRecord,
     UpdateRecord,
-    first_mistake,
+    described,
 )
 from socialai_dsl.reporting.seeds import read_updates
 from trainer.config import HYPER, RunConfig, configure
@@ -152,7 +152,7 @@ def read_experiment(folder: Path) -> Experiment:
     try:
         record = ExperimentRecord.model_validate_json(path.read_bytes())
     except ValidationError as error:
-        raise ValueError(f"{path}: {first_mistake(error)}") from None
+        raise ValueError(f"{path}: {described(error)}") from None
     entries: dict[str, list[RunEntry]] = {entry.name: [] for entry in record.conditions}
     for run in record.runs:
         if run.condition not in entries:
@@ -277,7 +277,7 @@ def _read(path: Path, form: TypeAdapter[Content], problems: list[str]) -> Conten
     except OSError as error:
         problems.append(f"{path.name} cannot be read ({error.strerror})")
     except ValidationError as error:
-        problems.append(f"{path.name} is damaged ({first_mistake(error)})")
+        problems.append(f"{path.name} is damaged ({described(error)})")
     return None
 
 

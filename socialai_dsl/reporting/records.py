@@ -6,6 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
+from socialai_dsl.errors import first_mistake
+
 _Words = Annotated[str, BeforeValidator(lambda value: "" if value is None else value)]
 """A text that may be left out, or null, which is the same."""
 
@@ -160,8 +162,6 @@ class UpdateRecord(_Record):
     rules: dict[str, float | None]
 
 
-def first_mistake(error: ValidationError) -> str:
+def described(error: ValidationError) -> str:
     """Where the first mistake of a file is, and what."""
-    first = error.errors()[0]
-    place = ".".join(str(part) for part in first["loc"])
-    return f"{place}: {first['msg']}" if place else first["msg"]
+    return ": ".join(filter(None, first_mistake(error.errors())))

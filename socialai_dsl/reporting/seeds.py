@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from socialai_dsl.reporting.records import UpdateRecord, first_mistake
+from socialai_dsl.reporting.records import UpdateRecord, described
 
 Float = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ def read_updates(metrics: Path) -> list[UpdateRecord]:
         try:
             updates.append(UpdateRecord.model_validate_json(line))
         except ValidationError as error:
-            what = first_mistake(error)
+            what = described(error)
             raise ValueError(f"{metrics}:{number}: expected an update as JSON, {what}") from None
     return updates
 

@@ -15,6 +15,7 @@ from pydantic import (
     create_model,
 )
 
+from socialai_dsl.errors import first_mistake
 from socialai_dsl.schema.scenario import Model, Prose, Word, _as_tuple, _one_or_many
 from socialai_dsl.schema.suite import MemberName
 from trainer.config import FLAGS, HYPER, RunConfig
@@ -137,8 +138,7 @@ def one_setting(name: str, value: str | int) -> Settings | str:
     try:
         return Settings.model_validate({name: value})
     except ValidationError as error:
-        said = error.errors()[0]["msg"]
-        return said[:1].lower() + said[1:]
+        return first_mistake(error.errors())[1].partition(", got ")[0]  # the finding says the value itself
 
 
 class Condition(Settings):

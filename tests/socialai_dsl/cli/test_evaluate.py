@@ -117,7 +117,7 @@ def test_what_does_not_fit_is_refused_and_the_rest_is_kept(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["random"], "--on: random does not say which"),
+        (["random"], "random does not say which"),
         (["nowhere", "--on", "help"], "nowhere"),
         (["random", "--on", "help", "--record", "3"], "--record: expected --out DIR as well"),
         (["random", "--on", "help", "--seed", str(1 << 63)], "seed: got 9223372036854775808"),

@@ -128,6 +128,21 @@ def test_the_completion_script_is_sound(capsys: Capture) -> None:
     subprocess.run(["bash", "-n"], input=capsys.readouterr().out, text=True, check=True, timeout=30)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "talkitout", "--nett", "x"], "socialai run: there is no option --nett; did you mean --net?"),
+        (
+            ["list", "--wibble=3"],
+            "socialai list: there is no option --wibble=3; `socialai list --help` lists the options",
+        ),
+    ],
+)
+def test_an_option_that_does_not_exist(arguments: list[str], message: str, capsys: Capture) -> None:
+    assert main(arguments) == 2
+    assert capsys.readouterr().err == f"{message}\n"
+
+
 def test_a_run_that_stops_by_itself(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
     assert ending_with(monkeypatch, RunFailed("the loss is not finite"))() == 4
     assert capsys.readouterr().err == "socialai: the loss is not finite\n"

@@ -85,7 +85,7 @@ def test_runs_without_an_experiment(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     [
         (None, "expected the folder of a run"),
         ("{", "experiment.json: "),
-        ('{"format": 1}', "name: Field required"),
+        ('{"format": 1}', "name: is missing"),
     ],
 )
 def test_what_is_no_experiment_is_said(

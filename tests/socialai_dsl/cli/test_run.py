@@ -265,17 +265,17 @@ def test_a_trained_agent_is_evaluated_elsewhere(trained: Path, capsys: Capture) 
         (["corridor.yaml", "--hyper", "envs=3"], "envs has an option of its own, --envs"),
         (["corridor.yaml", "--hyper", "lr=1", "--hyper", "lr=2"], "--hyper: lr is given twice"),
         (["corridor.yaml", "--hyper", "lr=[1]"], "expected a number, a word, true, false or null"),
-        (["corridor.yaml", "--hyper", "lr=-1"], "--hyper lr: Input should be greater than 0, got -1"),
+        (["corridor.yaml", "--hyper", "lr=-1"], "--hyper lr: expected more than 0, got -1"),
         (["corridor.yaml", "--hyper", "bptt=5"], "--hyper bptt: got 5, expected a divisor of horizon = 32"),
         (
             ["corridor.yaml", "--checkpoint-every", "0"],
-            "--checkpoint-every: Input should be greater than or equal to 1",
+            "--checkpoint-every: expected at least 1",
         ),
         (
             ["corridor.yaml", "--keep-checkpoints", "0"],
-            "--keep-checkpoints: Input should be greater than or equal to 1",
+            "--keep-checkpoints: expected at least 1",
         ),
-        (["corridor.yaml", "--seed", "-1"], "--seed: Input should be greater than or equal to 0, got -1"),
+        (["corridor.yaml", "--seed", "-1"], "--seed: expected at least 0, got -1"),
         (
             ["corridor.yaml", "--guide", "script"],
             "corridor.yaml: the agent of corridor has no frame, and there is no variant",
@@ -408,7 +408,7 @@ def test_a_scripted_scenario_is_guided_unless_another_recipe_is_asked_for(capsys
     assert "--frames: got 4096, expected 2048, because guide and schedules" in said
     assert json.loads(Path("here/config.json").read_text()) == config, "it can still be resumed as it was"
     assert run_main(["--resume", "here", "--frames", "-1"]) == 2
-    assert "--frames: Input should be greater than or equal to 0, got -1" in capsys.readouterr().err
+    assert "--frames: expected at least 0, got -1" in capsys.readouterr().err
     assert run_main(["help", "--recipe", "plain", *few, "--out", "plain"]) == 0
     assert (result_of("plain")["recipe"], result_of("plain")["guide"]) == ("plain", "none")
 

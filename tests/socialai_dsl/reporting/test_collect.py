@@ -111,7 +111,7 @@ def test_a_folder_in_place_of_a_file_is_a_problem_too(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"format": 2}, "format: Input should be 1"),
+        ({"format": 2}, "format: expected 1, got 2"),
         (
             {"runs": [{"id": "x", "condition": "nobody", "seed": 0}]},
             "condition 'nobody', which is not listed",
