@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from socialai_dsl.loader.reader import read_document
+from socialai_dsl.loader.reader import Data, read_document
 from socialai_dsl.schema.scenario import Model, UtteranceGrammar, Word
 from socialai_dsl.semantics.entities import Prelude
 from socialai_dsl.semantics.terms import COLOR, ObjectType
@@ -112,7 +112,7 @@ def types_by_code() -> dict[int, ObjectType]:
 
 
 @cache
-def shared_grammars() -> dict[str, object]:
+def shared_grammars() -> dict[str, Data]:
     """The grammars that a scenario can name, as plain data."""
     document = read_document(_FOLDER / "grammars.yaml")
     GrammarLibrary.model_validate(document.data)

@@ -260,13 +260,14 @@ def _types() -> Iterator[str]:
 
 def _grammars() -> Iterator[str]:
     from socialai_dsl.library import shared_grammars
+    from socialai_dsl.schema.scenario import UtteranceGrammar
 
     yield "## Shared grammars\n"
     yield "| name | templates | nouns |\n|---|---|---|"
-    for name, grammar in shared_grammars().items():
-        assert isinstance(grammar, dict), "internal: a library has its model"
-        templates = ", ".join(f"`{text}`" for text in grammar["templates"])
-        nouns = ", ".join(map(str, grammar["nouns"]))
+    for name, written in shared_grammars().items():
+        grammar = UtteranceGrammar.model_validate(written)
+        templates = ", ".join(f"`{text}`" for text in grammar.templates)
+        nouns = ", ".join(map(str, grammar.nouns))
         yield f"| `{name}` | {templates} | {nouns} |"
     yield ""
 

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from collections.abc import Container, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Final
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, ScenarioError, Severity, did_you_mean
 from socialai_dsl.library import GrammarLibrary, ObjectLibrary, prelude, shared_grammars
+from socialai_dsl.loader.library import Node
 from socialai_dsl.loader.reader import Data, read_plain
 from socialai_dsl.loader.resolved import ResolvedFile
 from socialai_dsl.schema.scenario import CastMember, Npc, Scenario
-from socialai_dsl.schema.shape import PARAMETER, MovedPlaces, ShapedFile, model_of, written
+from socialai_dsl.schema.shape import PARAMETER, ShapedFile, model_of
 from socialai_dsl.semantics.check import check_meaning
 from socialai_dsl.semantics.plans import CheckedScenario
-from socialai_dsl.source import DataPath, Positions
 from socialai_dsl.vocabulary import PRIMITIVES
 
 Value = int | bool | float | str
@@ -23,50 +23,33 @@ Value = int | bool | float | str
 _WHOLE = re.compile(r"\$([A-Za-z_]\w*)")
 
 
-@dataclass(frozen=True)
-class Substitution:
-    """A document with its parameters put in.
+def put_parameters(
+    tree: Node, values: Mapping[str, Value], declared: Container[str], bag: DiagnosticBag
+) -> None:
+    """Put its value in wherever a parameter is the whole of a value; reports S206.
 
-    Attributes:
-        data: a copy in which every value that was `$name` is the parameter's value.
-        values: parameter -> value, for those inside expressions.
-        paths: where a whole value was a parameter.
+    Args:
+        tree: a scenario; changed.
+        values: parameter -> value.
+        declared: all parameters, also those without a value.
+        bag: takes the findings.
     """
-
-    data: Mapping[str, object]
-    values: dict[str, Value] = field(default_factory=dict)
-    paths: frozenset[DataPath] = frozenset()
-
-
-def substitute(resolved: ResolvedFile, bag: DiagnosticBag) -> Substitution:
-    """Put the parameters in: defaults, or what was given behind `?`. Reports S206."""
-    assert isinstance(resolved.data, dict), "internal: a file is a mapping"
-    values, declared = _values(resolved, bag), _declared(resolved)
-    paths: list[DataPath] = []
-
-    def filled(part: Data, path: DataPath) -> Data:
-        if isinstance(part, dict):
-            return {key: filled(value, (*path, key)) for key, value in part.items()}
-        if isinstance(part, list):
-            return [filled(value, (*path, i)) for i, value in enumerate(part)]
-        match = _WHOLE.fullmatch(part) if isinstance(part, str) else None
-        if match is None:
-            return part
+    for path, node in tree.walk():
+        match = _WHOLE.fullmatch(node.value) if isinstance(node.value, str) else None
+        if match is None or path[:1] == ("params",):
+            continue
         name = match.group(1)
         if name in values:
-            paths.append(path)
-            return values[name]
-        if name not in declared:  # without a default, it is reported where it is declared
+            node.put(values[name])
+            node.substituted = True
+        elif name not in declared:  # without a default, it is reported where it is declared
             near = did_you_mean(name, values)
-            span = resolved.locate(path, 0, len(name) + 1)
+            span = node.document.locate(node.path, 0, len(name) + 1)
             bag.error("S206", f"unknown parameter `{name}`", span, suggestion=near)
-        return part
-
-    data = {key: part if key == "params" else filled(part, (key,)) for key, part in resolved.data.items()}
-    return Substitution(data, values, frozenset(paths))
 
 
-def _values(resolved: ResolvedFile, bag: DiagnosticBag) -> dict[str, Value]:
+def parameter_values(resolved: ResolvedFile, bag: DiagnosticBag) -> dict[str, Value]:
+    """Parameter -> value: its default, or what was given behind `?`; reports S206."""
     declared = _declared(resolved)
     values: dict[str, Value] = {}
     for name, declaration in declared.items():
@@ -154,146 +137,103 @@ _ONE_EACH: Final = ("name", "color", "place", "facing", "at")
 """Keys of a group whose lists give one value each."""
 
 
-@dataclass(frozen=True)
-class SpreadCast:
-    """A document whose groups of the cast are written out.
-
-    Attributes:
-        data: the document.
-        places: where its parts stand; those of a member of a group, where the group is written.
-        paths: the paths that were given, in the document as it is now.
-    """
-
-    data: Mapping[str, object]
-    places: Positions
-    paths: frozenset[DataPath]
-
-
-def spread(
-    data: Mapping[str, object], places: Positions, paths: frozenset[DataPath], bag: DiagnosticBag
-) -> SpreadCast:
-    """Write out the groups; reports counts that are none, and lists of another length.
+def spread(tree: Node, bag: DiagnosticBag) -> None:
+    """Write out the groups of the cast; reports counts that are none, and lists of another length.
 
     Args:
-        data: a scenario as plain data.
-        places: where its parts stand.
-        paths: of values that were a parameter.
+        tree: a scenario; changed.
         bag: takes the findings.
     """
-    cast = data.get("cast")
-    if not isinstance(cast, dict):
-        return SpreadCast(data, places, paths)
-    members: dict[str, object] = {}
-    origins: dict[DataPath, DataPath] = {}
-    for name, member in cast.items():
-        if "[" in str(name):
-            message = f"`{name}` is not a name"
+    cast = tree.entry("cast")
+    if cast is None or not isinstance(cast.children, dict):
+        return
+    members: dict[str, Node] = {}
+    for name, member in cast.children.items():
+        if "[" in name:
             hint = "a group is written once, with `count:`"
-            bag.error("S104", message, places.key_span(("cast", name)), hint=hint)
-        member = _with_one_frame(name, member, places, bag)
-        if not isinstance(member, dict) or "count" not in member or name == _AGENT:
-            members[name] = _alone(name, member, places, bag)
+            bag.error("S104", f"`{name}` is not a name", member.key_span(), hint=hint)
+        if isinstance(member.children, dict):
+            _keep_one_frame(name, member, member.children, bag)
+        written = member.entry("count")
+        if written is None or name == _AGENT:
+            if isinstance(member.children, dict):
+                _keep_alone(name, member.children, bag)
+            members[name] = member
             continue
-        count = _count(name, member["count"], places, bag)
+        count = _count(written, bag)
         for i in range(count or 1):
-            members[f"{name}[{i}]"] = _one(name, member, i, count, places, bag, origins)
-            origins[("cast", f"{name}[{i}]")] = ("cast", name)
-    if members == cast:
-        return SpreadCast(data, places, paths)
-    moved = {copy for copy in _paths(members, ("cast",)) if written(copy, origins) in paths}
-    return SpreadCast({**data, "cast": members}, MovedPlaces(places, origins), paths | moved)
+            members[f"{name}[{i}]"] = _one(member, i, count, bag)
+    cast.children = members
 
 
-def _with_one_frame(name: str, member: object, places: Positions, bag: DiagnosticBag) -> object:
-    """A member that is given several frames with the first of them only."""
-    if not isinstance(member, dict):
-        return member
+def _keep_one_frame(name: str, member: Node, keys: dict[str, Node], bag: DiagnosticBag) -> None:
+    """Of several frames that a member is given keep the first."""
     for key in ("frames", "frame"):
-        given = member.get(key)
-        if not isinstance(given, list):
+        given = keys.get(key)
+        if given is None or not isinstance(given.children, list):
             continue
-        made = {other: value for other, value in member.items() if other != key}
-        words = [str(word) for word in given]
+        words = [str(item.data()) for item in given.children]
         if len(words) > 1:
             message = f"`{words[0]}` and `{words[1]}` would both move `{name}`: a member follows one frame"
             hint = "join them in one frame, or let two members follow them"
-            bag.error("S313", message, places.value_span(("cast", name, key, 1)), hint=hint)
+            bag.error("S313", message, given.children[1].value_span(), hint=hint)
         else:
             hint = f"write `frame: {words[0]}`" if words else "leave it out: without a frame it stays"
-            message = "`frame` names one frame, here is a list"
-            bag.error("S104", message, places.value_span(("cast", name, key)), hint=hint)
-        return {**made, "frame": words[0]} if words else made
-    return member
+            bag.error("S104", "`frame` names one frame, here is a list", given.value_span(), hint=hint)
+        del keys[key]
+        if words:
+            given.put(words[0])
+            keys["frame"] = given
+        return
 
 
-def _alone(name: str, member: object, places: Positions, bag: DiagnosticBag) -> object:
-    """A member that is no group: it has no `count`, and no lists of one value for each."""
-    if not isinstance(member, dict):
-        return member
-    if "count" in member:
-        message = "there is one agent, so it has no `count`"
-        bag.error("S101", message, places.key_span(("cast", name, "count")))
-    made = {key: value for key, value in member.items() if key != "count"}
-    for key in [key for key in made if did_you_mean(str(key), [*_KEYS, "count"]) == "count"]:
+def _keep_alone(name: str, keys: dict[str, Node], bag: DiagnosticBag) -> None:
+    """Leave out what only groups have: `count`, and lists of one value for each."""
+    if "count" in keys:
+        bag.error("S101", "there is one agent, so it has no `count`", keys.pop("count").key_span())
+    for key in [key for key in keys if did_you_mean(key, [*_KEYS, "count"]) == "count"]:
         message = f"unknown key `{key}` in a member of the cast"
-        bag.error("S101", message, places.key_span(("cast", name, key)), suggestion="count")
-        del made[key]
+        bag.error("S101", message, keys.pop(key).key_span(), suggestion="count")
     for key in _ONE_EACH[:-1]:
-        if isinstance(made.get(key), list):
+        if key in keys and isinstance(keys[key].children, list):
             message = f"a list gives one `{key}` to each of a group; `{name}` is only one"
             hint = None if name == _AGENT else "a group has a `count`; alternatives are drawn by pick(a | b)"
-            bag.error("S104", message, places.value_span(("cast", name, key)), hint=hint)
-            del made[key]
-    return made
+            bag.error("S104", message, keys.pop(key).value_span(), hint=hint)
 
 
-def _count(name: str, count: object, places: Positions, bag: DiagnosticBag) -> int | None:
+def _count(written: Node, bag: DiagnosticBag) -> int | None:
     """How many a group has; None if that is not known."""
+    count = written.value
     if isinstance(count, int) and not isinstance(count, bool) and 1 <= count <= MOST_MEMBERS:
         return count
     if isinstance(count, str) and PARAMETER.fullmatch(count):
         return None  # there is no such parameter, which has been said
     message = f"`count` is a number of members from 1 to {MOST_MEMBERS}"
-    bag.error("S106", message, places.value_span(("cast", name, "count")))
+    bag.error("S106", message, written.value_span())
     return None
 
 
-def _one(
-    name: str,
-    member: Mapping[str, Any],
-    index: int,
-    count: int | None,
-    places: Positions,
-    bag: DiagnosticBag,
-    origins: dict[DataPath, DataPath],
-) -> dict[str, object]:
+def _one(group: Node, index: int, count: int | None, bag: DiagnosticBag) -> Node:
     """One member of a group."""
-    made: dict[str, object] = {}
-    for key, value in member.items():
+    made: dict[str, Node] = {}
+    for key, value in group.items():
+        items = value.children
         if key == "count":
             continue
-        if key not in _ONE_EACH or not isinstance(value, list):
-            made[key] = value
+        if key not in _ONE_EACH or not isinstance(items, list):
+            made[str(key)] = value
             continue
-        one_cell = key == "at" and not any(isinstance(cell, list) for cell in value)
-        given = [value] if one_cell else value
-        if len(given) != count:
-            if index == 0 and count is not None:
-                message = f"{len(given)} given for {count}: a list has one for each member of the group"
-                bag.error("S106", message, places.value_span(("cast", name, key)))
-            continue
-        made[key] = given[index]
-        if not one_cell:
-            origins[("cast", f"{name}[{index}]", key)] = ("cast", name, key, index)
-    return made
-
-
-def _paths(part: object, path: DataPath) -> Iterator[DataPath]:
-    """The paths of a part and of all below it."""
-    yield path
-    items = part.items() if isinstance(part, dict) else enumerate(part) if isinstance(part, list) else ()
-    for key, value in items:
-        yield from _paths(value, (*path, key))
+        given = (
+            [value] if key == "at" and not any(isinstance(cell.children, list) for cell in items) else items
+        )
+        if len(given) == count:
+            made[str(key)] = given[index]
+        elif index == 0 and count is not None:
+            message = f"{len(given)} given for {count}: a list has one for each member of the group"
+            bag.error("S106", message, value.value_span())
+    member = Node(group.document, group.path, {})
+    member.children = made
+    return member
 
 
 def check_npc(resolved: ResolvedFile, bag: DiagnosticBag) -> None:
@@ -352,13 +292,13 @@ class Draft:
 
     Attributes:
         scenario: its models. name: with variants.
-        shaped: the data the models were made of. filled: its parameters. patched: whether a variant changed it.
+        shaped: the data the models were made of. values: its parameters. patched: whether a variant changed it.
     """
 
     scenario: Scenario
     name: str
     shaped: ShapedFile[Scenario]
-    filled: Substitution
+    values: Mapping[str, Value]
     patched: bool = False
 
     def with_actions(self, actions: tuple[str, ...]) -> Draft:
@@ -390,16 +330,18 @@ def draft_of(resolved: ResolvedFile, bag: DiagnosticBag) -> Draft | None:
         bag.extend(error.diagnostics)
         return None
     assert isinstance(resolved.data, dict), "internal: a file is a mapping"
-    filled = substitute(resolved, bag)
-    data = _with_grammar(filled, resolved, bag)
-    abstract = data.get("abstract") is True
-    groups = spread(data, resolved, filled.paths, bag)
-    filled = replace(filled, paths=groups.paths)
-    failed = bag.has_errors
-    shaped = model_of(Scenario, groups.data, groups.places, bag, partial=abstract)
+    values, declared = parameter_values(resolved, bag), _declared(resolved)
+    whole = resolved.changed(
+        lambda tree: put_parameters(tree, values, declared, bag),
+        lambda tree: put_grammar(tree, bag),
+        lambda tree: spread(tree, bag),
+    )
+    assert isinstance(whole.data, dict), "internal: a file is a mapping"
+    abstract, failed = whole.data.get("abstract") is True, bag.has_errors
+    shaped = model_of(Scenario, whole.data, whole, bag, partial=abstract)
     if shaped.model is None or abstract or failed:
         return None
-    return Draft(shaped.model, resolved.name, shaped, filled, bool(resolved.edits))
+    return Draft(shaped.model, resolved.name, shaped, values, bool(resolved.edits))
 
 
 def meaning_of(draft: Draft, bag: DiagnosticBag) -> CheckedScenario | None:
@@ -410,9 +352,9 @@ def meaning_of(draft: Draft, bag: DiagnosticBag) -> CheckedScenario | None:
         bag: what was found in this scenario so far; takes the findings.
     """
     found = DiagnosticBag()
-    shaped, filled = draft.shaped, draft.filled
+    shaped = draft.shaped
     checked = check_meaning(
-        draft.scenario, draft.name, shaped.places, found, prelude(), shaped.data, filled.values, filled.paths
+        draft.scenario, draft.name, shaped.places, found, prelude(), shaped.data, draft.values
     )
     if draft.patched:
         found = DiagnosticBag(d for d in found if d.code not in _OF_ALL_VARIANTS)
@@ -424,20 +366,18 @@ def meaning_of(draft: Draft, bag: DiagnosticBag) -> CheckedScenario | None:
     return None
 
 
-def _with_grammar(filled: Substitution, resolved: ResolvedFile, bag: DiagnosticBag) -> dict[str, object]:
-    """The data with the name of a shared grammar replaced by the grammar."""
-    data = dict(filled.data)
-    name = data.get("grammar")
-    if not isinstance(name, str):
-        return data
+def put_grammar(tree: Node, bag: DiagnosticBag) -> None:
+    """Put a shared grammar in place of its name."""
+    named = tree.entry("grammar")
+    if named is None or not isinstance(named.value, str):
+        return
     shared = shared_grammars()
-    if name in shared:
-        return {**data, "grammar": shared[name]}
-    span = resolved.value_span(("grammar",))
-    near = did_you_mean(name, shared)
-    hint = None if near else "shared are " + ", ".join(shared) + "; else write `templates` and `nouns`"
-    bag.error("S201", f"there is no shared grammar `{name}`", span, suggestion=near, hint=hint)
-    return {**data, "grammar": next(iter(shared.values()))}
+    if named.value not in shared:
+        near = did_you_mean(named.value, shared)
+        hint = None if near else "shared are " + ", ".join(shared) + "; else write `templates` and `nouns`"
+        message = f"there is no shared grammar `{named.value}`"
+        bag.error("S201", message, named.value_span(), suggestion=near, hint=hint)
+    named.put(shared.get(named.value, next(iter(shared.values()))))
 
 
 def naming_the_patch(finding: Diagnostic, resolved: ResolvedFile) -> Diagnostic:

@@ -147,15 +147,17 @@ class Node:
         path: where in that file.
         children: the entries of a mapping or list; None for a scalar.
         value: the scalar's value; None for a mapping or list.
+        substituted: whether it is the value of a parameter, so that places inside of it mean nothing.
     """
 
-    __slots__ = ("children", "document", "path", "value")
+    __slots__ = ("children", "document", "path", "substituted", "value")
 
     def __init__(self, document: Document, path: DataPath, data: Data) -> None:
         self.document = document
         self.path = path
         self.value: str | int | float | bool | None = None
         self.children: Children = None
+        self.substituted = False
         if isinstance(data, dict):
             self.children = {key: Node(document, (*path, key), part) for key, part in data.items()}
         elif isinstance(data, list):
@@ -213,6 +215,21 @@ class Node:
         entry = self.entry(key)
         return entry.value if entry is not None and isinstance(entry.value, str) else None
 
+    def put(self, data: Data) -> None:
+        """Put data in place of what is written here; all parts of it stand where this one does."""
+        self.value, self.children = None, None
+        if isinstance(data, dict):
+            self.children = {key: self._here(part) for key, part in data.items()}
+        elif isinstance(data, list):
+            self.children = [self._here(part) for part in data]
+        else:
+            self.value = data
+
+    def _here(self, data: Data) -> Node:
+        part = Node(self.document, self.path, None)
+        part.put(data)
+        return part
+
     def data(self) -> Data:
         """The part as plain data."""
         if isinstance(self.children, dict):
@@ -224,6 +241,7 @@ class Node:
     def copy(self) -> Node:
         """This part with all below it, free to be changed."""
         copied = Node(self.document, self.path, self.value)
+        copied.substituted = self.substituted
         if isinstance(self.children, dict):
             copied.children = {key: part.copy() for key, part in self.children.items()}
         elif isinstance(self.children, list):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -418,6 +418,18 @@ class ResolvedFile(PositionedData):
             path = path[:-1]
         part = self._parts[path]
         return part.document, part.path
+
+    def locate(self, path: DataPath, offset: int = 0, width: int = 1) -> Span:
+        """The place of a character of the text at `path`; of a parameter's value, where it is put in."""
+        part = self._parts.get(path)
+        return super().locate(path, 0 if part is not None and part.substituted else offset, width)
+
+    def changed(self, *steps: Callable[[Node], None]) -> ResolvedFile:
+        """This scenario after steps that change its tree."""
+        build = self._build.copy()
+        for step in steps:
+            step(build.tree)
+        return ResolvedFile(self._builder, build, self._given)
 
     def origin(self, path: DataPath) -> Span:
         """Where the value at `path` was written."""

@@ -345,7 +345,6 @@ def check_meaning(
     prelude: Prelude,
     data: object,
     params: Mapping[str, Scalar] | None = None,
-    substituted: frozenset[DataPath] = frozenset(),
 ) -> CheckedScenario | None:
     """The meaning of a scenario; None if it has mistakes, which `bag` then holds.
 
@@ -360,14 +359,13 @@ def check_meaning(
         prelude: object types.
         data: the document the models were made from.
         params: the values of the file's parameters.
-        substituted: paths of values that were a parameter as a whole.
     """
     words: dict[str, Type] = {}
     ranges = Ranges(scenario)
     checked: CheckedScenario | None = None
     for _ in range(_MAX_ROUNDS):
         found = DiagnosticBag()
-        findings = Findings(found, places, params or {}, substituted, data)
+        findings = Findings(found, places, params or {}, data)
         if AGENT not in scenario.cast:
             _no_agent(scenario, findings, places)
             break

@@ -61,7 +61,6 @@ class Findings:
         bag: takes the findings.
         places: path -> place in the file.
         params: the file's parameters with their values, for `$name`.
-        substituted: paths whose whole value was a parameter; places inside them mean nothing.
         data: the document, to tell one value from a list of one.
         unknown: the names that were found to mean nothing where they stand.
     """
@@ -69,7 +68,6 @@ class Findings:
     bag: DiagnosticBag
     places: Positions
     params: Mapping[str, Scalar] = field(default_factory=dict)
-    substituted: frozenset[DataPath] = frozenset()
     data: object = None
     unknown: set[str] = field(default_factory=set)
 
@@ -99,7 +97,7 @@ class Findings:
             span = self.places.key_span(path[:-1])
             quote = int(span.width > len(str(path[-2])))
             return span.shifted(offset + quote, width)
-        return self.places.locate(path, 0 if path in self.substituted else offset, width)
+        return self.places.locate(path, offset, width)
 
     def node(self, path: DataPath, node: ast.Expr) -> Span:
         """The place of a part of the expression at `path`."""

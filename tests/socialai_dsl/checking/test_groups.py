@@ -6,9 +6,10 @@ import pytest
 import yaml
 
 from socialai_dsl.checking.scenarios import MOST_MEMBERS as MOST
-from socialai_dsl.checking.scenarios import spread
+from socialai_dsl.checking.scenarios import put_parameters, spread
 from socialai_dsl.diagnostics import DiagnosticBag
 from socialai_dsl.frontend import check
+from socialai_dsl.loader.library import tree_of
 from socialai_dsl.loader.reader import read_document
 from socialai_dsl.source import Source
 
@@ -20,15 +21,16 @@ cast:
 """
 
 
-def written_out(text, paths=frozenset()):
-    document, bag = read_document(Source("party.yaml", text)), DiagnosticBag()
-    return spread(document.data, document, frozenset(paths), bag), list(bag)
+def written_out(text):
+    tree, bag = tree_of(read_document(Source("party.yaml", text))), DiagnosticBag()
+    spread(tree, bag)
+    return tree, list(bag)
 
 
 def test_each_member_has_its_own_of_a_list_and_the_rest_in_common():
     made, found = written_out(TEXT)
     assert not found
-    assert made.data["cast"] == {
+    assert made.data()["cast"] == {
         "peers[0]": {"name": "Bob", "color": "distinct", "at": [1, 1], "kind": "guest"},
         "peers[1]": {"name": "Cy", "color": "distinct", "at": [2, 1], "kind": "guest"},
         "peers[2]": {"name": "Dee", "color": "distinct", "at": [3, 1], "kind": "guest"},
@@ -40,24 +42,25 @@ def test_what_is_wrong_with_one_of_them_is_shown_where_it_is_written():
     made, _ = written_out(TEXT)
     columns = {"Bob": 28, "Cy": 33, "Dee": 37}
     for i, column in enumerate(columns.values()):
-        place = made.places.value_span(("cast", f"peers[{i}]", "name"))
+        place = made.at(("cast", f"peers[{i}]", "name")).value_span()
         assert (place.line, place.column) == (3, column)
-        assert made.places.key_span(("cast", f"peers[{i}]")).column == 3
-        assert made.places.locate(("cast", f"peers[{i}]", "at", 0)).line == 3
-        assert made.places.in_flow(("cast", f"peers[{i}]", "kind"))
+        assert made.at(("cast", f"peers[{i}]")).key_span().column == 3
+        assert made.at(("cast", f"peers[{i}]", "at", 0)).value_span().line == 3
 
 
 def test_parameters_are_followed_to_every_member():
-    made, _ = written_out(TEXT, [("cast", "peers", "kind")])
-    assert {path for path in made.paths if path[-1] == "kind" and "[" in path[1]} == {
-        ("cast", f"peers[{i}]", "kind") for i in range(3)
-    }
+    tree = tree_of(read_document(Source("party.yaml", TEXT.replace("guest", "$kind"))))
+    put_parameters(tree, {"kind": "guest"}, ["kind"], bag := DiagnosticBag())
+    spread(tree, bag)
+    kinds = [tree.at(("cast", f"peers[{i}]", "kind")) for i in range(3)]
+    assert [(kind.value, kind.substituted) for kind in kinds] == [("guest", True)] * 3
+    assert not list(bag)
 
 
 def test_without_groups_nothing_changes():
     text = "scenario: alone\ncast: {agent: {}, bob: {name: Bob}}\n"
     made, found = written_out(text)
-    assert made.data == yaml.safe_load(text)
+    assert made.data() == yaml.safe_load(text)
     assert not found
 
 
@@ -65,7 +68,7 @@ def test_without_groups_nothing_changes():
 def test_what_is_no_cast_is_left_to_others(cast):
     made, found = written_out(f"scenario: alone\ncast: {cast}\n")
     assert not found
-    assert set(made.data) == {"scenario", "cast"}
+    assert set(made.data()) == {"scenario", "cast"}
 
 
 @pytest.mark.parametrize(
@@ -99,7 +102,7 @@ def test_mistakes_are_reported_once(member, code, message):
 def test_a_group_of_one_is_a_group():
     made, found = written_out("scenario: party\ncast: {peers: {count: 1, at: [1, 1], name: [Bob]}}\n")
     assert not found
-    assert made.data["cast"] == {"peers[0]": {"at": [1, 1], "name": "Bob"}}
+    assert made.data()["cast"] == {"peers[0]": {"at": [1, 1], "name": "Bob"}}
 
 
 PARTY = """\
