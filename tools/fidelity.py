@@ -2,9 +2,11 @@
 
 import argparse
 import json
+import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
@@ -53,11 +55,21 @@ def execute(arguments: argparse.Namespace) -> Exit:
     if arguments.json:
         print(json.dumps([_object(name, c) for name, c in compared.items()], indent=2))
     if arguments.out is not None:
-        write_text(arguments.out, page(compared, arguments.episodes, arguments.seed))
+        today = datetime.now(UTC).date().isoformat()
+        write_text(arguments.out, page(compared, arguments.episodes, arguments.seed, today, _commit()))
     differing = [name for name, comparison in compared.items() if not comparison.agrees]
     if differing:
         print(f"differs from the paper's code: {', '.join(differing)}", file=sys.stderr)
     return Exit.FINDINGS if differing else Exit.GOOD
+
+
+def _commit() -> str:
+    """The commit that is checked out, short."""
+    command = ["git", "rev-parse", "--short", "HEAD"]
+    found = subprocess.run(
+        command, cwd=Path(__file__).parent, capture_output=True, text=True, check=True, timeout=60
+    )
+    return found.stdout.strip()
 
 
 def chosen(names: list[str]) -> Iterator[tuple[str, Published]]:

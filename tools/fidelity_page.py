@@ -16,7 +16,8 @@ knows nothing of any implementation and visits every corner a little: what ends 
 blocks whom and how often chance succeeds all show in these figures.
 
 * **Theirs** was measured on the released SocialAI 1.0 code (20,000 episodes, 4,000 of ShowMe and of all *unsocial*
-  runs, in which the others are neither seen nor heard). **Ours**: {episodes:,} episodes each, seed {seed}.
+  runs, in which the others are neither seen nor heard). **Ours**: {episodes:,} episodes each, seed {seed},
+  measured on {date} at commit {commit}.
 * Every environment plays the same number of episodes and all of them count, so long episodes are not missed.
 * **Success** is compared by Fisher's exact test, two-sided; p has to be at least {p}.
 * **Length** is compared by the distance of the means in combined standard errors (of both sides, and of their rounding
@@ -32,9 +33,11 @@ _COLUMNS: Final = (
 )
 
 
-def page(compared: Mapping[str, Comparison], episodes: int, seed: int) -> str:
-    """The page as Markdown; comparisons by the name of what was played."""
-    head = _HEAD.format(episodes=episodes, seed=seed, p=f"{LEAST_P:g}", limit=f"{LIMIT:g}")
+def page(compared: Mapping[str, Comparison], episodes: int, seed: int, date: str, commit: str) -> str:
+    """The page as Markdown; comparisons by the name of what was played, measured on a date (ISO) at a commit."""
+    head = _HEAD.format(
+        episodes=episodes, seed=seed, date=date, commit=commit, p=f"{LEAST_P:g}", limit=f"{LIMIT:g}"
+    )
     social = {name: c for name, c in compared.items() if not name.endswith("+unsocial")}
     unsocial = {name: c for name, c in compared.items() if name.endswith("+unsocial")}
     parts = [head]

@@ -87,9 +87,10 @@ def test_a_scenario_is_named_with_or_without_its_variant() -> None:
 def test_page() -> None:
     published, ours = Published(20_000, 100, 8.00, 4.0, 0.1), Sample(400_000, 2000, 8.5, 4.0, 0.1)
     text = page(
-        {"x+as_coded": compare(published, ours), "x+as_coded+unsocial": compare(published, ours)}, 400_000, 3
+        {"x+as_coded": compare(published, ours), "x+as_coded+unsocial": compare(published, ours)},
+        *(400_000, 3, "2026-11-23", "0a1b2c3"),
     )
-    assert "400,000 episodes each, seed 3" in text
+    assert "400,000 episodes each, seed 3,\n  measured on 2026-11-23 at commit 0a1b2c3" in text
     rows = [line for line in text.splitlines() if line.startswith("| `x")]
     assert [row.split(" | ")[-1] for row in rows] == ["**differs** |", "**differs** |"]
     header = next(line for line in text.splitlines() if line.startswith("| scenario"))
