@@ -116,9 +116,28 @@ Playable = Program | ProgramSuite
 
 
 def channels_of(programs: Iterable[Program]) -> tuple[str, ...]:
-    """The channels of pictures in which several programs are shown: those that one of them has."""
-    shown = {name for program in programs for name in program.channels}
-    return tuple(name for name in CHANNELS if name in shown)
+    """The channels of pictures in which several programs are shown: those that one of them has.
+
+    Raises:
+        ValueError: a look has other words in one program than in another.
+    """
+    programs = tuple(programs)
+    words_of_looks(programs)
+    shown = dict.fromkeys(name for program in programs for name in program.channels)
+    return (*(name for name in CHANNELS if name in shown), *(name for name in shown if name not in CHANNELS))
+
+
+def words_of_looks(programs: Iterable[Program]) -> dict[str, tuple[str, ...]]:
+    """The words of each look that one of several programs shows; raises ValueError as `channels_of` does."""
+    found: dict[str, tuple[str, ...]] = {}
+    for program in programs:
+        for name, words in program.looks:
+            if found.setdefault(name, words) != words:
+                raise ValueError(
+                    f"{program.name}: got the look {name!r} with the words {', '.join(words)}; what is played "
+                    f"together has one and the same, and another has {', '.join(found[name])}"
+                )
+    return found
 
 
 def prefixed(member: str, name: str) -> str:

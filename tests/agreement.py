@@ -186,7 +186,7 @@ def _object(described: dict[str, Any]) -> dict[str, Any]:
     """An object; the status of one that is gone means nothing."""
     gone = described.get("gone", False)
     kept = ("at", "color") if gone else ("at", "color", "state")
-    return {key: described[key] for key in kept} | {"gone": gone}
+    return {key: described[key] for key in kept} | {"gone": gone, "looks": described.get("looks", {})}
 
 
 def _member(described: dict[str, Any]) -> dict[str, Any]:
@@ -194,7 +194,8 @@ def _member(described: dict[str, Any]) -> dict[str, Any]:
     kept = ("at", "color", "facing", "clock", "name", "state")
     gone = described.get("gone", False)
     return {key: described[key] for key in kept if key in described and not (gone and key == "clock")} | {
-        "gone": gone
+        "gone": gone,
+        "looks": described.get("looks", {}),
     }
 
 

@@ -2273,3 +2273,123 @@ def test_11_15_its_own_cell_shows_what_it_carries(play: Folder) -> None:
     assert run.step("pickup").shown(0)[:4] == [BALL, 0, 0, 0]
     run.step("right").step("drop")
     assert (run.shown(0)[:4], run.shown(1)[4]) == ([EMPTY, 0, 0, 0], BALL)
+
+
+# -- looks -----------------------------------------------------------------------------------------
+
+
+def _looks(run: Play, name: str) -> dict[str, str]:
+    found: dict[str, str] = run.state[name]["looks"]
+    return found
+
+
+def test_12_1_start_or_one_of_the_words(play: Folder) -> None:
+    run = play("""
+        looks:
+          size: {for: balls, words: [small, large], start: [large, random, large if it.x > 1 else small]}
+          mood: {for: ann, words: [calm, angry], start: angry}
+        objects: {balls: {type: ball, at: [[3, 3], [4, 4], [5, 5]]}}
+        cast: {ann: {at: [1, 5]}}
+    """)
+    sizes = [ball["looks"]["size"] for ball in run.state["balls"]]
+    assert (sizes[0], sizes[2], _looks(run, "ann")) == ("large", "large", {"mood": "angry"})
+    drawn = set()
+    for seed in range(9):
+        run.env.reset(seed=seed)
+        drawn.add(run.state["balls"][1]["looks"]["size"])
+    assert drawn == {"small", "large"}
+
+
+def test_12_2_set_of_one_and_of_a_group(play: Folder) -> None:
+    run = play("""
+        looks:
+          size: {for: balls, words: [small, large], start: small}
+          mood: {for: ann | bob, words: [calm, angry], start: [calm, angry]}
+        objects: {balls: {type: ball, at: [[3, 3], [4, 4]]}}
+        frames:
+          feel: {states: {s: {then: [{when: t == 1, set: {mood: bob.mood, bob.mood: self.mood, balls.size: large}}]}}}
+        rules: [{when: t == 2, set: {first(balls).size: small}}]
+        cast: {ann: {at: [1, 5], frame: feel}, bob: {at: [5, 1]}}
+    """).step()
+    assert [_looks(run, name)["mood"] for name in ("ann", "bob")] == ["angry", "calm"]
+    assert [ball["looks"]["size"] for ball in run.state["balls"]] == ["large", "large"]
+    assert [ball["looks"]["size"] for ball in run.step().state["balls"]] == ["small", "large"]
+
+
+def test_12_3_the_look_of_what_has_none_finds_nothing(play: Folder) -> None:
+    text = """
+        looks: {{mood: {{for: ann, words: [calm, angry], start: calm}}}}
+        frames:
+          hear: {{states: {{s: {{then: [{{hears: any, when: {}, say: Yes}}]}}}}}}
+        cast: {{ann: {{at: [1, 5], frame: hear}}, bob: {{at: [5, 1], frame: hear}}}}
+    """
+    for condition in ("speaker.mood == calm", "speaker.mood != calm", "not (speaker.mood == calm)"):
+        assert play(text.format(condition)).step(said="Say bye").info["utterance"] == "NA"
+
+
+def test_12_4_reset_and_vanish_leave_them(play: Folder) -> None:
+    run = play("""
+        looks: {size: {for: ball, words: [small, large], start: small}}
+        objects: {ball: {type: ball, at: [3, 3]}}
+        rules: [{when: t == 1, set: {ball.size: large}}, {when: t == 2, cause: [ball.vanish, ball.reset]}]
+    """).steps(2)
+    assert (_looks(run, "ball"), run.at("ball")) == ({"size": "large"}, [3, 3])
+
+
+def test_12_5_the_channel_shows_what_is_seen(play: Folder) -> None:
+    text = """
+        looks:
+          size: {{for: under | over, words: [small, large], start: [small, large]}}
+          mood: {{for: ann, words: [calm, angry], start: angry}}
+        objects: {{under: {{type: floor, at: [2, 1]}}, over: {{type: floor, at: [2, 1], overlap: true}}}}
+        cast: {{ann: {{at: {}}}}}
+    """
+    assert play(text.format("[5, 5]")).shown(1)[4:] == [1, 255]
+    assert play(text.format("[2, 1]")).shown(1)[4:] == [255, 1]
+    assert play(text.format("[2, 1]")).shown(2)[4:] == [255, 255]
+
+
+def test_12_6_its_own_cell_shows_those_of_its_load(play: Folder) -> None:
+    looks = "{size: {for: toy, words: [small, large], start: large}, mood: {for: agent, words: [calm, sad]}}"
+    run = play(_with_toy(looks=looks))
+    assert run.shown(0)[4:] == [255, 255]
+    assert run.step("pickup").shown(0)[4:] == [1, 255]
+
+
+def test_12_7_neither_in_the_dark_nor_of_hidden_npcs(play: Folder) -> None:
+    text = """
+        looks: {{size: {{for: ball, words: [small, large], start: large}}, mood: {{for: ann, words: [calm, sad]}}}}
+        objects: {{ball: {{type: ball, at: [4, 1]}}, bricks: {{type: wall, place: column(3), count: 5}}}}
+        cast: {{ann: {{at: [2, 1]}}}}
+        room: {{size: 7, occlusion: {}}}
+        observe: {{npcs: hidden}}
+    """
+    assert play(text.format("false")).shown(3)[4:] == [1, 255]
+    run = play(text.format("true"))
+    assert run.shown(1)[4:] == [255, 255]
+    assert run.shown(3) == [0, 0, 0, 0, 255, 255]
+
+
+def test_12_8_the_tone_is_that_of_the_moment(play: Folder) -> None:
+    run = play("""
+        looks: {mood: {for: ann, words: [calm, angry], start: calm}}
+        frames:
+          feel: {states: {s: {then: [{when: t == 2, set: {self.mood: angry}, say: Well}, {say: So}]}}}
+        cast: {ann: {at: [1, 5], frame: feel}}
+        observe: {tone: mood}
+    """)
+    heard = [run.step().info["utterance"] for _ in range(3)]
+    assert heard == ["Ann: (calm) So", "Ann: (angry) Well", "Ann: (angry) So"]
+
+
+def test_12_9_the_tone_is_no_part_of_what_is_said(play: Folder) -> None:
+    run = play("""
+        looks: {mood: {for: ann, words: [calm, angry], start: angry}}
+        frames:
+          feel: {states: {s: {then: [{when: t == 1, say: Say hello}]}}}
+          hear: {let: {known: 0}, states: {s: {then: [{hears: Say <noun>, when: noun == hello, set: {known: 1}}]}}}
+        cast: {ann: {at: [1, 5], frame: feel}, bob: {at: [5, 1], frame: hear}}
+        observe: {tone: mood}
+        outcome: [{failure: ann.said("Say hello") and bob.known == 1}]
+    """).step()
+    assert (run.info["utterance"], run.terminated) == ("Ann: (angry) Say hello", True)

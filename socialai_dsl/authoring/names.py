@@ -15,6 +15,7 @@ KINDS: Final = {
     "let": "drawn or computed once per episode",
     "define": "recomputed at every use",
     "state": "a register of the world",
+    "looks": "a look of things or members of the cast",
     "tables": "a table",
     "memory": "a memory",
 }

@@ -252,8 +252,8 @@ class Effects:
             for i, (term, entity) in enumerate(zip(effect.entities, targets, strict=True)):
                 with only(effect.only[i] if effect.only else None):
                     self._cause(effect, term, entity, value)
-        if operands.line is not None and speaker is not None:
-            self.lines.speak(self.to, speaker, operands.line)
+        if operands.line is not None and speaker is not None and what.say is not None:
+            self.lines.speak(self.to, speaker, operands.line, what.say)
 
     def _steady(self, value: int, what: RulePlan | StepPlan) -> int:
         """The operand of a value that nothing the rule sets can change."""

@@ -426,12 +426,16 @@ class Lines:
         self.agent_says = 1 + len(self.texts)
         agent = self.checked.entities[0]
         for k, text in enumerate(self.grammar):
-            line = self._append(agent, self._word(agent.name), text)
+            line = self._append(agent, (self._word(agent.name), text))
             self.classes[line] = self.classes_of.of_pair[k]
             self.nouns[line] = self._noun_of_pair(k)
 
-    def _append(self, speaker: Entity, name: str, text: str) -> int:
-        heard = f"{name}: {text}" if self.checked.names_shown else text
+    def _append(self, speaker: Entity, pieces: Sequence[str]) -> int:
+        """A line of its pieces: the tone if the speaker has one, the name, the text."""
+        *before, name = pieces[: len(_before(speaker))]
+        tone = "".join(f"({word}) " for word in before)
+        text = "".join(pieces[1 + len(before) :])
+        heard = f"{name}: {tone}{text}" if self.checked.names_shown else f"{tone}{text}"
         line = len(self.texts)
         self.texts.append(heard)
         self.classes.append(self.classes_of.of_text(text))
@@ -462,16 +466,24 @@ class Lines:
         return frozenset(line for line in own if wanted is None or self.classes[line] in wanted)
 
     def bounds(self, speaker: Entity, line: Line) -> tuple[int, int]:
-        """The least and the greatest number of the line that `say` gives."""
+        """The least and the greatest number that `say` gives for a line."""
         if speaker.number == 0:
             numbers = [number for number in self._utterances(line) if number is not None]
             return min(numbers), max(numbers)
-        first = self._family(speaker, (speaker.name or "", *line.parts))
-        return first, first + prod(map(len, map(_choices, (speaker.name or "", *line.parts)))) - 1
+        pieces = (*_before(speaker), *line.parts)
+        first = self._family(speaker, pieces)
+        return first, first + _number_of(pieces, speaker) - 1
 
-    def speak(self, to: Expressions, speaker: Entity, line: int) -> None:
-        """Emit that `speaker` says the line in an operand, and note it if a condition reads it."""
+    def speak(self, to: Expressions, speaker: Entity, line: int, said: Line) -> None:
+        """Emit that `speaker` says a line, whose number is in an operand."""
+        self._speak(to, speaker, line, _number_of((*_before(speaker), *said.parts), speaker))
+
+    def _speak(self, to: Expressions, speaker: Entity, line: int, of: int) -> None:
+        """Emit that `speaker` says one of so many lines in its present tone; note it if a condition reads it."""
         block = to.block
+        if speaker.tone is not None:
+            tone = to.into_temporary(Op.MUL, to.value(speaker.tone), constant(of))
+            line = to.into_temporary(Op.ADD, line, tone)
         block.emit(Op.SAY, constant(speaker.number), line)
         noted = to.registers.by_path.get(said_path(speaker))
         if noted is None:
@@ -484,13 +496,14 @@ class Lines:
         block.release(mark)
 
     def say(self, to: Expressions, speaker: Entity, line: Line) -> int:
-        """Emit the number of the line that `speaker` says; the operand it is in."""
+        """Emit the number of the line that `speaker` says, in its first tone; the operand it is in."""
         to.site, to.block.span = line.site, line.span
         if speaker.number == 0:
             return self._utterance(to, line)
-        pieces = (speaker.name or "", *line.parts)
+        pieces = (*_before(speaker), *line.parts)
         first = self._family(speaker, pieces)
-        return self._index(to, [part for part in pieces if not isinstance(part, str | Const)], first)
+        varying = [part for part in pieces if not isinstance(part, str | Const) and part is not speaker.tone]
+        return self._index(to, varying, first)
 
     def perform(self, to: Expressions, speaker: Entity, utterance: Term) -> None:
         """Emit that `speaker` says an utterance of the grammar as part of a sequence; 0 is silence."""
@@ -503,7 +516,7 @@ class Lines:
             block.test(Op.IF_NE, said, constant(0), silent)
             said = to.into_temporary(Op.MAX, said, constant(1))
         line = self._line_performed(to, speaker, said)
-        self.speak(to, speaker, line)
+        self._speak(to, speaker, line, _number_of((*_before(speaker),), speaker) * len(self.grammar))
         block.bind(silent)
 
     def _line_performed(self, to: Expressions, speaker: Entity, said: int) -> int:
@@ -522,8 +535,9 @@ class Lines:
             return self.agent_says - 1
         texts = self.grammar
         anything = Variable(Type("utterance", 1, len(texts), texts), "performed")
-        first = self._family(speaker, (speaker.name or "", anything))
-        for k in range(len(_choices(speaker.name or "")) * len(texts)):
+        before = _before(speaker)
+        first = self._family(speaker, (*before, anything))
+        for k in range(prod(map(len, map(_choices, before))) * len(texts)):
             self.classes[first + k] = self.classes_of.of_performed[k % len(texts)]
             self.nouns[first + k] = self._noun_of_pair(k % len(texts))
         return first
@@ -549,8 +563,8 @@ class Lines:
         key = (speaker.number, parts)
         if key not in self._known:
             self._known[key] = len(self.texts)
-            for name, *pieces in product(*(_choices(part) for part in parts)):
-                self._append(speaker, name, "".join(pieces))
+            for pieces in product(*(_choices(part) for part in parts)):
+                self._append(speaker, pieces)
         return self._known[key]
 
     def _utterance(self, to: Expressions, line: Line) -> int:
@@ -612,6 +626,16 @@ def note_what_is_said(checked: CheckedScenario, lines: Lines, registers: Registe
             )
     for term in asked:
         lines.classes_of.said[term.entity, term.pattern] = lines.said_by(term.entity, term.pattern)
+
+
+def _before(speaker: Entity) -> tuple[str | Term, ...]:
+    """The parts of a line before its text: the speaker's tone if it has one, and its name."""
+    return (speaker.name or "",) if speaker.tone is None else (speaker.tone, speaker.name or "")
+
+
+def _number_of(pieces: tuple[str | Term, ...], speaker: Entity) -> int:
+    """How many lines pieces make in each tone of the speaker."""
+    return prod(len(_choices(part)) for part in pieces if part is not speaker.tone)
 
 
 def _choices(part: str | Term) -> tuple[str, ...]:

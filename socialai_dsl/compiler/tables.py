@@ -26,6 +26,7 @@ from socialai_dsl.program import (
     ENTITY_FIELDS,
     FIRST_ENTITY,
     MAX_SIDE,
+    NO_GESTURE,
     TESTS,
     EntityColumn,
     EntityName,
@@ -43,7 +44,7 @@ from socialai_dsl.program import (
 )
 from socialai_dsl.program.instructions import ANYTHING, TABLE
 from socialai_dsl.semantics.free_cells import interior_cells
-from socialai_dsl.semantics.plans import CheckedScenario, Entity, RoomPlan
+from socialai_dsl.semantics.plans import CheckedScenario, Entity, LookPlan, RoomPlan
 from socialai_dsl.semantics.terms import ObjectType
 from socialai_dsl.vocabulary import ACTIONS, COLORS, EMPTY, NPC, WALL
 
@@ -97,6 +98,8 @@ class Tables:
         table(Header.TOKEN_AT, [token for tokens in lines.tokens for token in tokens])
         table(Header.SITE_AT, self.sites.words())
         table(Header.CLASS_SET_AT, self.classes.set_words())
+        shown = [look for look in checked.looks if look.shown]
+        body += self._look_rows(shown)
 
         header |= self.lowered.entries | {
             Header.SIZE: Header.END + len(body),
@@ -156,7 +159,14 @@ class Tables:
             vocabulary=lines.vocabulary,
             source_map=tuple(self.code.spans),
             labels=dict(self.code.labels),
+            looks=tuple((look.name, look.words) for look in shown),
         )
+
+    def _look_rows(self, shown: list[LookPlan]) -> list[int]:
+        """The look table: for each entity the register of each look that the picture shows, 0 where it has none."""
+        registers = [dict(look.registers) for look in shown]
+        paths = (own.get(entity.number) for entity in self.checked.entities for own in registers)
+        return [0 if path is None else self.registers.by_path[path] for path in paths]
 
     def _flags(self) -> int:
         checked = self.checked
@@ -524,6 +534,7 @@ def verify(program: Program) -> None:
     """Raise InvalidProgramError unless the program is proven safe."""
     _header(program)
     _entities(program)
+    _looks(program)
     _frames(program)
     _lines(program)
     _inside(program, Header.ACTION_AT, program.header(Header.PRIMITIVES) + 1, 0, 7)
@@ -644,6 +655,15 @@ def _entities(program: Program) -> None:
         _require(0 < status[TypeColumn.CODE] < 32, f"type row {number} has no type code")
         for column in (TypeColumn.STATUS, TypeColumn.ORIENTATION):
             _require(0 <= status[column] < 256, f"type row {number} does not fit into the picture")
+
+
+def _looks(program: Program) -> None:
+    """Every look is in a register that holds one of its words."""
+    table, ranges = program.look_table, {name.register: (name.low, name.high) for name in program.registers}
+    _require(table.shape == (program.header(Header.ENTITIES), len(program.looks)), "looks without words")
+    for (name, words), registers in zip(program.looks, table.T.tolist(), strict=True):
+        known = all(ranges.get(register) == (0, len(words) - 1) for register in registers if register)
+        _require(known and len(words) < NO_GESTURE, f"a register of the look `{name}` holds something else")
 
 
 def _frames(program: Program) -> None:

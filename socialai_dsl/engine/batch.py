@@ -49,6 +49,7 @@ class Part:
         tokens: the batch's id of each token id of the program.
         successes: whether each way to end is a success.
         name: what an error calls the program.
+        looks: for each look that the program's picture shows its channel of the batch, counted from the fifth.
     """
 
     words: NDArray[np.int32]
@@ -61,6 +62,7 @@ class Part:
     tokens: Sequence[int]
     successes: Sequence[bool]
     name: str = ""
+    looks: Sequence[int] = ()
 
 
 class Batch:
@@ -104,8 +106,7 @@ class Batch:
             np.array([self.offsets[i] for pool in pools for i in pool], np.int64),
             np.concatenate([np.arange(1, len(pool) + 1) for pool in pools]).astype(np.int64),
         )
-        shown = _shown(headers)
-        self.more = 2 * bool(shown & Trait.GESTURES) + bool(shown & Trait.HANDS)
+        self.more = _more(parts)
         self.state: State = empty_state(rows, registers, board, length, VIEW, self.more)
         counters = int(sum(int(header[Header.COUNTERS]) for header in headers))
         self.ports: Ports = empty_ports(self.state, counters, len(parts[0].slots), self.more)
@@ -220,7 +221,7 @@ def _link(
     parts: Sequence[Part],
 ) -> tuple[NDArray[np.int32], NDArray[np.uint16], list[int], list[int]]:
     """Lay programs and their links one behind the other: words, views, offset and first counter of each program."""
-    shown = _shown([part.words for part in parts])
+    shown = _shown(parts)
     words: list[NDArray[np.int32]] = []
     views: dict[tuple[int, int], int] = {}
     offsets, first_counters = [], []
@@ -243,8 +244,12 @@ def _link(
         link[Link.SLOTS] = len(part.slots)
         spoken = [*part.templates, *chain(*part.strides), *map(len, part.slots), *chain(*part.slots)]
         link[Link.ENDINGS] = len(part.actions) + len(spoken)
-        tables = np.array([*part.actions, *spoken, *part.outcomes, *part.successes], np.int32)
+        tables = np.array([*part.actions, *spoken, *part.outcomes, *part.successes, *part.looks], np.int32)
         own = _with_tokens(part)
+        entities = int(own[Header.ENTITIES])
+        link[Link.MORE], link[Link.LOOKS] = _more(parts), len(part.looks)
+        link[Link.LOOK_TABLE] = len(own) - entities * len(part.looks)
+        link[Link.LOOK_PLACES] = len(own) + len(link) + len(tables) - len(part.looks)
         link[Link.FIRST_ROLLING], link[Link.LAST_ROLLING] = _rolling(own)
         own[Header.FLAGS] |= _traits(own) | shown
         words += [own, link, tables]
@@ -255,14 +260,22 @@ def _link(
     return np.concatenate(words), np.concatenate([view_table(*c) for c in views]), offsets, first_counters
 
 
-def _shown(headers: Sequence[NDArray[np.int32]]) -> int:
+def _shown(parts: Sequence[Part]) -> int:
     """What the channels behind the fourth show if one of the programs has them, as bits of `Trait`."""
     shown = 0
-    for header in headers:
-        carrying = int(header[Header.FLAGS] & Flag.SHOWS_CARRYING != 0)
-        shown |= Trait.HANDS * carrying
-        shown |= Trait.GESTURES * int(header[Header.CHANNELS] - carrying > _PLAIN_CHANNELS)
+    for part in parts:
+        carrying = int(part.words[Header.FLAGS] & Flag.SHOWS_CARRYING != 0)
+        shown |= (Trait.HANDS | Trait.MORE) * carrying
+        shown |= Trait.GESTURES * int(part.words[Header.CHANNELS] - carrying > _PLAIN_CHANNELS)
+        shown |= Trait.MORE * bool(part.looks)
     return shown
+
+
+def _more(parts: Sequence[Part]) -> int:
+    """How many channels pictures have behind the fourth; those of looks are the last."""
+    shown = _shown(parts)
+    others = 2 * bool(shown & Trait.GESTURES) + bool(shown & Trait.HANDS)
+    return max((others, *(1 + place for part in parts for place in part.looks)))
 
 
 def _traits(words: NDArray[np.int32]) -> int:

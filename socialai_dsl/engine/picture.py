@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from socialai_dsl.engine import rng
 from socialai_dsl.engine.boards import object_look
 from socialai_dsl.engine.carrying import carried_by
-from socialai_dsl.engine.entities import field, npc_at, step_x, step_y
+from socialai_dsl.engine.entities import field, is_present, npc_at, step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.pointers import bytes_of, uint16_of
 from socialai_dsl.engine.shadows import lit_cells
@@ -65,8 +65,8 @@ def take_picture(row: Row, link: int, book: Any, number: int) -> None:
         carried = carried_by(row, AGENT)
         if carried != 0:
             row.image[OWN_PLACE] = object_look(row, carried)
-    if flags & Trait.HANDS:
-        _show_hands(row, bytes_of(book, Book.EXTRA, number), bytes_of(book, Book.PICTURE, number))
+    if flags & Trait.MORE:
+        _show_more(row, link, bytes_of(book, Book.EXTRA, number), bytes_of(book, Book.PICTURE, number))
     elif flags & (Flag.EGOCENTRIC | Trait.GESTURES):
         _show_npcs(row, uint16_of(book, Book.EXTRA, number), uint16_of(book, Book.PICTURE, number))
 
@@ -131,14 +131,15 @@ def _show_npcs(row: Row, extra: NDArray[np.uint16], picture: NDArray[np.uint16])
 
 
 @outline
-def _show_hands(row: Row, extra: NDArray[np.uint8], picture: NDArray[np.uint8]) -> None:
-    """As `_show_npcs`, where pictures of the batch also show what NPCs carry."""
+def _show_more(row: Row, link: int, extra: NDArray[np.uint8], picture: NDArray[np.uint8]) -> None:
+    """As `_show_npcs`, where pictures of the batch also show what NPCs carry, or looks."""
     stay_outline()
     flags = row.program[Header.FLAGS]
     gestures = 2 if flags & Trait.GESTURES else 0
-    more = gestures + 1
+    more = row.program[link + Link.MORE]
     for i in range(more * CELLS):
         extra[i] = NO_GESTURE
+    _show_looks_of_objects(row, link, extra)
     own = field(row, AGENT, Field.DIR)
     for npc in range(1, row.program[Header.NPCS] + 1):
         place = _place_in_view(row, npc)
@@ -158,11 +159,43 @@ def _show_hands(row: Row, extra: NDArray[np.uint8], picture: NDArray[np.uint8]) 
         if shows and carried != 0:
             look = object_look(row, carried)
             extra[more * place + gestures] = (look & 0xFF) | (look >> 8 & 0xFF) << 5
+        _show_looks(row, link, extra, place, npc)
     for i in range(CELLS):
         for k in range(4):
             picture[(4 + more) * i + k] = row.image[i] >> 8 * k & 0xFF
         for k in range(more):
             picture[(4 + more) * i + 4 + k] = extra[more * i + k]
+
+
+@inline
+def _show_looks_of_objects(row: Row, link: int, extra: NDArray[np.uint8]) -> None:
+    """Show the looks of objects that the picture shows: of several in a cell the last, which lies on top."""
+    if row.program[link + Link.LOOKS] == 0 or field(row, AGENT, Field.X) < 0:
+        return
+    carried = carried_by(row, AGENT)
+    for entity in range(row.program[Header.NPCS] + 1, row.program[Header.ENTITIES]):
+        place = _place_in_view(row, entity)
+        if entity == carried:
+            _show_looks(row, link, extra, OWN_PLACE, entity)
+        elif place >= 0 and place != OWN_PLACE and is_present(row, entity) and _shows(row, place, entity):
+            _show_looks(row, link, extra, place, entity)
+
+
+@inline
+def _shows(row: Row, place: int, entity: int) -> bool:
+    """Whether the picture shows the type of an object; an NPC may stand before it, or it may lie in the dark."""
+    return (row.image[place] ^ object_look(row, entity)) & 0xFF == 0
+
+
+@inline
+def _show_looks(row: Row, link: int, extra: NDArray[np.uint8], place: int, entity: int) -> None:
+    """Show the looks of what is seen at a place of the picture."""
+    looks, more = row.program[link + Link.LOOKS], row.program[link + Link.MORE]
+    base = row.program[link + Link.LOOK_TABLE] + looks * entity
+    for k in range(looks):
+        register = row.program[base + k]
+        shown = row.registers[register] if register != 0 else np.int64(NO_GESTURE)
+        extra[more * place + row.program[row.program[link + Link.LOOK_PLACES] + k]] = shown
 
 
 @inline

@@ -61,7 +61,7 @@ class Link(IntEnum):
     After them: for each action and template of the batch the program's own (-1 if it has none); for each template
     what a filling is without its slots, and what the word of each slot counts (0 if the template lacks it); how many
     words each slot has; for each word of each slot the program's own; for each outcome of the program the batch's, then
-    whether each is a success.
+    whether each is a success; for each look its channel.
     """
 
     NUMBER = 0  # of the program in the batch
@@ -75,7 +75,11 @@ class Link(IntEnum):
     ENDINGS = 8  # words before those of outcomes
     FIRST_ROLLING = 9  # the first and the last entity that may ever roll
     LAST_ROLLING = 10
-    END = 11
+    MORE = 11  # channels of the batch behind the fourth
+    LOOKS = 12  # how many looks the program shows
+    LOOK_TABLE = 13  # where the register of each look of each entity is
+    LOOK_PLACES = 14  # where the channel of each look is, counted from the fifth
+    END = 15
 
 
 class Trait(IntEnum):
@@ -85,7 +89,8 @@ class Trait(IntEnum):
     PUSHED = 1 << 21  # some object takes another status when it is pushed
     GESTURES = 1 << 22  # pictures of the batch have channels for where NPCs point and what they did last
     REWARDS = 1 << 23  # there are rewards besides that of an outcome
-    HANDS = 1 << 25  # pictures of the batch have a channel for what NPCs carry
+    MORE = 1 << 25  # pictures of the batch have channels for what NPCs carry, or for looks
+    HANDS = 1 << 26  # one for what NPCs carry
     APART = 1 << 24  # some frame has code for what it perceives, or for the rest of a rule of `first`
 
 

@@ -46,6 +46,8 @@ def describe(program: Program, registers: Row) -> dict[str, Any]:
                 described[key] = _value(program, registers, owned)
         if beliefs := addresses.beliefs.get(str(entity)):
             described["believes"] = {key: _value(program, registers, name) for key, name in beliefs.items()}
+        if looks := addresses.looks.get(str(entity)):
+            described["looks"] = {key: _value(program, registers, name) for key, name in looks.items()}
         if entity.index is None:
             state[entity.key] = described
         else:

@@ -91,7 +91,7 @@ _WORDS: dict[str, tuple[Field, Sequence[str]]] = {
     "color": (Field.COLOR, COLORS),
 }
 _KEYS = {
-    "agent": ("at", "believes", "carries", "clock", "color", "facing", "gone", "name", "state"),
+    "agent": ("at", "believes", "carries", "clock", "color", "facing", "gone", "looks", "name", "state"),
     "npc": (
         "at",
         "believes",
@@ -101,13 +101,14 @@ _KEYS = {
         "facing",
         "gone",
         "last",
+        "looks",
         "name",
         "pointing",
         "poked",
         "state",
         "toggled",
     ),
-    "object": ("at", "color", "facing", "gone", "initial", "inside", "state", "timer"),
+    "object": ("at", "color", "facing", "gone", "initial", "inside", "looks", "state", "timer"),
 }
 _OTHER_KEYS = ("t", "room", "one_of", "let", "state", "memory", "last", "heard", "pending")
 
@@ -216,7 +217,8 @@ class _Layout:
             if given.get(name) is not None:
                 self._owned(key, name, given[name])
         self._gestures(key, number, given)
-        self._believes(key, given.get("believes"))
+        self._noted(f"{key}.believes", self.addresses.beliefs.get(key, {}), given.get("believes"))
+        self._noted(f"{key}.looks", self.addresses.looks.get(key, {}), given.get("looks"))
         if given.get("carries") is not None:
             self.carried[number] = given["carries"]
         inside = given.get("inside")
@@ -256,17 +258,16 @@ class _Layout:
         for field, value in ((Field.X, -1), (Field.Y, -1), (Field.GONE, 1), (Field.CARRIER, 1 + number)):
             self._set(thing, field, value)
 
-    def _believes(self, owner: str, given: Any) -> None:
-        """What a member of the cast takes for true."""
+    def _noted(self, place: str, known: Mapping[str, RegisterName], given: Any) -> None:
+        """What a member of the cast takes for true, or what looks something has, each in a register of its own."""
         if not given:
             return
-        self._mapping(f"{owner}.believes", given)
-        known = self.addresses.beliefs.get(owner, {})
+        self._mapping(place, given)
         for key, value in given.items():
             if key not in known:
-                raise ValueError(f"{owner}.believes: there is no {key!r}{meant(key, known)}")
+                raise ValueError(f"{place}: there is no {key!r}{meant(key, known)}")
             if value is not None:
-                self._pin(known[key], value, f"{owner}.believes.{key}")
+                self._pin(known[key], value, f"{place}.{key}")
 
     def _set(self, number: int, field: Field, value: int) -> None:
         self.row[FIRST_ENTITY + ENTITY_FIELDS * number + field] = value

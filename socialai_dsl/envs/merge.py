@@ -9,7 +9,17 @@ import numpy as np
 from gymnasium import spaces
 
 from socialai_dsl.engine.batch import Part
-from socialai_dsl.program import NO_GESTURE, VIEW, Body, EntityColumn, Header, Program, TypeColumn, room_words
+from socialai_dsl.program import (
+    LOOKS,
+    NO_GESTURE,
+    VIEW,
+    Body,
+    EntityColumn,
+    Header,
+    Program,
+    TypeColumn,
+    room_words,
+)
 from socialai_dsl.program_suite import Playable, ProgramSuite, channels_of, mixture, prefixed
 from socialai_dsl.vocabulary import ACTIONS, Sentences
 
@@ -45,10 +55,10 @@ class Merged:
         playable = playables[0] if len(playables) == 1 else mixture(playables)
         suite = playable if isinstance(playable, ProgramSuite) else mixture([playable])
         outcomes = tuple((outcome.name, outcome.success) for outcome in playable.outcome_table)
-        parts = _parts(suite, [name for name, _ in outcomes], playable)
+        channels = channels_of(suite.programs)
+        parts = _parts(suite, [name for name, _ in outcomes], playable, channels)
         length = max(program.header(Header.TOKENS) for program in suite.programs)
         highest = np.max([_highest_codes(program) for program in suite.programs], axis=0).tolist()
-        channels = channels_of(suite.programs)
         highest += [NO_GESTURE] * (len(channels) - len(highest))
         return cls(
             playable,
@@ -91,7 +101,9 @@ def _pools(playables: Sequence[Playable]) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(range(end - size, end)) for size, end in zip(sizes, ends, strict=True))
 
 
-def _parts(suite: ProgramSuite, outcomes: Sequence[str], playable: Playable) -> tuple[Part, ...]:
+def _parts(
+    suite: ProgramSuite, outcomes: Sequence[str], playable: Playable, channels: Sequence[str]
+) -> tuple[Part, ...]:
     """Each program with its links into the batch."""
     token = {word: i for i, word in enumerate(playable.vocabulary)}
     ending = {name: i for i, name in enumerate(outcomes)}
@@ -107,6 +119,7 @@ def _parts(suite: ProgramSuite, outcomes: Sequence[str], playable: Playable) -> 
             tokens=[token[word] for word in program.vocabulary],
             name=program.name,
             successes=[outcome.success for outcome in program.outcome_table],
+            looks=[channels.index(name) - len(LOOKS) for name, _ in program.looks],
         )
         for member, program, templates, slots in zip(
             suite.members, suite.programs, suite.template_maps, suite.slot_maps, strict=True

@@ -12,6 +12,7 @@ from socialai_dsl.envs.table import Table
 from socialai_dsl.program import (
     ENTITY_FIELDS,
     FIRST_ENTITY,
+    NO_GESTURE,
     VIEW,
     EntityColumn,
     EntityName,
@@ -23,6 +24,7 @@ from socialai_dsl.program import (
 )
 from socialai_dsl.render.gestures import Gesture, gestures_of
 from socialai_dsl.render.grid import draw_ansi, draw_grid, figures, own_hands
+from socialai_dsl.render.marks import Marks, marks_of
 from socialai_dsl.render.panel import Face
 from socialai_dsl.render.tiles import NPC, Code, draw_tile
 
@@ -40,6 +42,7 @@ class Scene:
         below: (x, y) -> the object in whose cell an NPC stands.
         gestures: (x, y) -> where the NPC there points and what it did last.
         held: (x, y) -> what the agent or the NPC there carries, as far as the agent sees it.
+        marks: (x, y) -> the looks of what is seen there; where the agent stands, of what it carries.
     """
 
     codes: NDArray[np.uint8]
@@ -48,11 +51,18 @@ class Scene:
     below: dict[tuple[int, int], Code]
     gestures: dict[tuple[int, int], Gesture]
     held: dict[tuple[int, int], Code]
+    marks: dict[tuple[int, int], Marks]
 
     @property
     def own(self) -> Code | None:
         """What the agent carries."""
         return self.held.get(self.agent[:2])
+
+    @property
+    def own_words(self) -> list[str]:
+        """A line on what the agent carries, if it carries something."""
+        own, place = self.own, self.agent[:2]
+        return [] if own is None else [own_hands(own, self.marks.get(place, ()))]
 
 
 def scene(table: Table, row: int) -> Scene:
@@ -66,6 +76,7 @@ def scene(table: Table, row: int) -> Scene:
         _under_npcs(table, row),
         gestures_of(table.program(row), table.state.registers[row]),
         _held(table, row, agent),
+        _marks(table, row, codes, agent),
     )
 
 
@@ -73,10 +84,10 @@ def frame(table: Table, row: int, mode: str, tile: int = 32) -> Any:
     """uint8 (H * tile, W * tile, 3) for rgb_array, a text for ansi."""
     shown = scene(table, row)
     if mode == "ansi":
-        told = figures(shown.codes, shown.gestures, held=shown.held)
-        own = [own_hands(shown.own)] if shown.own is not None else []
-        return "\n".join([plain_text(table, row), *told, *own])
-    return draw_grid(shown.codes, shown.agent, shown.seen, tile, shown.below, shown.gestures, shown.held)
+        told = figures(shown.codes, shown.gestures, held=shown.held, marks=shown.marks)
+        return "\n".join([plain_text(table, row), *told, *shown.own_words])
+    things = shown.below, shown.gestures, shown.held, shown.marks
+    return draw_grid(shown.codes, shown.agent, shown.seen, tile, *things)
 
 
 def plain_text(table: Table, row: int) -> str:
@@ -90,12 +101,12 @@ def coloured_text(table: Table, row: int) -> str:
     """The room as text with escape codes for colours, what the agent has in view on a lighter ground.
 
     Where the scenario shows its agent gestures, lines below the room say who points and who did what last; where it
-    shows hands, who carries what.
+    shows hands, who carries what; where it shows looks, what has which.
     """
     found = scene(table, row)
     shown = {place: gesture for place, gesture in found.gestures.items() if gesture.words}
-    told = figures(found.codes, shown, {**shown, **found.held}, found.held)
-    told += [own_hands(found.own)] if found.own is not None else []
+    told = figures(found.codes, shown, {**shown, **found.held}, found.held, found.marks)
+    told += found.own_words
     return "\n".join([draw_ansi(found.codes, found.agent, colour=True, seen=found.seen), *told])
 
 
@@ -165,6 +176,31 @@ def _held(table: Table, row: int, agent: tuple[int, int, int]) -> dict[tuple[int
         elif shown and who[Field.X] >= 0 and not who[Field.GONE]:
             found.setdefault((int(who[Field.X]), int(who[Field.Y])), (*look[:2], 0, 0))
     return found
+
+
+def _marks(
+    table: Table, row: int, codes: NDArray[np.uint8], agent: tuple[int, int, int]
+) -> dict[tuple[int, int], Marks]:
+    """(x, y) -> the looks of what is seen there; where the agent stands, of what it carries."""
+    program, registers = table.program(row), table.state.registers[row]
+    if not program.looks:
+        return {}
+    fields = registers[FIRST_ENTITY:][: ENTITY_FIELDS * len(program.entities)].reshape(-1, ENTITY_FIELDS)
+    words, found = dict(program.looks), dict[tuple[int, int], Marks]()
+    roles = [entity.role for entity in program.entities]
+    things = [number for number, role in enumerate(roles) if role == "object"]
+    npcs = [number for number, role in enumerate(roles) if role == "npc"]
+    # Of several in a cell the last object is seen, and the first NPC before all objects.
+    for number in (*things, *reversed(npcs)):
+        entity = fields[number]
+        place = int(entity[Field.X]), int(entity[Field.Y])
+        carried = roles[number] == "object" and entity[Field.CARRIER] == 1
+        away = place[0] < 0 or entity[Field.GONE] or place == agent[:2]
+        if not carried and (away or (codes[place[1], place[0], 0] == NPC) != (number in npcs)):
+            continue
+        shown = (int(registers[one]) if one else NO_GESTURE for one in program.look_table[number])
+        found[agent[:2] if carried else place] = marks_of(words, shown)
+    return {place: marks for place, marks in found.items() if marks}
 
 
 def _look(program: Program, number: int, entity: NDArray[np.int16]) -> Code:

@@ -16,7 +16,7 @@ from socialai_dsl.envs.explain import Recording
 from socialai_dsl.envs.picture import Scene, cast_of, coloured_text, frame, looks_of_npcs, plain_text, scene
 from socialai_dsl.envs.table import Table
 from socialai_dsl.program import EntityName, Register
-from socialai_dsl.program_suite import Playable, ProgramSuite
+from socialai_dsl.program_suite import Playable, ProgramSuite, words_of_looks
 from socialai_dsl.render.panel import Face
 from socialai_dsl.render.tiles import Code
 from socialai_dsl.semantics.plans import CheckedScenario
@@ -414,6 +414,11 @@ class ScenarioEnv(gymnasium.Env[Observation, NDArray[np.int64]]):
     def channels(self) -> tuple[str, ...]:
         """Names of the channels of the picture."""
         return self._table.merged.channels
+
+    @property
+    def looks(self) -> dict[str, tuple[str, ...]]:
+        """The looks that the picture shows, each with its words."""
+        return words_of_looks(self._table.programs)
 
     def plain_text(self) -> str:
         """The room as text, two characters for each cell, without colours."""

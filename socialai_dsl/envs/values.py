@@ -15,6 +15,7 @@ from socialai_dsl.program import CELL, Flag, Header, Program, RegisterName
 
 _ELEMENT: Final = re.compile(r"(let|memory)\.(\w+)\[(\d+)\]\.(move|utterance)")
 _FILLED: Final = re.compile(r"memory\.(\w+)\.filled")
+_LOOK: Final = re.compile(r"looks\.(\w+)\((.*)\)")
 _OF_KEY: Final = re.compile(r"(.+?)\((.*)\)")
 _BELIEF: Final = re.compile(r"(.+)\.believes\.(\w+)")
 _OF_ENTITY: Final = {
@@ -54,6 +55,7 @@ class Addresses:
         one_of: cast member -> which file it is. owned: (entity, key) -> register, e.g. ("wizard", "state").
         plain: all others by their key under `let`; what tells nothing between steps is left out.
         kept: those that there are for each of a group, by place in a layout (`let.ann.trust`) and key.
+        looks: entity -> look -> register.
     """
 
     def __init__(self, program: Program) -> None:
@@ -66,6 +68,7 @@ class Addresses:
         self.beliefs: dict[str, dict[str, RegisterName]] = {}
         self.plain: dict[str, RegisterName] = {}
         self.kept: dict[str, dict[str, RegisterName]] = {}
+        self.looks: dict[str, dict[str, RegisterName]] = {}
         entities = {str(entity) for entity in program.entities}
         for name in program.registers:
             self._add(name, entities)
@@ -78,6 +81,8 @@ class Addresses:
             group, key, index, part = element.groups()
             acts = (self.sequences if group == "let" else self.memories).setdefault(key, Acts())
             (acts.moves if part == "move" else acts.utterances)[int(index)] = name
+        elif look := _LOOK.fullmatch(name.path):
+            self.looks.setdefault(look[2], {})[look[1]] = name
         elif of_key := _OF_KEY.fullmatch(name.path):
             place = of_key[1] if of_key[1].startswith("state.") else f"let.{of_key[1]}"
             self.kept.setdefault(place, {})[of_key[2]] = name

@@ -11,6 +11,7 @@ from socialai_dsl.program import NO_GESTURE, VIEW, unpack_held
 from socialai_dsl.render import tiles
 from socialai_dsl.render.gestures import Gesture, gesture_shown
 from socialai_dsl.render.grid import draw_ansi, letters, own_hands, thing_words
+from socialai_dsl.render.marks import LookWords, Marks, mark_words, marks_of
 from socialai_dsl.render.tiles import Code
 from socialai_dsl.vocabulary import COLORS
 
@@ -30,12 +31,14 @@ class View:
         facing: where the agent looks, 0 right, 1 down, 2 left, 3 up.
         egocentric: whether directions of NPCs are given as seen from the agent.
         channels: names of the channels.
+        looks: words of those that are looks.
     """
 
     image: NDArray[np.uint8]
     facing: int
     egocentric: bool
     channels: tuple[str, ...]
+    looks: LookWords
 
     @property
     def text(self) -> str:
@@ -44,22 +47,24 @@ class View:
 
     @property
     def figures(self) -> list[str]:
-        """One line for each NPC in view that points, has done or carries something, and one for the agent's own hands.
+        """One line for each NPC in view that points, has done or carries something, for each thing or NPC that has
+        looks, and one for the agent's own hands.
 
         `Av 2 ahead, 1 left: did toggle`, `you carry a red ball, rb`.
         """
-        gestures, held, lines = self.gestures, self.held, []
-        own = held.pop(_OWN, None)
-        for column, row in dict.fromkeys((*gestures, *held)):
+        gestures, held, marks, lines = self.gestures, self.held, self.marks, []
+        own, own_marks = held.pop(_OWN, None), marks.pop(_OWN, ())
+        for column, row in dict.fromkeys((*gestures, *held, *marks)):
             gesture = gestures.get((column, row))
             said = [gesture.words] if gesture is not None and gesture.words else []
+            said += [mark_words(marks[column, row])] if (column, row) in marks else []
             said += [f"carries {thing_words(held[column, row])}"] if (column, row) in held else []
             if not said:
                 continue
             aside, before = column - VIEW // 2, VIEW - 1 - row
             side = f", {abs(aside)} {'right' if aside > 0 else 'left'}" if aside else ""
             lines.append(f"{letters(self.codes, row, column)} {before} ahead{side}: {', '.join(said)}")
-        return [*lines, own_hands(own)] if own is not None else lines
+        return [*lines, own_hands(own, own_marks)] if own is not None else lines
 
     @property
     def codes(self) -> NDArray[np.uint8]:
@@ -97,6 +102,15 @@ class View:
             for column, row in np.argwhere(carrying != NO_GESTURE).tolist():
                 found[column, row] = (*unpack_held(int(carrying[column, row])), 0, 0)
         return found
+
+    @property
+    def marks(self) -> dict[tuple[int, int], Marks]:
+        """(column, row) -> the looks of what is seen there; at the agent's own place, of what it carries."""
+        if not self.looks:
+            return {}
+        shown = self.image[..., [self.channels.index(name) for name in self.looks]]
+        places = np.argwhere((shown != NO_GESTURE).any(axis=2).T).tolist()
+        return {(column, row): marks_of(self.looks, shown[column, row].tolist()) for row, column in places}
 
     @property
     def _turn(self) -> int:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from functools import cache
-from typing import Final
+from typing import Any, Final
 
 from socialai_dsl.library import prelude
 from socialai_dsl.program import NO_GESTURE, EntityColumn, Header, Program, unpack_held
 from socialai_dsl.render.gestures import gesture_shown
+from socialai_dsl.render.marks import LookWords, marks_of
 from socialai_dsl.semantics.terms import ObjectType
 from socialai_dsl.vocabulary import COLORS, NPC, UNSEEN
 
@@ -55,23 +56,36 @@ def is_surface(cell: Cell) -> bool:
 
 
 def facts(
-    cell: Cell, channels: Sequence[str], kinds: Mapping[int, str], directions: tuple[str, ...]
-) -> dict[str, str]:
-    """The facts of a cell: `what` it is and, as far as it has one, `color`, `state`, direction, gestures and load.
+    cell: Cell,
+    channels: Sequence[str],
+    kinds: Mapping[int, str],
+    directions: tuple[str, ...],
+    looks: LookWords,
+) -> dict[str, Any]:
+    """The facts of a cell: `what` it is and, as far as it has them, `color`, `state`, direction, gestures, looks.
 
     Args:
         cell: not an empty one.
         channels: names of its numbers.
         kinds: see `kinds_of`.
         directions: `COMPASS` or `RELATIVE`, for those of NPCs.
+        looks: words of the channels that are looks.
     """
+    numbers = dict(zip(channels, cell, strict=True))
+    marks = marks_of(looks, [numbers[name] for name in looks])
+    told = _facts(cell, numbers, kinds, directions)
+    return told | {"looks": {mark.look: mark.word for mark in marks}} if marks else told
+
+
+def _facts(
+    cell: Cell, numbers: Mapping[str, int], kinds: Mapping[int, str], directions: tuple[str, ...]
+) -> dict[str, Any]:
     kind, colour, status, orientation = cell[:LOOKS]
     if kind == UNSEEN:
         return {"what": "cells out of sight"}
     if kind == NPC:
         what = kinds.get(status, f"person of look {status}")
         look = {"what": what, "color": COLORS[colour], "looking": directions[orientation]}
-        numbers = dict(zip(channels, cell, strict=True))
         return look | _gestures(numbers, directions) | _carried(numbers)
     found = _types().get(kind)
     if found is None:
@@ -87,10 +101,18 @@ def facts(
     return told
 
 
-def phrase(told: Mapping[str, str]) -> str:
-    """Facts in a few words: `a closed red door`, `a blue guide, looking east, just turned left`."""
-    named = " ".join(told[key] for key in ("state", "color", "what") if key in told)
-    doing = [f"{key} {told[key]}" for key in ("looking", "moving", "pointing", "carrying") if key in told]
+def phrase(told: Mapping[str, Any], shared: Container[str] = ()) -> str:
+    """Facts in a few words: `a closed red door`, `a small striped ball`, `a blue guide, mood angry, looking east`.
+
+    Args:
+        told: see `facts`.
+        shared: words of several looks, beside which a thing has the name of the look.
+    """
+    looks = {} if told["what"].startswith("cells") else told.get("looks", {})
+    plain = [word for word in looks.values() if "looking" not in told and word not in shared]
+    named = " ".join([*plain, *(told[key] for key in ("state", "color", "what") if key in told)])
+    doing = [f"{look} {word}" for look, word in looks.items() if word not in plain]
+    doing += [f"{key} {told[key]}" for key in ("looking", "moving", "pointing", "carrying") if key in told]
     doing += [told["last"]] if "last" in told else []
     if told["what"].startswith("cells"):
         return named

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from typing import Any, Final, Literal, get_args
@@ -23,7 +24,7 @@ from socialai_dsl.llm.looks import (
     phrase,
 )
 from socialai_dsl.program import VIEW, Flag, Header, Program
-from socialai_dsl.program_suite import Playable, channels_of
+from socialai_dsl.program_suite import Playable, channels_of, words_of_looks
 from socialai_dsl.render.grid import draw_ansi, letters
 from socialai_dsl.vocabulary import EMPTY, NPC, UNSEEN
 
@@ -61,6 +62,9 @@ class TextView:
         self._members = _members(program)
         self._kinds = kinds_of(list(self._members.values()))
         self._channels = channels_of(self._members.values())
+        self._looks = words_of_looks(self._members.values())
+        words = Counter(word for look in self._looks.values() for word in look)
+        self._shared = frozenset(word for word, looks in words.items() if looks > 1)
         self._language = ActionLanguage(program)
         self._described = lru_cache(_REMEMBERED)(self._describe)
 
@@ -141,12 +145,16 @@ class TextView:
             cell = tuple(image[across, along].tolist())
             if (across, along) != _OWN and cell[0] != EMPTY:
                 seen[VIEW - 1 - along, across - VIEW // 2] = cell
-        told = {cell: facts(cell, self._channels, self._kinds, directions) for cell in seen.values()}
         own = tuple(image[_OWN].tolist())
-        carried = None if own[0] == EMPTY else facts(own, self._channels, self._kinds, directions)
+        told = {
+            cell: facts(cell, self._channels, self._kinds, directions, self._looks)
+            for cell in (*seen.values(), own)
+        }
+        carried = None if own[0] == EMPTY else told[own]
+        words = {cell: phrase(one, self._shared) for cell, one in told.items()}
+        own_hands = [] if carried is None else [f"You carry {words[own]}."]
         if self._style == "grid":
-            picture = _picture(image, seen, told, directions)
-            return picture if carried is None else f"{picture}\n{_in_hands(carried)}"
+            return "\n".join([_picture(image, seen, words, directions), *own_hands])
         places = sorted((p for p, cell in seen.items() if not is_surface(cell)), key=_nearness)
         surfaces = sorted({cell for cell in seen.values() if is_surface(cell)}, reverse=True)
         areas = {cell: _areas(place for place, found in seen.items() if found == cell) for cell in surfaces}
@@ -155,15 +163,10 @@ class TextView:
             covered = [told[cell] | {"areas": areas[cell]} for cell in surfaces]
             hands = {} if carried is None else {"carrying": carried}
             return json.dumps({"seen": things, "covered": covered} | hands, ensure_ascii=False)
-        lines = [f"- {_where(place)}: {phrase(told[seen[place]])}" for place in places]
-        lines += [f"- {phrase(told[cell])}: {'; '.join(map(_extent, areas[cell]))}" for cell in surfaces]
+        lines = [f"- {_where(place)}: {words[seen[place]]}" for place in places]
+        lines += [f"- {words[cell]}: {'; '.join(map(_extent, areas[cell]))}" for cell in surfaces]
         told_of_cells = ["You see:", *lines] if lines else ["You see nothing but empty cells."]
-        own_hands = [] if carried is None else [_in_hands(carried)]
         return "\n".join([*told_of_cells, *own_hands])
-
-
-def _in_hands(told: Mapping[str, str]) -> str:
-    return f"You carry {phrase(told)}."
 
 
 def _members(program: Playable) -> dict[str | None, Program]:
@@ -180,7 +183,7 @@ def _is_egocentric(program: Program) -> bool:
 def _picture(
     image: NDArray[np.uint8],
     seen: Mapping[Place, Cell],
-    told: Mapping[Cell, Mapping[str, str]],
+    words: Mapping[Cell, str],
     directions: tuple[str, ...],
 ) -> str:
     """Letters, and below them what each stands for; of people also where they are, since their letters say less."""
@@ -194,7 +197,7 @@ def _picture(
         if cell[0] != UNSEEN:
             look = letters(codes, VIEW - 1 - place[0], place[1] + VIEW // 2)
             where = f", {_where(place)}" if cell[0] == NPC else ""
-            legend[f"{look} {phrase(told[cell])}{where}"] = None
+            legend[f"{look} {words[cell]}{where}"] = None
     return "\n".join(["You see:", draw_ansi(codes, (*_OWN, _UP)), *legend])
 
 

@@ -170,7 +170,7 @@ class Game:
         program = played(self._program, {"member": self.now.member})
         egocentric = bool(program.header(Header.FLAGS) & Flag.EGOCENTRIC)
         facing = DIRECTIONS.index(self._env.describe()["agent"]["facing"])
-        return View(self.now.view, facing, egocentric, self._env.channels)
+        return View(self.now.view, facing, egocentric, self._env.channels, self._env.looks)
 
     def place(self) -> tuple[int, int] | None:
         """X and y of the agent; None if it has left."""

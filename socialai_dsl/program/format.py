@@ -86,7 +86,9 @@ class Header(IntEnum):
     )
     CLASS_SETS = 54
     CLASS_SET_WORDS = 55
-    CHANNELS = 56  # of the picture: 4, 2 more with pointing and last act, 1 more with `Flag.SHOWS_CARRYING`
+    # Channels of the picture: 4, 2 more with pointing and last act, 1 more with `Flag.SHOWS_CARRYING`. Looks are not
+    # counted: their table, (ENTITIES, looks), is all that follows the table at CLASS_SET_AT; see `Program.look_table`.
+    CHANNELS = 56
     END = 57
 
 
@@ -249,12 +251,12 @@ TESTS = frozenset(op for op in Op if op >> CLASS_BITS == OpClass.TEST)
 LAST_ACTS = {"forward": 0, "left": 1, "right": 2, "toggle": 3, "point": 4, "stop": 8, "none": 10}
 """Last acts of an NPC in the sixth channel; `point` has the direction added, relative if the picture is egocentric."""
 NO_GESTURE = 255
-"""In the channels behind the fourth: no NPC, or it does not point, or carries nothing."""
+"""In the channels behind the fourth: no NPC, or it does not point, carries nothing, or has no such look."""
 LOOKS = ("type", "color", "status", "orientation")
 """The channels that say what a cell looks like."""
 GESTURES = ("pointing", "last_act")
 CHANNELS = (*LOOKS, *GESTURES, "carrying")
-"""All channels of the picture, in their order."""
+"""All channels of the picture that need no declaration, in their order; behind them come looks."""
 
 
 def pack_held(code: int, color: int) -> int:

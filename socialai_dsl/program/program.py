@@ -128,6 +128,7 @@ class Program:
         vocabulary: word of each token id; 0 pads, 1 is unknown.
         source_map: one span (or None) for each instruction.
         labels: heading of the block that starts at a pc.
+        looks: name and words of each look that the picture shows.
     """
 
     words: npt.NDArray[np.int32]
@@ -142,6 +143,7 @@ class Program:
     vocabulary: tuple[str, ...]
     source_map: Sequence[Span | None] = field(repr=False)
     labels: Mapping[int, str] = field(repr=False)
+    looks: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
     def header(self, word: Header) -> int:
         """One word of the header."""
@@ -172,6 +174,8 @@ class Program:
         for slot in self.sentences.slots:
             if slot.name != NOUN:
                 digest.update("\x1f".join((slot.name, *slot.words)).encode())
+        for name, words in self.looks:
+            digest.update("\x1f".join((name, *words)).encode())
         return digest.hexdigest()
 
     @property
@@ -180,7 +184,14 @@ class Program:
         carrying = bool(self.header(Header.FLAGS) & Flag.SHOWS_CARRYING)
         gestures = self.header(Header.CHANNELS) - carrying > len(LOOKS)
         shown = {*LOOKS, *(GESTURES if gestures else ()), *(["carrying"] if carrying else [])}
-        return tuple(name for name in CHANNELS if name in shown)
+        return (*(name for name in CHANNELS if name in shown), *(name for name, _ in self.looks))
+
+    @property
+    def look_table(self) -> npt.NDArray[np.int32]:
+        """The register of each look of each entity, 0 where it has none, int32 (entities, looks)."""
+        h = self.header
+        start = h(Header.CLASS_SET_AT) + h(Header.CLASS_SETS) * h(Header.CLASS_SET_WORDS)
+        return self.words[start:].reshape(h(Header.ENTITIES), len(self.looks))
 
     @property
     def code(self) -> npt.NDArray[np.int32]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from socialai_dsl.library import types_by_code
 from socialai_dsl.render import tiles
 from socialai_dsl.render.gestures import Gesture
+from socialai_dsl.render.marks import Marks, mark_words
 from socialai_dsl.render.tiles import SEEN_LINE, Code, draw_tile
 from socialai_dsl.vocabulary import COLORS
 
@@ -29,6 +30,7 @@ def draw_grid(
     below: Mapping[tuple[int, int], Code] | None = None,
     gestures: Mapping[tuple[int, int], Gesture] | None = None,
     held: Mapping[tuple[int, int], Code] | None = None,
+    marks: Mapping[tuple[int, int], Marks] | None = None,
 ) -> NDArray[np.uint8]:
     """Draw the room from above.
 
@@ -40,6 +42,7 @@ def draw_grid(
         below: (x, y) -> what lies under the one who stands there, such as a doorway.
         gestures: (x, y) -> where the NPC there points and what it did last.
         held: (x, y) -> what the agent or the NPC there carries.
+        marks: (x, y) -> the looks of what is seen there; where the agent stands, of what it carries.
 
     Returns:
         uint8 (H * tile, W * tile, 3).
@@ -60,7 +63,8 @@ def draw_grid(
             under = below.get((column, row)) if below else None
             gesture = gestures.get((column, row)) if gestures else None
             carried = held.get((column, row)) if held else None
-            cells.append(draw_tile(code, here, lit, tile, under, gesture, carried))
+            looks = marks.get((column, row), ()) if marks else ()
+            cells.append(draw_tile(code, here, lit, tile, under, gesture, carried, looks))
         rows.append(np.concatenate(cells, axis=1))
     picture = np.concatenate(rows, axis=0)
     if seen is not None:
@@ -123,24 +127,34 @@ def figures(
     gestures: Mapping[tuple[int, int], Gesture],
     places: Container[tuple[int, int]] | None = None,
     held: Mapping[tuple[int, int], Code] | None = None,
+    marks: Mapping[tuple[int, int], Marks] | None = None,
 ) -> list[str]:
-    """Further facts of NPCs, one line each in reading order: `A> 3,1 red, points down`.
+    """Further facts of NPCs, and of things that have looks, one line each in reading order: `A> 3,1 red, points down`.
 
     Args:
         codes: as for `draw_grid`.
         gestures: (x, y) -> where the NPC there points and what it did last.
-        places: the cells to be told of; None for all.
+        places: the cells of NPCs to be told of; None for all.
         held: (x, y) -> what the NPC there carries.
+        marks: (x, y) -> the looks of what is seen there.
     """
-    held = held or {}
+    held, marks = held or {}, marks or {}
     lines = []
-    for row, column in np.argwhere(codes[..., 0] == tiles.NPC).tolist():
-        if places is not None and (column, row) not in places:
-            continue
-        code, gesture = _code(codes, row, column), gestures.get((column, row))
-        said = [COLORS[code[1] % len(COLORS)], *([gesture.words] if gesture and gesture.words else [])]
-        said += [f"carries {thing_words(held[column, row])}"] if (column, row) in held else []
-        lines.append(f"{_letters_of(code)} {column},{row} {', '.join(said)}")
+    for row, column in np.ndindex(codes.shape[:2]):
+        code, looks = _code(codes, row, column), marks.get((column, row), ())
+        said = [mark_words(looks)] if looks else []
+        if code[0] == tiles.NPC:
+            if not looks and places is not None and (column, row) not in places:
+                continue
+            gesture = gestures.get((column, row))
+            said = [
+                COLORS[code[1] % len(COLORS)],
+                *([gesture.words] if gesture and gesture.words else []),
+                *said,
+            ]
+            said += [f"carries {thing_words(held[column, row])}"] if (column, row) in held else []
+        if said and code[0] not in (tiles.EMPTY, tiles.UNSEEN):
+            lines.append(f"{_letters_of(code)} {column},{row} {', '.join(said)}")
     return lines
 
 
@@ -150,9 +164,10 @@ def thing_words(code: Code) -> str:
     return f"{COLORS[code[1] % len(COLORS)]} {'thing' if type_ is None else type_.name.replace('_', ' ')}"
 
 
-def own_hands(code: Code) -> str:
-    """What the agent carries, in words and letters: `you carry a red ball, rb`."""
-    return f"you carry a {thing_words(code)}, {_letters_of(code).strip()}"
+def own_hands(code: Code, marks: Marks = ()) -> str:
+    """What the agent carries, in words and letters: `you carry a red ball, rb, size small`."""
+    more = f", {mark_words(marks)}" if marks else ""
+    return f"you carry a {thing_words(code)}, {_letters_of(code).strip()}{more}"
 
 
 def letters(codes: NDArray[np.uint8], row: int, column: int) -> str:

@@ -13,6 +13,7 @@ from socialai_dsl.library import types_by_code
 from socialai_dsl.render.canvas import INK, PAPER, WHITE, Canvas, Rgb, mix
 from socialai_dsl.render.figures import draw_agent, draw_gesture, draw_npc, turn
 from socialai_dsl.render.gestures import Gesture
+from socialai_dsl.render.marks import Marks, draw_marks, draw_patterns, sized
 from socialai_dsl.vocabulary import EMPTY as EMPTY
 from socialai_dsl.vocabulary import NPC as NPC
 from socialai_dsl.vocabulary import UNSEEN as UNSEEN
@@ -45,6 +46,7 @@ def draw_tile(
     below: Code | None = None,
     gesture: Gesture | None = None,
     held: Code | None = None,
+    marks: Marks = (),
 ) -> NDArray[np.uint8]:
     """Draw one cell.
 
@@ -56,6 +58,7 @@ def draw_tile(
         below: what lies under it, such as the doorway in which an NPC stands; None for plain floor.
         gesture: where an NPC points and what it did last; None where that is not shown.
         held: what who stands here carries; None for nothing.
+        marks: the looks of what is here; where the agent stands, of what it carries.
 
     Returns:
         A read-only array, uint8 (size, size, 3).
@@ -63,14 +66,17 @@ def draw_tile(
     canvas = Canvas(size)
     canvas.fill(mix(PAPER, SEEN_TINT, 0.55) if seen else PAPER)
     canvas.rectangle(0, 0, 1, 1, outline=mix(LINE, SEEN_TINT, 0.5) if seen else LINE, width=0.03)
-    for kind, colour, status, orientation in [below, code] if below is not None else [code]:
-        _drawer(kind)(canvas, PALETTE[colour % len(PALETTE)], status, orientation)
+    if below is not None:
+        _draw(canvas, below)
+    _draw(canvas, code, () if agent_direction is not None else marks)
     if gesture is not None:
         draw_gesture(canvas, PALETTE[code[1] % len(PALETTE)], code[3], gesture)
     if agent_direction is not None:
         draw_agent(canvas, agent_direction)
+    if agent_direction is None:
+        draw_marks(canvas, marks)
     if held is not None:
-        _draw_held(canvas, held)
+        _draw_held(canvas, held, marks if agent_direction is not None else ())
     pixels = canvas.pixels()
     pixels.setflags(write=False)
     return pixels
@@ -84,11 +90,20 @@ def _light(colour: Rgb) -> Rgb:
     return mix(colour, WHITE, 0.55)
 
 
-def _draw_held(canvas: Canvas, held: Code) -> None:
+def _draw(canvas: Canvas, code: Code, marks: Marks = ()) -> None:
+    """A thing or an NPC in its size and with its pattern."""
+    kind, colour, status, orientation = code
+    part = sized(canvas, marks)
+    _drawer(kind)(part, PALETTE[colour % len(PALETTE)], status, orientation)
+    draw_patterns(part, marks)
+
+
+def _draw_held(canvas: Canvas, held: Code, marks: Marks) -> None:
     """A small picture of a thing in the lower left corner."""
-    kind, colour, status, orientation = held
     canvas.circle(0.2, 0.8, 0.19, fill=WHITE, outline=INK, width=0.03)
-    _drawer(kind)(canvas.part(0.05, 0.65, 0.3), PALETTE[colour % len(PALETTE)], status, orientation)
+    part = canvas.part(0.05, 0.65, 0.3)
+    _draw(part, held, marks)
+    draw_marks(part, marks)
 
 
 def _draw_nothing(canvas: Canvas, colour: Rgb, status: int, orientation: int) -> None:

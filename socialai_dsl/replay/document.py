@@ -25,6 +25,10 @@ Gesture = tuple[_Number, Annotated[int, Field(ge=-1, le=3)], str]
 """Cell, direction in which the NPC there points (-1: none), and what it did last."""
 
 
+Mark = tuple[str, str, _Number, _Number]
+"""A look of something: its name, its word, the place of the word among those of the look, and that of the look."""
+
+
 class _Part(BaseModel):
     """What is left out has its default."""
 
@@ -118,6 +122,8 @@ class Moment(_Part):
         view: the agent's own view, 7 rows of 7 numbers of looks; the agent stands in the middle of the last row and
             looks up.
         view_gestures, view_held: what NPCs in it show, and what they and the agent carry.
+        marks, view_marks: pairs of a cell and the number of the looks of what is seen there; where the agent stands, of
+            what it carries.
         state: values that differ, by address: `wizard.state`, `doors[1].color`, `let.exit`.
         action: body action, speak, template, noun or slots; None without a step. did: the body action's word.
         said: the agent's utterance, None in silence. heard: lines.
@@ -140,6 +146,8 @@ class Moment(_Part):
     view: list[_Number] | None = None
     view_gestures: list[Gesture] = []
     view_held: list[tuple[_Number, _Number]] = []
+    marks: list[tuple[_Number, _Number]] = []
+    view_marks: list[tuple[_Number, _Number]] = []
     state: dict[str, Any] = {}
     action: tuple[_Number, _Number, _Number, _Number] | None = None
     did: str | None = None
@@ -167,6 +175,7 @@ class Trace(_Part):
         nouns: words of the nouns.
         slots: in place of nouns, the words of each slot.
         looks: the looks of cells that moments refer to by number.
+        marks: the looks of things and NPCs that moments refer to by number, each a list.
         texts: the texts that moments refer to by number.
         rules: the rules that moments refer to by number.
         moments: the room before the first step and after each step.
@@ -182,6 +191,7 @@ class Trace(_Part):
     nouns: list[str]
     slots: dict[str, list[str]] = {}
     looks: list[Look] = []
+    marks: list[list[Mark]] = []
     texts: list[str] = []
     rules: list[Rule] = []
     moments: list[Moment] = []

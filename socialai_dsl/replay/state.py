@@ -60,6 +60,7 @@ def present(cast: Sequence[str], state: dict[str, Any]) -> list[str]:
         told += [one["color"]] if name != "agent" else []
         told += [f"points {one['pointing']}"] if "pointing" in one else []
         told += [f"carries {one['carries']}"] if "carries" in one else []
+        told += [f"{look} {word}" for look, word in one.get("looks", {}).items()]
         told += [f"did {one['last']}"] if one.get("last") not in (None, "none") else []
         lines.append(f"{name:<{width}}  {place:<5} {one.get('facing', ''):<5}  {', '.join(told)}".rstrip())
     return lines

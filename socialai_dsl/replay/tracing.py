@@ -14,6 +14,7 @@ from socialai_dsl.envs.view import View
 from socialai_dsl.program import VIEW, Flag, Header, Program
 from socialai_dsl.program_suite import outcome_name
 from socialai_dsl.render.gestures import Gesture
+from socialai_dsl.render.marks import Marks
 from socialai_dsl.replay import document
 from socialai_dsl.replay.document import Line, Member, Moment, Outcome, Reply, Rule, Thought, Trace
 from socialai_dsl.replay.state import leaves, played
@@ -113,6 +114,7 @@ class Tracer:
         self._env, self._program = env.unwrapped, env.unwrapped.program
         self._scenario, self.agent, self._endings, self._about = scenario, agent, endings, about
         self._looks: dict[tuple[int, int, int, int], int] = {}
+        self._marks: dict[Marks, int] = {}
         self._texts: dict[str, int] = {}
         self._rules: dict[Rule, int] = {}
         self._seen: list[_Seen] = []
@@ -162,7 +164,16 @@ class Tracer:
         last = self.moments[-1]
         kept = {
             name: getattr(last, name)
-            for name in ("agent", "below", "gestures", "held", "view_gestures", "view_held")
+            for name in (
+                "agent",
+                "below",
+                "gestures",
+                "held",
+                "marks",
+                "view_gestures",
+                "view_held",
+                "view_marks",
+            )
         }
         self.moments.append(Moment(t=len(self.moments), replies=_replies(replies), ended=ended, **kept))
         self._seen.append(self._seen[-1])
@@ -173,13 +184,13 @@ class Tracer:
         self.moments.pop()
         self._seen.pop()
 
-    def trace(self, since: Marks | None = None) -> Trace:
+    def trace(self, since: Counts | None = None) -> Trace:
         """The trace so far.
 
         Args:
-            since: counts from `marks`; looks, texts, rules and moments up to these counts are left out.
+            since: counts from `counts`; looks, marks, texts, rules and moments up to these counts are left out.
         """
-        looks, texts, rules, moments = since or (0, 0, 0, 0)
+        looks, marks, texts, rules, moments = since or (0, 0, 0, 0, 0)
         program = self._program
         return Trace(
             scenario=self._scenario,
@@ -191,14 +202,16 @@ class Tracer:
             nouns=list(program.sentences.nouns),
             slots={slot.name: list(slot.words) for slot in program.sentences.slots if slot.name != NOUN},
             looks=list(self._looks)[looks:],
+            marks=[list(one) for one in self._marks][marks:],
             texts=list(self._texts)[texts:],
             rules=list(self._rules)[rules:],
             moments=self.moments[moments:],
         )
 
-    def marks(self) -> Marks:
-        """How many looks, texts, rules and moments there are."""
-        return len(self._looks), len(self._texts), len(self._rules), len(self.moments)
+    def counts(self) -> Counts:
+        """How many looks, marks, texts, rules and moments there are."""
+        looks, marks, texts = len(self._looks), len(self._marks), len(self._texts)
+        return looks, marks, texts, len(self._rules), len(self.moments)
 
     def _add(self, observation: Mapping[str, NDArray[Any]], info: Mapping[str, Any], **more: Any) -> Moment:
         """Add a moment, with what differs from the one before it."""
@@ -222,6 +235,8 @@ class Tracer:
             view_gestures=_gestures(view.gestures, view.codes.shape[1]),
             held=[(y * width + x, self._look(code)) for (x, y), code in scene.held.items()],
             view_held=[(y * VIEW + x, self._look(code)) for (x, y), code in view.held.items()],
+            marks=self._marked(scene.marks, width),
+            view_marks=self._marked(view.marks, VIEW),
             **_differences(before, seen),
             **more,
         )
@@ -232,7 +247,7 @@ class Tracer:
     def _view(self, image: NDArray[np.uint8], described: Mapping[str, Any], info: Mapping[str, Any]) -> View:
         egocentric = bool(self._playing(info.get("member")).header(Header.FLAGS) & Flag.EGOCENTRIC)
         facing = DIRECTIONS.index(described["agent"]["facing"])
-        return View(image, facing, egocentric, self._env.channels)
+        return View(image, facing, egocentric, self._env.channels, self._env.looks)
 
     def _cast(self, described: Mapping[str, Any]) -> list[Member]:
         """The NPCs, with the names by which they are heard."""
@@ -254,6 +269,9 @@ class Tracer:
     def _look(self, code: tuple[int, int, int, int]) -> int:
         return _number(self._looks, code)
 
+    def _marked(self, marks: Mapping[tuple[int, int], Marks], width: int) -> list[tuple[int, int]]:
+        return [(y * width + x, _number(self._marks, one)) for (x, y), one in marks.items()]
+
     def _rule(self, entry: Mapping[str, Any]) -> int:
         return _number(self._rules, Rule(**{key: entry[key] for key in Rule.model_fields if key in entry}))
 
@@ -262,7 +280,7 @@ class Tracer:
         return Outcome(name=name, success=bool(info["success"]), text=self._endings.get(name, name))
 
 
-Marks = tuple[int, int, int, int]
+Counts = tuple[int, int, int, int, int]
 
 
 def _replies(answers: Answers) -> list[Reply]:

@@ -28,9 +28,12 @@ WORD_SCHEMA: Final[JsonDict] = {"pattern": "^[A-Za-z_][A-Za-z0-9_]*$", "maxLengt
 """The same for keys of a mapping whose known keys have fields; pydantic leaves their names out."""
 
 Target = Annotated[
-    str, StringConstraints(pattern=r"^\s*[A-Za-z_][A-Za-z0-9_]*\s*(\(.+\)\s*)?$", max_length=200)
+    str,
+    StringConstraints(
+        pattern=r"^\s*[A-Za-z_][A-Za-z0-9_]*\s*(\(.+\)\s*)?(\.\s*[A-Za-z_][A-Za-z0-9_]*\s*)?$", max_length=200
+    ),
 ]
-"""What `set` changes: a register by its name, or one of those that there are for each of a group, `trust(speaker)`."""
+"""What `set` changes: a register, one of those for each of a group, `trust(speaker)`, or a look, `ann.mood`."""
 
 Expression = int | bool | str
 """The source of an expression; a bare number or truth value may be written without quotes."""
@@ -214,6 +217,20 @@ class Register(Model):
     )
     for_: Expression | None = Field(
         None, alias="for", description="a group: one register for each of it", examples=["peers"]
+    )
+
+
+class Look(Model):
+    """An attribute that is seen, of each of a group, and may change."""
+
+    for_: Expression = Field(
+        alias="for", description="a group: objects, or members of the cast", examples=["balls"]
+    )
+    words: Annotated[tuple[Word, ...], BeforeValidator(_as_tuple)] = Field(
+        min_length=2, max_length=8, description="its values", examples=[["small", "large"]]
+    )
+    start: Expressions = Field(
+        ("random",), description="its value at first, or a list with one for each; default random"
     )
 
 
@@ -445,6 +462,7 @@ class ObjectGroup(Model):
 
 Channel = Literal["type", "color", "status", "orientation", "pointing", "last_act", "carrying"]
 CHANNELS: tuple[Channel, ...] = get_args(Channel)
+"""Channels that need no declaration; each of `looks` is one as well."""
 
 
 class Observe(Model):
@@ -456,11 +474,14 @@ class Observe(Model):
     image: Literal["end", "before_npcs"] = Field("end", description="when in the step the picture is taken")
     names: Literal["shown", "hidden"] = Field("shown", description="speaker names in what is heard")
     own_voice: bool = Field(False, description="whether the agent hears itself")
-    channels: Annotated[tuple[Channel, ...], BeforeValidator(_as_tuple)] | None = Field(
+    channels: Annotated[tuple[Channel | Word, ...], BeforeValidator(_as_tuple)] | None = Field(
         None,
-        description="of the image: the first four, and perhaps the next two, and carrying; default the first "
-        "four, and carrying where something can be carried",
+        description="of the image: the first four, and perhaps the next two, carrying, and looks; default the first "
+        "four, carrying where something can be carried, and all looks",
         examples=[["type", "color", "status", "orientation", "carrying"]],
+    )
+    tone: Word | None = Field(
+        None, description="a look of NPCs, whose word is heard before what they say: `(angry) Great idea.`"
     )
     directions: Literal["absolute", "egocentric"] = Field(
         "absolute",
@@ -655,6 +676,12 @@ class Scenario(Model):
         default_factory=dict,
         description="name: an object in the room",
         examples=[{"exit": {"type": "door", "place": "wall(top)"}}],
+    )
+    looks: dict[Word, Look] = Field(
+        default_factory=dict,
+        max_length=6,
+        description="name: an attribute of things or members of the cast that is seen, and may change",
+        examples=[{"size": {"for": "balls", "words": ["small", "large"]}}],
     )
     let: dict[Word, Expression | Sequence] = Field(
         default_factory=dict, description="drawn or computed once per episode"

@@ -422,19 +422,26 @@ class _Deeds:
     def _assigned(self, key: str, raw: Scalar, scope: Scope) -> Iterator[Assignment]:
         """What a register is set to, for which it makes room.
 
-        It is written as a name, or with whose register is meant, `trust(speaker)`, or those of a group, `trust(peers)`.
+        It is written as a name, or with whose register is meant, `trust(speaker)`, or those of a group, `trust(peers)`;
+        a look as `ann.mood`, or in a frame `mood`.
         """
-        resolver, register = self.resolver, self.register(scope.path, key.partition("(")[0].strip())
-        if register not in resolver.registers:
-            raise FailedError  # its group means nothing, which has been reported
+        resolver = self.resolver
         own = scope.at((*scope.path, KEY), f"{scope.draws.site}.key")
         node = resolver.findings.expression(own.path, key)
+        look = _look_named(resolver, node, own)
+        register = (
+            self.register(scope.path, key.partition("(")[0].strip()) if look is None else f"looks.{look}"
+        )
+        if register not in resolver.registers:
+            raise FailedError  # its group means nothing, which has been reported
         if isinstance(node, ast.Call) and len(node.args) == 1 and those.found(node.args[0]):
             yield from those.assigned(resolver, register, node, raw, scope, own)
             return
         value = texts.value_for(resolver, register, raw, scope)
         targets: list[Term] = []
-        if isinstance(node, ast.Call):
+        if look is not None:
+            targets += rows.looks_set(resolver, look, node, own)
+        elif isinstance(node, ast.Call):
             targets += rows.of_keys(resolver, register, node, own)
         else:
             targets.append(single(resolver, register, None, node, own))
@@ -451,6 +458,19 @@ class _Deeds:
             with surviving():
                 made += effects(self.resolver, place, raw, self.scope(place, f"cause[{i}]"))
         return tuple(made)
+
+
+def _look_named(resolver: Resolver, node: ast.Expr, scope: Scope) -> str | None:
+    """The look that is set: `ann.mood`, or in a frame `mood`; None if the name is not that of a look."""
+    looks = resolver.symbols.scenario.looks
+    if isinstance(node, ast.Attribute) and node.name not in looks:
+        near = did_you_mean(node.name, looks)
+        hint = None if near else "what is set before a dot is a look, declared under `looks:`"
+        raise resolver.fail(
+            "S205", f"nothing here has a `{node.name}`", node, scope, suggestion=near, hint=hint
+        )
+    name = node.name if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
+    return name if name in looks else None
 
 
 @dataclass(frozen=True)

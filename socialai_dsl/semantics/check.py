@@ -10,7 +10,7 @@ from typing import Final, Literal, get_args
 
 from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, Severity, did_you_mean
 from socialai_dsl.schema.scenario import CHANNELS, Expression, Property, Scenario, Sequence
-from socialai_dsl.semantics import behaviour, entities, groups, object_facts, possible, setup, tables
+from socialai_dsl.semantics import behaviour, entities, groups, object_facts, possible, rows, setup, tables
 from socialai_dsl.semantics.entities import AGENT, Prelude, entities_of
 from socialai_dsl.semantics.free_cells import check_absences, check_placements
 from socialai_dsl.semantics.groups import performs
@@ -472,6 +472,8 @@ class _Run:
             findings.error("S106", message, findings.places.key_span((part,)), hint=hint)
             return None
         entities.check_slots(resolver)
+        if scenario.observe.tone is not None:
+            rows.check_tone(resolver, scenario.observe.tone)
         possible.check_flow(scenario, findings)
         spoken = self._spoken()
         outcomes = tuple(self._outcomes())
@@ -497,7 +499,12 @@ class _Run:
             possible.check_shadowed(plan, findings)
         self._report_unused()
         names = [resolver.registers.read(f"{member}.name") for member in self._symbols.cast]
-        words = words_in_order(self._symbols.sentences, names, spoken.lines(self._symbols.cast))
+        words = words_in_order(
+            self._symbols.sentences,
+            names,
+            spoken.lines(self._symbols.cast),
+            [one.tone for one in inhabitants],
+        )
         return CheckedScenario(
             name=name,
             horizon=scenario.horizon,
@@ -523,6 +530,7 @@ class _Run:
             beliefs=tuple(believed),
             channels=self._channels(),
             shows_carrying=self._shows_carrying(),
+            looks=tuple(rows.look_plans(resolver)) if scenario.looks else (),
             each_step=round(scenario.reward.each_step * 1_000_000),
             properties=claimed,
             probes=asked,
@@ -644,15 +652,15 @@ class _Run:
         return reward.term.value, None
 
     def _channels(self) -> int:
-        """How many channels the picture has, without the one for what is carried: the first four, or two more."""
+        """How many channels the picture has: the first four, or two more; not those for what is carried and looks."""
         given = self._scenario.observe.channels or CHANNELS[:4]
-        known = tuple(name for name in given if name != "carrying")
-        if known not in (CHANNELS[:4], CHANNELS[:6]) or given != tuple(n for n in CHANNELS if n in given):
-            message = (
-                f"`channels` are {', '.join(CHANNELS[:4])}, and perhaps pointing and last_act, and carrying"
-            )
+        known = (*CHANNELS, *self._scenario.looks)
+        plain = tuple(name for name in given if name in CHANNELS[:6])
+        if plain not in (CHANNELS[:4], CHANNELS[:6]) or given != tuple(n for n in known if n in given):
+            more = f", then {', '.join(self._scenario.looks)}" if self._scenario.looks else ""
+            message = f"`channels` are {', '.join(CHANNELS[:4])}, and perhaps pointing and last_act, and carrying{more}"
             self._findings.error("S106", message, self._findings.places.key_span(("observe", "channels")))
-        return 4 if known == CHANNELS[:4] else 6
+        return 4 if plain == CHANNELS[:4] else 6
 
     def _shows_carrying(self) -> bool:
         """Whether the picture has a channel for what NPCs carry; by default where something can be carried."""

@@ -22,7 +22,7 @@ from socialai_dsl.semantics.terms import (
     numbers_of,
 )
 
-_SAYABLE: Final = ("text", "noun", "color", "int", "status", "direction", "action")
+_SAYABLE: Final = ("text", "noun", "color", "int", "status", "look", "direction", "action")
 _MOST_WORDS: Final = 256
 """The most texts that one value may be read as, where another is a text."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from collections.abc import Sequence as Items
 from dataclasses import dataclass, field, replace
 
@@ -213,8 +213,11 @@ def _check_names(scenario: Scenario, findings: Findings) -> None:
             article = "an" if taken[name] == "object" else "a"
             findings.error("S213", f"`{name}` is the name of {article} {taken[name]} already", span)
         taken.setdefault(name, kind)
+    shared = dict.fromkeys(scenario.looks, "look") | dict.fromkeys(
+        scenario.grammar.slots, "slot of the grammar"
+    )
     for path, frame in frames_of(scenario):
-        _check_frame_names(path, frame, scenario.grammar.slots, findings)
+        _check_frame_names(path, frame, shared, findings)
 
 
 def mean_two_things(scenario: Scenario) -> bool:
@@ -223,9 +226,8 @@ def mean_two_things(scenario: Scenario) -> bool:
     return len(set(names)) < len(names)
 
 
-def _check_frame_names(
-    path: DataPath, frame: Frame, slots_of_grammar: Container[str], findings: Findings
-) -> None:
+def _check_frame_names(path: DataPath, frame: Frame, shared: Mapping[str, str], findings: Findings) -> None:
+    """No slot, register or definition may be called as something else; `shared`: what all frames know."""
     own: dict[str, str] = {}
     for kind, section in (("slot", frame.slots), ("register", frame.let), ("definition", frame.define)):
         for key in section:
@@ -236,8 +238,8 @@ def _check_frame_names(
                 findings.error(
                     "S213", f"`{name}` is a word of the language; call the {kind} something else", span
                 )
-            elif name in own or name in slots_of_grammar:
-                of = f"{own[name]} of this frame" if name in own else "slot of the grammar"
+            elif name in own or name in shared:
+                of = f"{own[name]} of this frame" if name in own else shared[name]
                 findings.error("S213", f"`{name}` is the name of a {of} already", span)
             own.setdefault(name, kind)
 
@@ -257,6 +259,8 @@ def _names(scenario: Scenario) -> Iterator[tuple[str, DataPath, str]]:
         yield "memory", ("memory", name), name
     for name in scenario.state:
         yield "`state`", ("state", name), name
+    for name in scenario.looks:
+        yield "look", ("looks", name), name
     for name in scenario.tables:
         yield "table", ("tables", name), name
     for name in scenario.roles:
@@ -402,6 +406,8 @@ def declare_registers(resolver: Resolver) -> None:
     for name, start in symbols.scenario.state.items():
         path = ("state", name)
         _declare_register(resolver, f"state.{name}", name, path, start, reset_scope(path))
+    if symbols.scenario.looks:
+        rows.declare_looks(resolver)
     object_facts.declare(resolver)
     for name in symbols.cast:
         declare_name(resolver, name)
@@ -569,6 +575,7 @@ def entities_of(resolver: Resolver) -> Iterator[Entity]:
                 near=near,
                 far=far,
                 audible=member.audible == "always",
+                tone=rows.tone_of(resolver, number) if symbols.scenario.observe.tone and number else None,
                 view=member.view if member.view is not None else VIEW,
             )
     statuses = initial(resolver)

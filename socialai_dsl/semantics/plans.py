@@ -328,6 +328,8 @@ class Entity:
     """Objects of its group: while one of them is not in its initial status, the others react to nothing."""
     pushed_by_rolling: bool = False
     carryable: bool = False
+    tone: Term | None = None
+    """The look whose word is heard before what it says."""
     contains: tuple[int, ...] = ()
     """What may lie inside: when this one is opened while something does, it is replaced by that."""
 
@@ -352,6 +354,16 @@ class RoomPlan:
     canvas: tuple[int, int]
     build: tuple[tuple[ObjectType, Region, Span], ...] = ()
     occlusion: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class LookPlan:
+    """An attribute that is seen: its values, and of each entity that has it the path of its register."""
+
+    name: str
+    words: tuple[str, ...]
+    registers: tuple[tuple[int, str], ...]
+    shown: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -490,6 +502,7 @@ class CheckedScenario:
     each_step: int = 0
     channels: int = 4
     shows_carrying: bool = False
+    looks: tuple[LookPlan, ...] = ()
     properties: tuple[PropertyPlan, ...] = ()
     probes: tuple[ProbePlan, ...] = ()
     accepting: tuple[tuple[int, str], ...] = ()

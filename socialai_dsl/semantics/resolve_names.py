@@ -130,7 +130,8 @@ def _unknown_attribute(
             "S205", f"nothing here has a `{name}`; write `{usage(VALUES[synonym])}`", node, scope
         )
     known = [s.name for s in VALUES.values() if not s.takes and s.subject != "none"]
-    near = did_you_mean(name, [*known, *sorted(statuses), *_of_frame(resolver, node)])
+    declared = [*resolver.symbols.scenario.looks, *_of_frame(resolver, node)]
+    near = did_you_mean(name, [*known, *sorted(statuses), *declared])
     near = near or did_you_mean(name, [s.name for s in VALUES.values() if s.subject != "none"])
     return resolver.fail("S205", f"nothing here has a `{name}`", node, scope, suggestion=near)
 
@@ -406,6 +407,8 @@ def _declared(resolver: Resolver, node: ast.Name, expected: Type | None, scope: 
         if f"state.{word}" not in resolver.registers:
             raise FailedError  # its group means nothing, which has been reported
         return single(resolver, f"state.{word}", expected, node, scope)
+    if word in symbols.scenario.looks:
+        return rows.look(resolver, word, node, scope)
     if word in symbols.scenario.let:
         resolver.used.add(("let", word))
         return resolver.registers.read(f"let.{word}", expected, resolver.findings.node(scope.path, node))
@@ -583,6 +586,8 @@ def attribute(resolver: Resolver, node: ast.Attribute, scope: Scope) -> Term:
     """`subject.name`."""
     if isinstance(node.subject, ast.Attribute) and node.subject.name == "believes":
         return object_facts.believed(resolver, node.subject, node, scope)
+    if node.name in resolver.symbols.scenario.looks:
+        return rows.look(resolver, node.name, node, scope)
     if isinstance(node.subject, ast.Attribute) and node.name not in VALUES:
         near = did_you_mean(node.subject.name, ["believes"])
         if near is not None and node.subject.name not in VALUES:

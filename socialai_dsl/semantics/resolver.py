@@ -186,7 +186,8 @@ class Declaration:
         range: the numbers it keeps to, if its declaration says them.
         constant: a known value needs no register.
         imagined: it is only looked at, and never drawn.
-        for_each: the keys of the group of which each has one. starts_with_nothing: until it is set.
+        for_each: the keys of the group of which each has one. each: what each starts with, where that is a list.
+        starts_with_nothing: until it is set.
         gathers: it has room for whatever things it is set to. forgets: it may hold nothing again.
     """
 
@@ -201,6 +202,7 @@ class Declaration:
     imagined: bool = False
     others: tuple[tuple[DataPath, Scalar], ...] = ()
     for_each: tuple[Const, ...] = ()
+    each: tuple[tuple[DataPath, Scalar], ...] = ()
     starts_with_nothing: bool = False
     gathers: bool = False
     forgets: bool = False
@@ -349,7 +351,7 @@ class Registers:
         """Whether a register is one that rules can set: of a frame's `let`, or of `state`."""
         path = path.partition("(")[0]
         source = self._declared[path].source if path in self._declared else ()
-        return source[:1] == ("state",) or ("frames" in source and "let" in source)
+        return source[:1] in (("state",), ("looks",)) or ("frames" in source and "let" in source)
 
     def starts_with_nothing(self, path: str) -> bool:
         """Whether a register holds nothing until it is set."""
@@ -419,8 +421,9 @@ class Registers:
             return [(Sited(self._written(declaration, expected), scope.draws.site, span), path)]
         starts = []
         for i, key in enumerate(declaration.for_each):
-            own = replace(scope.at(scope.path, f"{scope.draws.site}[{i}]"), it=key)
-            term = self._written(replace(declaration, scope=own), expected)
+            source, raw = declaration.each[i] if declaration.each else (declaration.source, declaration.raw)
+            own = replace(scope.at(source, f"{scope.draws.site}[{i}]"), it=key)
+            term = self._written(replace(declaration, source=source, raw=raw, scope=own), expected)
             starts.append((Sited(term, own.draws.site, span), self._called(path, key)))
         return starts
 
@@ -499,7 +502,7 @@ ENTITY = Type("entity", 0, 0)
 VOCABULARIES = (COLOR, DIRECTION, ACTION, TURN, SIDE)
 """The types whose words belong to the language."""
 
-WORDED = ("text", "noun", "color", "status")
+WORDED = ("text", "noun", "color", "status", "look")
 """Kinds of values that are called by words, which values of another kind may be called as well."""
 
 
@@ -764,4 +767,4 @@ def same_kind(actual: Type, expected: Type) -> bool:
         return bool(actual.words) == bool(expected.words) and (
             not actual.words or actual.words == expected.words
         )
-    return actual.kind not in ("status", "noun") or actual.words == expected.words
+    return actual.kind not in ("status", "noun", "look") or actual.words == expected.words

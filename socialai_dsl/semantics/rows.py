@@ -1,13 +1,28 @@
-"""Registers that there are for each of a group, `trust: {for: peers, start: 2}`: their keys, and that of one key."""
+"""Registers that there are for each of a group, `trust: {for: peers, start: 2}`: their keys, and that of one key.
+
+Looks are such registers as well, whose values are words and which the picture shows: `ann.mood`.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
+from socialai_dsl.diagnostics import did_you_mean
 from socialai_dsl.grammar import ast
-from socialai_dsl.schema.scenario import Expression
+from socialai_dsl.schema.scenario import CHANNELS, Expression, Look
 from socialai_dsl.semantics import groups
-from socialai_dsl.semantics.resolver import ENTITY, Resolver
-from socialai_dsl.semantics.scope import FailedError, Scope, of_each, quoted, reset_scope
-from socialai_dsl.semantics.terms import Const, Read, ReadEach, Term, numbers_of
+from socialai_dsl.semantics.plans import LookPlan
+from socialai_dsl.semantics.resolver import ENTITY, Declaration, Resolver
+from socialai_dsl.semantics.scope import (
+    FailedError,
+    Scope,
+    of_each,
+    quoted,
+    reset_scope,
+    surviving,
+)
+from socialai_dsl.semantics.signatures import WORDS
+from socialai_dsl.semantics.terms import Const, Read, ReadEach, Term, Type, entity, numbers_of
 from socialai_dsl.source import DataPath
 
 _KEYS = ("entity", "color", "noun", "int")
@@ -83,3 +98,146 @@ def of_key(resolver: Resolver, path: str, node: ast.Call, scope: Scope) -> Read 
         message = f"there is no `{node.name}` for `{quoted(node.args[0])}`"
         raise resolver.fail("S204", message, node.args[0], scope, hint=f"there is one for each of {listed}")
     return registers.of_key(path, key)
+
+
+# -- looks ---------------------------------------------------------------------------------------------------
+
+
+def declare_looks(resolver: Resolver) -> None:
+    """Make the register of each that has a look known, and report words that mean something already."""
+    for name, look in resolver.symbols.scenario.looks.items():
+        with surviving():
+            _check_words(resolver, name, look)
+            has_it = keys(resolver, ("looks", name, "for"), look.for_)
+            _check_has_looks(resolver, name, has_it)
+            type_ = Type("look", 0, len(look.words) - 1, look.words)
+            declared = Declaration(
+                f"looks.{name}",
+                name,
+                ("looks", name, "start"),
+                _start(look, 0),
+                reset_scope(("looks", name, "start"), f"looks.{name}"),
+                type_,
+                for_each=has_it,
+                each=_starts(resolver, name, look, len(has_it)),
+            )
+            resolver.registers.declare(declared)
+
+
+def _check_words(resolver: Resolver, name: str, look: Look) -> None:
+    """Report words that mean something already, or come twice."""
+    findings = resolver.findings
+    is_status = any(name in type_.states for type_ in resolver.symbols.types.values())
+    if is_status or name in CHANNELS:
+        message = (
+            f"`{name}` is {'a status of objects' if is_status else 'a channel'}; call the look something else"
+        )
+        findings.error("S213", message, findings.places.key_span(("looks", name)))
+    for i, word in enumerate(look.words):
+        span = findings.at(("looks", name, "words", i), 0, len(word))
+        if word in resolver.symbols.declared or word in WORDS or word == "none":
+            findings.error("S213", f"`{word}` means something else already; call the value otherwise", span)
+        elif word in look.words[:i]:
+            findings.error("S213", f"`{word}` is a value of `{name}` already", span)
+
+
+def _check_has_looks(resolver: Resolver, name: str, has_it: tuple[Const, ...]) -> None:
+    """Report a group that is neither of things nor of members of the cast."""
+    if has_it[0].type.kind != "entity":
+        path: DataPath = ("looks", name, "for")
+        message = "only objects and members of the cast have looks"
+        raise resolver.findings.fail("S204", message, resolver.findings.at(path))
+
+
+def _start(look: Look, i: int) -> Expression:
+    """What one of the group starts with."""
+    raw = look.start[i]
+    return f"pick({' | '.join(look.words)})" if raw == "random" else raw
+
+
+def _starts(resolver: Resolver, name: str, look: Look, count: int) -> tuple[tuple[DataPath, Expression], ...]:
+    """What each of the group starts with, where a list says it."""
+    path: DataPath = ("looks", name, "start")
+    if not resolver.findings.is_list(path):
+        return ()
+    if len(look.start) != count:
+        message = f"{len(look.start)} given for {count}: a list has one for each of the group"
+        raise resolver.findings.fail("S106", message, resolver.findings.at(path))
+    return tuple(((*path, i), _start(look, i)) for i in range(count))
+
+
+def look(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> Term:
+    """The look of what stands before the dot; in a frame without one that of the member itself."""
+    (found,) = _looks(resolver, name, _bearers(resolver, name, node, scope, several=False), node, scope)
+    return found
+
+
+def looks_set(resolver: Resolver, name: str, node: ast.Expr, scope: Scope) -> list[Term]:
+    """The looks that `set` changes: that of one, or those of each of a group."""
+    return _looks(resolver, name, _bearers(resolver, name, node, scope, several=True), node, scope)
+
+
+def _bearers(resolver: Resolver, name: str, node: ast.Expr, scope: Scope, several: bool) -> tuple[Term, ...]:
+    """Whose look is meant."""
+    if isinstance(node, ast.Attribute):
+        if several and groups.is_group(resolver, node.subject, scope):
+            return tuple(dict.fromkeys(groups.group(resolver, node.subject, None, scope).items))
+        return (resolver.value(node.subject, ENTITY, scope),)
+    if scope.member is None:
+        message = f"`{name}` is a look: say whose, `x.{name}`"
+        raise resolver.fail("S211", message, node, scope)
+    return (entity(resolver.symbols.numbers[scope.member]),)
+
+
+def _looks(
+    resolver: Resolver, name: str, bearers: tuple[Term, ...], node: ast.Expr, scope: Scope
+) -> list[Term]:
+    """The registers of a look; what cannot have it is a mistake."""
+    registers, path = resolver.registers, f"looks.{name}"
+    if path not in registers:
+        raise FailedError  # its group means nothing, which has been reported
+    known = {key.value for key in registers.keys(path)}
+    found: list[Term] = []
+    for who in bearers:
+        if who.type.kind != "entity" or not known & {*numbers_of(who)}:
+            called = quoted(node.subject) if isinstance(node, ast.Attribute) else str(scope.member)
+            first, last = (resolver.symbols.called(registers.keys(path)[i].value) for i in (0, -1))
+            listed = first if first == last else f"{first} to {last}"
+            message = f"`{called}` has no `{name}`"
+            raise resolver.fail("S204", message, node, scope, hint=f"what has one: {listed}")
+        found.append(registers.of_key(path, who))
+    return found
+
+
+def look_plans(resolver: Resolver) -> Iterator[LookPlan]:
+    """The looks of the scenario, and whether the picture shows them."""
+    scenario, registers = resolver.symbols.scenario, resolver.registers
+    channels = scenario.observe.channels
+    for name, described in scenario.looks.items():
+        path = f"looks.{name}"
+        if path not in registers:
+            continue
+        with surviving():
+            of = {key.value: registers.of_key(path, key) for key in registers.keys(path)}
+            paths = tuple((number, read.path) for number, read in of.items() if isinstance(read, Read))
+            yield LookPlan(name, described.words, paths, channels is None or name in channels)
+
+
+def tone_of(resolver: Resolver, number: int) -> Term | None:
+    """The look whose word is heard before what an NPC says; None where there is no such."""
+    path, registers = f"looks.{resolver.symbols.scenario.observe.tone}", resolver.registers
+    if path not in registers:
+        return None
+    return next((registers.of_key(path, key) for key in registers.keys(path) if key.value == number), None)
+
+
+def check_tone(resolver: Resolver, name: str) -> None:
+    """Report a tone that is no look, or that no NPC has."""
+    looks, findings = resolver.symbols.scenario.looks, resolver.findings
+    span = findings.at(("observe", "tone"), 0, len(name))
+    if name not in looks:
+        near = did_you_mean(name, looks)
+        hint = None if near else "looks are declared under `looks:`"
+        findings.error("S201", f"unknown look `{name}`", span, suggestion=near, hint=hint)
+    elif not any(tone_of(resolver, number) for number in range(1, len(resolver.symbols.numbers))):
+        findings.error("S204", f"no NPC has a `{name}`, so nobody speaks in that tone", span)

@@ -230,6 +230,7 @@ _KINDS: Final = {
     "text": "a text",
     "noun": "a noun",
     "status": "a status",
+    "look": "a look",
     "utterance": "an utterance",
     "cell": "a cell",
 }
@@ -453,6 +454,7 @@ class Symbols:
         found |= dict.fromkeys(self.defines, "define")
         found |= dict.fromkeys(self.scenario.memory, "memory")
         found |= dict.fromkeys(self.scenario.state, "state")
+        found |= dict.fromkeys(self.scenario.looks, "looks")
         found |= dict.fromkeys(self.scenario.tables, "tables")
         found |= dict.fromkeys(self.scenario.roles, "roles")
         found |= {name: "object" if o.single else "objects" for name, o in self.objects.items()}

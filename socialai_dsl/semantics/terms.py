@@ -12,6 +12,7 @@ entity     number of the entity: 0 the agent, NPCs in cast order, then objects i
 text       index into `words`: the finite set of texts that the expression can be (names, kinds)
 noun       index into `words`, the nouns of the scenario's grammar, or the words of one of its slots
 status     index into `words`, the states of an object type
+look       index into `words`, the values of one of the scenario's `looks`
 utterance  0 silence, else 1 + template * fillings + filling (`vocabulary.Sentences`); `words` are the texts
 cell       CELL + 32 * y + x (program); where an entity is asked for its place, a cell will do
 =========  =====================================================================================
@@ -30,8 +31,8 @@ from socialai_dsl.source import Span
 from socialai_dsl.vocabulary import ACTIONS, COLORS, DIRECTIONS, SIDES, TURNS
 
 Kind = Literal[
-    "bool", "int", "direction", "color", "action", "entity", "text", "noun", "status", "utterance", "cell"
-]
+    "bool", "int", "direction", "color", "action", "entity", "text", "noun", "status", "look", "utterance", "cell"
+]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

@@ -63,7 +63,7 @@ _JOINED = re.compile(r"\s*\|\s*|\s+or\s+")
 ANYTHING = "any"
 """`hears: any` is whatever anybody says."""
 
-_SAYABLE = ("text", "noun", "color", "int", "status", "direction", "action")
+_SAYABLE = ("text", "noun", "color", "int", "status", "look", "direction", "action")
 
 
 def said(resolver: Resolver, node: ast.Expr, scope: Scope) -> Term:
@@ -714,20 +714,25 @@ def _is_noun(resolver: Resolver, raw: str, scope: Scope) -> bool:
 
 
 def words_in_order(
-    sentences: Sentences, names: Iterable[Term], lines: Mapping[str, Sequence[Line]]
+    sentences: Sentences,
+    names: Iterable[Term],
+    lines: Mapping[str, Sequence[Line]],
+    tones: Iterable[Term | None],
 ) -> tuple[str, ...]:
-    """The words of the grammar, then of the names, then of what each member can say, by first appearance.
+    """The words of the grammar, then of the names, of what each member can say, and of tones, by first appearance.
 
     Args:
         sentences: templates come first, then the words of their slots.
         names: the name of each member of the cast, in order.
         lines: member -> its lines in the order of its frame.
+        tones: the tone of each entity, None without one.
     """
     texts = chain(
         (re.sub("<[^<>]*>", " ", template) for template in sentences.templates),
         (word for slot in sentences.slots for word in slot.words),
         (word for name in names for word in words_of_values(name.type)),
         (text for said in lines.values() for line in said for text in _pieces(line)),
+        (word for tone in tones if tone is not None for word in tone.type.words),
     )
     return tuple(dict.fromkeys(word for text in texts for word in words(text)))
 

@@ -262,13 +262,13 @@ class Session:
         assert tracer is not None, "internal: an episode has begun"
         if not self._moments or self._moments[-1].ended:
             raise RefusalError("the episode has ended; take steps back, or begin another")
-        marks = tracer.marks()
+        before = tracer.counts()
         observation, reward, terminated, truncated, info = env.step(action)
         tracer.step(action, observation, reward, terminated, truncated, info, thought=thought)
         self._moments.append(
             _Before(env.snapshot(), observation, self._chance.bit_generator.state, terminated or truncated)
         )
-        return {"more": tracer.trace(marks).model_dump(mode="json", exclude_defaults=True)}
+        return {"more": tracer.trace(before).model_dump(mode="json", exclude_defaults=True)}
 
 
 ASKED: Final[Mapping[str, Callable[..., Reply]]] = {

@@ -15,6 +15,7 @@ from socialai_dsl.library import prelude
 from socialai_dsl.program import LAST_ACTS
 from socialai_dsl.render import tiles
 from socialai_dsl.render.gestures import Gesture
+from socialai_dsl.render.marks import SIZES, Mark
 from socialai_dsl.render.tiles import draw_tile
 from socialai_dsl.replay import trace_of
 from socialai_dsl.replay.scripts import bundled
@@ -59,6 +60,28 @@ def all_tiles() -> list[Tile]:
     found += [
         ((tiles.NPC, 4, 1, 0), {"held": (code, colour, 0, 0)}) for code, _ in types for colour in range(6)
     ]
+    words = (
+        *SIZES,
+        "plain",
+        "striped",
+        "spotted",
+        "checked",
+        "cheerful",
+        "angry",
+        "surprised",
+        "calm",
+        "sad",
+    )
+    found += [
+        ((code, 3, 0, 1), {"marks": [("look", word, 0, 0)]})
+        for code in (prelude().types["ball"].code, prelude().types["box"].code, tiles.NPC)
+        for word in (*words, "laughing", "afraid")
+    ]
+    tags = [[("a", "cap", place, 0), ("b", "rank", 7 - place, 1)] for place in range(8)]
+    found += [((tiles.NPC, 4, 1, 0), {"marks": tag}) for tag in tags]
+    ball = (prelude().types["ball"].code, 2, 0, 0)
+    marks = [("size", "small", 0, 0), ("pattern", "striped", 1, 1)]
+    found += [(ball, {"marks": marks}), ((tiles.EMPTY, 0, 0, 0), {"agent": 2, "held": ball, "marks": marks})]
     found += [((tiles.EMPTY, 0, 0, 0), {"agent": 1, "held": (prelude().types["ball"].code, 2, 1, 1)})]
     return [*found, ((tiles.NPC, 1, 2, 3), {"below": (prelude().types["door"].code, 0, 0, 0)})]
 
@@ -69,7 +92,9 @@ def as_png(look: tiles.Code, more: dict[str, Any]) -> np.ndarray:
         pointing = gesture["pointing"]
         gesture = Gesture(None if pointing < 0 else pointing, gesture["act"])
     held = more.get("held")
-    return draw_tile(look, more.get("agent"), more.get("seen", False), SIZE, more.get("below"), gesture, held)
+    marks = tuple(Mark(*mark) for mark in more.get("marks", ()))
+    seen = more.get("seen", False)
+    return draw_tile(look, more.get("agent"), seen, SIZE, more.get("below"), gesture, held, marks)
 
 
 def pixels(address: str) -> np.ndarray:

@@ -65,6 +65,16 @@ def assignments(
     found = []
     for written, source in rule.set.items():
         name = written.partition("(")[0].strip()
+        tree = sources.expression(f"{path}.set.{written}.key", written, frame).tree
+        if (
+            isinstance(tree, ast.Attribute | ast.Name)
+            and (look := last_word(tree)) in context.world.look_names
+        ):
+            value = there(_assigned(sources, f"{path}.set.{written}", source, context, frame))
+            found += [
+                (f".{look}", one, value) for one in _bearers(sources, written, look, path, context, frame)
+            ]
+            continue
         value: Any = NOTHING
         variable = _variable(sources, written, source, path, frame)
         if variable is not None:
@@ -80,6 +90,25 @@ def assignments(
         ):
             value = there(_assigned(sources, f"{path}.set.{written}", source, context, frame))
         found += [(name, key, value) for key in _keys(sources, written, path, context, frame)]
+    return found
+
+
+def last_word(tree: ast.Attribute | ast.Name) -> str:
+    """The name of what is set: of `ann.mood`, the look."""
+    return tree.id if isinstance(tree, ast.Name) else tree.name
+
+
+def _bearers(
+    sources: Sources, written: str, look: str, path: str, context: Context, frame: str | None
+) -> list[Entity]:
+    """Whose look is set: that of one, of each of a group, or one's own."""
+    value = sources.expression(f"{path}.set.{written}.key", written, frame)
+    if isinstance(value.tree, ast.Name):
+        return as_list(context.me)
+    assert isinstance(value.tree, ast.Attribute)
+    found = as_list(there(of(value.tree.subject, replace(context, value=value))))
+    if not all(look in one.looks for one in found):
+        raise NothingFoundError
     return found
 
 
@@ -133,6 +162,9 @@ def holder_of(world: World, me: Entity | None, name: str) -> Any:
 def assign(world: World, me: Entity | None, values: list[tuple[str, Any, Any]]) -> None:
     """Sets registers of one's own, else those of the world. A given range saturates."""
     for name, key, value in values:
+        if name.startswith("."):
+            key.looks[name[1:]] = value
+            continue
         holder = holder_of(world, me, name)
         if name in holder.ranges and value is not NOTHING:
             low, high = holder.ranges[name]

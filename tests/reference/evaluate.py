@@ -123,6 +123,8 @@ def _name(node: ast.Name, context: Context) -> Any:
         found, slot = _slot(word, context)
         if found:
             return slot
+    if me is not None and word in world.look_names:
+        return attribute(me, word, context)
     if word in context_lets(context):
         return _let(word, context)
     if word in world.registers:
@@ -219,6 +221,12 @@ def attribute(subject: Any, name: str, context: Context) -> Any:
         cell = where(subject)
         return -1 if cell is None else cell["xy".index(name)]
     assert isinstance(subject, Entity), f"{subject!r}.{name}"
+    if context.setup and name in context.setup.scenario.looks:
+        context.setup.compute_look(name)
+    if name in context.world.look_names:
+        if name not in subject.looks:
+            raise NothingFoundError
+        return subject.looks[name]
     if name == "color":
         if subject.color is None and context.setup:
             context.setup.compute_colors(subject)

@@ -95,6 +95,13 @@ class Reference:
             occlusion=scenario.room.occlusion,
             gestures="pointing" in (scenario.observe.channels or ()),
             hands=self.shows_hands(),
+            look_names=frozenset(scenario.looks),
+            tone=scenario.observe.tone,
+            shown_looks={
+                name: look.words
+                for name, look in scenario.looks.items()
+                if scenario.observe.channels is None or name in scenario.observe.channels
+            },
             canvas=self.canvas,
             step_names={
                 name: [entry.step.state for entry in frame.entries]
@@ -418,6 +425,7 @@ class Reference:
         """A member of the cast."""
         return {
             "at": plain(member.cell),
+            "looks": dict(member.looks),
             "facing": member.facing,
             "color": member.color,
             "name": member.name,
@@ -461,7 +469,13 @@ class Reference:
     @staticmethod
     def describe_object(thing: Entity) -> dict[str, Any]:
         """An object."""
-        return {"at": plain(thing.cell), "color": thing.color, "state": thing.status, "gone": thing.gone}
+        return {
+            "at": plain(thing.cell),
+            "looks": dict(thing.looks),
+            "color": thing.color,
+            "state": thing.status,
+            "gone": thing.gone,
+        }
 
 
 def plain(value: Any) -> Any:

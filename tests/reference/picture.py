@@ -20,7 +20,8 @@ NOWHERE = (-1000, -1000)
 def picture(world: World, canvas: tuple[int, int]) -> np.ndarray:
     """`image[i, j]` shows the cell (6 - j) ahead and (i - 3) to the right of the agent; uint8 (7, 7, 4), with gestures
     (7, 7, 6)."""
-    more = 2 * world.gestures + world.hands
+    more = 2 * world.gestures + world.hands + len(world.shown_looks)
+    behind = 4 + 2 * world.gestures + world.hands
     image = np.full((SIZE, SIZE, 4 + more), NOTHING, dtype=np.uint8)
     agent = world.agent
     eye = agent.cell or NOWHERE
@@ -34,18 +35,26 @@ def picture(world: World, canvas: tuple[int, int]) -> np.ndarray:
             elif ahead == right == 0:
                 carried = world.carried_by(agent)
                 image[i, j, :4] = EMPTY if carried is None else thing_shown(carried)
+                image[i, j, behind:] = looks(world, carried)
             else:
                 image[i, j, :4] = shown(world, cell, canvas)
                 if world.gestures:
                     image[i, j, 4:6] = gestures(world, cell)
                 if world.hands:
-                    image[i, j, -1] = hands(world, cell)
+                    image[i, j, behind - 1] = hands(world, cell)
+                image[i, j, behind:] = looks(world, npc_shown(world, cell) or world.object_at(cell))
     return image
 
 
 def npc_shown(world: World, cell: Cell) -> Entity | None:
     """The NPC that is seen in a cell."""
     return next((npc for npc in world.npcs if npc.cell == cell and not world.npcs_hidden), None)
+
+
+def looks(world: World, entity: Entity | None) -> list[int]:
+    """The numbers of the looks of what is seen."""
+    has = {} if entity is None else entity.looks
+    return [words.index(has[name]) if name in has else NOTHING for name, words in world.shown_looks.items()]
 
 
 def hands(world: World, cell: Cell) -> int:

@@ -60,6 +60,8 @@ class Setup:
         for member in self.world.cast.values():
             self.compute_facing(member)
             self.compute_name(member)
+        for name in self.scenario.looks:
+            self.compute_look(name)
         for name in self.scenario.let:
             self.compute_let(name)
         for thing in self.world.things():
@@ -547,6 +549,19 @@ class Setup:
         for name, source in (frame.let if frame else {}).items():
             path = f"{member.key}/frames.{member.frame}.let.{name}"
             self.compute_register(member, name, source, path, member.frame)
+
+    def compute_look(self, name: str) -> None:
+        """What each of those that have a look starts with."""
+        written = self.scenario.looks[name]
+        group = as_list(evaluate(self.sources.expression(f"looks.{name}.for", written.for_), self.context()))
+        starts = written.start if isinstance(written.start, tuple) else (written.start,) * len(group)
+        for number, (entity, start) in enumerate(zip(group, starts, strict=True)):
+            if name in entity.looks:
+                continue
+            given = (self.pinned(entity).get("looks") or {}).get(name)
+            source = f"pick({' | '.join(written.words)})" if start == "random" else start
+            value = self.sources.expression(f"looks.{name}[{number}]", source)
+            entity.looks[name] = given or evaluate(value, self.context(it=entity))
 
     def compute_register(
         self, holder: Entity | World, name: str, source: Any, path: str, frame: str | None

@@ -217,6 +217,15 @@ class Memory:
 
 
 @dataclass(frozen=True)
+class Look:
+    """An attribute of each of a group that is seen."""
+
+    for_: Any
+    words: tuple[str, ...]
+    start: Any = "random"
+
+
+@dataclass(frozen=True)
 class Outcome:
     """One way the episode ends."""
 
@@ -249,6 +258,7 @@ class Observe:
     directions: str = "absolute"
     own_voice: bool = False
     channels: tuple[str, ...] | None = None
+    tone: str | None = None
 
 
 @dataclass(frozen=True)
@@ -332,6 +342,7 @@ class Script:
     let: dict[str, Any] = field(default_factory=dict)
     define: dict[str, Any] = field(default_factory=dict)
     state: dict[str, Any] = field(default_factory=dict)
+    looks: dict[str, Look] = field(default_factory=dict)
     tables: dict[str, Any] = field(default_factory=dict)
     memory: dict[str, Memory] = field(default_factory=dict)
     frames: dict[str, Frame] = field(default_factory=dict)
@@ -593,6 +604,7 @@ READERS: Final[dict[str, Callable[[Any], Any]]] = {
     "order": many,
     "objects": each(lambda entry: record(Group, entry, {})),
     "let": each(let_of),
+    "looks": each(lambda entry: record(Look, entry, {})),
     "memory": each(lambda entry: record(Memory, entry, {})),
     "frames": each(frame_of),
     "roles": each(member_of),

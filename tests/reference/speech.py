@@ -104,9 +104,15 @@ def speak(world: World, speaker: Entity, text: str, filled: dict[str, Any] | Non
             continue
         hearer.inbox.append(Heard(speaker, text, filled or {}))
         if hearer is world.agent:
-            world.lines.append((speaker, text))
+            world.lines.append((speaker, toned(world, speaker, text)))
     if speaker is world.agent and world.own_voice:
         world.lines.append((speaker, text))
+
+
+def toned(world: World, speaker: Entity, text: str) -> str:
+    """What the agent hears of an NPC: where tones are heard, with that of the speaker before it."""
+    tone = None if world.tone is None else speaker.looks.get(world.tone)
+    return text if tone is None else f"({tone}) {text}"
 
 
 def in_speaking_order(world: World, inbox: list[Heard]) -> list[Heard]:

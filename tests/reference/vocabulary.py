@@ -59,6 +59,8 @@ class Vocabulary(Words):
                 for who in self.who(name):
                     for piece in self.pieces(value.tree, who):
                         yield from piece
+        for name in self.members:
+            yield from self.tones(name)
 
     # -- what can be said ----------------------------------------------------------------------------------
 
@@ -87,6 +89,19 @@ class Vocabulary(Words):
         if isinstance(tree, ast.Name) and tree.id not in self.scenario.let:
             return [tree.id]
         return self.values(tree, member)
+
+    def tones(self, name: str) -> tuple[str, ...]:
+        """The words that can be heard before what a member says."""
+        tone = self.scenario.observe.tone
+        if tone is None or name == "agent":
+            return ()
+        written = self.scenario.looks[tone]
+        named = {
+            node.id
+            for node in self.sources.expression(f"looks.{tone}.for", written.for_).tree.walk()
+            if isinstance(node, ast.Name)
+        }
+        return written.words if named & {"cast", name, name.partition("[")[0]} else ()
 
     def sayings(self, member: Who) -> list[Value]:
         """The texts of a member's frame, in order of its states or steps."""
@@ -157,6 +172,8 @@ class Vocabulary(Words):
                 return list(DIRECTIONS)
             if tree.name == "name":
                 return self.names_of_subject(tree.subject, member)
+            if tree.name in self.scenario.looks:
+                return list(self.scenario.looks[tree.name].words)
         if isinstance(tree, ast.Text):
             texts = [""]
             for piece in self.pieces(tree, member):
@@ -207,6 +224,8 @@ class Vocabulary(Words):
                     if None in found
                     else list(dict.fromkeys(word for some in found for word in some or ()))
                 )
+            if tree.id in self.scenario.looks:
+                return list(self.scenario.looks[tree.id].words)
             return None if tree.id in ("t", "W", "H") or tree.id in self.scenario.state else [tree.id]
         if isinstance(tree, ast.Number):
             return [str(tree.value)]
@@ -224,7 +243,8 @@ class Vocabulary(Words):
         if isinstance(tree, ast.Call) and tree.name in self.scenario.tables:
             return self.table_options(tree.name)
         if isinstance(tree, ast.Attribute):
-            return self.values(tree, member) if tree.name in ("color", "facing", "name") else None
+            words_ = ("color", "facing", "name", *self.scenario.looks)
+            return self.values(tree, member) if tree.name in words_ else None
         return None
 
     def chosen_options(self, tree: ast.Conditional, member: Who) -> list[str] | None:
@@ -372,7 +392,8 @@ class Vocabulary(Words):
         ]
         if self.performs(member):
             lengths.append(self.longest_utterance())
-        return self.longest_name(member[0]) + max(lengths) if lengths else 0
+        tone = max((len(words(text)) for text in self.tones(member[0])), default=0)
+        return self.longest_name(member[0]) + tone + max(lengths) if lengths else 0
 
     def longest_name(self, name: str) -> int:
         """The words before a member's lines; none where names are hidden."""

@@ -148,6 +148,7 @@ class Entity:
     exclusive: bool = False
     blocked: bool = False  # another of its exclusive group was used: it reacts to no toggle and no push
     at_reset: tuple[Any, ...] = ()  # what `reset` brings back
+    looks: dict[str, str] = field(default_factory=dict)  # those that it has
     # the cast
     facing: str = "right"
     name: str | None = None
@@ -248,6 +249,9 @@ class World:
     occlusion: bool = False
     gestures: bool = False  # whether the picture shows them
     hands: bool = False  # whether it shows what NPCs carry
+    tone: str | None = None  # the look whose word is heard before what NPCs say
+    look_names: frozenset[str] = frozenset()
+    shown_looks: dict[str, tuple[str, ...]] = field(default_factory=dict)  # words of those that it shows
     canvas: tuple[int, int] = (0, 0)
     bonus: int = 0  # per cent that rules pay in this step
     lines: list[tuple[Entity, str]] = field(default_factory=list)  # what the agent heard in this step

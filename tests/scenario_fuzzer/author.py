@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from tests.scenario_fuzzer.behaviour import Behaviour
-from tests.scenario_fuzzer.declared import STATUSES, Declared, Frame, Row, Thing
+from tests.scenario_fuzzer.declared import STATUSES, Declared, Frame, Look, Row, Thing
 from tests.scenario_fuzzer.phrases import COLORS, Phrases, Where
 
 NOUNS: tuple[tuple[str | int, ...], ...] = (
@@ -31,6 +31,11 @@ TEMPLATES = ("Say <noun>", "Where is <noun>", "It is <noun>", "Give me <noun>", 
 SAYINGS = ("Good day", "Look at me!", "Stop it.")
 """What some NPC says in every scenario that has a frame."""
 WORDS = ("ana", "bel", "cor", "dol", "ers", "fit")
+LOOKS = {
+    "size": ("small", "large"),
+    "pattern": ("plain_one", "striped", "spotted"),
+    "mood": ("calm", "angry", "sad"),
+}
 GROUPED = ("door", "box", "switch", "ball", "marble", "generator", "apple", "lever")
 CARRIED = ("ball", "apple", "box", "marble", "generator", "floor", "switch")
 SINGLE = (*GROUPED, "remote_door", "platform", "fence", "floor", "wall", "lava")
@@ -77,8 +82,10 @@ class _Author:
         objects = self.objects()
         frames = self.plan_cast()
         made["grammar"] = made["grammar"] or self.grammar_with_slots()
+        looks = self.looks()
         tables, lets, state = self.tables(), self.lets(), self.state()
         made |= {"objects": objects} if objects else {}
+        made |= {"looks": looks} if looks else {}
         made |= {"tables": tables} if tables else {}
         made |= {"let": lets} if lets else {}
         made |= {"state": state} if state else {}
@@ -307,6 +314,25 @@ class _Author:
             if self.often(0.6):
                 made["dance"]["utterance"] = {"chance": 0.5}
             self.declared.sequences.append("dance")
+        return made
+
+    def looks(self) -> dict[str, Any]:
+        """What things and members of the cast look like."""
+        made: dict[str, Any] = {}
+        several = [thing.name for thing in self.declared.several]
+        for name, words in LOOKS.items():
+            if self.often(0.75):
+                continue
+            look = Look(name, self.rng.choice([*several, "cast", "cast"]), words)
+            self.declared.looks.append(look)
+            made[name] = {"for": look.of, "words": list(words)}
+            if self.often(0.5):
+                drawn = f"pick({words[0]} | 2 * {words[1]})"
+                starts = ("random", words[0], drawn, f"{words[1]} if W > 6 else {words[0]}")
+                made[name]["start"] = self.rng.choice(starts)
+            elif look.of != "cast":
+                count = self.declared.group(look.of).count or 1
+                made[name]["start"] = [self.rng.choice((*words, "random")) for _ in range(count)]
         return made
 
     def state(self) -> dict[str, Any]:
@@ -618,6 +644,10 @@ class _Author:
             made["channels"] = ["type", "color", "status", "orientation", "pointing", "last_act"]
             if self.declared.carried and self.often(0.7):
                 made["channels"].append("carrying")
+            made["channels"] += [look.name for look in self.declared.looks if self.often(0.6)]
+        spoken = [look.name for look in self.declared.looks if look.of == "cast"]
+        if spoken and self.often(0.4):
+            made["tone"] = self.rng.choice(spoken)
         return made
 
 

@@ -157,6 +157,13 @@ class Behaviour:
             found[self.target(row, where)] = lambda row=row: (  # type: ignore[misc]
                 "none" if row.empty and self.often(0.2) else self.phrases.value_of(row, where)
             )
+        for look in self.declared.looks:
+            target = self.phrases.look(look, where)
+            if target.startswith("(") or self.often(0.15):
+                target = f"{look.of}.{look.name}"  # of the whole group
+            found[target] = lambda look=look: (  # type: ignore[misc]
+                self.rng.choice(look.words) if self.often(0.6) else self.phrases.look(look, where)
+            )
         if where.frame is not None:
             frame = where.frame
             found |= {name: lambda: self.phrases.number(where) for name in frame.numbers}

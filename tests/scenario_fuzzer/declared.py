@@ -41,6 +41,15 @@ class Row:
     empty: bool = False
 
 
+@dataclass(frozen=True)
+class Look:
+    """A look: of whom or what (the objects of a name, or `cast`), and its words."""
+
+    name: str
+    of: str
+    words: tuple[str, ...]
+
+
 @dataclass
 class Frame:
     """A frame as others speak of it: what it can be asked for."""
@@ -81,6 +90,7 @@ class Declared:
     ranks: list[str] = field(default_factory=list)  # colour -> number
     contents: dict[str, str] = field(default_factory=dict)  # what lies in things: the containers
     carried: list[Thing] = field(default_factory=list)  # what can be carried
+    looks: list[Look] = field(default_factory=list)
     templates: list[str] = field(default_factory=list)
     nouns: list[str | int] = field(default_factory=list)
     slots: dict[str, list[str | int]] = field(

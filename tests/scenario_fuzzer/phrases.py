@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from random import Random
 
-from tests.scenario_fuzzer.declared import STATUSES, Declared, Frame, Row, Thing
+from tests.scenario_fuzzer.declared import STATUSES, Declared, Frame, Look, Row, Thing
 
 COLORS = ("red", "green", "blue", "purple", "yellow", "grey")
 DIRECTIONS = ("right", "down", "left", "up")
@@ -340,6 +341,7 @@ class Phrases:
             [self.of_this_step, self.of_speech, self.of_this_step, self.of_frames] if not where.reset else []
         )
         simple += [self.of_rows, self.of_rows] if not where.reset else []
+        simple += [self.of_looks, self.of_looks] if self.declared.looks else []
         simple += [self.quantified, self.quantified] if not where.searching else []
         simple += (
             [self.defined]
@@ -439,6 +441,31 @@ class Phrases:
                 lambda: f"any(c in cells where c.next_to({self.anchor(where)}) and {self.of_cell(where)})"
             )
         return self.one_of(*options) if options else self.relation(where)
+
+    def bearer(self, look: Look, where: Where) -> str:
+        """Somebody or something that has a look, or perhaps one that has not."""
+        if look.of == "cast":
+            return self.rng.choice(["speaker"] * where.heard + [self.member(where)])
+        return self.one(self.declared.group(look.of), where)
+
+    def look(self, look: Look, where: Where) -> str:
+        """The look of something, or in a frame one's own."""
+        if look.of == "cast" and where.frame is not None and self.often(0.3):
+            return look.name
+        return f"{self.bearer(look, where)}.{look.name}"
+
+    def of_looks(self, where: Where) -> str:
+        """What something looks like."""
+        look = self.rng.choice(self.declared.looks)
+        one, other = self.rng.choice(look.words), self.rng.choice(look.words)
+        options: list[str | Callable[[], str]] = [
+            lambda: f"{self.look(look, where)} == {one}",
+            lambda: f"{self.look(look, where)} != {self.look(look, where)}",
+            lambda: f"{self.look(look, where)} in {one} | {other}",
+        ]
+        if not (where.reset or where.still or where.variables):
+            options.append(lambda: f"prev(agent.{look.name} == {one})" if look.of == "cast" else "t > 3")
+        return self.one_of(*options)
 
     def of_this_step(self, where: Where) -> str:
         """What the agent did, and what was used."""
@@ -612,6 +639,8 @@ class Phrases:
         if not where.reset:
             slots = [f"agent.{slot}" for slot in self.declared.slots] or ["agent.noun"]
             options += [lambda: f"Was it <{self.rng.choice(slots)}>"]
+        for look in known.looks:
+            options.append(lambda look=look: f"It is <{self.in_text(partial(self.look, look), where)}>")
         if known.tables:
             options += [
                 lambda: f"They say <{self.rng.choice(known.tables)}({self.in_text(self.color, where)})>"

@@ -13,7 +13,7 @@ import { inView } from "./trace.js";
  *   first letters of colours
  */
 export function drawPicture(canvas, picture, { tile, letters = false }) {
-  const { width, height, cells, agent, below, gestures, held, tinted } = picture;
+  const { width, height, cells, agent, below, gestures, held, marks, tinted } = picture;
   canvas.width = width * tile;
   canvas.height = height * tile;
   const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
@@ -27,6 +27,7 @@ export function drawPicture(canvas, picture, { tile, letters = false }) {
       below: below.get(cell),
       gesture: gestures.get(cell),
       held: held.get(cell),
+      marks: marks.get(cell),
       letter: letters,
     });
   });

@@ -8,6 +8,7 @@
 /** @typedef {[number, number]} Point */
 /** @typedef {[number, number, number, number]} Look type, colour, status, orientation */
 /** @typedef {{pointing: number, act: string}} Gesture pointing -1: at nothing */
+/** @typedef {[string, string, number, number]} Mark look, word, place of the word, row of the look */
 /** @typedef {(canvas: Pen, colour: Rgb, status: number, orientation: number) => void} Drawer */
 
 /** @type {Rgb} */ const INK = [38, 40, 46];
@@ -54,6 +55,11 @@ class Pen {
     this.x = x;
     this.y = y;
     this.size = size;
+  }
+
+  /** A square of this one: its upper left corner and its side. @param {number} x @param {number} y @param {number} size */
+  part(x, y, size) {
+    return new Pen(this.c, this.x + x * this.size, this.y + y * this.size, size * this.size);
   }
 
   /** @param {Rgb} colour */
@@ -162,9 +168,10 @@ class Pen {
  * @param {CanvasRenderingContext2D} context
  * @param {number} x left edge in pixels @param {number} y upper edge @param {number} size side
  * @param {Look} look
- * @param {{agent?: number, seen?: boolean, below?: Look, gesture?: Gesture, held?: Look, letter?: boolean}} more
+ * @param {{agent?: number, seen?: boolean, below?: Look, gesture?: Gesture, held?: Look, marks?: Mark[], letter?: boolean}} more
  *   agent: its direction if it stands here; seen: tinted, since it is in the agent's field of view; below: what lies
- *   under an NPC; held: what it carries; letter: the first letter of the colour in a corner (e: grey)
+ *   under an NPC; held: what it carries; marks: the looks of what is here, or of what the agent carries; letter: the
+ *   first letter of the colour in a corner (e: grey)
  */
 export function drawTile(context, x, y, size, look, more = {}) {
   context.save();
@@ -174,22 +181,98 @@ export function drawTile(context, x, y, size, look, more = {}) {
   const pen = new Pen(context, x, y, size);
   pen.fill(more.seen ? mix(PAPER, SEEN_TINT, 0.55) : PAPER);
   pen.rectangle(0, 0, 1, 1, { outline: more.seen ? mix(LINE, SEEN_TINT, 0.5) : LINE, width: 0.03 });
-  for (const [type, colour, status, orientation] of more.below ? [more.below, look] : [look]) {
-    (DRAWERS[type] ?? drawUnknown)(pen, PALETTE[colour % 6], status, orientation);
-  }
+  const marks = more.marks ?? [], isAgents = more.agent !== undefined;
+  if (more.below) drawThing(pen, more.below, []);
+  drawThing(pen, look, isAgents ? [] : marks);
   const colour = PALETTE[look[1] % 6];
   if (more.gesture) drawGesture(pen, colour, look[3], more.gesture);
   if (more.agent !== undefined) drawAgent(pen, more.agent);
-  if (more.held) drawHeld(pen, more.held);
+  if (!isAgents) drawMarks(pen, marks);
+  if (more.held) drawHeld(pen, more.held, isAgents ? marks : []);
   if (more.letter && !UNLETTERED.includes(look[0])) drawLetter(pen, look[1]);
   context.restore();
 }
 
-/** A small picture of what is carried, in the lower left corner. @param {Pen} pen @param {Look} held */
-function drawHeld(pen, [type, colour, status, orientation]) {
-  pen.circle(0.2, 0.8, 0.19, { fill: WHITE, outline: INK, width: 0.03 });
-  const part = new Pen(pen.c, pen.x + 0.05 * pen.size, pen.y + 0.65 * pen.size, 0.3 * pen.size);
+/** A thing or an NPC in its size and with its pattern. @param {Pen} pen @param {Look} look @param {Mark[]} marks */
+function drawThing(pen, [type, colour, status, orientation], marks) {
+  const side = marks.reduce((part, [, word]) => part * (SIZES[word] ?? 1), 1);
+  const part = pen.part((1 - side) / 2, (1 - side) / 2, side);
   (DRAWERS[type] ?? drawUnknown)(part, PALETTE[colour % 6], status, orientation);
+  for (const [, word] of marks) PATTERNS[word]?.(part);
+}
+
+/** A small picture of what is carried, in the lower left corner.
+ * @param {Pen} pen @param {Look} held @param {Mark[]} marks */
+function drawHeld(pen, held, marks) {
+  pen.circle(0.2, 0.8, 0.19, { fill: WHITE, outline: INK, width: 0.03 });
+  const part = pen.part(0.05, 0.65, 0.3);
+  drawThing(part, held, marks);
+  drawMarks(part, marks);
+}
+
+/** Words that make a thing smaller. @type {Record<string, number>} */
+const SIZES = { tiny: 0.4, small: 0.55, medium: 0.75, large: 0.95 };
+
+/** Words that are drawn over a thing. @type {Record<string, (pen: Pen) => void>} */
+const PATTERNS = {
+  plain: (pen) => pen.arc(0.5, 0.5, 0.2, 190, 290, WHITE, 0.06),
+  striped: (pen) => {
+    for (const y of [0.38, 0.52, 0.66]) {
+      pen.line([[0.3, y], [0.7, y]], INK, 0.1);
+      pen.line([[0.3, y], [0.7, y]], WHITE, 0.06);
+    }
+  },
+  spotted: (pen) => {
+    for (const [x, y] of [[0.38, 0.4], [0.62, 0.4], [0.5, 0.53], [0.38, 0.66], [0.62, 0.66]]) {
+      pen.circle(x, y, 0.07, { fill: WHITE, outline: INK, width: 0.02 });
+    }
+  },
+  checked: (pen) => {
+    pen.rectangle(0.32, 0.36, 0.68, 0.72, { fill: INK });
+    pen.rectangle(0.34, 0.38, 0.5, 0.54, { fill: WHITE });
+    pen.rectangle(0.5, 0.54, 0.66, 0.7, { fill: WHITE });
+  },
+};
+
+/** Words that are a face, each with its colour. @type {Record<string, Rgb>} */
+const FACES = {
+  calm: [255, 236, 160],
+  cheerful: [255, 214, 60],
+  laughing: [255, 170, 40],
+  sad: [150, 190, 240],
+  angry: [240, 90, 70],
+  afraid: [200, 170, 230],
+  surprised: [170, 230, 170],
+};
+
+/** Faces, and tags for words without a drawing of their own. @param {Pen} pen @param {Mark[]} marks */
+function drawMarks(pen, marks) {
+  for (const [, word, place, row] of marks) {
+    if (FACES[word]) drawFace(pen, word);
+    else if (!SIZES[word] && !PATTERNS[word]) drawTag(pen, place, row);
+  }
+}
+
+/** @param {Pen} pen @param {string} word */
+function drawFace(pen, word) {
+  const x = 0.8, y = 0.2;
+  pen.circle(x, y, 0.19, { fill: FACES[word], outline: INK, width: 0.03 });
+  for (const side of [-1, 1]) {
+    pen.circle(x + side * 0.07, y - 0.04, ["afraid", "surprised"].includes(word) ? 0.045 : 0.03, { fill: INK });
+    if (word === "angry") pen.line([[x + side * 0.12, y - 0.13], [x + side * 0.03, y - 0.08]], INK, 0.03);
+  }
+  if (word === "calm") pen.line([[x - 0.07, y + 0.08], [x + 0.07, y + 0.08]], INK, 0.03);
+  else if (word === "cheerful") pen.arc(x, y, 0.125, 20, 160, INK, 0.03);
+  else if (word === "laughing") pen.pie(x, y + 0.02, 0.11, 0, 180, INK);
+  else if (word === "sad" || word === "angry") pen.arc(x, y + 0.17, 0.12, 215, 325, INK, 0.03);
+  else pen.circle(x, y + 0.09, word === "surprised" ? 0.05 : 0.03, { fill: INK });
+}
+
+/** @param {Pen} pen @param {number} place @param {number} row */
+function drawTag(pen, place, row) {
+  const y = 0.94 - 0.09 * row, left = 0.5 - 0.035 * place;
+  pen.rectangle(left - 0.05, y - 0.045, left + 0.07 * place + 0.05, y + 0.045, { fill: WHITE, outline: INK, width: 0.015 });
+  for (let dot = 0; dot <= place; dot++) pen.circle(left + 0.07 * dot, y, 0.025, { fill: INK });
 }
 
 /** @param {Pen} pen @param {number} colour */

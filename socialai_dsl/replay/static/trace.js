@@ -3,6 +3,7 @@
 
 /** @typedef {import("./tiles.js").Look} Look */
 /** @typedef {import("./tiles.js").Gesture} Gesture */
+/** @typedef {import("./tiles.js").Mark} Mark */
 /** @typedef {{text: string, name?: string, who?: string | null}} Line */
 /** @typedef {{who: string, kind: string, state?: string | null, list?: string | null, name: string, at: string, words: string}} Rule */
 /** @typedef {{key: string, name: string, look: Look}} Member */
@@ -22,6 +23,8 @@
  * @property {number[] | null} [view]
  * @property {[number, number, string][]} [view_gestures]
  * @property {[number, number][]} [view_held]
+ * @property {[number, number][]} [marks]
+ * @property {[number, number][]} [view_marks]
  * @property {Record<string, any>} [state]
  * @property {[number, number, number, number] | null} [action]
  * @property {string | null} [did]
@@ -46,6 +49,7 @@
  * @property {string[]} nouns
  * @property {Record<string, string[]>} [slots]
  * @property {Look[]} [looks]
+ * @property {Mark[][]} [marks]
  * @property {string[]} [texts]
  * @property {Rule[]} [rules]
  * @property {Moment[]} [moments]
@@ -60,6 +64,7 @@
  * @property {Map<number, Look>} below
  * @property {Map<number, Gesture>} gestures
  * @property {Map<number, Look>} held what who stands in a cell carries
+ * @property {Map<number, Mark[]>} marks the looks of what is seen in a cell
  * @property {boolean} tinted whether the agent's field of view is marked
  */
 /**
@@ -87,6 +92,7 @@ export class Episode {
     }
     this.trace = trace;
     /** @type {Look[]} */ this.looks = [];
+    /** @type {Mark[][]} */ this.marks = [];
     /** @type {string[]} */ this.texts = [];
     /** @type {Rule[]} */ this.rules = [];
     /** @type {Scene[]} */ this.scenes = [];
@@ -106,6 +112,7 @@ export class Episode {
   /** Go on with what a trace adds. @param {Trace} more */
   add(more) {
     this.looks.push(...(more.looks ?? []));
+    this.marks.push(...(more.marks ?? []));
     this.texts.push(...(more.texts ?? []));
     this.rules.push(...(more.rules ?? []));
     for (const moment of more.moments ?? []) this.scenes.push(this.scene(moment));
@@ -125,6 +132,7 @@ export class Episode {
     const pairs = (/** @type {[number, number, string][]} */ found) =>
       new Map(found.map(([cell, pointing, act]) => [cell, { pointing, act }]));
     const looks = (/** @type {[number, number][]} */ found) => new Map(found.map(([cell, look]) => [cell, this.looks[look]]));
+    const marks = (/** @type {[number, number][]} */ found) => new Map(found.map(([cell, one]) => [cell, this.marks[one]]));
     const changed = moment.state ?? {};
     return {
       moment,
@@ -138,6 +146,7 @@ export class Episode {
         below: looks(moment.below ?? []),
         gestures: pairs(moment.gestures ?? []),
         held: looks(moment.held ?? []),
+        marks: marks(moment.marks ?? []),
         tinted: true,
       },
       view: {
@@ -148,6 +157,7 @@ export class Episode {
         below: new Map(),
         gestures: pairs(moment.view_gestures ?? []),
         held: looks(moment.view_held ?? []),
+        marks: marks(moment.view_marks ?? []),
         tinted: false,
       },
       state: moment.room ? changed : { ...before.state, ...changed },

@@ -38,7 +38,7 @@ OTHERS = sorted(
 CUES = [f"school/boxes+{cue}" for cue in ("color", "pointing", "feedback", "emulation", "scaffolding")]
 NAMES = [name for name in (*PAPER, *OTHERS, *CUES) if not name.endswith(("_as_coded", "_oracle"))]
 HANDS = Path(__file__).parents[2] / "data" / "hands"
-NAMES += [f"{HANDS}.yaml", f"{HANDS}_and_gestures.yaml"]
+NAMES += [f"{HANDS}.yaml", f"{HANDS}_and_gestures.yaml", f"{HANDS.parent / 'looks'}.yaml"]
 STEPS, TILE, EDGE = 60, 32, 3
 _ROOM = 348
 """So many columns of a film show the room."""

@@ -34,7 +34,10 @@ PLAYED = [
     "school/generators+color",
     "novel/gaze_following",
     "novel/sally_anne",
-    *(str(Path(__file__).parents[2] / "data" / f"hands{more}.yaml") for more in ("", "_and_gestures")),
+    *(
+        str(Path(__file__).parents[2] / "data" / f"{name}.yaml")
+        for name in ("hands", "hands_and_gestures", "looks")
+    ),
 ]
 """Four channels and more, occlusion or none, hidden NPCs, suites, absolute directions and relative ones."""
 
@@ -172,3 +175,22 @@ def test_hands_are_told_of() -> None:
     text = TextView(sd.compile(sd.load(name)), "prose").observe(observation, info)
     assert "You carry a plain red ball." in text
     assert "looking south, carrying a red apple" in text
+
+
+def test_looks_are_told_of() -> None:
+    """Words before the colour of things, and with the name of the look of NPCs."""
+    name = str(Path(__file__).parents[2] / "data" / "looks.yaml")
+    layout = {
+        "agent": {"at": [2, 3], "facing": "up", "carries": "balls[0]"},
+        "balls": [{"looks": {"size": "small", "pattern": "striped"}}],
+        "box": {"at": [2, 2], "looks": {"size": "large"}},
+        "ann": {"at": [2, 1], "facing": "down", "looks": {"mood": "angry"}},
+    }
+    env = sd.make(name)
+    observation, info = env.reset(seed=0, options={"layout": layout})
+    text = TextView(sd.compile(sd.load(name)), "prose").observe(observation, info)
+    assert "You carry a small striped plain red ball." in text
+    assert "1 step ahead: a large shut red box" in text
+    assert "peer, mood angry, looking south" in text
+    told = json.loads(TextView(sd.compile(sd.load(name)), "json").observe(observation, info))
+    assert told["carrying"]["looks"] == {"size": "small", "pattern": "striped"}
