@@ -473,7 +473,8 @@ class _Run:
             return None
         entities.check_slots(resolver)
         if scenario.observe.tone is not None:
-            rows.check_tone(resolver, scenario.observe.tone)
+            with surviving():
+                rows.check_tone(resolver, scenario.observe.tone)
         possible.check_flow(scenario, findings)
         spoken = self._spoken()
         outcomes = tuple(self._outcomes())

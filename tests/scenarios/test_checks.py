@@ -27,6 +27,8 @@ NOVEL = {
     "haggling": 3,
     "implicature": 4,
     "interpreter": 2,
+    "reference_game": 2,
+    "sarcasm": 3,
     "turn_taking": 2,
     "whisper": 3,
 }

@@ -28,6 +28,10 @@ SHOP: dict[str, Any] = {
 }
 
 
+FOUR = evenly((friends, meant) for friends in (False, True) for meant in (False, True))
+"""Friends or not, and whether the idea is meant."""
+
+
 def played(name: str, seed: int) -> tuple[dict[str, Any], dict[str, Any], float]:
     """The end of an episode of the scripted agent: the state, the info and the reward."""
     env = made(name)
@@ -345,6 +349,56 @@ class TestFetch:
         episode.acts("pickup", "right", "pickup", "left", "left", "drop")
         assert episode.now()["agent"]["carries"] == "balls[0]"
         assert "carries" not in episode.now()["asker"]
+
+
+class TestReferenceGame:
+    def test_some_two_words_single_out_the_star_and_not_all(self) -> None:
+        for room in rooms("novel/reference_game", 200):
+            *others, star = [{**ball["looks"], "color": ball["color"]} for ball in room["balls"]]
+            pairs = (("size", "pattern"), ("size", "color"), ("pattern", "color"))
+            found = [all(any(ball[key] != star[key] for key in pair) for ball in others) for pair in pairs]
+            assert any(found)
+            assert not all(found)
+
+    def test_the_star_is_seen_on_one_ball(self) -> None:
+        for room in rooms("novel/reference_game", 20):
+            assert [ball["state"] for ball in room["balls"]] == ["plain"] * 3 + ["tagged"]
+
+    def test_max_takes_any_other_that_fits(self) -> None:
+        """Whatever is said that fits another ball leads to a failure."""
+        for seed in range(12):
+            env = made("novel/reference_game")
+            env.reset(seed=seed)
+            *others, star = [{**ball["looks"], "color": ball["color"]} for ball in env.describe()["balls"]]
+            fits = any(all(ball[key] == star[key] for key in ("size", "pattern")) for ball in others)
+            said = f"The {star['size']} {star['pattern']} one"
+            *_, terminated, truncated, info = env.step(env.encode_action((None, said)))
+            while not (terminated or truncated):
+                *_, terminated, truncated, info = env.step(env.encode_action((None, None)))
+            assert info["success"] != fits
+
+
+class TestSarcasm:
+    def test_bond_prize_and_idea_are_drawn_alone(self) -> None:
+        drawn = [room["let"] for room in rooms("novel/sarcasm", 1200)]
+        check_shares(((let["friends"], let["prize"] == let["proposed"]) for let in drawn), FOUR)
+
+    @pytest.mark.parametrize(("friends", "meant"), FOUR)
+    def test_the_words_are_the_same_and_tone_and_greeting_tell(self, friends: bool, meant: bool) -> None:
+        let = {"friends": friends, "prize": f"boxes[{int(not meant)}]", "proposed": "boxes[0]"}
+        episode = Episode("novel/sarcasm", {"let": let, "boxes": [{"color": "red"}, {"color": "blue"}]})
+        heard = [line for _ in range(6) for line in episode.act().heard.split("\n") if line]
+        greeting = "Hello my friend" if friends else "You again"
+        tone = "laughing" if friends == meant else "calm"
+        assert heard == [
+            "Bob: Hello Ann",
+            f"Ann: (calm) {greeting}",
+            "Bob: I would open the red box",
+            f"Ann: ({tone}) Great idea",
+        ]
+
+    def test_the_tone_is_not_seen(self) -> None:
+        assert made("novel/sarcasm").observation_space["image"].shape == (7, 7, 4)
 
 
 class TestGossip:
