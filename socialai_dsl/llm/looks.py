@@ -109,7 +109,11 @@ def phrase(told: Mapping[str, Any], shared: Container[str] = ()) -> str:
         shared: words of several looks, beside which a thing has the name of the look.
     """
     looks = {} if told["what"].startswith("cells") else told.get("looks", {})
-    plain = [word for word in looks.values() if "looking" not in told and word not in shared]
+    plain = [
+        word
+        for word in looks.values()
+        if "looking" not in told and word not in shared and word != told.get("state")
+    ]
     named = " ".join([*plain, *(told[key] for key in ("state", "color", "what") if key in told)])
     doing = [f"{look} {word}" for look, word in looks.items() if word not in plain]
     doing += [f"{key} {told[key]}" for key in ("looking", "moving", "pointing", "carrying") if key in told]

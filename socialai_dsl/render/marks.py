@@ -60,11 +60,12 @@ def sized(canvas: Canvas, marks: Marks) -> Canvas:
     return canvas if side == 1.0 else canvas.part((1 - side) / 2, (1 - side) / 2, side)
 
 
-def draw_patterns(canvas: Canvas, marks: Marks) -> None:
-    """Draw the patterns of a thing over it; `canvas` is the part of the cell that it takes up."""
-    for mark in marks:
-        if mark.word in _PATTERNS:
-            _PATTERNS[mark.word](canvas)
+def draw_patterns(canvas: Canvas, marks: Marks) -> bool:
+    """Draw the patterns of a thing over it; whether it has any. `canvas` is the part of the cell that it takes up."""
+    patterns = [_PATTERNS[mark.word] for mark in marks if mark.word in _PATTERNS]
+    for draw in patterns:
+        draw(canvas)
+    return bool(patterns)
 
 
 def draw_marks(canvas: Canvas, marks: Marks) -> None:

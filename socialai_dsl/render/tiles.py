@@ -94,8 +94,11 @@ def _draw(canvas: Canvas, code: Code, marks: Marks = ()) -> None:
     """A thing or an NPC in its size and with its pattern."""
     kind, colour, status, orientation = code
     part = sized(canvas, marks)
-    _drawer(kind)(part, PALETTE[colour % len(PALETTE)], status, orientation)
-    draw_patterns(part, marks)
+    drawer = _drawer(kind)
+    drawer(part, PALETTE[colour % len(PALETTE)], status, orientation)
+    if draw_patterns(part, marks) and drawer is _draw_ball and status:
+        part.polygon(_star(0.5, 0.5, 0.34), fill=WHITE)
+        part.polygon(_star(0.5, 0.5, 0.25), fill=INK)
 
 
 def _draw_held(canvas: Canvas, held: Code, marks: Marks) -> None:

@@ -81,7 +81,11 @@ def all_tiles() -> list[Tile]:
     found += [((tiles.NPC, 4, 1, 0), {"marks": tag}) for tag in tags]
     ball = (prelude().types["ball"].code, 2, 0, 0)
     marks = [("size", "small", 0, 0), ("pattern", "striped", 1, 1)]
-    found += [(ball, {"marks": marks}), ((tiles.EMPTY, 0, 0, 0), {"agent": 2, "held": ball, "marks": marks})]
+    found += [
+        ((*ball[:2], 1, 0), {"marks": marks}),
+        (ball, {"marks": marks}),
+        ((tiles.EMPTY, 0, 0, 0), {"agent": 2, "held": ball, "marks": marks}),
+    ]
     found += [((tiles.EMPTY, 0, 0, 0), {"agent": 1, "held": (prelude().types["ball"].code, 2, 1, 1)})]
     return [*found, ((tiles.NPC, 1, 2, 3), {"below": (prelude().types["door"].code, 0, 0, 0)})]
 

@@ -198,7 +198,12 @@ function drawThing(pen, [type, colour, status, orientation], marks) {
   const side = marks.reduce((part, [, word]) => part * (SIZES[word] ?? 1), 1);
   const part = pen.part((1 - side) / 2, (1 - side) / 2, side);
   (DRAWERS[type] ?? drawUnknown)(part, PALETTE[colour % 6], status, orientation);
-  for (const [, word] of marks) PATTERNS[word]?.(part);
+  const patterns = marks.map(([, word]) => PATTERNS[word]).filter((draw) => draw);
+  for (const draw of patterns) draw(part);
+  if (patterns.length && DRAWERS[type] === drawBall && status) {
+    part.polygon(star(0.34), WHITE);
+    part.polygon(star(0.25), INK);
+  }
 }
 
 /** A small picture of what is carried, in the lower left corner.
@@ -347,12 +352,15 @@ function drawBall(pen, colour, status) {
     pen.circle(0.41, 0.4, 0.07, { fill: light(colour) });
     return;
   }
-  /** @type {Point[]} */ const star = [];
-  for (let corner = 0; corner < 10; corner++) {
-    const reach = corner % 2 ? 0.22 * 0.42 : 0.22, angle = Math.PI * (corner / 5 - 0.5);
-    star.push([0.5 + reach * Math.cos(angle), 0.5 + reach * Math.sin(angle)]);
-  }
-  pen.polygon(star, INK);
+  pen.polygon(star(0.22), INK);
+}
+
+/** The ten corners of a five-pointed star in the middle, one point up. @param {number} radius @returns {Point[]} */
+function star(radius) {
+  return Array.from({ length: 10 }, (_, corner) => {
+    const reach = corner % 2 ? radius * 0.42 : radius, angle = Math.PI * (corner / 5 - 0.5);
+    return [0.5 + reach * Math.cos(angle), 0.5 + reach * Math.sin(angle)];
+  });
 }
 
 /** @type {Drawer} */
