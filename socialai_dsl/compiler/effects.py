@@ -20,7 +20,7 @@ from socialai_dsl.compiler.assembler import (
 )
 from socialai_dsl.compiler.cells import ROW
 from socialai_dsl.compiler.expressions import Expressions, Lines
-from socialai_dsl.compiler.folding import Changes, Mobility, When, numbers_of, plans
+from socialai_dsl.compiler.folding import Changes, Mobility, When, plans
 from socialai_dsl.compiler.hands import back_into_hands, move_into, out_of_hands
 from socialai_dsl.compiler.rows import row, row_of
 from socialai_dsl.compiler.those import Choice, Chosen, sizes
@@ -38,7 +38,7 @@ from socialai_dsl.semantics.plans import (
     RulePlan,
     StepPlan,
 )
-from socialai_dsl.semantics.terms import BOOL, Const, ObjectType, Sited, Term, Type
+from socialai_dsl.semantics.terms import BOOL, Const, ObjectType, Sited, Term, Type, numbers_of
 
 # -- what the effect `reset` puts back -----------------------------------------------------------------------
 

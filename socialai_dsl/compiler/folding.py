@@ -12,7 +12,16 @@ from socialai_dsl.program import Body
 from socialai_dsl.semantics import terms
 from socialai_dsl.semantics.plans import Activity, CheckedScenario, Effect, Entity, RulePlan, StepPlan
 from socialai_dsl.semantics.signatures import ACTIVITIES
-from socialai_dsl.semantics.terms import BOOL, Const, HeardNoun, Pattern, Speaker, Term, may_find_nothing
+from socialai_dsl.semantics.terms import (
+    BOOL,
+    Const,
+    HeardNoun,
+    Pattern,
+    Speaker,
+    Term,
+    may_find_nothing,
+    numbers_of,
+)
 from socialai_dsl.vocabulary import normal
 
 _Kind = TypeVar("_Kind")
@@ -477,11 +486,6 @@ def leaving(checked: CheckedScenario) -> frozenset[int]:
     Any may be out of it from the beginning, for want of a free cell, say, or as a layout has it.
     """
     return frozenset(Mobility(checked).vanishing)
-
-
-def numbers_of(term: Term) -> list[int]:
-    """The entities that a term may name."""
-    return [term.value] if isinstance(term, Const) else list(term.type.values)
 
 
 def plans(checked: CheckedScenario) -> Iterable[RulePlan | StepPlan]:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from socialai_dsl.compiler.assembler import Label, constant, entity_register
 from socialai_dsl.compiler.expressions import Expressions
-from socialai_dsl.compiler.folding import numbers_of
 from socialai_dsl.program import Field, Op
 from socialai_dsl.semantics.plans import CheckedScenario
-from socialai_dsl.semantics.terms import Term
+from socialai_dsl.semantics.terms import Term, numbers_of
 
 
 def members(checked: CheckedScenario) -> int:

@@ -172,6 +172,35 @@ def frame_code(allocation: Allocation, number: int, frame: FramePlan) -> FrameCo
     return FrameCode(compiler.rows(), compiler.perceive(), compiler.deferred())
 
 
+def _conditions(
+    to: Expressions,
+    rule: RulePlan,
+    asked: Asked,
+    following: Label,
+    once: int | None,
+    clock: int | None = None,
+) -> None:
+    """Fall through if all conditions of a rule hold, else skip to `following`.
+
+    `once` is the register that says whether it has fired, `clock` that of the frame.
+    """
+    block = to.block
+    block.span = rule.span
+    if rule.hears:
+        to.condition(fold(terms.Heard(rule.hears), to.facts, to.classes), asked.unless("hears", following))
+    if once is not None:
+        block.test(Op.IF_EQ, once, constant(0), asked.unless("once", following))
+    if rule.after:
+        assert clock is not None, "internal: the world has no clock"
+        block.test(Op.IF_LE, constant(rule.after), clock, asked.unless("after", following))
+    if rule.when is not None:
+        asked.condition(to, "when", rule.when, following)
+    block.span = rule.span
+    if rule.chance is not None:
+        site = to.sites.row(f"{rule.site}.chance")
+        block.test(Op.IF_CHANCE, chance_word(rule.chance), site, asked.unless("chance", following))
+
+
 class _FrameCompiler:
     """One frame as one member plays it."""
 
@@ -330,22 +359,7 @@ class _FrameCompiler:
         return self.shared.notes.rule(to, self.counters[what.name], what, self.frame.entity)
 
     def _conditions(self, to: Expressions, rule: RulePlan, asked: Asked, following: Label) -> None:
-        """Fall through if all conditions of a rule hold, else skip to `following`."""
-        block = to.block
-        block.span = rule.span
-        if rule.hears:
-            heard = fold(terms.Heard(rule.hears), to.facts, self.shared.classes)
-            to.condition(heard, asked.unless("hears", following))
-        if rule.once:
-            block.test(Op.IF_EQ, self.once[rule.name], constant(0), asked.unless("once", following))
-        if rule.after:
-            block.test(Op.IF_LE, constant(rule.after), self.clock, asked.unless("after", following))
-        if rule.when is not None:
-            asked.condition(to, "when", rule.when, following)
-        block.span = rule.span
-        if rule.chance is not None:
-            site = self.shared.sites.row(f"{rule.site}.chance")
-            block.test(Op.IF_CHANCE, chance_word(rule.chance), site, asked.unless("chance", following))
+        _conditions(to, rule, asked, following, self.once.get(rule.name), self.clock)
 
     def _rule(self, to: Expressions, rule: RulePlan, follow: bool) -> None:
         block = to.block
@@ -594,41 +608,22 @@ class _FrameCompiler:
 # -- rules of the world: once a step, after all turns, each that holds fires ---------------------------------
 
 
-def world_rules(
-    to: Expressions,
-    lines: Lines,
-    homes: Homes,
-    counted: list[str],
-    notes: NoteTaker = NO_NOTES,
-) -> None:
+def world_rules(to: Expressions, allocation: Allocation) -> None:
     """Emit the rules top to bottom, and add their names to those that are counted."""
+    notes = allocation.notes
     for rule in to.checked.rules:
-        counted.append(rule.name)
-        if rule.when is not None and fold(rule.when.term, to.facts, to.classes) == FALSE:
-            if notes.recording:
-                _ask_in_vain(to, rule, len(counted) - 1, notes)
-            continue
-        _world_rule(to, lines, homes, rule, len(counted) - 1, notes)
+        allocation.rules.append(rule.name)
+        asked = notes.rule(to, len(allocation.rules) - 1, rule, None)
+        if rule.when is None or fold(rule.when.term, to.facts, to.classes) != FALSE:
+            _world_rule(to, allocation, rule, asked)
+        elif notes.recording:  # what keeps it from ever firing
+            following = Label()
+            asked.condition(to, "when", rule.when, following)
+            asked.report(to, following)
+            to.block.bind(following)
 
 
-def _ask_in_vain(to: Expressions, rule: RulePlan, counter: int, notes: NoteTaker) -> None:
-    """Only note what keeps a rule from ever firing."""
-    assert rule.when is not None, "internal: a rule without a condition can fire"
-    following = Label()
-    asked = notes.rule(to, counter, rule, None)
-    asked.condition(to, "when", rule.when, following)
-    asked.report(to, following)
-    to.block.bind(following)
-
-
-def _world_rule(
-    to: Expressions,
-    lines: Lines,
-    homes: Homes,
-    rule: RulePlan,
-    counter: int,
-    notes: NoteTaker,
-) -> None:
+def _world_rule(to: Expressions, allocation: Allocation, rule: RulePlan, asked: Asked) -> None:
     assert not rule.hears, "internal: the world has no ears"
     assert rule.say is None, "internal: the world has no voice"
     assert rule.do is None, "internal: the world has no body"
@@ -636,17 +631,9 @@ def _world_rule(
     following = Label()
     mark = block.taken
     fired = to.registers.add(f"world.fired.{rule.name}", BOOL) if rule.once else None
-    block.span = rule.span
-    asked = notes.rule(to, counter, rule, None)
-    if fired is not None:
-        block.test(Op.IF_EQ, fired, constant(0), asked.unless("once", following))
-    if rule.when is not None:
-        asked.condition(to, "when", rule.when, following)
-    block.span = rule.span
-    if rule.chance is not None:
-        site = to.sites.row(f"{rule.site}.chance")
-        block.test(Op.IF_CHANCE, chance_word(rule.chance), site, asked.unless("chance", following))
-    Effects(to, lines, homes).emit(rule, counter, asked.nothing("values", following))
+    _conditions(to, rule, asked, following, fired)
+    effects = Effects(to, allocation.lines, allocation.homes)
+    effects.emit(rule, len(allocation.rules) - 1, asked.nothing("values", following))
     if fired is not None:
         block.emit(Op.LOAD, fired, constant(1))
     asked.report(to, following)
@@ -733,11 +720,7 @@ def lower(allocation: Allocation) -> LoweredCode:
         Header.BEFORE_PC: entry("before", *((ask,) if allocation.checked.probes else ()), remember),
         Header.LINKS_PC: entry("links", links),
         Header.SETTLE_PC: entry("settle", computed.settle),
-        Header.RULES_PC: entry(
-            "rules",
-            push_acts,
-            lambda to: world_rules(to, allocation.lines, homes, allocation.rules, notes),
-        ),
+        Header.RULES_PC: entry("rules", push_acts, lambda to: world_rules(to, allocation)),
         Header.TICK_PC: entry("tick", tick),
     }
     outcomes = outcome_table(allocation)

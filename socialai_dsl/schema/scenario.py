@@ -178,6 +178,11 @@ class State(Model):
         (), description="rules read after moving; the first that holds takes effect"
     )
 
+    @property
+    def rules(self) -> tuple[ThenRule, ...]:
+        """All of them, in the order written."""
+        return (*self.first, *self.then)
+
 
 class Step(Effects):
     """One entry of `steps`: an activity until it is finished, then its effects."""

@@ -12,7 +12,7 @@ from socialai_dsl.diagnostics import Diagnostic, DiagnosticBag, Severity, did_yo
 from socialai_dsl.schema.scenario import CHANNELS, Expression, Property, Scenario, Sequence
 from socialai_dsl.semantics import behaviour, entities, groups, object_facts, possible, rows, setup, tables
 from socialai_dsl.semantics.entities import AGENT, Prelude, entities_of
-from socialai_dsl.semantics.free_cells import check_absences, check_placements
+from socialai_dsl.semantics.free_cells import Known, check_absences, check_placements
 from socialai_dsl.semantics.groups import performs
 from socialai_dsl.semantics.plans import CheckedScenario, Drawn, FramePlan, OutcomePlan, PropertyPlan
 from socialai_dsl.semantics.possible import check_possible
@@ -39,16 +39,11 @@ from socialai_dsl.semantics.scope import (
 from socialai_dsl.semantics.setup import room_plan, room_sizes
 from socialai_dsl.semantics.terms import (
     BOOL,
-    Compare,
     Const,
     Line,
-    Logic,
-    Not,
     Quantified,
     Sited,
-    Term,
     Type,
-    Variable,
     walk,
 )
 from socialai_dsl.semantics.texts import words_in_order
@@ -209,34 +204,15 @@ def _values(drawn: Drawn) -> tuple[int, ...]:
         return ()
     found = []
     for item in term.items:
-        kept = 1 if term.condition is None else _constant(term.condition, {term.variable: item.value})
+        kept = (
+            1
+            if term.condition is None
+            else Known(variables={term.variable: item.value}).value(term.condition)
+        )
         if kept is None:
             return ()
         found += [item.value] * bool(kept)
     return tuple(found)
-
-
-def _constant(term: Term, variables: dict[str, int]) -> int | None:
-    """The value of a term that depends on nothing but variables; None if it depends on more."""
-    match term:
-        case Const(value=value):
-            return value
-        case Variable(name=name):
-            return variables.get(name)
-        case Not(arg=arg):
-            truth = _constant(arg, variables)
-            return None if truth is None else int(not truth)
-        case Logic(op=op, args=args):
-            values = [_constant(arg, variables) for arg in args]
-            if None in values:
-                return None
-            return int(all(values) if op == "and" else any(values))
-        case Compare(op=op, left=left, right=right):
-            a, b = _constant(left, variables), _constant(right, variables)
-            if a is None or b is None:
-                return None
-            return int({"==": a == b, "!=": a != b, "<": a < b, "<=": a <= b}[op])
-    return None
 
 
 # -- ranges of registers that are set --------------------------------------------------------------------------
@@ -318,7 +294,7 @@ def _setters(scenario: Scenario) -> int:
         rule
         for frame in scenario.frames.values()
         for state in (frame.states or {}).values()
-        for rule in (*state.first, *state.then)
+        for rule in state.rules
     ]
     steps = [step for frame in scenario.frames.values() for _, step in frame.entries()]
     own = sum(bool(entry.set) for entry in (*rules, *steps))

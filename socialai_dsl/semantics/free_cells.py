@@ -7,7 +7,7 @@ somebody who is found missing really is.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence, Set
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import product
@@ -70,36 +70,62 @@ def _lies_in(name: str, args: Sequence[int], cell: Cell, size: Size) -> bool:
 
 def value(term: Term, size: Size, here: Cell = (0, 0)) -> int:
     """The value of a term that reads only the size of the room and the cell; raises UnknownError for others."""
-    match term:
-        case terms.Const():
-            return term.value
-        case terms.World(name="width"):
-            return size[0]
-        case terms.World(name="height"):
-            return size[1]
-        case terms.Here(name=name):
-            return here[0 if name == "x" else 1]
-        case terms.Operation(op=op, args=args):
-            numbers = [value(arg, size, here) for arg in args]
-            # As in a room: dividing by nothing gives 0.
-            return 0 if op in ("//", "%") and numbers[1] == 0 else compute(op, *numbers)
-        case terms.Compare(op=op, left=left, right=right):
-            return COMPARISONS[op](value(left, size, here), value(right, size, here))
-        case terms.Logic(op="and", args=args):
-            return all(value(arg, size, here) for arg in args)
-        case terms.Logic(args=args):
-            return any(value(arg, size, here) for arg in args)
-        case terms.Not(arg=arg):
-            return not value(arg, size, here)
-    raise UnknownError(str(term))
+    found = Known(size, here).value(term)
+    if found is None:
+        raise UnknownError(str(term))
+    return found
 
 
-COMPARISONS: Final[dict[str, Callable[[int, int], bool]]] = {
+_COMPARISONS: Final[dict[str, Callable[[int, int], bool]]] = {
     "==": lambda a, b: a == b,
     "!=": lambda a, b: a != b,
     "<": lambda a, b: a < b,
     "<=": lambda a, b: a <= b,
 }
+
+
+class Known:
+    """What is known when a term is asked for its value; None stands for what is not.
+
+    Attributes:
+        size: of the room. here: the candidate cell. variables: those of quantifiers.
+    """
+
+    def __init__(
+        self,
+        size: Size | None = None,
+        here: Cell | None = None,
+        variables: Mapping[str, int] | None = None,
+    ) -> None:
+        self.size, self.here = size, here
+        self.variables = dict(variables or {})
+
+    def value(self, term: Term) -> int | None:
+        """The value of a term; None if it is not known here."""
+        match term:
+            case Const(value=value):
+                return value
+            case terms.Variable(name=name):
+                return self.variables.get(name)
+            case terms.Here(name="x" | "y" as name) if self.here is not None:
+                return self.here["xy".index(name)]
+            case terms.World(name="width" | "height" as name) if self.size is not None:
+                return self.size[("width", "height").index(name)]
+            case terms.Operation(op=op, args=args) if op != "turn":
+                known = [value for value in map(self.value, args) if value is not None]
+                if len(known) < len(args):
+                    return None
+                # As in a room: dividing by nothing gives 0.
+                return 0 if op in ("//", "%") and known[1] == 0 else compute(op, *known)
+            case terms.Compare(op=op, left=left, right=right):
+                a, b = self.value(left), self.value(right)
+                return None if a is None or b is None else int(_COMPARISONS[op](a, b))
+            case terms.Not(arg=arg):
+                truth = self.value(arg)
+                return None if truth is None else int(not truth)
+            case terms.Logic(op=op, args=args):
+                return _joined(op == "and", map(self.value, args))
+        return None
 
 
 # -- rooms of each size: what can be proven ------------------------------------------------------------------
@@ -541,7 +567,7 @@ def _tried(checked: CheckedScenario) -> _Found:
     sizes = _sizes(checked)
     generator.shuffle(sizes)
     rooms = _ROOMS // len(sizes) * len(sizes) or _ROOMS  # each size equally often
-    known: _Known = cache(lambda region, size, overlap: frozenset(_cells(checked, region, size, overlap)))
+    known: _CellsOf = cache(lambda region, size, overlap: frozenset(_cells(checked, region, size, overlap)))
     for number in range(rooms):
         room = _DrawnRoom(sizes[number % len(sizes)], generator, known)
         for item in checked.setup:
@@ -554,7 +580,7 @@ def _tried(checked: CheckedScenario) -> _Found:
     return found
 
 
-_Known = Callable[[Region, Size, bool], frozenset[Cell]]
+_CellsOf = Callable[[Region, Size, bool], frozenset[Cell]]
 
 
 def _cells(checked: CheckedScenario, region: Region, size: Size, overlap: bool) -> Iterator[Cell]:
@@ -568,24 +594,23 @@ def _cells(checked: CheckedScenario, region: Region, size: Size, overlap: bool) 
     yield from inside if overlap and region.name in EXACT else (cell for cell in inside if cell not in built)
 
 
-class _DrawnRoom:
-    """A room while it is drawn; None stands for what is not known here."""
+class _DrawnRoom(Known):
+    """A room while it is drawn."""
 
-    def __init__(self, size: Size, generator: Random, cells: _Known) -> None:
+    def __init__(self, size: Size, generator: Random, cells: _CellsOf) -> None:
+        super().__init__(size, (0, 0))
         self._size, self._generator, self._cells = size, generator, cells
         self._places: dict[int, Cell | None] = {}
         self._registers: dict[str, int | None] = {}
         self._taken: set[Cell] = set()
-        self._here: Cell = (0, 0)
-        self._variables: dict[str, int] = {}
         self.absent: set[int] = set()
         self.effort = 0
 
     def do(self, item: plans.Setup) -> None:
         """Draw one thing."""
         if isinstance(item, plans.Drawn):
-            self._registers[item.path] = self._value(item.value.term)
-        elif isinstance(item, Placing) and (item.when is None or self._value(item.when)):
+            self._registers[item.path] = self.value(item.value.term)
+        elif isinstance(item, Placing) and (item.when is None or self.value(item.when)):
             self._place(item)
 
     def _place(self, placing: Placing) -> None:
@@ -594,7 +619,7 @@ class _DrawnRoom:
             self._places[entity] = None
             return
         if placing.at is not None:
-            x, y = (self._value(part) for part in placing.at)
+            x, y = (self.value(part) for part in placing.at)
             if x is not None and y is not None:
                 self._put(entity, (x, y))
             return
@@ -608,9 +633,9 @@ class _DrawnRoom:
         while free:
             number = self._generator.randrange(len(free))
             free[number], free[-1] = free[-1], free[number]
-            self._here = free.pop()
-            if placing.where is None or self._value(placing.where) != 0:
-                self._put(entity, self._here)
+            self.here = free.pop()
+            if placing.where is None or self.value(placing.where) != 0:
+                self._put(entity, self.here)
                 return
         self._places[entity] = None
         self.absent.add(entity)
@@ -622,13 +647,13 @@ class _DrawnRoom:
     def _region(self, region: Region, overlap: bool) -> Set[Cell] | None:
         """The cells of a region; None if they are not known."""
         if region.name in ("next_to", "in_front_of"):
-            target = self._value(region.args[0])
+            target = self.value(region.args[0])
             cell = None if target is None else self._places.get(target)
             if cell is None or region.name == "in_front_of":
                 return None
             floor = self._cells(Region("anywhere"), self._size, False)
             return {near for dx, dy in _AROUND if (near := (cell[0] + dx, cell[1] + dy)) in floor}
-        args = [self._value(arg) for arg in region.args]
+        args = [self.value(arg) for arg in region.args]
         if None in args:
             return None
         known = tuple(Const(arg.type, value or 0) for arg, value in zip(region.args, args, strict=True))
@@ -636,18 +661,10 @@ class _DrawnRoom:
 
     # -- values --
 
-    def _value(self, term: Term) -> int | None:
+    def value(self, term: Term) -> int | None:
         """The value of a term; None if it is not known here."""
         self.effort += 1
         match term:
-            case Const(value=value):
-                return value
-            case terms.Here(name="x" | "y" as name):
-                return self._here["xy".index(name)]
-            case terms.World(name="width" | "height" as name):
-                return self._size[("width", "height").index(name)]
-            case terms.Variable(name=name):
-                return self._variables.get(name)
             case terms.Read(path=path):
                 return self._registers.get(path)
             case terms.FieldOf(entity=entity, name="x" | "y" as name):
@@ -655,30 +672,16 @@ class _DrawnRoom:
                 return None if cell is None else cell["xy".index(name)]
             case terms.Measure(name="distance", args=(one, other)):
                 return self._distance(self._cell(one), self._cell(other))
-            case terms.Operation(op=op, args=args):
-                values = [self._value(arg) for arg in args]
-                if op == "turn" or None in values:
-                    return None
-                known = [value for value in values if value is not None]
-                return 0 if op in ("//", "%") and known[1] == 0 else compute(op, *known)
-            case terms.Compare(op=op, left=left, right=right):
-                a, b = self._value(left), self._value(right)
-                return None if a is None or b is None else COMPARISONS[op](a, b)
-            case terms.Not(arg=arg):
-                truth = self._value(arg)
-                return None if truth is None else int(not truth)
-            case terms.Logic(op=op, args=args):
-                return _joined(op == "and", map(self._value, args))
             case terms.Test(name=name, subject=subject, object=target):
-                return self._related(name, self._here if subject is None else self._cell(subject), target)
+                return self._related(name, self.here if subject is None else self._cell(subject), target)
             case terms.Quantified(cells=False):
                 return self._quantified(term)
-        return None
+        return super().value(term)
 
     def _cell(self, entity: Term) -> Cell | None:
         if isinstance(entity, terms.Here):
-            return self._here
-        number = self._value(entity)
+            return self.here
+        number = self.value(entity)
         return None if number is None else self._places.get(number)
 
     @staticmethod
@@ -719,13 +722,13 @@ class _DrawnRoom:
     def _holds_for(self, term: terms.Quantified, value: int) -> int | None:
         if term.condition is None:
             return 1
-        outer = self._variables.get(term.variable)
-        self._variables[term.variable] = value
-        truth = self._value(term.condition)
+        outer = self.variables.get(term.variable)
+        self.variables[term.variable] = value
+        truth = self.value(term.condition)
         if outer is None:
-            del self._variables[term.variable]
+            del self.variables[term.variable]
         else:
-            self._variables[term.variable] = outer
+            self.variables[term.variable] = outer
         return truth
 
 

@@ -154,7 +154,7 @@ def _entries(frame: Frame) -> Iterator[Effects]:
     """Every rule and step of a frame."""
     yield from (step for _, step in frame.entries())
     for state in (frame.states or {}).values():
-        yield from (*state.first, *state.then)
+        yield from state.rules
 
 
 def _effects(scenario: Scenario) -> Iterator[object]:

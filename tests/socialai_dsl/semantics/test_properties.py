@@ -24,12 +24,14 @@ def test_draws_that_can_be_guessed_are_free_choices(meaning):
             "other": "pick(d in doors where d != exit)",
             "number": "pick(1..3)",
             "odd": "pick(n in 1..4 where n != 2 and (n < 4 or n == 9))",
+            "even": "pick(n in 1..4 where n % 2 == 0)",
             "sum": "number + 1",
         },
         check=[{"needs": "guide"}, {"needs": ["guide"], "draw": "number"}],
     )
     every, one = checked.properties
-    assert every.draws == (EXIT, ("let.number", (1, 2, 3)), ("let.odd", (1, 3)))
+    numbers = (("let.number", (1, 2, 3)), ("let.odd", (1, 3)), ("let.even", (2, 4)))
+    assert every.draws == (EXIT, *numbers)
     assert one.draws == (("let.number", (1, 2, 3)),)
 
 
