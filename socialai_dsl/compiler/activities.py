@@ -9,7 +9,7 @@ from socialai_dsl.compiler.expressions import Expressions, Lines
 from socialai_dsl.compiler.hands import is_member
 from socialai_dsl.program import MOST_CHOICES, Body, Field, Op
 from socialai_dsl.semantics.plans import Activity, CheckedScenario
-from socialai_dsl.semantics.terms import BOOL, CellOf, Const, FieldOf, Measure, ObjectType, Read, Term
+from socialai_dsl.semantics.terms import BOOL, CellOf, Const, FieldOf, Measure, ObjectType, Read, Sited, Term
 
 _BODIES = {
     "left": Body.LEFT,
@@ -19,7 +19,7 @@ _BODIES = {
     "pickup": Body.PICKUP,
     "drop": Body.DROP,
 }
-GOING = ("go_to", "go_next_to", "enter")
+GOING = ("go_to", "go_next_to", "enter", "search")
 """Activities that take no step when they are fulfilled before they begin."""
 
 
@@ -43,7 +43,9 @@ def has_aim(activity: Activity) -> bool:
     """Whether what an activity is about is computed anew in each turn, so that its end must know what it was."""
     if activity.name in ACTS:
         return True
-    return activity.name in (*GOING, "turn_to") and not isinstance(activity.args[0], Const)
+    return activity.name in ("go_to", "go_next_to", "enter", "turn_to") and not isinstance(
+        activity.args[0], Const
+    )
 
 
 class Activities:
@@ -137,6 +139,8 @@ class Activities:
                 self._use(to.value(activity.args[0]), noting=True)
             case "fetch" | "give" | "bring":
                 self._use_hands(activity, lambda choose: choose())
+            case "search":
+                self._search(activity)
             case "enter":
                 self._enter(activity)
             case "push":
@@ -293,6 +297,21 @@ class Activities:
                 carrier = entity_register(entity.number, Field.CARRIER)
                 self.to.block.test(Op.IF_NE, carrier, constant(1 + self.entity), otherwise)
 
+    def _search(self, activity: Activity) -> None:
+        """Stay once it sees what it looks for."""
+        block = self.to.block
+        unseen, done = Label(), Label()
+        self._unless_seen(activity, unseen)
+        block.emit(Op.BODY, constant(Body.NONE))
+        block.skip(done)
+        block.bind(unseen)
+        block.emit(Op.EXPLORE, constant(self.entity), self.clock)
+        block.bind(done)
+
+    def _unless_seen(self, activity: Activity, otherwise: Label) -> None:
+        """Fall through if it sees what it searches for; what is not found is not seen."""
+        self.to.sited_condition(Sited(activity.args[0], activity.site, activity.span), otherwise)
+
     def _enter(self, activity: Activity) -> None:
         """Use it while it cannot be walked on, then go there; who is there stays there."""
         block = self.to.block
@@ -436,6 +455,8 @@ class Activities:
             elif activity.name in OF_HANDS:
                 self._while_empty_handed(otherwise)
             block.bind(ended)
+        elif activity.name == "search":
+            self._unless_seen(activity, otherwise)
         elif activity.name == "turn_to":
             facing = entity_register(self.entity, Field.DIR)
             block.test(Op.IF_EQ, facing, self._goal(activity, nothing), otherwise)

@@ -3,16 +3,25 @@
 import numpy as np
 
 from socialai_dsl.engine import small_paths
-from socialai_dsl.engine.boards import is_deadly, npcs_are_hidden, solid_line
-from socialai_dsl.engine.entities import field, is_present, preferred, quadrant
+from socialai_dsl.engine.boards import is_deadly, is_solid, npcs_are_hidden, room_table, solid_line
+from socialai_dsl.engine.entities import field, is_at, is_present, npc_at, preferred, quadrant, step_x, step_y
 from socialai_dsl.engine.jit import inline, outline, stay_outline
 from socialai_dsl.engine.operands import draw_below
 from socialai_dsl.engine.sets import add_cell, clear, drop_cell, fill_next_to, get_line, has_cell, set_line
-from socialai_dsl.engine.state import AGENT, FREE, FRONT, NO_CELL, NO_PATH, ONE, SEEN, STILL, Row
+from socialai_dsl.engine.state import AGENT, FREE, FRONT, NO_CELL, NO_PATH, ONE, SEEN, STILL, ZERO, Row
 from socialai_dsl.engine.whereabouts import distance, is_somewhere, x_of, y_of
 from socialai_dsl.program import Body, Field, Header
 
 _SIDES = np.int64(2)
+
+_ROUND = 16
+"""Turns of a search after which the mover looks around again, and prefers the other side."""
+
+_LOOKS = 3
+"""Quarter turns with which it has looked in all directions."""
+
+_KEPT = np.int64(2)
+"""Free cells that it leaves before it turns, in the first round: from there it sees as far as the wall."""
 
 
 @outline
@@ -98,6 +107,45 @@ def _grow(row: Row) -> bool:
         above = here
         any_grown |= grown
     return any_grown != 0
+
+
+@outline
+def explore(row: Row, mover: int, turn: int) -> int:
+    """The body action in a turn of a search, the first of which is 0.
+
+    It depends on cells that the mover has in view alone: on those straight ahead and beside it.
+    """
+    stay_outline()
+    if not is_present(row, mover):
+        return STILL
+    if turn % _ROUND < _LOOKS:
+        return np.int64(Body.LEFT)
+    facing = field(row, mover, Field.DIR)
+    kept = _KEPT if turn < _ROUND else ZERO
+    if _walks(row, mover, facing, kept + 1):
+        return np.int64(Body.FORWARD)
+    left = _walks(row, mover, facing - 1 & 3, ONE)
+    right = _walks(row, mover, facing + 1 & 3, ONE)
+    if left == right:
+        left = turn // _ROUND % 2 == 0
+    return np.int64(Body.LEFT) if left else np.int64(Body.RIGHT)
+
+
+@inline
+def _walks(row: Row, mover: int, direction: int, cells: int) -> bool:
+    """Whether so many cells in a direction are floor that a mover could walk on now."""
+    height = row.program[Header.CANVAS_HEIGHT]
+    floor = room_table(row) + row.program[Header.CANVAS_WIDTH] * height + 1 + height
+    for k in range(1, cells + 1):
+        x = field(row, mover, Field.X) + k * step_x(direction)
+        y = field(row, mover, Field.Y) + k * step_y(direction)
+        if is_solid(row, x, y) or (row.program[floor + y] >> x) & 1 == 0 or is_deadly(row, x, y):
+            return False
+        if (mover > 0 or not npcs_are_hidden(row)) and npc_at(row, x, y) > 0:
+            return False
+        if mover > 0 and is_at(row, AGENT, x, y):
+            return False
+    return True
 
 
 @outline

@@ -196,6 +196,8 @@ def _choose(row: Row, op: int, a: int, b: int, c: int) -> int:
         return np.int64(Body.POINT)
     if op == Op.TURN_TO:
         return paths.turn_towards(row, mover, target, c)
+    if op == Op.EXPLORE:
+        return paths.explore(row, mover, target)
     way = paths.find_way(row, mover, target, op == Op.GO_NEXT_TO)
     if way == NO_PATH:
         return STILL

@@ -332,6 +332,7 @@ class Op(IntEnum):
     POINT = 260
     CHOOSE = 261
     FACE = 262
+    EXPLORE = 263
 
     B_FLOOR = 320
     B_WALL = 321
@@ -674,18 +675,10 @@ _ALL: Final = (
         _SITE,
     ),
     _plain(
-        Op.GO_TO,
-        "a takes one step of a shortest path to the cell of b; site c for turning round.",
-        _ENTITY,
-        _PLACE,
-        _SITE,
+        Op.GO_TO, "a steps along a shortest path to the cell of b, turning at site c.", _ENTITY, _PLACE, _SITE
     ),
     _plain(
-        Op.GO_NEXT_TO,
-        "a takes one step of a shortest path to a free cell next to b; site c for turning round.",
-        _ENTITY,
-        _PLACE,
-        _SITE,
+        Op.GO_NEXT_TO, "a steps along a shortest path next to b, turning at site c.", _ENTITY, _PLACE, _SITE
     ),
     _plain(Op.POINT, "a points in direction v(b).", _ENTITY, _DIRECTION),
     _plain(
@@ -701,6 +694,14 @@ _ALL: Final = (
         _ENTITY,
         _PLACE,
         _SITE,
+    ),
+    _plain(
+        Op.EXPLORE,
+        "Turn v(b) of a search by a, in rounds of sixteen: three quarter turns left, then forward while three cells "
+        "ahead are free floor, in later rounds one; else left in the first round, right in the second, and so on, "
+        "unless only the other side is free.",
+        _ENTITY,
+        _VALUE,
     ),
     _plain(Op.B_FLOOR, "Board a = the cells of plain floor.", _FILLED),
     _plain(

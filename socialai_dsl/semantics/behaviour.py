@@ -100,6 +100,9 @@ def activity(resolver: Resolver, path: DataPath, raw: str | None, scope: Scope) 
         terms = tuple(_argument(resolver, name, arg, ENTITY, scope) for arg in args)
         hands.check_arguments(resolver, name, terms, args, scope)
         return Activity(name, terms, site, span)
+    if name == "search":
+        assert isinstance(node, ast.Call), "internal: it has an argument"
+        return Activity(name, (resolver.value(replace(node, name="sees"), BOOL, scope),), site, span)
     if name in ("push", "point", "follow"):
         return _at_something(resolver, name, args, Activity("stay", (), site, span), scope)
     terms = tuple(

@@ -178,6 +178,7 @@ SIGNATURES: Final[tuple[Signature, ...]] = (
     _activity("fetch", ("entity",), "go next to x, face it, pick it up"),
     _activity("give", ("entity", "entity"), "go next to y and hand over x, if it carries x"),
     _activity("bring", ("entity", "entity"), "fetch x, then give it to y, or lay it down on the cell of y"),
+    _activity("search", ("entities",), "look around, then walk about, until it sees x"),
     _activity("enter", ("entity",), "open x if it is closed, then go in"),
     _activity("push", ("entity", "direction"), "go behind x and push it that way"),
     _activity("point", ("entity",), "point the way x lies", moves="stays"),
@@ -214,7 +215,8 @@ SYNONYMS: Final = {
     "gaze": "face", "wait": "stay", "nothing": "stay", "none": "stay", "idle": "stay", "random": "wander",
     "take": "fetch", "grab": "fetch", "get": "fetch", "pick_up": "pickup", "carry": "bring", "deliver": "bring",
     "hand": "give", "hand_over": "give", "put_down": "drop", "lay_down": "drop", "go_through": "enter",
-    "rotate": "turn", "exit": "enter", "dance": "perform", "repeat": "perform",
+    "rotate": "turn", "look_for": "search", "find": "search", "explore": "search", "seek": "search",
+    "look_around": "search", "exit": "enter", "dance": "perform", "repeat": "perform",
 }  # fmt: skip
 """What authors write for an activity -> what it is called here."""
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from socialai_dsl.grammar import ast
 from tests.reference import chance, geometry, motion
-from tests.reference.evaluate import Context, drawn, of, something, weighed
+from tests.reference.evaluate import Context, NothingFoundError, drawn, of, something, weighed
 from tests.reference.source import Value
 from tests.reference.world import (
     TYPES,
@@ -107,6 +109,7 @@ class Activity:
     way: Any = None  # of a push; how near to stay
     acting: bool = False  # this turn is that of the toggle, the push, the pickup or the drop itself
     done_before: bool = False  # of hands: what they were for was so before this turn
+    sees: Callable[[], bool] = bool  # of a search: whether it sees what it looks for now
 
     def primitive(self, world: World, me: Entity) -> str:
         """The body action it asks for now."""
@@ -156,6 +159,8 @@ class Activity:
             return "none"
         if self.verb == "perform":
             return self.element(me)[0]
+        if self.verb == "search":
+            return "none" if self.sees() else look_around(world, me)
         if all(where(goal) is None for goal in as_list(self.goal)):
             return "none"
         if self.verb == "stay_near" and geometry.distance(world, me, self.goal) <= self.way:
@@ -188,6 +193,8 @@ class Activity:
         """Whether what it goes for is reached already."""
         if self.verb in ("go_to", "enter"):
             return geometry.at(world, me, self.goal)
+        if self.verb == "search":
+            return self.sees()
         return self.verb == "go_next_to" and geometry.next_to(world, me, self.goal)
 
     def finished(self, world: World, me: Entity) -> bool:
@@ -198,7 +205,7 @@ class Activity:
             return self.done_before or (self.acting and me.action == act and full == (act == "pickup"))
         if self.verb in ("use", "push"):
             return self.acting and me.action == ("toggle" if self.verb == "use" else "forward")
-        if self.verb in ("go_to", "enter", "go_next_to"):
+        if self.verb in ("go_to", "enter", "go_next_to", "search"):
             return self.fulfilled(world, me)
         if self.verb == "perform":
             return me.clock >= len(self.goal.elements)
@@ -217,7 +224,41 @@ def plan(value: Value, context: Context) -> Activity:
             return Activity(("forward", "left", "right")[drawn(context, node, 3)])
         return Activity(node.id)
     assert isinstance(node, ast.Call), "internal: no activity"
+    if node.name == "search":
+        return Activity("search", sees=partial(sees, replace(node, name="sees"), context))
     return Activity(node.name, *(something(of(argument, context)) for argument in node.args))
+
+
+def sees(condition: ast.Call, context: Context) -> bool:
+    """Whether what is searched for is in view; what is not found is not."""
+    try:
+        return bool(something(of(condition, context)))
+    except NothingFoundError:
+        return False
+
+
+def look_around(world: World, me: Entity) -> str:
+    """Three turns left, then thirteen of walking: at first up to three cells before an obstacle, then up to it. Where
+    it goes no further it turns left, every other time right, or to the side that is free if only one of them is."""
+    assert me.cell is not None
+    often, number = divmod(me.clock, 16)
+    if number < 3:
+        return "left"
+
+    def free(quarter: int, cells: int) -> bool:
+        cell, way = me.cell, turned(me.facing, quarter)
+        for _ in range(cells):
+            cell = step_from(cell, way)  # type: ignore[arg-type]
+            if world.terrain.get(cell) is not None or not geometry.free(world, cell, me):
+                return False
+        return True
+
+    if free(0, 1 if often else 3):
+        return "forward"
+    left, right = free(-1, 1), free(1, 1)
+    if left != right:
+        return "left" if left else "right"
+    return "right" if often % 2 else "left"
 
 
 def turn_towards(world: World, me: Entity, wanted: str) -> str:

@@ -217,6 +217,7 @@ class Behaviour:
             lambda: f"face({phrases.spot(where)})",
             lambda: f"go_to({phrases.reachable(where)})",
             lambda: f"go_next_to({phrases.reachable(where)})",
+            lambda: f"search({phrases.sought(where)})",
             lambda: (
                 f"{rng.choice(('follow', 'flee', *(['point'] if points else [])))}({phrases.entity(where)})"
             ),

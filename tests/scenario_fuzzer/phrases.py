@@ -362,6 +362,11 @@ class Phrases:
         made = (self.relation, self.relation, self.status, self.comparison)
         return self.chosen(lambda: self.rng.choice(made)(where), where)
 
+    def sought(self, where: Where) -> str:
+        """What can be seen: one thing, a group, or a cell."""
+        groups = [*(thing.name for thing in self.declared.several), *self.declared.groups]
+        return self.one_of(*groups, *[lambda: self.spot(where)] * 2)
+
     def relation(self, where: Where) -> str:
         """A condition between two things, or of somebody and a place."""
         verbs = ("at", "next_to", "in_line", "unobstructed", "in_front_of", "faces", "can_reach", *SEARCHING)
